@@ -1,0 +1,26 @@
+"""Reciprocating compressor with joint clearance: cases, simulation, studies.
+
+The public calls: `load_cases(path, ...)` reads case files, `simulate(case)` runs one case,
+`open_study(folder)` opens what a sweep stored. They are imported when first used, since the
+command line must answer `--help` at once.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from compressor.case import Case
+    from compressor.plan import load_cases
+    from compressor.simulate import simulate
+    from compressor.store import open_study
+
+__version__ = "0.1.0"
+__all__ = ["Case", "load_cases", "open_study", "simulate"]
+
+HOMES = {"Case": "case", "load_cases": "plan", "simulate": "simulate", "open_study": "store"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in HOMES:
+        raise AttributeError(f"module 'compressor' has no attribute {name!r}")
+    return getattr(import_module(f"compressor.{HOMES[name]}"), name)

@@ -1,0 +1,108 @@
+"""Contact at a clearance joint: ADAMS's IMPACT, STEP and friction (Eq. 14-16, DESIGN 2.3)."""
+
+import math
+from typing import NamedTuple
+
+from compressor.physics._jit import jit
+
+# Table 2 of the paper: density (kg/m^3), Young's modulus (Pa), Poisson's ratio
+MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326)}
+
+
+@jit
+def step(x, x0, h0, x1, h1):
+    """ADAMS's STEP: the cubic from h0 at x0 to h1 at x1, constant outside (x0 < x1)."""
+    if x <= x0:
+        return h0
+    if x >= x1:
+        return h1
+    s = (x - x0) / (x1 - x0)
+    return h0 + (h1 - h0) * s * s * (3.0 - 2.0 * s)
+
+
+@jit
+def friction_coefficient(slip, p):
+    """Signed friction coefficient mu(v_t), odd in the slip (m/s): ADAMS's smoothed Coulomb law.
+
+    Rises from 0 to `static` over the stiction velocity, falls to `dynamic` at the friction one.
+    """
+    size = step(abs(slip), p.stiction_velocity, p.static, p.friction_velocity, p.dynamic)
+    return step(slip, -p.stiction_velocity, -1.0, p.stiction_velocity, 1.0) * size
+
+
+@jit
+def power(base, exponent):
+    """base ** exponent for base >= 0; a square root does for Hertz's 1.5."""
+    if exponent == 1.5:
+        return base * math.sqrt(base)
+    return base**exponent
+
+
+@jit
+def unclamped_force(penetration, rate, stiffness, p):
+    """K delta^p + STEP(delta; 0, 0; d_max, C_max) delta' (N) for delta > 0, before the clamp."""
+    damping = step(penetration, 0.0, 0.0, p.full_damping, p.damping)
+    return stiffness * power(penetration, p.exponent) + damping * rate
+
+
+@jit
+def normal_force(penetration, rate, stiffness, p):
+    """Normal force (N) of the IMPACT law, never pulling; 0 unless penetration (m) > 0."""
+    if penetration <= 0.0:
+        return 0.0
+    return max(0.0, unclamped_force(penetration, rate, stiffness, p))
+
+
+class Contact(NamedTuple):
+    """One joint's contact: SI, forces on the rod."""
+
+    fx: float
+    fy: float
+    moment: float  # on the rod about the bore's centre
+    normal: float  # F_N
+    friction: float  # F_t
+    penetration: float  # delta; negative: a gap
+    rate: float  # of the penetration
+    slip: float  # v_t
+
+
+@jit
+def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
+    """Contact between a joint's journal and the rod's bore.
+
+    Takes the eccentricity (journal centre minus bore centre, m), its rate (m/s) and both spins
+    (rad/s, counter-clockwise). Returns a `Contact`; one contact point serves both bodies, so that
+    angular momentum balances (DESIGN 2.3). Concentric circles exert no force.
+    """
+    clearance = p.clearance[joint]
+    distance = math.sqrt(ex * ex + ey * ey)
+    penetration = distance - clearance
+    if distance == 0.0:
+        return Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0)
+    nx = ex / distance
+    ny = ey / distance
+    rate = ex_rate * nx + ey_rate * ny
+    bore = p.pin_radius + clearance
+    arm = p.pin_radius - penetration
+    slip = ey_rate * nx - ex_rate * ny + journal_spin * arm - rod_spin * bore
+    normal = normal_force(penetration, rate, p.stiffness[joint], p)
+    friction = 0.0
+    if p.friction and normal > 0.0:
+        friction = -friction_coefficient(slip, p) * normal
+    fx = normal * nx + friction * ny
+    fy = normal * ny - friction * nx
+    return Contact(fx, fy, -bore * friction, normal, friction, penetration, rate, slip)
+
+
+def contact_stiffness(first, second, journal_radius, bearing_radius):
+    """Eq. 15's stiffness K (N/m^1.5) of two materials by name and two radii (m).
+
+    Raises KeyError for a material that is not in Table 2. Steel on steel with radii 10 and 9.9 mm
+    gives Table 3's 3.36e5 N/mm^1.5.
+    """
+    compliance = 0.0
+    for name in (first, second):
+        _, modulus, poisson = MATERIALS[name]
+        compliance += (1.0 - poisson**2) / (math.pi * modulus)
+    radius = journal_radius * bearing_radius / (journal_radius + bearing_radius)
+    return 4.0 / (3.0 * math.pi * compliance) * math.sqrt(radius)

@@ -1,0 +1,124 @@
+"""Piston force: the ideal gas cycle (typical) and the spring on a cam (design), DESIGN 2.4.
+
+The force is positive towards the crank. A load has four phases a revolution (expansion, suction,
+compression, discharge); the caller names the phase, so that both sides of a corner are exact.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import jit
+from compressor.physics.kinematics import angle_at
+from compressor.physics.parameters import Load
+
+TYPICAL = int(Load.TYPICAL)
+DESIGN = int(Load.DESIGN)
+EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
+
+
+@jit
+def typical_force(phase, x, p):
+    """Gas force (N) with the crosshead at x (m): Eq. 6, isentropic, less the back pressure."""
+    if phase == 1:
+        return p.suction_force - p.back_force
+    if phase == 3:
+        return p.discharge_force - p.back_force
+    space = p.rod_length + p.crank_radius + p.head_clearance - x
+    if phase == 0:
+        full = p.head_clearance
+        force = p.discharge_force
+    else:
+        full = p.head_clearance + 2.0 * p.crank_radius
+        force = p.suction_force
+    return force * (full / space) ** p.gas_exponent - p.back_force
+
+
+@jit
+def design_force(phase, x, v, deviation, deviation_rate, p):
+    """Spring force (N) between piston and cam follower: Eq. 8-10, closed as in DESIGN 2.4.
+
+    x (m), v (m/s) of the crosshead and their deviations from the ideal motion. While the follower
+    moves with the ideal piston the spring sees the deviation alone.
+    """
+    if phase == 1:
+        shortening = deviation
+        rate = deviation_rate
+    elif phase == 3:
+        shortening = p.spring_stroke + deviation
+        rate = deviation_rate
+    elif phase == 0:
+        shortening = x - (p.rod_length + p.crank_radius - p.spring_stroke)
+        rate = v
+    else:
+        shortening = x - (p.rod_length - p.crank_radius)
+        rate = v
+    return p.preload + p.spring_stiffness * shortening + p.spring_damping * rate
+
+
+@jit
+def piston_force(phase, x, v, deviation, deviation_rate, p):
+    """Piston force (N), positive towards the crank, of the record's load."""
+    if p.load == DESIGN:
+        return design_force(phase, x, v, deviation, deviation_rate, p)
+    if p.load == TYPICAL:
+        return typical_force(phase, x, p)
+    return 0.0
+
+
+def printed_corners():
+    """Eq. 13's corners (rad): 38.95, 180 and 294.2 degrees."""
+    return math.radians(38.95), math.pi, math.radians(294.2)
+
+
+def gas_corners(crank_radius, rod_length, head_clearance, pressure_ratio, exponent):
+    """Exact corners of the ideal gas cycle (rad): ends of expansion, suction and compression.
+
+    Lengths in m, `pressure_ratio` = p_d / p_s. Raises ValueError when the gas left in the head
+    clearance never expands to the suction pressure within the stroke.
+    """
+    head = rod_length + crank_radius + head_clearance
+    growth = pressure_ratio ** (1.0 / exponent)
+    expansion = angle_at(head - head_clearance * growth, crank_radius, rod_length)
+    packed = (2.0 * crank_radius + head_clearance) / growth
+    compression = angle_at(head - packed, crank_radius, rod_length)
+    return expansion, math.pi, 2.0 * math.pi - compression
+
+
+def cam_corners(crank_radius, rod_length, stroke):
+    """Corners of the closed cam (rad): the follower dwells for `stroke` (m) of travel each way.
+
+    84.2608, 180 and 275.7392 degrees in the paper. Raises ValueError unless 0 < stroke < 2R.
+    """
+    if not 0.0 < stroke < 2.0 * crank_radius:
+        raise ValueError(f"the stroke, {stroke} m, must lie within (0, {2 * crank_radius}) m")
+    rise = angle_at(rod_length + crank_radius - stroke, crank_radius, rod_length)
+    fall = angle_at(rod_length - crank_radius + stroke, crank_radius, rod_length)
+    return rise, math.pi, 2.0 * math.pi - fall
+
+
+def segments(p, duration):
+    """Cut [0, duration] (s) at every corner of the record's load.
+
+    Returns edges, shape (n + 1,) in s, and phases, shape (n,). A corner closer than a
+    billionth of a turn to the end opens no segment of its own.
+    """
+    if p.load == Load.NONE:
+        return np.array([0.0, duration]), np.zeros(1, dtype=np.int64)
+    turn = 2.0 * math.pi / p.omega
+    revolutions = np.arange(math.ceil(duration / turn * (1 + 1e-9)))
+    starts = np.concatenate(([0.0], np.asarray(p.corners) / p.omega))
+    edges = (revolutions[:, None] * turn + starts).ravel()
+    edges = edges[edges < duration - 1e-9 * turn]
+    phases = np.arange(edges.size, dtype=np.int64) % 4
+    return np.append(edges, duration), phases
+
+
+def sample_segments(times, edges):
+    """Segment of each sample, shape of times: on a corner the one that begins, at the end the last.
+
+    A sample within a billionth of a segment of an edge counts as on it.
+    """
+    slack = 1e-9 * (edges[1:] - edges[:-1]).min()
+    found = np.searchsorted(edges[:-1], times + slack, side="right") - 1
+    return np.clip(found, 0, edges.size - 2)

@@ -1,0 +1,219 @@
+"""Equations of motion of the four scenes, in deviations from the ideal motion (DESIGN 2.2-2.3).
+
+State y: the deviations, then their rates. Big end and small end: (x, phi); both joints: (x, X, Y,
+phi) with (X, Y) the rod's centre. Eccentricities come from difference identities, never from
+subtracting two cosines, so that a clearance of a nanometre keeps its digits.
+
+`derivative` is what integrators call; `observe` recomputes outputs by the same functions.
+"""
+
+import math
+from typing import NamedTuple
+
+from compressor.physics._jit import jit
+from compressor.physics.contact import joint_contact
+from compressor.physics.kinematics import ideal
+from compressor.physics.loads import piston_force
+from compressor.physics.parameters import BIG_END as AT_BIG_END
+from compressor.physics.parameters import SMALL_END as AT_SMALL_END
+from compressor.physics.parameters import Scene
+
+BIG_END = int(Scene.BIG_END)
+SMALL_END = int(Scene.SMALL_END)
+BOTH = int(Scene.BOTH)
+
+
+class Turn(NamedTuple):
+    """cos and sin of the rod's angle less those of its ideal angle, and their rates (1/s)."""
+
+    dc: float
+    ds: float
+    dc_rate: float
+    ds_rate: float
+
+
+@jit
+def turned(motion, eta, eta_rate):
+    """`Turn` of the rod from the ideal angle phi by the deviation eta, without cancellation."""
+    half = 0.5 * eta
+    sin_half = math.sin(half)
+    cos_half = math.cos(half)
+    dc = -2.0 * sin_half * (motion.sin_phi * cos_half + motion.cos_phi * sin_half)
+    ds = 2.0 * sin_half * (motion.cos_phi * cos_half - motion.sin_phi * sin_half)
+    dc_rate = -ds * motion.rate - (motion.sin_phi + ds) * eta_rate
+    ds_rate = dc * motion.rate + (motion.cos_phi + dc) * eta_rate
+    return Turn(dc, ds, dc_rate, ds_rate)
+
+
+@jit
+def eccentricity_big_end(y, turn, p):
+    """Journal centre less bore centre at the big end and its rate, small end ideal (m, m/s)."""
+    dc, ds, dc_rate, ds_rate = turn
+    length = p.rod_length
+    return -y[0] + length * dc, -length * ds, -y[2] + length * dc_rate, -length * ds_rate
+
+
+@jit
+def eccentricity_small_end(y, turn, p):
+    """Journal centre less bore centre at the small end and its rate, big end ideal (m, m/s)."""
+    dc, ds, dc_rate, ds_rate = turn
+    length = p.rod_length
+    return y[0] - length * dc, length * ds, y[2] - length * dc_rate, length * ds_rate
+
+
+@jit
+def eccentricities_both(y, turn, p):
+    """The same at the big end, then the small end, of a rod that is free in the plane."""
+    dc, ds, dc_rate, ds_rate = turn
+    a = p.rod_centre
+    b = p.rod_length - a
+    big = (a * dc - y[1], -a * ds - y[2], a * dc_rate - y[5], -a * ds_rate - y[6])
+    small = (
+        y[0] - y[1] - b * dc,
+        b * ds - y[2],
+        y[4] - y[5] - b * dc_rate,
+        b * ds_rate - y[6],
+    )
+    return big, small
+
+
+@jit
+def load_force(phase, y, motion, p):
+    """Piston force (N) in the state y around the ideal motion."""
+    n = y.size // 2
+    return piston_force(phase, motion.x + y[0], motion.v + y[n], y[0], y[n], p)
+
+
+@jit
+def solve_big_end(y, motion, turn, load, contact, p):
+    """Accelerations (x, phi) of the rod hung on the crosshead and struck at the big end."""
+    sin_phi = motion.sin_phi + turn.ds
+    cos_phi = motion.cos_phi + turn.dc
+    rate = motion.rate + y[3]
+    b = p.rod_length - p.rod_centre
+    coupling = p.rod_mass * b * sin_phi
+    mass = p.reciprocating_mass + p.rod_mass
+    inertia = p.rod_inertia + p.rod_mass * b * b
+    push = contact.fx - load - p.rod_mass * b * cos_phi * rate * rate
+    moment = p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
+    moment -= p.rod_mass * p.gravity * b * cos_phi
+    determinant = mass * inertia - coupling * coupling
+    a = (inertia * push - coupling * moment) / determinant
+    spin_up = (mass * moment - coupling * push) / determinant
+    return a, spin_up
+
+
+@jit
+def solve_small_end(motion, turn, load, contact, p):
+    """Accelerations (x, phi) of the rod hung on the crankpin and struck at the small end."""
+    sin_phi = motion.sin_phi + turn.ds
+    cos_phi = motion.cos_phi + turn.dc
+    a = (-load - contact.fx) / p.reciprocating_mass
+    moment = -p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
+    pin = p.crank_radius * p.omega * p.omega  # the crankpin's centripetal acceleration
+    carried = pin * (sin_phi * motion.cos_theta + cos_phi * motion.sin_theta)
+    moment += p.rod_mass * p.rod_centre * (p.gravity * cos_phi - carried)
+    inertia = p.rod_inertia + p.rod_mass * p.rod_centre * p.rod_centre
+    return a, moment / inertia
+
+
+@jit
+def solve_both(motion, turn, load, big, small, p):
+    """Accelerations (x, X, Y, phi) of a rod between two clearance joints."""
+    sin_phi = motion.sin_phi + turn.ds
+    cos_phi = motion.cos_phi + turn.dc
+    a = (-load - small.fx) / p.reciprocating_mass
+    centre_x = (big.fx + small.fx) / p.rod_mass
+    centre_y = (big.fy + small.fy) / p.rod_mass - p.gravity
+    moment = p.rod_centre * (cos_phi * big.fy + sin_phi * big.fx)
+    moment -= (p.rod_length - p.rod_centre) * (cos_phi * small.fy + sin_phi * small.fx)
+    moment -= big.moment + small.moment
+    return a, centre_x, centre_y, moment / p.rod_inertia
+
+
+@jit
+def contact_big_end(y, motion, turn, p):
+    """`joint_contact` of the big end in scene big_end."""
+    ex, ey, ex_rate, ey_rate = eccentricity_big_end(y, turn, p)
+    return joint_contact(AT_BIG_END, ex, ey, ex_rate, ey_rate, p.omega, -motion.rate - y[3], p)
+
+
+@jit
+def contact_small_end(y, motion, turn, p):
+    """`joint_contact` of the small end in scene small_end."""
+    ex, ey, ex_rate, ey_rate = eccentricity_small_end(y, turn, p)
+    return joint_contact(AT_SMALL_END, ex, ey, ex_rate, ey_rate, 0.0, -motion.rate - y[3], p)
+
+
+@jit
+def contacts_both(y, motion, turn, p):
+    """`joint_contact` of the big end and of the small end in scene both."""
+    big, small = eccentricities_both(y, turn, p)
+    spin = -motion.rate - y[7]
+    at_big = joint_contact(AT_BIG_END, big[0], big[1], big[2], big[3], p.omega, spin, p)
+    at_small = joint_contact(AT_SMALL_END, small[0], small[1], small[2], small[3], 0.0, spin, p)
+    return at_big, at_small
+
+
+@jit
+def ideal_centre_acceleration(motion, p):
+    """Acceleration (m/s^2) of the rod's centre in the ideal motion, x and y."""
+    pin = p.crank_radius * p.omega * p.omega
+    inward = motion.rate * motion.rate
+    ax = p.rod_centre * (motion.cos_phi * inward + motion.sin_phi * motion.spin_up)
+    ay = p.rod_centre * (motion.sin_phi * inward - motion.cos_phi * motion.spin_up)
+    return -pin * motion.cos_theta - ax, ay - pin * motion.sin_theta
+
+
+@jit
+def derivative(t, y, phase, p, out):
+    """Write dy/dt of the record's scene into `out`.
+
+    y and out: length 4 (one clearance joint) or 8 (both); `phase`: the load's phase, 0 to 3.
+    """
+    motion = ideal(t, p)
+    load = load_force(phase, y, motion, p)
+    n = y.size // 2
+    turn = turned(motion, y[n - 1], y[2 * n - 1])
+    for i in range(n):
+        out[i] = y[n + i]
+    if p.scene == BIG_END:
+        contact = contact_big_end(y, motion, turn, p)
+        a, spin_up = solve_big_end(y, motion, turn, load, contact, p)
+    elif p.scene == SMALL_END:
+        contact = contact_small_end(y, motion, turn, p)
+        a, spin_up = solve_small_end(motion, turn, load, contact, p)
+    else:
+        big, small = contacts_both(y, motion, turn, p)
+        a, centre_x, centre_y, spin_up = solve_both(motion, turn, load, big, small, p)
+        ideal_x, ideal_y = ideal_centre_acceleration(motion, p)
+        out[n + 1] = centre_x - ideal_x
+        out[n + 2] = centre_y - ideal_y
+    out[n] = a - motion.a
+    out[2 * n - 1] = spin_up - motion.spin_up
+
+
+@jit
+def start(offset, y, p):
+    """Write the state at top dead centre, ideal rates, journals shifted by `offset`, into y.
+
+    offset: (joint, axis) in m, shape (2, 2), of the journal from its bore's centre; only joints
+    with clearance are read.
+    """
+    for i in range(y.size):
+        y[i] = 0.0
+    if p.scene == BIG_END:
+        eta = math.asin(-offset[0, 1] / p.rod_length)
+        y[0] = -offset[0, 0] + p.rod_length * (math.cos(eta) - 1.0)
+        y[1] = eta
+    elif p.scene == SMALL_END:
+        eta = math.asin(offset[1, 1] / p.rod_length)
+        y[0] = offset[1, 0] + p.rod_length * (math.cos(eta) - 1.0)
+        y[1] = eta
+    elif p.scene == BOTH:
+        eta = math.asin((offset[1, 1] - offset[0, 1]) / p.rod_length)
+        less = math.cos(eta) - 1.0
+        y[0] = p.rod_length * less + offset[1, 0] - offset[0, 0]
+        y[1] = p.rod_centre * less - offset[0, 0]
+        y[2] = -p.rod_centre * math.sin(eta) - offset[0, 1]
+        y[3] = eta

@@ -1,0 +1,390 @@
+"""Outputs recomputed from (t, y): what is stored, drawn, measured and audited.
+
+The right-hand side records nothing. `observe` writes one row of quantities, `tally_step` gathers
+a step's metrics from rows at Gauss-Lobatto nodes of its dense solution. The energy flows (work of
+crank and load, losses to damping and friction) are integrated beside the motion.
+"""
+
+import math
+from enum import IntEnum
+
+import numpy as np
+
+from compressor.physics._jit import jit
+from compressor.physics.contact import Contact, power
+from compressor.physics.kinematics import ideal
+from compressor.physics.motion import (
+    contact_big_end,
+    contact_small_end,
+    contacts_both,
+    derivative,
+    eccentricities_both,
+    eccentricity_big_end,
+    eccentricity_small_end,
+    load_force,
+    solve_big_end,
+    solve_both,
+    solve_small_end,
+    turned,
+)
+from compressor.physics.parameters import Scene
+
+IDEAL = int(Scene.IDEAL)
+BIG_END = int(Scene.BIG_END)
+SMALL_END = int(Scene.SMALL_END)
+BOTH = int(Scene.BOTH)
+
+
+class Column(IntEnum):
+    """Columns of an observed row (SI); pairs are big end, small end; forces act on the rod."""
+
+    DISPLACEMENT = 0
+    VELOCITY = 1
+    ACCELERATION = 2
+    ROD_ANGLE = 3
+    PISTON_FORCE = 4
+    FORCE = 5  # four: (joint, axis)
+    ECCENTRICITY = 9  # four: (joint, axis)
+    PENETRATION = 13  # two
+    NORMAL = 15  # two
+    FORCE_SIZE = 17  # two
+    DEVIATION = 19  # of the acceleration from the ideal motion
+    CRANK_POWER = 20  # put into the mechanism by the crank
+    LOAD_POWER = 21  # put into the mechanism by the piston force
+    DAMPING_POWER = 22  # lost in the contacts' normal direction
+    FRICTION_POWER = 23  # lost to friction
+    KINETIC = 24
+    POTENTIAL = 25  # contacts' springs and gravity
+
+
+COLUMNS = 26
+# numba wants plain integers
+DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, 2
+ROD_ANGLE, PISTON_FORCE = int(Column.ROD_ANGLE), int(Column.PISTON_FORCE)
+FORCE, ECCENTRICITY = int(Column.FORCE), int(Column.ECCENTRICITY)
+PENETRATION, NORMAL = int(Column.PENETRATION), int(Column.NORMAL)
+FORCE_SIZE, DEVIATION = int(Column.FORCE_SIZE), int(Column.DEVIATION)
+CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
+DAMPING_POWER, FRICTION_POWER = int(Column.DAMPING_POWER), int(Column.FRICTION_POWER)
+KINETIC, POTENTIAL = int(Column.KINETIC), int(Column.POTENTIAL)
+
+NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def lobatto(n):
+    """Nodes in [0, 1], both ends included, and weights of n-point Gauss-Lobatto quadrature."""
+    legendre = np.polynomial.legendre.Legendre.basis(n - 1)
+    inner = np.sort(legendre.deriv().roots().real)
+    nodes = np.concatenate(([-1.0], inner, [1.0]))
+    weights = 2.0 / (n * (n - 1) * legendre(nodes) ** 2)
+    return (nodes + 1.0) / 2.0, weights / 2.0
+
+
+NODES, WEIGHTS = lobatto(9)
+
+
+@jit
+def eccentricity_row(y, turn, p, row):
+    """Write both eccentricities (m) into the row; an ideal joint has none."""
+    for i in range(4):
+        row[ECCENTRICITY + i] = 0.0
+    if p.scene == BIG_END:
+        row[ECCENTRICITY], row[ECCENTRICITY + 1], _, _ = eccentricity_big_end(y, turn, p)
+    elif p.scene == SMALL_END:
+        row[ECCENTRICITY + 2], row[ECCENTRICITY + 3], _, _ = eccentricity_small_end(y, turn, p)
+    elif p.scene == BOTH:
+        big, small = eccentricities_both(y, turn, p)
+        row[ECCENTRICITY], row[ECCENTRICITY + 1] = big[0], big[1]
+        row[ECCENTRICITY + 2], row[ECCENTRICITY + 3] = small[0], small[1]
+
+
+@jit
+def centre_motion(y, motion, turn, a, spin_up, centre_x, centre_y, p):
+    """Rod centre's velocity, acceleration (x, y each) and height (m): vx, vy, ax, ay, height."""
+    sin_phi = motion.sin_phi + turn.ds
+    cos_phi = motion.cos_phi + turn.dc
+    n = y.size // 2
+    rate = motion.rate + y[2 * n - 1]
+    crank = p.crank_radius * p.omega
+    if p.scene == BIG_END:
+        b = p.rod_length - p.rod_centre
+        vx = motion.v + y[2] + b * sin_phi * rate
+        vy = b * cos_phi * rate
+        ax = a + b * (cos_phi * rate * rate + sin_phi * spin_up)
+        ay = b * (cos_phi * spin_up - sin_phi * rate * rate)
+        return vx, vy, ax, ay, b * sin_phi
+    c = p.rod_centre
+    height = p.crank_radius * motion.sin_theta - c * motion.sin_phi
+    if p.scene == BOTH:
+        vx = -crank * motion.sin_theta - c * motion.sin_phi * motion.rate + y[5]
+        vy = crank * motion.cos_theta - c * motion.cos_phi * motion.rate + y[6]
+        return vx, vy, centre_x, centre_y, height + y[2]
+    vx = -crank * motion.sin_theta - c * sin_phi * rate
+    vy = crank * motion.cos_theta - c * cos_phi * rate
+    ax = -crank * p.omega * motion.cos_theta - c * (cos_phi * rate * rate + sin_phi * spin_up)
+    ay = -crank * p.omega * motion.sin_theta + c * (sin_phi * rate * rate - cos_phi * spin_up)
+    return vx, vy, ax, ay, height - c * turn.ds
+
+
+@jit
+def joint_forces(big, small, load, a, spin_up, centre, sin_phi, cos_phi, p):
+    """Forces on the rod at both joints: the contact's, or by inverse dynamics at an ideal joint.
+
+    Newton-Euler of the rod with the crosshead's x balance; returns (big x, big y, small x, small
+    y) in N.
+    """
+    across = p.rod_mass * centre[2]
+    up = p.rod_mass * (centre[3] + p.gravity)
+    if p.scene == BOTH:
+        return big.fx, big.fy, small.fx, small.fy
+    if p.scene == SMALL_END:
+        return across - small.fx, up - small.fy, small.fx, small.fy
+    small_x = -load - p.reciprocating_mass * a
+    if p.scene == BIG_END:
+        return big.fx, big.fy, small_x, up - big.fy
+    big_x = across - small_x
+    c = p.rod_centre
+    b = p.rod_length - c
+    small_y = -p.rod_inertia * spin_up + c * (cos_phi * up + sin_phi * big_x)
+    small_y = (small_y - b * sin_phi * small_x) / (p.rod_length * cos_phi)
+    return big_x, up - small_y, small_x, small_y
+
+
+@jit
+def elastic_energy(contact, stiffness, p):
+    """Energy (J) in a contact's spring, K delta^(p+1) / (p+1)."""
+    if contact.penetration <= 0.0:
+        return 0.0
+    return (
+        stiffness
+        * power(contact.penetration, p.exponent)
+        * contact.penetration
+        / (p.exponent + 1.0)
+    )
+
+
+@jit
+def damping_power(contact, stiffness, p):
+    """Power (W) a contact loses in its normal direction, the clamp's included; never negative."""
+    if contact.penetration <= 0.0:
+        return 0.0
+    return (contact.normal - stiffness * power(contact.penetration, p.exponent)) * contact.rate
+
+
+@jit
+def energy_row(y, motion, load, big, small, centre, row, p):
+    """Write powers (W) and energies (J) into the row, once forces stand in it."""
+    n = y.size // 2
+    v = motion.v + y[n]
+    rate = motion.rate + y[2 * n - 1]
+    crank = p.crank_radius * p.omega
+    row[CRANK_POWER] = crank * (motion.cos_theta * row[FORCE + 1] - motion.sin_theta * row[FORCE])
+    if p.scene == BIG_END or p.scene == BOTH:
+        row[CRANK_POWER] -= p.omega * (p.pin_radius - big.penetration) * big.friction
+    row[LOAD_POWER] = -load * v
+    row[DAMPING_POWER] = damping_power(big, p.stiffness[0], p) + damping_power(
+        small, p.stiffness[1], p
+    )
+    row[FRICTION_POWER] = -big.friction * big.slip - small.friction * small.slip
+    kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
+    kinetic += p.rod_mass * (centre[0] * centre[0] + centre[1] * centre[1])
+    row[KINETIC] = 0.5 * kinetic
+    row[POTENTIAL] = elastic_energy(big, p.stiffness[0], p) + elastic_energy(
+        small, p.stiffness[1], p
+    )
+    row[POTENTIAL] += p.rod_mass * p.gravity * centre[4]
+
+
+@jit
+def observe(t, y, phase, p, row):
+    """Write all quantities of `Column` at time t (s) and state y into row, shape (COLUMNS,).
+
+    In the ideal scene y is four zeros.
+    """
+    motion = ideal(t, p)
+    n = y.size // 2
+    turn = turned(motion, y[n - 1], y[2 * n - 1])
+    load = load_force(phase, y, motion, p)
+    big = NO_CONTACT
+    small = NO_CONTACT
+    a = motion.a
+    spin_up = motion.spin_up
+    centre_x = 0.0
+    centre_y = 0.0
+    if p.scene == BIG_END:
+        big = contact_big_end(y, motion, turn, p)
+        a, spin_up = solve_big_end(y, motion, turn, load, big, p)
+    elif p.scene == SMALL_END:
+        small = contact_small_end(y, motion, turn, p)
+        a, spin_up = solve_small_end(motion, turn, load, small, p)
+    elif p.scene == BOTH:
+        big, small = contacts_both(y, motion, turn, p)
+        a, centre_x, centre_y, spin_up = solve_both(motion, turn, load, big, small, p)
+    centre = centre_motion(y, motion, turn, a, spin_up, centre_x, centre_y, p)
+    sin_phi = motion.sin_phi + turn.ds
+    cos_phi = motion.cos_phi + turn.dc
+    row[DISPLACEMENT] = motion.x + y[0]
+    row[VELOCITY] = motion.v + y[n]
+    row[ACCELERATION] = a
+    row[ROD_ANGLE] = math.atan2(sin_phi, cos_phi)
+    row[PISTON_FORCE] = load
+    forces = joint_forces(big, small, load, a, spin_up, centre, sin_phi, cos_phi, p)
+    for i in range(4):
+        row[FORCE + i] = forces[i]
+    eccentricity_row(y, turn, p, row)
+    row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration
+    row[NORMAL], row[NORMAL + 1] = big.normal, small.normal
+    row[FORCE_SIZE] = math.sqrt(forces[0] * forces[0] + forces[1] * forces[1])
+    row[FORCE_SIZE + 1] = math.sqrt(forces[2] * forces[2] + forces[3] * forces[3])
+    row[DEVIATION] = a - motion.a
+    energy_row(y, motion, load, big, small, centre, row, p)
+
+
+@jit
+def observe_all(times, states, phases, p, rows):
+    """`observe` at each of m times: states (m, k), phases (m,) integers, rows (m, COLUMNS)."""
+    for i in range(times.size):
+        observe(times[i], states[i], phases[i], p, rows[i])
+
+
+TALLY = np.dtype(
+    [
+        ("seconds", "f8"),  # of machine time measured
+        ("square_acceleration", "f8"),
+        ("square_deviation", "f8"),
+        ("peak_acceleration", "f8"),
+        ("peak_force", "f8", (2,)),
+        ("peak_force_axis", "f8", (4,)),  # (joint, axis), flat
+        ("max_penetration", "f8", (2,)),
+        ("loss_seconds", "f8", (2,)),
+        ("impacts", "i8", (2,)),
+        ("touching", "i8", (2,)),
+        ("deepest", "f8"),  # penetration over the whole run
+        ("energy", "f8"),  # at the start
+        ("crank_work", "f8"),
+        ("load_work", "f8"),
+        ("damping_loss", "f8"),
+        ("friction_loss", "f8"),
+        ("worst_imbalance", "f8"),  # J
+        ("peak_kinetic", "f8"),
+        ("started", "i8"),
+    ],
+    align=True,
+)
+
+
+def new_tally():
+    """An empty tally; a joint counts as touching until it is seen apart."""
+    tally = np.zeros(1, dtype=TALLY).view(np.recarray)[0]
+    tally.touching[:] = 1
+    tally.max_penetration[:] = -math.inf
+    tally.deepest = -math.inf
+    return tally
+
+
+@jit
+def peak_of(times, rows, column):
+    """Largest |value| of a column over a step: its nodes, and the parabola through the best."""
+    last = times.size - 1
+    best = 0
+    for i in range(1, last + 1):
+        if abs(rows[i, column]) > abs(rows[best, column]):
+            best = i
+    top = abs(rows[best, column])
+    i = min(max(best, 1), last - 1)
+    left, mid, right = times[i - 1] - times[i], abs(rows[i, column]), times[i + 1] - times[i]
+    slope_left = (abs(rows[i - 1, column]) - mid) / left
+    slope_right = (abs(rows[i + 1, column]) - mid) / right
+    curvature = (slope_right - slope_left) / (right - left)
+    if curvature < 0.0:
+        slope = slope_left - curvature * left
+        at = -0.5 * slope / curvature
+        if left < at < right:
+            top = max(top, mid + 0.5 * slope * at)
+    return top
+
+
+@jit
+def tally_energy(row, flows, tally):
+    """Keep the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
+
+    `row` is observed at the end of a step; the first call, with flows of zero, sets the start.
+    """
+    energy = row[KINETIC] + row[POTENTIAL]
+    if not tally.started:
+        tally.energy = energy
+        tally.started = 1
+    tally.crank_work, tally.load_work = flows[0], flows[1]
+    tally.damping_loss, tally.friction_loss = flows[2], flows[3]
+    tally.peak_kinetic = max(tally.peak_kinetic, row[KINETIC])
+    imbalance = abs(energy - tally.energy - flows[0] - flows[1] + flows[2] + flows[3])
+    # a comparison with nan is false: keep the nan
+    if not imbalance <= tally.worst_imbalance:
+        tally.worst_imbalance = imbalance
+
+
+@jit
+def add_flows(rows, span, flows):
+    """Add to flows, (4,) J, the quadrature of the powers at a step's nodes; span in s."""
+    for k in range(4):
+        for i in range(rows.shape[0]):
+            flows[k] += span * WEIGHTS[i] * rows[i, CRANK_POWER + k]
+
+
+@jit
+def derivative_with_flows(t, z, phase, p, row, out):
+    """dz/dt of the motion and of its four energy flows, z = (y, flows); row is scratch."""
+    n = z.size - 4
+    y = z[:n]
+    derivative(t, y, phase, p, out[:n])
+    observe(t, y, phase, p, row)
+    for k in range(4):
+        out[n + k] = row[CRANK_POWER + k]
+
+
+@jit
+def tally_contact(joint, times, rows, span, measured, tally):
+    """Add a step's contact loss, impacts and penetration at one joint."""
+    lost = 0.0
+    for i in range(times.size):
+        apart = rows[i, NORMAL + joint] <= 0.0
+        if apart:
+            lost += WEIGHTS[i]
+        elif measured and not tally.touching[joint]:
+            tally.impacts[joint] += 1
+        tally.touching[joint] = 0 if apart else 1
+        depth = rows[i, PENETRATION + joint]
+        tally.deepest = max(tally.deepest, depth)
+        if measured:
+            tally.max_penetration[joint] = max(tally.max_penetration[joint], depth)
+    if measured:
+        tally.loss_seconds[joint] += lost * span
+
+
+@jit
+def tally_step(times, rows, measured, tally, p):
+    """Add one step (or part of one) to the tally, from rows at its Lobatto nodes.
+
+    times: (9,) in s; rows: (9, COLUMNS); measured: whether the metrics count (after settling);
+    the depth of contact over the whole run always does.
+    """
+    span = times[-1] - times[0]
+    if p.clearance[0] > 0.0:
+        tally_contact(0, times, rows, span, measured, tally)
+    if p.clearance[1] > 0.0:
+        tally_contact(1, times, rows, span, measured, tally)
+    if not measured:
+        return
+    tally.seconds += span
+    for i in range(times.size):
+        weight = span * WEIGHTS[i]
+        tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
+        tally.square_deviation += weight * rows[i, DEVIATION] ** 2
+    tally.peak_acceleration = max(tally.peak_acceleration, peak_of(times, rows, ACCELERATION))
+    for joint in range(2):
+        size = peak_of(times, rows, FORCE_SIZE + joint)
+        tally.peak_force[joint] = max(tally.peak_force[joint], size)
+        for axis in range(2):
+            k = 2 * joint + axis
+            top = peak_of(times, rows, FORCE + k)
+            tally.peak_force_axis[k] = max(tally.peak_force_axis[k], top)

@@ -1,0 +1,86 @@
+"""The record of parameters that every compiled function reads, and the names of its choices.
+
+All numbers are SI. One scalar numpy record instead of closures or arguments: numba keeps the
+machine code of functions that take it in its disk cache.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+BIG_END = 0
+SMALL_END = 1
+
+
+class Scene(IntEnum):
+    """Which joints have clearance, hence what is integrated (DESIGN 2.2)."""
+
+    IDEAL = 0
+    BIG_END = 1
+    SMALL_END = 2
+    BOTH = 3
+
+
+class Load(IntEnum):
+    """What presses on the piston (DESIGN 2.4)."""
+
+    NONE = 0
+    TYPICAL = 1
+    DESIGN = 2
+
+
+class Law(IntEnum):
+    """The normal contact law."""
+
+    IMPACT = 0
+
+
+# unknowns integrated in each scene: half of the state's length
+FREEDOMS = {Scene.IDEAL: 0, Scene.BIG_END: 2, Scene.SMALL_END: 2, Scene.BOTH: 4}
+
+RECORD = np.dtype(
+    [
+        ("scene", "i8"),
+        ("load", "i8"),
+        ("law", "i8"),
+        ("friction", "i8"),
+        # mechanism
+        ("omega", "f8"),  # crank speed, rad/s
+        ("crank_radius", "f8"),  # R, m
+        ("rod_length", "f8"),  # L, m
+        ("rod_mass", "f8"),  # kg
+        ("rod_centre", "f8"),  # a: from the big end to the mass centre, m
+        ("rod_inertia", "f8"),  # about the mass centre, kg m^2
+        ("reciprocating_mass", "f8"),  # crosshead, piston rod and piston, kg
+        ("gravity", "f8"),  # along -y, m/s^2
+        # contact, per joint: big end, small end
+        ("pin_radius", "f8"),  # journal radius R_j, m
+        ("clearance", "f8", (2,)),  # radial, m; 0 for an ideal joint
+        ("stiffness", "f8", (2,)),  # K, N/m^p
+        ("exponent", "f8"),  # p
+        ("damping", "f8"),  # C_max, N s/m
+        ("full_damping", "f8"),  # d_max, m
+        # friction: ADAMS's four numbers
+        ("static", "f8"),
+        ("dynamic", "f8"),
+        ("stiction_velocity", "f8"),  # m/s
+        ("friction_velocity", "f8"),  # m/s
+        # load
+        ("corners", "f8", (3,)),  # crank angles at which phases 1, 2, 3 begin, rad
+        ("suction_force", "f8"),  # p_s A, N
+        ("discharge_force", "f8"),  # p_d A, N
+        ("back_force", "f8"),  # on the piston's other face, N
+        ("head_clearance", "f8"),  # s0, m
+        ("gas_exponent", "f8"),
+        ("spring_stiffness", "f8"),  # N/m
+        ("spring_damping", "f8"),  # N s/m
+        ("preload", "f8"),  # N
+        ("spring_stroke", "f8"),  # piston travel of each dwell of the follower, m
+    ],
+    align=True,
+)
+
+
+def new_record() -> np.record:
+    """A record of zeros, to be filled field by field."""
+    return np.zeros(1, dtype=RECORD).view(np.recarray)[0]
