@@ -1,0 +1,282 @@
+"""Integrate one record over time with SciPy's methods by name; the only door to scipy.integrate.
+
+Every load corner is a restart. Each accepted step's dense solution is observed at Gauss-Lobatto
+nodes for metrics and energy flows, and sampled on the output grid. SciPy is not trusted with
+states that go bad: its LSODA reports success with nan, and its Runge-Kutta methods hang on inf.
+"""
+
+import itertools
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import integrate as scipy_integrate
+
+from compressor.physics.loads import sample_segments, segments
+from compressor.physics.observe import (
+    COLUMNS,
+    NODES,
+    add_flows,
+    derivative_with_flows,
+    new_tally,
+    observe,
+    observe_all,
+    tally_energy,
+    tally_step,
+)
+from compressor.physics.parameters import FREEDOMS, Load, Scene
+
+METHODS = {
+    name: getattr(scipy_integrate, name) for name in ("LSODA", "Radau", "BDF", "DOP853", "RK45")
+}
+METHODS["auto"] = METHODS["DOP853"]
+BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
+EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
+FLOWS = 4  # energy flows integrated beside the motion
+IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
+
+
+@dataclass
+class Request:
+    """What to integrate: a record (SI), the initial state, samples, span, settings and budgets."""
+
+    p: np.record
+    start: np.ndarray
+    times: np.ndarray  # output grid, s, shape (m,)
+    settle: float  # s
+    rtol: float
+    method: str = "auto"
+    max_steps: int = 5_000_000
+    timeout: float = math.inf  # s
+
+
+@dataclass
+class Trajectory:
+    """States on the output grid, the tally of the dense solution, and how the run ended.
+
+    `states` has shape (m, k) and is nan from the sample at which an incomplete run stopped;
+    `reason` is empty when the run is complete.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    phases: np.ndarray
+    tally: np.record
+    reason: str = ""
+    detail: str = ""
+    stop_time: float = math.nan
+    stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
+    steps: int = 0
+    evaluations: int = 0
+    seconds: float = 0.0
+
+
+class Stop(Exception):
+    """A run that cannot go on, by its named reason."""
+
+    def __init__(self, reason: str, detail: str):
+        self.reason, self.detail = reason, detail
+        super().__init__(f"{reason}: {detail}")
+
+
+class Derivative:
+    """The compiled right-hand side as SciPy calls it, counted, timed and guarded."""
+
+    def __init__(self, request: Request):
+        self.p = request.p
+        self.z = np.zeros(request.start.size + FLOWS)
+        self.row = np.empty(COLUMNS)
+        self.phase = 0
+        self.evaluations = 0
+        self.bad = 0
+        self.limit = EVALUATIONS_PER_STEP * request.max_steps
+        self.timeout = request.timeout
+        self.deadline = time.monotonic() + request.timeout
+
+    def __call__(self, t: float, z: np.ndarray) -> np.ndarray:
+        self.z[:] = z
+        out = np.empty_like(self.z)
+        derivative_with_flows(t, self.z, self.phase, self.p, self.row, out)
+        self.evaluations += 1
+        if math.isfinite(out.sum()):
+            self.bad = 0
+        else:
+            self.bad += 1
+            if self.bad >= BAD_EVALUATIONS:
+                raise Stop("non_finite", "the right-hand side stays non-finite")
+        if self.evaluations % 256 == 0:
+            self.check_budget()
+        return out
+
+    def check_budget(self) -> None:
+        """Raise Stop when evaluations or wall time have run out."""
+        if self.evaluations > self.limit:
+            raise Stop("budget_steps", f"more than {self.limit} evaluations")
+        if time.monotonic() > self.deadline:
+            raise Stop("budget_seconds", f"more than {self.timeout:g} s of wall time")
+
+
+def scales(p: np.record) -> tuple[float, float]:
+    """Length (m) and speed (m/s) that absolute tolerances are relative to.
+
+    The length is the smaller of the clearance and the penetration under the forces at hand, but
+    not below a thousandth of the latter; the speed is that length at the contact's frequency.
+    """
+    force = p.reciprocating_mass * p.crank_radius * p.omega**2
+    if p.load == Load.DESIGN:
+        force += p.preload + p.spring_stiffness * p.spring_stroke
+    elif p.load == Load.TYPICAL:
+        force += p.discharge_force
+    faulty = p.clearance > 0
+    stiffness = p.stiffness[faulty].max()
+    depth = (force / stiffness) ** (1 / p.exponent)
+    length = max(min(p.clearance[faulty].min(), depth), 1e-3 * depth)
+    mass = min(p.rod_mass, p.reciprocating_mass)
+    frequency = math.sqrt(p.exponent * stiffness * depth ** (p.exponent - 1) / mass)
+    return length, length * frequency
+
+
+def absolute_tolerances(p: np.record, rtol: float) -> np.ndarray:
+    """SciPy's atol, shape (2 n + 4,), for the scene's deviations, their rates, energy flows."""
+    length, speed = scales(p)
+    n = FREEDOMS[Scene(int(p.scene))]
+    per_unit = np.ones(n)
+    per_unit[-1] = 1.0 / p.rod_length  # the last freedom is an angle
+    energy = (p.reciprocating_mass + p.rod_mass) * (p.crank_radius * p.omega) ** 2 / 2
+    return rtol * np.concatenate((length * per_unit, speed * per_unit, np.full(FLOWS, energy)))
+
+
+def integrate(request: Request) -> Trajectory:
+    """Integrate a scene with clearance over its output grid; a run that fails is returned too."""
+    edges, phases = segments(request.p, float(request.times[-1]))
+    owner = sample_segments(request.times, edges)
+    states = np.full((request.times.size, request.start.size), math.nan)
+    result = Trajectory(request.times, states, phases[owner], new_tally())
+    began = time.perf_counter()
+    right_hand_side = Derivative(request)
+    z = np.append(request.start, np.zeros(FLOWS))
+    observe(0.0, request.start, int(phases[0]), request.p, right_hand_side.row)
+    tally_energy(right_hand_side.row, z[-FLOWS:], result.tally)
+    try:
+        # a trial step may leave the finite numbers; the steps taken are checked
+        with np.errstate(all="ignore"):
+            for i, phase in enumerate(phases):
+                right_hand_side.phase = int(phase)
+                wanted = np.flatnonzero(owner == i)
+                segment = Segment(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
+                z = segment.run(z)
+    except Stop as stop:
+        result.reason, result.detail = stop.reason, stop.detail
+    result.evaluations = right_hand_side.evaluations
+    result.seconds = time.perf_counter() - began
+    return result
+
+
+class Segment:
+    """One stretch between load corners, stepped by a fresh SciPy solver."""
+
+    def __init__(self, request, right_hand_side, result, begin, end, wanted):
+        self.request, self.right_hand_side, self.result = request, right_hand_side, result
+        self.begin, self.end = begin, end
+        self.wanted = wanted  # indices of this segment's samples
+        self.times = np.clip(request.times[wanted], begin, end)
+
+    def run(self, z: np.ndarray) -> np.ndarray:
+        """Step to the segment's end and return state and flows there; raises Stop."""
+        request, result = self.request, self.result
+        result.stop_time, result.stop_state = self.begin, z[:-FLOWS]
+        solver = METHODS[request.method](
+            self.right_hand_side,
+            self.begin,
+            z,
+            self.end,
+            rtol=request.rtol,
+            atol=absolute_tolerances(request.p, request.rtol),
+        )
+        while solver.status == "running":
+            message = solver.step()
+            if solver.status == "failed":
+                raise Stop("step_underflow", str(message))
+            if not np.isfinite(solver.y).all():
+                raise Stop("non_finite", "the state is no longer finite")
+            result.steps += 1
+            self.take(solver)
+            self.audit(solver)
+            result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
+            if result.steps > request.max_steps:
+                raise Stop("budget_steps", f"more than {request.max_steps} steps")
+            self.check()
+        if self.end == request.times[-1]:
+            result.stop_time = math.nan
+        return solver.y.copy()
+
+    def take(self, solver) -> None:
+        """Tally the accepted step and sample the output grid within it."""
+        dense = solver.dense_output()
+        settle = self.request.settle
+        if solver.t_old < settle < solver.t:
+            self.tally(dense, solver.t_old, settle, False)
+            self.tally(dense, settle, solver.t, True)
+        else:
+            self.tally(dense, solver.t_old, solver.t, solver.t_old >= settle)
+        low = np.searchsorted(self.times, solver.t_old, side="right")
+        if solver.t_old == self.begin:
+            low = 0
+        high = np.searchsorted(self.times, solver.t, side="right")
+        if high > low:
+            self.result.states[self.wanted[low:high]] = dense(self.times[low:high])[:-FLOWS].T
+
+    def tally(self, dense, begin: float, end: float, measured: bool) -> None:
+        """Observe the dense solution on [begin, end] and add it to the tally."""
+        times = begin + (end - begin) * NODES
+        states = np.ascontiguousarray(dense(times)[:-FLOWS].T)
+        rows = np.empty((times.size, COLUMNS))
+        phases = np.full(times.size, self.right_hand_side.phase)
+        observe_all(times, states, phases, self.request.p, rows)
+        tally_step(times, rows, measured, self.result.tally, self.request.p)
+
+    def audit(self, solver) -> None:
+        """Compare the energy at the step's end with the flows up to there."""
+        state, flows = solver.y[:-FLOWS].copy(), solver.y[-FLOWS:].copy()
+        row = self.right_hand_side.row
+        observe(solver.t, state, self.right_hand_side.phase, self.request.p, row)
+        tally_energy(row, flows, self.result.tally)
+
+    def check(self) -> None:
+        """Raise Stop when a journal sinks in implausibly deep."""
+        deepest, limit = self.result.tally.deepest, IMPLAUSIBLE * self.request.p.pin_radius
+        if not deepest <= limit:
+            raise Stop(
+                "penetration_implausible",
+                f"{deepest * 1e3:.3g} mm, more than a tenth of the pin radius",
+            )
+        self.right_hand_side.check_budget()
+
+
+def closed_form(p: np.record, times: np.ndarray, settle: float) -> Trajectory:
+    """The ideal scene: nothing is integrated, metrics and energy flows by quadrature."""
+    edges, phases = segments(p, float(times[-1]))
+    result = Trajectory(
+        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally()
+    )
+    began = time.perf_counter()
+    cuts = np.unique(np.concatenate((edges, [settle], fine_grid(edges))))
+    owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
+    states = np.zeros((NODES.size, 4))
+    rows = np.empty((NODES.size, COLUMNS))
+    flows = np.zeros(FLOWS)
+    for begin, end, phase in zip(cuts[:-1], cuts[1:], phases[owner], strict=True):
+        nodes = begin + (end - begin) * NODES
+        observe_all(nodes, states, np.full(NODES.size, phase), p, rows)
+        tally_energy(rows[0], flows, result.tally)
+        add_flows(rows, end - begin, flows)
+        tally_energy(rows[-1], flows, result.tally)
+        tally_step(nodes, rows, begin >= settle, result.tally, p)
+    result.seconds = time.perf_counter() - began
+    return result
+
+
+def fine_grid(edges: np.ndarray) -> np.ndarray:
+    """Points that cut every segment of the ideal motion into pieces a quadrature resolves."""
+    return np.concatenate([np.linspace(a, b, 33) for a, b in itertools.pairwise(edges)])
