@@ -65,8 +65,7 @@ def simulate(case: Case) -> xr.Dataset:
     stopped. Metrics are taken over the dense solution after `settle_rev`.
     """
     p = record(case)
-    times = np.arange(round(case.steps) + 1) * (case.duration / round(case.steps))
-    times[-1] = case.duration
+    times = case.duration * (np.arange(round(case.steps) + 1) / round(case.steps))
     if scene(case) == Scene.IDEAL:
         trajectory = closed_form(p, times, case.settle)
     else:

@@ -194,6 +194,12 @@ def derivative(t, y, phase, p, out):
 
 
 @jit
+def versine(angle):
+    """1 - cos(angle) without cancellation."""
+    return 2.0 * math.sin(0.5 * angle) ** 2
+
+
+@jit
 def start(offset, y, p):
     """Write the state at top dead centre, ideal rates, journals shifted by `offset`, into y.
 
@@ -204,15 +210,15 @@ def start(offset, y, p):
         y[i] = 0.0
     if p.scene == BIG_END:
         eta = math.asin(-offset[0, 1] / p.rod_length)
-        y[0] = -offset[0, 0] + p.rod_length * (math.cos(eta) - 1.0)
+        y[0] = -offset[0, 0] - p.rod_length * versine(eta)
         y[1] = eta
     elif p.scene == SMALL_END:
         eta = math.asin(offset[1, 1] / p.rod_length)
-        y[0] = offset[1, 0] + p.rod_length * (math.cos(eta) - 1.0)
+        y[0] = offset[1, 0] - p.rod_length * versine(eta)
         y[1] = eta
     elif p.scene == BOTH:
         eta = math.asin((offset[1, 1] - offset[0, 1]) / p.rod_length)
-        less = math.cos(eta) - 1.0
+        less = -versine(eta)
         y[0] = p.rod_length * less + offset[1, 0] - offset[0, 0]
         y[1] = p.rod_centre * less - offset[0, 0]
         y[2] = -p.rod_centre * math.sin(eta) - offset[0, 1]

@@ -1,0 +1,49 @@
+# compsim: the verbs of the house. Everything happens in .venv, made here when it is missing.
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/installed
+.DEFAULT_GOAL := help
+.PHONY: help install run figures test test-pure check format accuracy clean
+
+help:  ## show this help
+	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+install: $(STAMP)  ## create .venv with compsim and what its tests need
+
+$(STAMP): pyproject.toml
+	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) not found: install Python 3.11 or newer"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "compsim needs Python 3.11 or newer: make PYTHON=python3.12 install"; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $(STAMP)
+
+run: install  ## simulate the paper's eleven cases and draw the report
+	$(BIN)/compsim run configs/*.yaml
+	$(BIN)/compsim report
+
+figures: install  ## draw the report again from the stored results
+	$(BIN)/compsim report
+
+test: install  ## run the whole test suite
+	$(BIN)/python -m pytest -n 2
+
+test-pure: install  ## run the physics tests on the same source with the JIT off
+	COMPSIM_JIT=0 $(BIN)/python -m pytest -m 'not slow' tests/test_kinematics.py tests/test_loads.py \
+	  tests/test_contact.py tests/test_cam.py tests/test_observe.py tests/test_motion.py
+
+check: install  ## ruff (format and lint) and mypy
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: install  ## let ruff format and mend what it can
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+accuracy: install  ## measure the errors behind the words of `accuracy` (about 10 minutes)
+	$(BIN)/python tests/measure_accuracy.py tests/results/accuracy.json
+
+clean:  ## remove results, report and caches; .venv stays
+	rm -rf results report .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -1,0 +1,170 @@
+"""The contact law against closed forms and ADAMS's definitions."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from compressor.case import Case
+from compressor.physics.contact import (
+    contact_stiffness,
+    friction_coefficient,
+    joint_contact,
+    normal_force,
+    step,
+)
+from compressor.record import record
+
+K = 3.36e5 * 1000**1.5
+finite = st.floats(-1e3, 1e3)
+
+
+def law(**values):
+    return record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **values}))
+
+
+@given(finite, finite, st.floats(1e-6, 1e3), finite, finite)
+def test_step_stays_between_its_ends(x, x0, width, h0, h1):
+    value = step(x, x0, h0, x0 + width, h1)
+    assert min(h0, h1) <= value <= max(h0, h1)
+
+
+@given(st.floats(0, 1), finite, finite)
+def test_step_is_symmetric_about_its_middle(s, h0, h1):
+    one, other = step(s, 0.0, h0, 1.0, h1), step(1.0 - s, 0.0, h0, 1.0, h1)
+    assert one + other == pytest.approx(h0 + h1, abs=1e-9)
+
+
+@pytest.mark.parametrize(("x", "h"), [(-1, 2), (0, 2), (0.25, 2.46875), (0.5, 3.5), (1, 5), (9, 5)])
+def test_step_values(x, h):
+    assert step(x, 0.0, 2.0, 1.0, 5.0) == pytest.approx(h)
+
+
+@given(st.floats(-10, 10))
+def test_friction_is_odd_and_bounded(slip):
+    p = law()
+    mu = friction_coefficient(slip, p)
+    assert mu == pytest.approx(-friction_coefficient(-slip, p), abs=1e-15)
+    assert abs(mu) <= 0.23
+    assert mu * slip >= -1e-15
+
+
+@pytest.mark.parametrize(
+    ("slip", "mu"), [(0, 0), (0.005, 0.158125), (0.01, 0.23), (0.055, 0.19), (0.1, 0.15), (3, 0.15)]
+)
+def test_friction_values(slip, mu):
+    assert friction_coefficient(slip, law()) == pytest.approx(mu)
+
+
+@pytest.mark.parametrize(("force", "depth_mm"), [(825, 0.018), (3087, 0.044)])
+def test_static_penetration(force, depth_mm):
+    assert (force / K) ** (2 / 3) * 1e3 == pytest.approx(depth_mm, abs=5e-4)
+    assert normal_force((force / K) ** (2 / 3), 0.0, K, law()) == pytest.approx(force)
+
+
+def test_the_clamp_never_pulls():
+    assert normal_force(1e-5, -100.0, K, law()) == 0.0
+    assert normal_force(0.0, 5.0, K, law()) == 0.0
+    assert normal_force(-1e-9, 5.0, K, law()) == 0.0
+
+
+def bounce(speed, p, mass=5.0):
+    """Contact time, exit speed and depth of a mass that strikes the contact at `speed`."""
+
+    def derivative(_, y):
+        return [y[1], -normal_force(y[0], y[1], K, p) / mass]
+
+    def leaves(_, y):
+        return y[0]
+
+    leaves.terminal, leaves.direction = True, -1
+    scale = speed * 1e-4
+    run = solve_ivp(
+        derivative, (0, 1), [1e-15, speed], "DOP853", events=leaves, rtol=1e-10,
+        atol=scale * 1e-10, dense_output=True,
+    )  # fmt: skip
+    depth = run.sol(np.linspace(0, run.t[-1], 2001))[0].max()
+    return run.t[-1], abs(run.y[1, -1]), depth
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.1, 1.0])
+def test_undamped_bounce_is_hertzian(speed):
+    seconds, out, depth = bounce(speed, law(contact={"damping_N_s_per_mm": 0}))
+    deepest = (5 * 5.0 * speed**2 / (4 * K)) ** 0.4
+    assert depth == pytest.approx(deepest, rel=1e-5)
+    assert seconds == pytest.approx(2.9432 * deepest / speed, rel=1e-4)
+    assert out == pytest.approx(speed, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("speed", "restitution"), [(0.01, 0.90), (0.1, 0.31), (0.2, 0.16), (1, 0.03)]
+)
+def test_restitution_of_the_paper_s_contact(speed, restitution):
+    assert bounce(speed, law())[1] / speed == pytest.approx(restitution, abs=0.006)
+
+
+vectors = st.tuples(
+    *[st.floats(-3e-4, 3e-4)] * 2, *[st.floats(-1, 1)] * 2, *[st.floats(-80, 80)] * 2
+)
+
+
+@given(vectors)
+def test_joint_contact_balances_angular_momentum(state):
+    ex, ey, *rates = state
+    p = law()
+    found = joint_contact(0, ex, ey, *rates, p)
+    # the journal's moment about its own centre, moved to the bore's centre with its force there
+    journal = (p.pin_radius - found.penetration) * found.friction
+    moved = journal + ex * -found.fy - ey * -found.fx
+    assert moved + found.moment == pytest.approx(0, abs=1e-9 * (1 + abs(journal)))
+
+
+@given(vectors)
+def test_joint_contact_only_loses_energy_to_friction(state):
+    found = joint_contact(0, *state, law())
+    assert found.friction * found.slip <= 0
+    assert found.normal >= 0
+    assert (found.normal > 0) <= (found.penetration > 0)
+
+
+def test_concentric_circles_exert_no_force():
+    assert joint_contact(0, 0.0, 0.0, 1.0, 1.0, 50.0, 3.0, law())[:5] == (0, 0, 0, 0, 0)
+
+
+def test_contact_pushes_the_journal_back():
+    found = joint_contact(0, 2.5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, law())
+    assert found.fx == pytest.approx(
+        K * (0.5e-4) ** 1.5
+    )  # on the rod; the journal gets its opposite
+    assert found.penetration == pytest.approx(0.5e-4)
+
+
+def test_no_friction_is_no_tangential_force():
+    found = joint_contact(0, 2.5e-4, 0.0, 0.0, 1.0, 50.0, 0.0, law(friction=False))
+    assert found.friction == 0
+    assert found.fy == 0
+
+
+@pytest.mark.parametrize(
+    ("radii", "stiffness"), [((0.010, 0.0099), 3.3606e5), ((0.010, 0.0102), 3.3858e5)]
+)
+def test_stiffness_of_steel_on_steel(radii, stiffness):
+    assert contact_stiffness("steel", "steel", *radii) / 1000**1.5 == pytest.approx(
+        stiffness, rel=2e-4
+    )
+
+
+def test_materials_give_each_joint_its_stiffness():
+    case = Case.from_values(
+        {
+            "joint": "both",
+            "clearance_mm": {"big_end": 0.1, "small_end": 0.3},
+            "contact": {"materials": ["steel", "copper"]},
+        }
+    )
+    expected = [contact_stiffness("steel", "copper", 0.010, 0.010 + c) for c in (1e-4, 3e-4)]
+    assert record(case).stiffness == pytest.approx(np.array(expected))
+    assert math.isclose(expected[0], contact_stiffness("copper", "steel", 0.0101, 0.010))

@@ -1,0 +1,131 @@
+"""Integration against an independent reference, a second method, energy and limits."""
+
+import numpy as np
+import pytest
+import reference
+
+from compressor.case import ACCURACY, Case
+from compressor.integrate import METHODS, absolute_tolerances
+from compressor.physics.parameters import FREEDOMS
+from compressor.record import record, scene
+from compressor.simulate import simulate
+
+NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
+PROMISED = {"draft": 2e-2, "standard": 5e-3, "fine": 1e-4, "reference": 1e-6}
+
+
+def run(joint, clearance, **solve):
+    return simulate(Case.from_values({"joint": joint, "clearance_mm": clearance, "solve": solve}))
+
+
+def apart(one, other):
+    """Relative L2 difference of two accelerations."""
+    return np.linalg.norm(one - other) / np.linalg.norm(other)
+
+
+def residual_bound(found, revolutions=4):
+    return 10 * found.attrs["rtol"] * revolutions
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("joint", "clearance"), NINE)
+def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance):
+    """Every promise on the nine fault cases over 0.48 s, judged by sympy's equations."""
+    params = reference.paper_params("design", joint, clearance * 1e-3)
+    words = {word: run(joint, clearance, accuracy=word) for word in ("draft", "standard", "fine")}
+    times = words["fine"]["time"].values
+    truth = reference.reference_solution(params, joint, times, rtol=1e-11)["a"]
+    for word, found in words.items():
+        assert apart(found["acceleration"].values, truth) <= PROMISED[word], word
+        assert float(found["energy_residual"]) <= residual_bound(found), word
+    one, other = (
+        run(joint, clearance, rtol=rtol, method=method)
+        for method, rtol in (("DOP853", 1e-10), ("LSODA", 1e-8))
+    )
+    assert apart(one["acceleration"].values, other["acceleration"].values) <= 1e-5
+    assert apart(one["acceleration"].values, truth) <= PROMISED["reference"]
+    peaks = [float(found["peak_acceleration"]) for found in (words["standard"], one)]
+    assert peaks[0] == pytest.approx(peaks[1], rel=5e-3)
+
+
+@pytest.mark.parametrize("load", ["typical", "none"])
+def test_other_loads_against_the_reference(load):
+    params = reference.paper_params(load, "both", 2e-4)
+    solve = {"duration_rev": 0.5, "settle_rev": 0, "accuracy": "fine"}
+    case = Case.from_values({"load": load, "joint": "both", "clearance_mm": 0.2, "solve": solve})
+    found = simulate(case)
+    truth = reference.reference_solution(params, "both", found["time"].values, rtol=1e-10)
+    assert apart(found["acceleration"].values, truth["a"]) <= PROMISED["fine"]
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "auto"])
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+def test_energy_residual_of_every_method(method, joint):
+    found = run(joint, 0.3, duration_rev=1, settle_rev=0, rtol=1e-5, method=method)
+    assert str(found["status"].values) == "ok"
+    assert 0 < float(found["energy_residual"]) <= residual_bound(found, revolutions=1)
+
+
+def test_the_audit_sees_a_lost_flow(monkeypatch):
+    """Without the damping loss in the ledger the energy no longer balances."""
+    from compressor import integrate
+    from compressor.physics.observe import derivative_with_flows
+
+    def lossless(t, z, phase, p, row, out):
+        derivative_with_flows(t, z, phase, p, row, out)
+        out[-2] = 0.0
+
+    monkeypatch.setattr(integrate, "derivative_with_flows", lossless)
+    found = run("big_end", 0.3, duration_rev=1, settle_rev=0, rtol=1e-5, method="DOP853")
+    assert float(found["energy_residual"]) > 100 * residual_bound(found, revolutions=1)
+
+
+def deviation(clearance_mm):
+    """Greatest |x - x_ideal| (m) with the contact scaled along (DESIGN 2.6)."""
+    size = clearance_mm / 0.2
+    contact = {
+        "stiffness_N_per_mm15": 3.36e5 * size**-1.5,
+        "full_damping_mm": 0.1 * size,
+        "damping_N_s_per_mm": 336 * size**-0.5,
+    }
+    values = {"joint": "both", "clearance_mm": clearance_mm, "contact": contact}
+    solve = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft"}
+    found = simulate(Case.from_values({**values, "solve": solve}))
+    ideal = simulate(Case.from_values({"solve": solve}))
+    return float(np.abs(found["displacement"] - ideal["displacement"]).max())
+
+
+@pytest.mark.slow
+def test_scaled_limit_of_vanishing_clearance():
+    sizes = np.array([1.0, 0.1, 0.01, 0.001])
+    moved = np.array([deviation(size) for size in sizes])
+    slopes = np.diff(np.log(moved)) / np.diff(np.log(sizes))
+    assert np.abs(slopes - 1).max() <= 0.1
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+def test_output_grid_does_not_touch_the_motion(joint):
+    coarse, fine = (
+        run(joint, 0.2, duration_rev=0.5, settle_rev=0, output_step_deg=step) for step in (3, 0.3)
+    )
+    same = fine.isel(time=slice(None, None, 10))
+    assert coarse["time"].values.tolist() == same["time"].values.tolist()
+    assert apart(coarse["acceleration"].values, same["acceleration"].values) < 1e-13
+    assert float(coarse["peak_acceleration"]) == float(fine["peak_acceleration"])
+
+
+@pytest.mark.parametrize("joint", ["big_end", "both"])
+def test_tolerances_scale_with_the_clearance(joint):
+    small, large = (
+        absolute_tolerances(record(Case.from_values({"joint": joint, "clearance_mm": c})), 1e-6)
+        for c in (0.001, 0.002)
+    )
+    n = FREEDOMS[scene(Case.from_values({"joint": joint, "clearance_mm": 0.1}))]
+    assert small.size == 2 * n + 4
+    assert large[: 2 * n] / small[: 2 * n] == pytest.approx(2)
+    assert small[0] == pytest.approx(1e-6 * 1e-6)
+
+
+def test_words_of_accuracy_are_ordered():
+    assert list(PROMISED) == list(ACCURACY)
+    assert sorted(ACCURACY.values(), reverse=True) == list(ACCURACY.values())

@@ -1,0 +1,179 @@
+"""Outputs recomputed from (t, y): inverse dynamics, power balance, quadrature, peaks."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.case import Case
+from compressor.physics.motion import derivative, start
+from compressor.physics.observe import (
+    COLUMNS,
+    NODES,
+    WEIGHTS,
+    Column,
+    lobatto,
+    new_tally,
+    observe,
+    observe_all,
+    peak_of,
+    tally_step,
+)
+from compressor.record import offsets, record
+
+JOINTS = ("big_end", "small_end", "both")
+
+
+def case(joint, **values):
+    clearance = {} if joint == "none" else {"joint": joint, "clearance_mm": 0.2}
+    return Case.from_values({**clearance, **values})
+
+
+def row_at(p, t, y, phase=1):
+    row = np.empty(COLUMNS)
+    observe(t, y, phase, p, row)
+    return row
+
+
+def random_state(joint, rng):
+    n = 4 if joint == "both" else 2
+    scale = np.full(n, 2.5e-4)
+    scale[-1] = 5e-4
+    return np.concatenate((rng.normal(size=n) * scale, rng.normal(size=n) * scale * 500))
+
+
+@pytest.mark.parametrize("n", [3, 5, 9])
+def test_lobatto_is_exact_for_polynomials(n):
+    nodes, weights = lobatto(n)
+    for degree in range(2 * n - 2):
+        assert weights @ nodes**degree == pytest.approx(1 / (degree + 1), rel=1e-12)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.parametrize("gravity", [0, 9.81])
+def test_energy_changes_by_the_powers(joint, gravity):
+    """dE/dt along the equations of motion equals the powers: an identity of the mechanics."""
+    p = record(case(joint, machine={"gravity_m_per_s2": gravity}))
+    rng = np.random.default_rng(1)
+    for t in np.linspace(0.001, 0.11, 12):
+        y = random_state(joint, rng)
+        rate = np.empty_like(y)
+        derivative(t, y, 1, p, rate)
+        h = 1e-7
+        energies = [
+            row_at(p, t + s, y + s * rate)[[Column.KINETIC, Column.POTENTIAL]].sum()
+            for s in (h, -h)
+        ]
+        row = row_at(p, t, y)
+        power = row[Column.CRANK_POWER] + row[Column.LOAD_POWER]
+        power -= row[Column.DAMPING_POWER] + row[Column.FRICTION_POWER]
+        scale = abs(row[Column.CRANK_POWER : Column.KINETIC]).sum()
+        assert (energies[0] - energies[1]) / (2 * h) == pytest.approx(power, abs=3e-5 * scale)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_losses_are_never_negative(joint):
+    p, rng = record(case(joint)), np.random.default_rng(2)
+    for t in np.linspace(0, 0.12, 200):
+        row = row_at(p, t, random_state(joint, rng))
+        assert row[Column.DAMPING_POWER] >= 0
+        assert row[Column.FRICTION_POWER] >= 0
+
+
+@pytest.mark.parametrize("joint", ["none", *JOINTS])
+def test_joint_forces_move_crosshead_and_rod(joint):
+    """Newton on the crosshead (x) and on crosshead plus rod, whatever the scene."""
+    p, rng = record(case(joint)), np.random.default_rng(3)
+    for t in np.linspace(0.001, 0.11, 12):
+        y = np.zeros(4) if joint == "none" else random_state(joint, rng)
+        row = row_at(p, t, y)
+        small_x = row[Column.FORCE + 2]
+        push = -row[Column.PISTON_FORCE] - small_x
+        assert push == pytest.approx(p.reciprocating_mass * row[Column.ACCELERATION], abs=1e-7)
+
+
+def test_ideal_joint_forces_give_the_rod_its_spin():
+    """Euler's equation of the rod about its centre with the forces found, and Newton along y."""
+    p = record(case("none", machine={"gravity_m_per_s2": 9.81, "rod_centre_mm": 220}))
+    h = 1e-5
+    for t in np.linspace(0.001, 0.11, 12):
+        early, row, late = (row_at(p, t + s, np.zeros(4)) for s in (-h, 0, h))
+        phi = [r[Column.ROD_ANGLE] for r in (early, row, late)]
+        spin_up = (phi[0] - 2 * phi[1] + phi[2]) / h**2
+        direction = np.array([math.cos(phi[1]), -math.sin(phi[1])])
+        big, small = row[Column.FORCE : Column.FORCE + 2], row[Column.FORCE + 2 : Column.FORCE + 4]
+        moment = [u * f[1] - w * f[0] for f in (big, small) for u, w in [direction]]
+        a, b = p.rod_centre, p.rod_length - p.rod_centre
+        assert b * moment[1] - a * moment[0] == pytest.approx(-p.rod_inertia * spin_up, abs=2e-2)
+        height = [p.crank_radius * math.sin(p.omega * (t + s)) - a * math.sin(f)
+                  for s, f in zip((-h, 0, h), phi, strict=True)]  # fmt: skip
+        lift = (height[0] - 2 * height[1] + height[2]) / h**2
+        assert big[1] + small[1] == pytest.approx(p.rod_mass * (lift + 9.81), abs=5e-2)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_eccentricity_matches_the_positions(joint):
+    """The difference identities against plain trigonometry of the positions."""
+    p, rng = record(case(joint)), np.random.default_rng(4)
+    for t in np.linspace(0.001, 0.11, 12):
+        y = random_state(joint, rng)
+        row = row_at(p, t, y)
+        theta, phi = p.omega * t, row[Column.ROD_ANGLE]
+        pin = p.crank_radius * np.array([math.cos(theta), math.sin(theta)])
+        rod = p.rod_length * np.array([math.cos(phi), -math.sin(phi)])
+        crosshead = np.array([row[Column.DISPLACEMENT], 0.0])
+        found = row[Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2)
+        # going round the loop: pin - e_big + rod + e_small = crosshead
+        assert pin - found[0] + rod + found[1] == pytest.approx(crosshead, abs=1e-14)
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_initial_offset_shifts_the_journal(joint):
+    shift = {"big_end_x": 0.05, "big_end_y": -0.08, "small_end_x": 0.02, "small_end_y": 0.11}
+    one = case(joint, initial_offset_mm=shift)
+    p = record(one)
+    y = np.zeros(8 if joint == "both" else 4)
+    start(offsets(one), y, p)
+    found = row_at(p, 0.0, y, 0)[Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2)
+    expected = offsets(one) * (p.clearance[:, None] > 0)
+    assert found == pytest.approx(expected, abs=1e-17)
+
+
+def test_rows_of_a_free_flight_show_no_contact():
+    p = record(case("big_end"))
+    row = row_at(p, 0.0, np.zeros(4), 0)
+    assert row[Column.PENETRATION] == pytest.approx(-2e-4)
+    assert row[Column.NORMAL] == 0
+    assert row[Column.FORCE : Column.FORCE + 2].tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
+def test_peak_between_nodes_is_found(middle):
+    rows = np.zeros((NODES.size, COLUMNS))
+    rows[:, 2] = -7.0 + 3 * (NODES - middle) ** 2
+    assert peak_of(NODES, rows, 2) == pytest.approx(7.0, rel=1e-12)
+
+
+def test_tally_of_a_known_step():
+    p = record(case("big_end"))
+    rows = np.zeros((NODES.size, COLUMNS))
+    rows[:, Column.ACCELERATION] = 3.0
+    rows[:, Column.NORMAL] = np.where(NODES > 0.5, 10.0, 0.0)
+    rows[:, Column.PENETRATION] = NODES - 0.5
+    tally = new_tally()
+    tally_step(NODES * 1e-4, rows, True, tally, p)
+    assert tally.seconds == pytest.approx(1e-4)
+    assert tally.square_acceleration == pytest.approx(9e-4)
+    assert tally.impacts.tolist() == [1, 0]
+    assert tally.max_penetration[0] == pytest.approx(0.5)
+    assert tally.loss_seconds[0] == pytest.approx(1e-4 * WEIGHTS[NODES <= 0.5].sum())
+
+
+def test_observe_all_is_observe_in_turn():
+    p, rng = record(case("both")), np.random.default_rng(5)
+    times = np.linspace(0, 0.1, 5)
+    states = np.array([random_state("both", rng) for _ in times])
+    rows = np.empty((5, COLUMNS))
+    observe_all(times, states, np.array([0, 1, 2, 3, 0]), p, rows)
+    for i, phase in enumerate((0, 1, 2, 3, 0)):
+        assert rows[i].tolist() == row_at(p, times[i], states[i], phase).tolist()

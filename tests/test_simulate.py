@@ -1,0 +1,122 @@
+"""One case to a Dataset: schema, units, ideal numbers, metrics against the series, failures."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from compressor.case import Case
+from compressor.simulate import LEDGER, METRICS, SERIES, simulate
+
+SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
+
+
+def run(**values):
+    return simulate(Case.from_values({"solve": SHORT, **values}))
+
+
+@pytest.fixture(scope="module")
+def faulty():
+    return run(joint="both", clearance_mm={"big_end": 0.1, "small_end": 0.2})
+
+
+@pytest.mark.parametrize("load", ["design", "typical", "none"])
+def test_ideal_machine(load):
+    found = simulate(Case.from_values({"load": load}))
+    assert float(found.peak_acceleration) == pytest.approx(394.784, abs=5e-4)
+    assert float(found.energy_residual) < 1e-10
+    assert int(found.steps) == int(found.evaluations) == 0
+    peak = {"design": 3346.7, "typical": 3086.6, "none": 0}[load]
+    assert float(found.piston_force.max()) == pytest.approx(peak, abs=2)
+
+
+def test_undamped_design_force_peaks_at_the_spring_s_3200_newtons():
+    undamped = simulate(Case.from_values({"spring": {"damping_N_s_per_mm": 0}}))
+    assert float(undamped.piston_force.max()) == pytest.approx(3200, abs=1e-6)
+
+
+def test_every_variable_has_unit_and_long_name(faulty):
+    for name in [*SERIES, *METRICS, *LEDGER, "crank_angle", "time"]:
+        assert faulty[name].attrs["units"], name
+        assert faulty[name].attrs["long_name"], name
+
+
+def test_dims_are_the_same_in_all_scenes(faulty):
+    for other in (run(), run(joint="big_end", clearance_mm=0.1)):
+        assert {n: v.dims for n, v in other.items()} == {n: v.dims for n, v in faulty.items()}
+    assert faulty.contact_force.dims == ("time", "joint", "axis")
+    assert faulty.joint.values.tolist() == ["big_end", "small_end"]
+
+
+def test_attributes_give_the_case_back(faulty):
+    case = Case.from_attribute(faulty.attrs["case"])
+    assert case.key == faulty.attrs["key"]
+    assert case.clearance_mm.small_end == 0.2
+    assert json.loads(faulty.attrs["case"])["joint"] == "both"
+
+
+def test_metrics_agree_with_the_series(faulty):
+    kept = faulty.isel(time=faulty.time.values >= 0.06)
+    a = kept.acceleration.values
+    # the dense solution sees at least what the grid sees, and seldom much more
+    assert 1 - 1e-6 <= float(faulty.peak_acceleration) / np.abs(a).max() <= 1.1
+    assert float(faulty.rms_acceleration) == pytest.approx(np.sqrt(np.mean(a**2)), rel=0.01)
+    size = np.hypot(*kept.contact_force.sel(joint="small_end").values.T)
+    peak = float(faulty.peak_contact_force.sel(joint="small_end"))
+    assert 1 - 1e-6 <= peak / size.max() <= 1.1
+    depth = float(kept.penetration.sel(joint="big_end").max())
+    assert float(faulty.max_penetration.sel(joint="big_end")) == pytest.approx(depth, rel=0.1)
+
+
+def test_only_metrics_are_kept_when_asked():
+    found = run(output={"keep": "metrics"})
+    assert "time" not in found.dims
+    assert "acceleration" not in found
+    assert float(found.peak_acceleration) > 0
+
+
+def test_friction_off_equals_no_friction():
+    off = run(joint="big_end", clearance_mm=0.2, friction=False)
+    none = run(joint="big_end", clearance_mm=0.2, friction={"static": 0, "dynamic": 0})
+    assert off.acceleration.values == pytest.approx(none.acceleration.values, rel=1e-9)
+    assert float(off.friction_loss) == 0
+
+
+def test_zero_clearance_is_the_ideal_joint():
+    zero = run(joint="big_end", clearance_mm=0)
+    assert zero.acceleration.values.tolist() == run().acceleration.values.tolist()
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"solve": {**SHORT, "max_steps": 50}}, "budget_steps"),
+        ({"solve": {**SHORT, "timeout_s": 1e-3}}, "budget_seconds"),
+        ({"contact": {"stiffness_N_per_mm15": 300}}, "penetration_implausible"),
+        (
+            {  # at the second top dead centre the piston is flung past the cylinder head
+                "load": "typical",
+                "gas": {"head_clearance_mm": 0.01, "switching": "exact"},
+                "solve": {"duration_rev": 1.25},
+            },
+            "non_finite",
+        ),
+    ],
+)
+@pytest.mark.parametrize("method", ["auto", "LSODA"])
+def test_a_run_that_cannot_go_on_says_why(values, reason, method):
+    solve = {**SHORT, **values.get("solve", {}), "method": method}
+    found = run(joint="both", clearance_mm=0.3, **{**values, "solve": solve})
+    assert (str(found.status.values), str(found.reason.values)) == ("failed", reason)
+    assert found.attrs["complete"] == 0
+    assert 0 <= found.attrs["stop_time"] < 0.1201
+    assert found.attrs["stop_crank_angle"] == pytest.approx(
+        found.attrs["stop_time"] * 500 * math.pi / 30
+    )
+    assert len(found.attrs["stop_state"]) == 8
+    assert np.isnan(found.peak_acceleration)
+    kept = np.isfinite(found.acceleration.values)
+    assert kept[0]
+    assert not kept[-1]
+    assert (np.diff(kept.astype(int)) <= 0).all()  # nothing after the stop
