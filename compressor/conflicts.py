@@ -1,6 +1,5 @@
 """What does not fit together in a case whose values are each in range."""
 
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -78,8 +77,7 @@ def _load_conflicts(case: "Case") -> Iterator[Problem]:
         yield Problem("gas.discharge_MPa", "must exceed suction_MPa")
     elif gas.switching == "exact":
         full = 2 * machine.crank_radius_mm + gas.head_clearance_mm
-        ratio = gas.discharge_MPa / gas.suction_MPa if gas.suction_MPa else math.inf
-        growth = ratio ** (1 / gas.exponent)
+        growth = (gas.discharge_MPa / gas.suction_MPa) ** (1 / gas.exponent)
         if gas.head_clearance_mm * growth >= full:
             yield Problem(
                 "gas.head_clearance_mm",

@@ -7,6 +7,7 @@
 import math
 import re
 import reprlib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -59,6 +60,8 @@ SHORT.maxstring = SHORT.maxother = SHORT.maxlong = 60
 
 def shown(value: Any) -> str:
     """A value as an error message quotes it: control characters escaped, long values cut."""
+    if isinstance(value, bool):
+        return str(value).lower()
     return SHORT.repr(value)
 
 
@@ -159,3 +162,14 @@ def choice(default: Any, choices: tuple[str, ...], source: str, phrase: str, **m
     row = {"unit": "", "low": 0.0, "high": 0.0, "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "choice", "choices": choices, "optional": False} | more
     return field(default=default, metadata=row)
+
+
+def parameter_table(rows: Iterable[Parameter]) -> str:
+    """The table of parameters in Markdown, for the README; `compressor.case.table` has the rows."""
+    lines = ["| key | unit | default | range | source | what it is |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        default = "" if row.default is None or row.kind == "text" else str(row.default)
+        default = default.removesuffix(".0")
+        cells = (f"`{row.key}`", row.unit, default, row.range, row.source, row.phrase)
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"

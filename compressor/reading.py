@@ -1,0 +1,350 @@
+"""Strict YAML 1.2: a case file's text -> values by dotted key that know where they stand.
+
+The only module that imports yaml, and only its parser: what a scalar means is decided here, by
+the core schema of YAML 1.2, so that `1e5` is a number and `no` is text. What a case file must not
+hold (aliases, tags, duplicate or unknown keys, ...) is noted with its place, and reading goes on;
+only broken syntax and oversized files end it.
+"""
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import yaml
+
+from compressor.case import GROUPS, Case, table
+from compressor.parameter import shown
+
+MAX_BYTES = 1 << 20
+MAX_DEPTH = 20
+MAX_PARTS = 100_000  # keys, values and brackets; keeps a hostile file from taking long
+MAX_SUGGESTIONS = 100  # for the same reason
+
+ODD_BREAKS = re.compile("[\x85\u2028\u2029]")  # lines for PyYAML, not for YAML 1.2 or an editor
+
+NULLS = {"", "~", "null", "Null", "NULL"}
+BOOLEANS = {"true": True, "True": True, "TRUE": True}
+BOOLEANS |= {"false": False, "False": False, "FALSE": False}
+INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
+REAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+
+
+@dataclass(frozen=True, order=True)
+class Place:
+    """Where a value stands; line and column count from 1, line 0 means the file as a whole."""
+
+    file: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        name = printable(self.file)
+        return f"{name}:{self.line}:{self.column}" if self.line else name
+
+
+@dataclass(frozen=True, order=True)
+class FileProblem:
+    """What is wrong with one key of a case file, and where; the key may be empty."""
+
+    place: Place
+    key: str
+    message: str
+
+    def __str__(self) -> str:
+        parts = (str(self.place), cut(printable(self.key)), printable(self.message))
+        return ": ".join(part for part in parts if part)
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value and its place: a scalar, a list of nodes or a dict of them; None if refused."""
+
+    value: Any
+    place: Place
+    key_place: Place  # of the key that the value belongs to
+
+    def plain(self) -> Any:
+        """The value without places."""
+        if isinstance(self.value, list):
+            return [item.plain() for item in self.value]
+        if isinstance(self.value, dict):
+            return {key: item.plain() for key, item in self.value.items()}
+        return self.value
+
+
+class _Unreadable(Exception):
+    """Ends the reading of a file; carries the last problem."""
+
+
+def printable(text: str) -> str:
+    """Text in which no character can steer a terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def cut(text: str, most: int = 60) -> str:
+    """Text of at most `most` characters."""
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def read_file(path: str, problems: list[FileProblem]) -> Node | None:
+    """The content of a case file, or None; what is wrong with it joins `problems`."""
+    try:
+        with open(path, "rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        message = getattr(error, "strerror", None) or str(error)
+        problems.append(FileProblem(Place(path), "", f"cannot be read: {message}"))
+        return None
+    if len(data) > MAX_BYTES:
+        problems.append(FileProblem(Place(path), "", "is larger than 1 MiB: no case file"))
+        return None
+    try:
+        text = data.decode().removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        place = _place_at(path, data[: error.start].decode())
+        problems.append(FileProblem(place, "", "is not UTF-8 text"))
+        return None
+    return read_text(text, Place(path, 1, 1), problems)
+
+
+def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | None:
+    """The value of a YAML text, or None; a `start` without a line places everything there."""
+    builder = _Builder(text, start, problems)
+    if odd := ODD_BREAKS.search(text):
+        problems.append(_forbidden(text, odd.start(), start))
+        return None
+    try:
+        return builder.document()
+    except _Unreadable as error:
+        problems.append(error.args[0])
+    except yaml.MarkedYAMLError as error:
+        place = builder.place(error.problem_mark or error.context_mark)
+        hint = "; indent with spaces, not tabs" if "'\\t'" in str(error.problem) else ""
+        problems.append(FileProblem(place, "", f"is no YAML: {cut(str(error.problem), 120)}{hint}"))
+    except yaml.reader.ReaderError as error:
+        problems.append(_forbidden(text, error.position, start))
+    except (ValueError, OverflowError):  # PyYAML on "\UFFFFFFFF" or %YAML 1.999...
+        problems.append(FileProblem(builder.last, "", "is no YAML: a number is too large here"))
+    return None
+
+
+def _forbidden(text: str, position: int, start: Place) -> FileProblem:
+    place = _place_at(start.file, text[:position]) if start.line else start
+    return FileProblem(place, "", f"must not hold the character U+{ord(text[position]):04X}")
+
+
+def _place_at(path: str, before: str) -> Place:
+    """The place that follows the text `before`."""
+    return Place(path, before.count("\n") + 1, len(before) - before.rfind("\n"))
+
+
+def resolved(text: str) -> Any:
+    """What a plain scalar means in the core schema of YAML 1.2."""
+    if text in NULLS:
+        return None
+    if text in BOOLEANS:
+        return BOOLEANS[text]
+    if NOT_FINITE.fullmatch(text):
+        return float(text.replace(".", ""))
+    if INTEGER.fullmatch(text):
+        return _integer(text)
+    return float(text) if REAL.fullmatch(text) else text
+
+
+def _integer(text: str) -> float:
+    """An integer; one beyond any float is infinite, since its digits may be a million."""
+    if text[:2] in ("0o", "0x"):
+        value = int(text, 0)
+        return value if value.bit_length() < 1000 else math.inf
+    return int(text) if len(text) <= 300 else float(text)
+
+
+class _Builder:
+    """Builds nodes out of the parser's events, and notes what a strict reader refuses."""
+
+    def __init__(self, text: str, start: Place, problems: list[FileProblem]):
+        self.start, self.last, self.problems, self.parts = start, start, problems, 0
+        self.events: Iterator[Any] = self._events(text)
+
+    def _events(self, text: str) -> Iterator[Any]:
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            self.parts += 1
+            self.last = self.place(event.start_mark)
+            if self.parts > MAX_PARTS:
+                raise _Unreadable(FileProblem(self.last, "", "is too long to be a case file"))
+            yield event
+
+    def place(self, mark: Any) -> Place:
+        if mark is None or not self.start.line:
+            return self.start
+        return Place(self.start.file, mark.line + 1, mark.column + 1)
+
+    def note(self, event: Any, key: str, message: str) -> None:
+        self.problems.append(FileProblem(self.place(event.start_mark), key, message))
+
+    def document(self) -> Node | None:
+        """The one document of the text."""
+        next(self.events)  # the stream's start
+        opening = next(self.events)
+        if isinstance(opening, yaml.StreamEndEvent):
+            raise _Unreadable(FileProblem(self.start, "", "is empty"))
+        if opening.version not in (None, (1, 2)):
+            self.note(opening, "", "case files are YAML 1.2")
+        node = self.node(next(self.events), "", 0, None)
+        next(self.events)  # the document's end
+        more = next(self.events)
+        if not isinstance(more, yaml.StreamEndEvent):
+            self.note(more, "", "a second document begins here; a case file holds one")
+        return node
+
+    def node(self, event: Any, key: str, depth: int, key_place: Place | None) -> Node:
+        """The value that begins with an event, and all that is in it."""
+        place = self.place(event.start_mark)
+        if depth > MAX_DEPTH:
+            message = f"nested deeper than {MAX_DEPTH} levels"
+            raise _Unreadable(FileProblem(place, key, message))
+        self.refuse_marks(event, key)
+        value: Any = None
+        if isinstance(event, yaml.MappingStartEvent):
+            value = self.mapping(key, depth)
+        elif isinstance(event, yaml.SequenceStartEvent):
+            value = self.sequence(key, depth)
+        elif isinstance(event, yaml.ScalarEvent):
+            value = self.scalar(event, key)
+        return Node(value, place, key_place or place)
+
+    def refuse_marks(self, event: Any, key: str) -> None:
+        """Note an alias, an anchor or a tag."""
+        if isinstance(event, yaml.AliasEvent):
+            self.note(event, key, "aliases (*) are not allowed; write the value out")
+        elif event.anchor is not None:
+            self.note(event, key, "anchors (&) are not allowed; write the value out")
+        elif event.tag is not None:
+            self.note(event, key, "tags (!) are not allowed")
+
+    def scalar(self, event: Any, key: str) -> Any:
+        value = resolved(event.value) if event.style is None else event.value
+        if value is None:
+            self.note(event, key, "has no value; leave the key out to get its default")
+        return value
+
+    def sequence(self, key: str, depth: int) -> list[Node]:
+        items = []
+        while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
+            items.append(self.node(event, key, depth + 1, None))
+        return items
+
+    def mapping(self, owner: str, depth: int) -> dict[str, Node]:
+        entries: dict[str, Node] = {}
+        while not isinstance(event := next(self.events), yaml.MappingEndEvent):
+            name = self.name(event, owner, depth)
+            key = f"{owner}.{name}" if owner and name else name or owner
+            value = self.node(next(self.events), key, depth + 1, self.place(event.start_mark))
+            if name in entries:
+                first = entries[name].key_place
+                where = f" at line {first.line}" if first.line else ""
+                self.note(event, key, f"is given twice; first{where}")
+            elif name is not None:
+                entries[name] = value
+        return entries
+
+    def name(self, event: Any, owner: str, depth: int) -> str | None:
+        """The text of a key, or None if it is refused."""
+        if not isinstance(event, yaml.ScalarEvent):
+            if not isinstance(event, yaml.AliasEvent):
+                self.note(event, owner, "a key must be plain text")
+            self.node(event, owner, depth + 1, None)
+            return None
+        self.refuse_marks(event, owner)
+        if event.value == "<<" and event.style is None:
+            self.note(event, owner, "merge keys (<<) are not allowed; write the values out")
+            return None
+        if not event.value:
+            self.note(event, owner, "a key is missing before the colon")
+            return None
+        return event.value
+
+
+@dataclass(frozen=True)
+class Leaves:
+    """The values of a case file by dotted key, and where each known key and group stands."""
+
+    values: dict[str, Node]
+    places: dict[str, Place]
+
+
+def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
+    """The leaves of a tree; keys that are unknown, or no group where one is due, are problems."""
+    found = Leaves({}, {})
+    for name, node in _known("", root, problems):
+        found.places[name] = node.key_place
+        if name in GROUPS and isinstance(node.value, dict):
+            for inner, item in _known(name, node, problems):
+                found.values[f"{name}.{inner}"] = item
+                found.places[f"{name}.{inner}"] = item.key_place
+        elif name == "friction" and node.value is not False:
+            message = f"needs false or a mapping of keys, not {shown(node.plain())}"
+            problems.append(FileProblem(node.place, name, message))
+        elif name in GROUPS and name not in ("friction", "clearance_mm"):
+            message = f"needs a mapping of keys, not {shown(node.plain())}"
+            problems.append(FileProblem(node.place, name, message))
+        else:
+            found.values[name] = node
+    return found
+
+
+def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tuple[str, Node]]:
+    """The entries of a group (or, for "", of a file) that it may hold and that have a value."""
+    for name, item in node.value.items():
+        if name not in _allowed(group):
+            hint = suggestion(name, group) if len(problems) < MAX_SUGGESTIONS else ""
+            key = f"{group}.{name}" if group else name
+            problems.append(FileProblem(item.key_place, key, "unknown key" + hint))
+        elif item.value is not None:
+            yield name, item
+
+
+def _allowed(group: str) -> list[str]:
+    return [item.name for item in dataclasses.fields(GROUPS[group] if group else Case)]
+
+
+def suggestion(name: str, group: str) -> str:
+    """The end of an error about an unknown key: what was probably meant, if anything."""
+    if name in table():
+        outer, _, inner = name.partition(".")
+        return f"; write {inner} inside {outer}"
+    if name.partition(":")[0] in _allowed(group):
+        return "; put a space after the colon"
+    near = _nearest(name, _allowed(group), cutoff=0.6)
+    if near:
+        return f"; did you mean {group}.{near}?" if group else f"; did you mean {near}?"
+    near = _nearest(name, [_leaf(key) for key in table()], cutoff=0.8)
+    meant = [key for key in table() if _leaf(key) == near]
+    return f"; did you mean {' or '.join(meant)}?" if meant else ""
+
+
+def _leaf(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
+    """The allowed key with another unit, or else the one most alike."""
+    stems = {_stem(key): key for key in reversed(allowed)}
+    for stem in sorted(stems, key=len, reverse=True):
+        if stem != stems[stem] and f"{name}_".startswith(f"{stem}_"):
+            return stems[stem]
+    return next(iter(get_close_matches(name, allowed, n=1, cutoff=cutoff)), None)
+
+
+def _stem(name: str) -> str:
+    """A key's name without its unit."""
+    for row in table().values():
+        if _leaf(row.key) == name and row.unit:
+            unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")
+            return name.removesuffix(f"_{unit}")
+    return name

@@ -1,0 +1,276 @@
+"""The case: what makes it the same job, what it fills in, and what it refuses."""
+
+import copy
+import pickle
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from compressor.case import ACCURACY, Case, table
+from compressor.parameter import JOINTS, CaseError, Problem, shown, to_si
+
+BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
+EXACT_GAS = {"switching": "exact"}
+
+
+def problems_of(values) -> list[tuple[str, str]]:
+    with pytest.raises(CaseError) as caught:
+        Case.from_values(values)
+    return [(problem.key, problem.message) for problem in caught.value.problems]
+
+
+# Identity
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"name": "other"},
+        {"output": {"keep": "metrics"}},
+        {"solve": {"timeout_s": 5}},
+        {"solve": {"duration_s": 0.48, "output_step_s": 1e-4}},
+        {"solve": {"rtol": ACCURACY["standard"]}},
+        {"machine": {"rod_centre_mm": 300, "gravity_m_per_s2": -0.0}},
+        {"load": "design", "joint": "none"},
+    ],
+)
+def test_what_computes_the_same_has_one_key(values):
+    assert Case.from_values(values).key == Case.from_values({}).key
+
+
+@pytest.mark.parametrize("values", [{"solve": {"accuracy": "fine"}}, {"solve": {"method": "BDF"}}])
+def test_how_it_is_solved_changes_the_key_but_not_the_physics(values):
+    case, default = Case.from_values(values), Case.from_values({})
+    assert case.key != default.key
+    assert case.physics_key == default.physics_key
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"machine": {"rod_mass_kg": 4.8}},
+        {"load": "none"},
+        {"friction": False},
+        {"solve": {"settle_rev": 2}},
+        {"solve": {"duration_rev": 5}},
+        {"solve": {"output_step_deg": 0.6}},
+        {"contact": {"materials": ["steel", "steel"]}},
+        BIG_END,
+    ],
+)
+def test_what_computes_something_else_has_another_key(values):
+    assert Case.from_values(values).physics_key != Case.from_values({}).physics_key
+
+
+def test_a_clearance_that_no_joint_has_is_no_part_of_the_key():
+    both = {"joint": "big_end", "clearance_mm": {"big_end": 0.1, "small_end": 0.2}}
+    assert Case.from_values(both).key == Case.from_values(BIG_END).key
+
+
+# What is filled in
+
+
+@pytest.mark.parametrize(
+    ("values", "centre", "inertia"),
+    [
+        ({}, 300.0, 0.141),  # the paper's rod, as a uniform bar
+        ({"machine": {"rod_length_mm": 1200}}, 600.0, 4 * 0.141),
+        ({"machine": {"rod_mass_kg": 9.4}}, 300.0, 2 * 0.141),
+        ({"machine": {"rod_centre_mm": 0, "rod_inertia_kg_m2": 7}}, 0.0, 7.0),
+    ],
+)
+def test_the_rod_is_uniform_unless_told(values, centre, inertia):
+    machine = Case.from_values(values).machine
+    assert machine.rod_centre_mm == centre
+    assert machine.rod_inertia_kg_m2 == pytest.approx(inertia, rel=1e-14)
+
+
+def test_what_stands_in_place_of_a_default_removes_it():
+    contact = {"materials": ["steel", "copper"]}
+    case = Case.from_values({"solve": {"duration_s": 0.48}, "contact": contact})
+    assert case.solve.duration_rev is None
+    assert case.contact.stiffness_N_per_mm15 is None
+    assert case.contact.materials == ("steel", "copper")
+
+
+def test_a_value_of_none_is_the_default():
+    values = {"contact": {"stiffness_N_per_mm15": None}, "solve": {"duration_rev": None}}
+    assert Case.from_values(values) == Case.from_values({})
+
+
+@pytest.mark.parametrize(
+    ("joint", "expected"), [("big_end", (0.1, 0)), ("small_end", (0, 0.1)), ("both", (0.1, 0.1))]
+)
+def test_one_clearance_goes_to_the_joints_that_have_one(joint, expected):
+    clearance = Case.from_values({"joint": joint, "clearance_mm": 0.1}).clearance_mm
+    assert (clearance.big_end, clearance.small_end) == expected
+
+
+def test_times_of_the_paper():
+    case = Case.from_values({})
+    assert (case.turn, case.duration, case.settle) == (0.12, 0.48, 0.12)
+    assert case.steps == pytest.approx(4800, rel=1e-14)
+    assert case.omega == pytest.approx(52.35987755982989, rel=1e-15)
+
+
+def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
+    assert to_si(0.1, "mm") == 1e-4
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("values", "key", "message"),
+    [
+        ({"machine": {"crank_radius_mm": 600}}, "machine.crank_radius_mm", "shorter than the rod"),
+        ({"machine": {"rod_centre_mm": 601}}, "machine.rod_centre_mm", "beyond"),
+        ({"machine": {"rod_mass_kg": 1e6, "rod_length_mm": 1e6}},
+         "machine.rod_inertia_kg_m2", "m L^2 / 12 of the rod: 8.33333e+10 is outside"),
+        ({"joint": "both", "clearance_mm": {"big_end": 1}}, "clearance_mm.small_end", "needed"),
+        ({"joint": "small_end"}, "clearance_mm.small_end", "is needed with joint: small_end"),
+        ({"joint": "big_end", "clearance_mm": 11}, "clearance_mm.big_end", "exceeds the pin"),
+        ({"clearance_mm": 0.1}, "clearance_mm", "no joint to be at"),
+        ({"clearance_mm": {"big_end": 0}}, "clearance_mm", "no joint to be at"),
+        ({"solve": {"duration_s": 0.48, "duration_rev": 4}}, "solve.duration_s", "in place of"),
+        ({"solve": {"output_step_s": 1e-4, "output_step_deg": 0.3}},
+         "solve.output_step_s", "in place of"),
+        ({"solve": {"rtol": 1e-5, "accuracy": "standard"}}, "solve.rtol", "in place of"),
+        ({"contact": {"materials": ["steel", "steel"], "stiffness_N_per_mm15": 1}},
+         "contact.materials", "in place of"),
+        ({"contact": {"materials": ["steel", "steel"], "exponent": 2}},
+         "contact.exponent", "needs exponent 1.5"),
+        ({"friction": {"stiction_velocity_mm_per_s": 100}},
+         "friction.friction_velocity_mm_per_s", "must exceed"),
+        ({"spring": {"stroke_mm": 240}}, "spring.stroke_mm", "less than the piston's stroke"),
+        ({"load": "typical", "gas": {"discharge_MPa": 0.1}}, "gas.discharge_MPa", "must exceed"),
+        ({"load": "typical", "gas": {"exponent": 1.3}}, "gas.switching", "set switching: exact"),
+        ({"load": "typical", "gas": {"discharge_MPa": 10, **EXACT_GAS}},
+         "gas.head_clearance_mm", "never expands"),
+        ({"load": "typical", "gas": {"suction_MPa": 5e-324, **EXACT_GAS}},
+         "gas.head_clearance_mm", "never expands"),
+        ({"solve": {"output_step_deg": 0.7}}, "solve.output_step_deg", "2057.14 output steps"),
+        ({"solve": {"output_step_s": 1}}, "solve.output_step_s", "longer than the duration"),
+        ({"solve": {"output_step_s": 5e-324}}, "solve.output_step_s", "makes inf samples"),
+        ({"solve": {"settle_rev": 4}}, "solve.settle_rev", "leave nothing of a run of 4"),
+    ],
+)  # fmt: skip
+def test_values_that_do_not_fit_each_other(values, key, message):
+    (found,) = problems_of(values)
+    assert found[0] == key
+    assert message in found[1]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"load": "none", "spring": {"stroke_mm": 240}},  # what is not simulated is not checked
+        {"load": "design", "gas": {"discharge_MPa": 0.1}},
+        {"load": "typical", "gas": {"exponent": 1.3, **EXACT_GAS}},
+        {"load": "typical", "gas": {"piston_radius_mm": 60, "back_pressure_MPa": 0.1}},
+        {"friction": False},
+        {"joint": "both", "clearance_mm": 0},
+    ],
+)
+def test_values_that_fit(values):
+    assert Case.from_values(values)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"joint": "top"}, ("joint", "'top' is none of none | big_end | small_end | both")),
+        ({"name": ".hidden"}, ("name", "is no name")),
+        ({"name": 5}, ("name", "needs text, not 5")),
+        ({"machine": {"rod_mass_kg": 0}}, ("machine.rod_mass_kg", "0 is outside (0, 1e+06] kg")),
+        ({"machine": {"rod_mass_kg": True}}, ("machine.rod_mass_kg", "needs a number, not true")),
+        ({"machine": {"rod_mass_kg": 10**400}}, ("machine.rod_mass_kg", "must be finite")),
+        ({"solve": {"max_steps": float("inf")}}, ("solve.max_steps", "must be finite")),
+        ({"solve": {"max_steps": 1.5}}, ("solve.max_steps", "needs a whole number, not 1.5")),
+        ({"contact": {"materials": ["steel"]}}, ("contact.materials", "needs a pair")),
+        ({"contact": {"materials": ["steel", "tin"]}}, ("contact.materials", "material 'tin'")),
+        ({"machine": 5}, ("machine", "needs a mapping of keys, not 5")),
+        ({"machine": {"colour": 5}}, ("machine.colour", "unknown key")),
+        ({"colour": 5}, ("colour", "unknown key")),
+    ],
+)
+def test_a_value_that_is_wrong_alone(values, expected):
+    (found,) = problems_of(values)
+    assert found[0] == expected[0]
+    assert expected[1] in found[1]
+
+
+def test_everything_wrong_is_told_at_once():
+    found = problems_of({"load": "x", "machine": {"rod_mass_kg": -1, "colour": 1}, "zzz": 1})
+    assert [key for key, _ in found] == [
+        "load",
+        "machine.colour",
+        "machine.rod_mass_kg",
+        "zzz",
+    ]
+
+
+def test_an_error_survives_the_way_between_processes():
+    error = CaseError([Problem("load", "is heavy")])
+    copied = pickle.loads(pickle.dumps(error))
+    assert (str(copied), copied.problems) == ("load: is heavy", error.problems)
+
+
+def test_quoted_values_cannot_write_to_a_terminal():
+    assert shown("\x1b[31m") == r"'\x1b[31m'"
+    assert len(shown("x" * 10_000)) <= 60
+
+
+# Values
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        BIG_END,
+        {"joint": "both", "clearance_mm": {"big_end": 0.1, "small_end": 0.2}},
+        {"friction": False},
+        {"solve": {"rtol": 1e-8}},
+        {"solve": {"duration_s": 0.48, "output_step_s": 1e-4}},
+        {"contact": {"materials": ["steel", "copper"]}},
+    ],
+)
+def test_values_read_back_to_an_equal_case(values):
+    case = Case.from_values(values)
+    plain = case.values()
+    assert Case.from_values(copy.deepcopy(plain)) == case
+    assert Case.from_values(plain).key == case.key
+
+
+def test_the_defaults_are_valid():
+    wrong = [key for key, row in table().items() if row.check(row.default) and not row.optional]
+    assert wrong == []
+
+
+def test_clearances_have_a_row_for_each_joint():
+    assert [f"clearance_mm.{joint}" for joint in JOINTS] == [
+        key for key in table() if key.startswith("clearance_mm")
+    ]
+
+
+NUMBERS = [key for key, row in table().items() if row.kind in ("number", "integer")]
+
+
+@given(
+    st.sampled_from(["none", "big_end", "both"]),
+    st.dictionaries(st.sampled_from(NUMBERS), st.floats() | st.integers(), max_size=4),
+)
+def test_any_number_is_either_refused_or_reads_back(joint, numbers):
+    values: dict = {"load": "typical", "joint": joint, "gas": dict(EXACT_GAS)}
+    if joint != "none":
+        values["clearance_mm"] = {"big_end": 0.1, "small_end": 0.1}
+    for key, number in numbers.items():
+        group, _, name = key.partition(".")
+        values.setdefault(group, {})[name] = number
+    try:
+        case = Case.from_values(values)
+    except CaseError:
+        return
+    assert Case.from_values(case.values()) == case

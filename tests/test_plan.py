@@ -1,0 +1,581 @@
+"""Case files to jobs: what a file means, how axes multiply, and where every mistake is shown."""
+
+import itertools
+import os
+import pickle
+import subprocess
+import sys
+import time
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from compressor.case import Case, table
+from compressor.parameter import parameter_table
+from compressor.plan import Axis, CaseFileError, load_cases, load_studies, to_yaml
+from compressor.reading import MAX_BYTES, resolved
+
+BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
+one_file = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=3000)
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    """Write a case file; its path is relative, so that messages begin with its bare name."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(text: str | bytes, name: str = "case.yaml") -> str:
+        (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+        return name
+
+    return write
+
+
+def mistakes(*paths, overrides=()) -> list[str]:
+    with pytest.raises(CaseFileError) as caught:
+        load_studies(*paths, overrides=overrides)
+    return str(caught.value).split("\n")
+
+
+# What a scalar means: the core schema of YAML 1.2
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e5", 1e5), ("3.36e5", 3.36e5), ("+5", 5), ("-.5", -0.5), ("5.", 5.0), ("1E-2", 0.01),
+        ("010", 10), ("0o17", 15), ("0x10", 16), ("true", True), ("FALSE", False),
+        ("no", "no"), ("yes", "yes"), ("on", "on"), ("off", "off"), ("1:30", "1:30"),
+        ("1_000", "1_000"), ("0b11", "0b11"), ("2024-01-01", "2024-01-01"), ("-0x10", "-0x10"),
+        ("inf", "inf"), ("nan", "nan"), (".", "."), ("e5", "e5"), ("tRUE", "tRUE"), ("٣", "٣"),
+        ("-.inf", float("-inf")), ("9" * 400, float("inf")), ("0x" + "f" * 400, float("inf")),
+        ("0" * 400 + "7", 7.0), ("~", None), ("null", None), ("", None),
+    ],
+)  # fmt: skip
+def test_plain_scalars_follow_yaml_1_2(text, value):
+    assert resolved(text) == value
+    assert type(resolved(text)) is type(value)
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())
+def test_numbers_read_as_python_writes_them(number):
+    assert resolved(repr(number)) == number
+
+
+# What a file means
+
+
+def test_an_empty_mapping_is_the_default_case(write):
+    (case,) = load_cases(write("{}", "paper.yaml"))
+    assert case == Case.from_values({"name": "paper"})
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("load: none\n", {"load": "none"}),
+        ("friction: false\n", {"friction": False}),
+        (BIG_END, {"joint": "big_end", "clearance_mm": 0.1}),
+        ("joint: both\nclearance_mm: {big_end: 1, small_end: 2}\n",
+         {"joint": "both", "clearance_mm": {"big_end": 1, "small_end": 2}}),
+        ("contact: {materials: [steel, copper]}\n",
+         {"contact": {"materials": ["steel", "copper"]}}),
+        ("\ufeffcontact:\r\n  stiffness_N_per_mm15: 1e5\r\n",
+         {"contact": {"stiffness_N_per_mm15": 100000}}),
+        ("%YAML 1.2\n---\nmachine:\n  speed_rpm: 0x10 # hex\n...\n",
+         {"machine": {"speed_rpm": 16}}),
+        ("name: no\n", {"name": "no"}),
+        ('"name": "1e5"\n', {"name": "1e5"}),
+        ("name: >-\n  folded\n", {"name": "folded"}),
+    ],
+)  # fmt: skip
+def test_a_file_without_lists_is_one_case(write, text, values):
+    (case,) = load_cases(write(text))
+    assert case == Case.from_values({"name": "case"} | values)
+
+
+def test_a_study_is_named_by_its_file_or_itself(write):
+    paths = [write("{}", "one.yaml"), write("name: TWO", "other.yaml")]
+    studies = load_studies(*paths)
+    assert [(s.name, s.path, s.cases[0].name) for s in studies] == [
+        ("one", "one.yaml", "one"),
+        ("TWO", "other.yaml", "TWO"),
+    ]
+
+
+# Axes
+
+
+def test_axes_multiply_in_the_order_of_the_file(write):
+    text = "machine: {rod_mass_kg: [3, 4, 5]}\njoint: both\nclearance_mm: [0.1, 0.2]\n"
+    (study,) = load_studies(write(text))
+    assert study.axes == (
+        Axis("machine.rod_mass_kg", (3.0, 4.0, 5.0)),
+        Axis("clearance_mm", (0.1, 0.2)),
+    )
+    found = [(c.machine.rod_mass_kg, c.clearance_mm.small_end) for c in study.cases]
+    assert found == list(itertools.product((3.0, 4.0, 5.0), (0.1, 0.2)))
+
+
+@pytest.mark.parametrize(
+    ("text", "axes"),
+    [
+        (BIG_END, []),
+        ("load: [none]\n", [("load", ("none",))]),
+        ("joint: both\nclearance_mm: {small_end: [1, 2], big_end: 3}\n",
+         [("clearance_mm.small_end", (1.0, 2.0))]),
+        ("contact: {materials: [[steel, steel], [steel, copper]]}\n",
+         [("contact.materials", (("steel", "steel"), ("steel", "copper")))]),
+        ("solve: {max_steps: [1e3, 2000]}\n", [("solve.max_steps", (1000, 2000))]),
+    ],
+)  # fmt: skip
+def test_every_list_is_an_axis(write, text, axes):
+    (study,) = load_studies(write(text))
+    assert [(axis.key, axis.values) for axis in study.axes] == axes
+
+
+def test_a_swept_joint_has_clearance_only_where_it_is(write):
+    text = "joint: [none, big_end, small_end, both]\nclearance_mm: 0.1\n"
+    (study,) = load_studies(write(text))
+    assert study.axes[0].key == "joint"
+    clearances = [(c.clearance_mm.big_end, c.clearance_mm.small_end) for c in study.cases]
+    assert clearances == [(0, 0), (0.1, 0), (0, 0.1), (0.1, 0.1)]
+
+
+def test_an_ideal_machine_is_one_job_however_often_it_is_swept(write):
+    cases = load_cases(write("joint: [none, big_end]\nclearance_mm: [0.1, 0.2]\n"))
+    assert len(cases) == 4
+    assert len({case.key for case in cases}) == 3
+
+
+def numbers(count: int) -> str:
+    return str(list(range(1, count + 1)))
+
+
+def test_ten_thousand_jobs_are_the_most(write):
+    machine = "machine: {{rod_mass_kg: {}, reciprocating_mass_kg: {}}}\n"
+    assert len(load_cases(write(machine.format(numbers(100), numbers(100))))) == 10_000
+    text = machine.format(numbers(100), numbers(101))
+    assert mistakes(write(text)) == [
+        f"case.yaml:1:{text.rindex('[') + 1}: machine.reciprocating_mass_kg: 10100 jobs are more "
+        "than 10000: machine.rod_mass_kg (100) x machine.reciprocating_mass_kg (101)"
+    ]
+
+
+def test_jobs_beyond_counting_are_refused_at_once(write):
+    keys = [k for k, row in table().items() if k.startswith(("machine.", "initial_offset_mm."))]
+    groups: dict[str, list[str]] = {}
+    for key in keys:
+        group, _, name = key.partition(".")
+        groups.setdefault(group, []).append(f"  {name}: {numbers(500)}\n")
+    text = "".join(f"{group}:\n" + "".join(lines) for group, lines in groups.items())
+    (message,) = mistakes(write(text))
+    assert f"{500 ** len(keys)} jobs are more than 10000" in message
+
+
+# Mistakes
+
+
+def test_ten_mistakes_are_ten_messages(write):
+    text = """\
+name: two words
+load: desing
+joint: [none, big_end, big_end]
+clearance_mm: [0.1, 1001]
+machine:
+  rod_mass: 5
+  speed_rpm: fast
+  speed_rpm: 500
+spring: &soft {stiffness_N_per_mm: .inf}
+qqq: wet
+"""
+    assert mistakes(write(text)) == [
+        "case.yaml:1:7: name: 'two words' is no name: "
+        "use [A-Za-z0-9._-], at most 64, no leading dot",
+        "case.yaml:2:7: load: 'desing' is none of design | typical | none",
+        "case.yaml:3:24: joint: 'big_end' is in the list twice",
+        "case.yaml:4:21: clearance_mm: 1001 is outside [0, 1000] mm",
+        "case.yaml:6:3: machine.rod_mass: unknown key; did you mean machine.rod_mass_kg?",
+        "case.yaml:7:14: machine.speed_rpm: needs a number, not 'fast'",
+        "case.yaml:8:3: machine.speed_rpm: is given twice; first at line 7",
+        "case.yaml:9:9: spring: anchors (&) are not allowed; write the value out",
+        "case.yaml:9:36: spring.stiffness_N_per_mm: must be finite",
+        "case.yaml:10:1: qqq: unknown key",
+    ]
+
+
+def test_mistakes_of_all_files_are_told_at_once(write):
+    paths = [write("load: x\n", "b.yaml"), "missing.yaml", write("\n- 1\n", "a.yaml")]
+    assert mistakes(*paths, overrides=["joint=y"]) == [
+        "--set joint=y: joint: 'y' is none of none | big_end | small_end | both",
+        "a.yaml:2:1: needs keys at the top, such as `joint: big_end`",
+        "b.yaml:1:7: load: 'x' is none of design | typical | none",
+        "missing.yaml: cannot be read: No such file or directory",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "1:1: is empty"),
+        ("# nothing\n", "1:1: is empty"),
+        ("12\n", "1:1: needs keys at the top, such as `joint: big_end`"),
+        ("joint: none\n---\njoint: none\n", "2:1: a second document begins here; "
+         "a case file holds one"),
+        ("%YAML 1.1\n---\nload: none\n", "1:1: case files are YAML 1.2"),
+        ("load: none\n\tjoint: none\n", "2:1: is no YAML: found character '\\t' that cannot "
+         "start any token; indent with spaces, not tabs"),
+        ("load: [none\n", "2:1: is no YAML: expected ',' or ']', but got '<stream end>'"),
+        ('name: "\\UFFFFFFFF"\n', "1:1: is no YAML: a number is too large here"),
+        ("load: none\nname: \x07\n", "2:7: must not hold the character U+0007"),
+        ("load: none # \u2028joint: both\n", "1:14: must not hold the character U+2028"),
+        (b"load: none\nname: \xff\n", "2:7: is not UTF-8 text"),
+        ("load: none\n".encode("utf-16"), "1:1: is not UTF-8 text"),
+        ("load: ~\n", "1:7: load: has no value; leave the key out to get its default"),
+        ("load:\n", "1:6: load: has no value; leave the key out to get its default"),
+        ("load: !!str none\n", "1:7: load: tags (!) are not allowed"),
+        ("load: ! none\n", "1:7: load: tags (!) are not allowed"),
+        ("<<: {load: none}\n", "1:1: merge keys (<<) are not allowed; write the values out"),
+        ("? [load]\n: none\n", "1:3: a key must be plain text"),
+        ('"": none\n', "1:1: a key is missing before the colon"),
+        ("load: none\nload: none\n", "2:1: load: is given twice; first at line 1"),
+        ("{load: *a}\n", "1:8: load: aliases (*) are not allowed; write the value out"),
+        ("load: {linspace: [1, 2, 3]}\n", "1:7: load: needs a value or a list of values, "
+         "not a mapping"),
+        ("load: []\n", "1:7: load: is an empty list"),
+        ("load: [none, [none]]\n", "1:14: load: needs text, not ['none']"),
+        ("name: [a, b]\n", "1:7: name: cannot be swept: it does not change what a job computes"),
+        ("machine: 5\n", "1:10: machine: needs a mapping of keys, not 5"),
+        ("friction: true\n", "1:11: friction: needs false or a mapping of keys, not true"),
+        ("friction: [false]\n", "1:11: friction: needs false or a mapping of keys, not [False]"),
+        ("contact: {materials: steel}\n", "1:22: contact.materials: needs a pair of materials, "
+         "such as [steel, steel]"),
+        ("contact: {materials: [[steel, steel], [steel, tin]]}\n",
+         "1:39: contact.materials: unknown material 'tin'; known: steel, copper"),
+        ("solve: {max_steps: [1, 1.0]}\n", "1:24: solve.max_steps: 1 is in the list twice"),
+        ("machine: {speed_rpm: " + "9" * 5000 + "}\n", "1:22: machine.speed_rpm: must be finite"),
+    ],
+)  # fmt: skip
+def test_one_mistake_is_one_message(write, text, expected):
+    assert mistakes(write(text)) == [f"case.yaml:{expected}"]
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("laod: none", "; did you mean load?"),
+        ("clearance: 1", "; did you mean clearance_mm?"),
+        ("machine: {rod_mass: 1}", "; did you mean machine.rod_mass_kg?"),
+        ("machine: {rod_mass_g: 1}", "; did you mean machine.rod_mass_kg?"),
+        ("machine: {speed_hz: 1}", "; did you mean machine.speed_rpm?"),
+        ("contact: {stiffness: 1}", "; did you mean contact.stiffness_N_per_mm15?"),
+        ("spring: {stiffness: 1}", "; did you mean spring.stiffness_N_per_mm?"),
+        ("solve: {duration: 1}", "; did you mean solve.duration_rev?"),
+        ("accuracy: fine", "; did you mean solve.accuracy?"),
+        ("rod_mass: 1", "; did you mean machine.rod_mass_kg?"),
+        ("exponent: 1", "; did you mean gas.exponent or contact.exponent?"),
+        ("solve.accuracy: fine", "; write accuracy inside solve"),
+        ("machine: {speed_rpm:500: 1}", "; put a space after the colon"),
+        ("qqq: 1", ""),
+    ],
+)
+def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):
+    (message,) = mistakes(write(text))
+    assert message.partition("unknown key")[2] == hint
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("clearance_mm: [1, 2, 3]\n",
+         ["1:16: clearance_mm: has no joint to be at; set joint, or leave it out"]),
+        ("joint: [none, both]\nclearance_mm: {big_end: 1}\n",
+         ["2:1: clearance_mm.small_end: is needed with joint: both"]),
+        ("\njoint: both\n", ["1:1: clearance_mm.big_end: is needed with joint: both",
+                             "1:1: clearance_mm.small_end: is needed with joint: both"]),
+        ("joint: both\nclearance_mm: [9, 11, 12]\n",
+         ["2:19: clearance_mm: 11 mm exceeds the pin radius, 10 mm",
+          "2:23: clearance_mm: 12 mm exceeds the pin radius, 10 mm"]),
+        ("spring:\n  stroke_mm: [100, 250]\nsolve: {rtol: 1e-5, accuracy: [fine, draft]}\n",
+         ["2:20: spring.stroke_mm: must be less than the piston's stroke, 240 mm",
+          "3:15: solve.rtol: stands in place of solve.accuracy: give one of the two"]),
+        ("load: typical\ngas: {exponent: 1.3}\n",
+         ["2:1: gas.switching: the printed corners hold for the paper's geometry and pressures "
+          "only; set switching: exact"]),
+    ],
+)  # fmt: skip
+def test_values_that_do_not_fit_are_told_once_where_they_stand(write, text, expected):
+    assert mistakes(write(text)) == [f"case.yaml:{line}" for line in expected]
+
+
+def test_a_sweep_full_of_conflicts_is_cut_short(write):
+    text = "machine: {rod_length_mm: %s, crank_radius_mm: %s}\nload: none\n"
+    found = mistakes(write(text % (numbers(30), numbers(30))))
+    assert found[0] == "case.yaml: 465 conflicts between swept values; the first 20 are"
+    assert len(found) == 21
+
+
+def test_names_decide_where_a_study_is_stored(write):
+    paths = [write("name: Same", "a.yaml"), write("{}", "same.yaml"), write("{}", "a b.yaml")]
+    assert mistakes(*paths) == [
+        "a b.yaml:1:1: name: the file's name gives none: 'a b' is no name: "
+        "use [A-Za-z0-9._-], at most 64, no leading dot; set name",
+        "same.yaml:1:1: name: a.yaml and same.yaml would be stored under one name, same",
+    ]
+
+
+# Overrides
+
+
+@pytest.mark.parametrize(
+    ("text", "overrides", "same_as"),
+    [
+        ("{}", ["machine.rod_mass_kg=5"], "machine: {rod_mass_kg: 5}"),
+        ("machine: {rod_mass_kg: [3, 4], speed_rpm: 400}", ["machine.rod_mass_kg = 5"],
+         "machine: {rod_mass_kg: 5, speed_rpm: 400}"),
+        ("machine: {rod_mass_kg: 4}", ["machine={speed_rpm: 400}"], "machine: {speed_rpm: 400}"),
+        ("load: [design, none]\nfriction: {static: [0.2, 0.3]}", ["load=[none, design]"],
+         "load: [none, design]\nfriction: {static: [0.2, 0.3]}"),
+        (BIG_END, ["clearance_mm=[0.2, 0.3]"], "joint: big_end\nclearance_mm: [0.2, 0.3]"),
+        ("joint: both\nclearance_mm: [1, 2]", ["clearance_mm.big_end=3"],
+         "joint: both\nclearance_mm: {big_end: 3, small_end: [1, 2]}"),
+        (BIG_END, ["joint=none"], "joint: none"),
+        (BIG_END, ["joint=[none, both]"], "joint: [none, both]\nclearance_mm: 0.1"),
+        ("friction: {static: 0.3}", ["friction=false"], "friction: false"),
+        ("friction: false", ["friction.static=0.3"], "friction: {static: 0.3}"),
+        ("solve: {accuracy: fine}", ["solve.rtol=1e-5"], "solve: {rtol: 1e-5}"),
+        ("solve: {duration_s: 0.24}", ["solve.duration_rev=6"], "solve: {duration_rev: 6}"),
+        ("load: none", ["name=other", "contact.materials=[steel, steel]"],
+         "load: none\nname: other\ncontact: {materials: [steel, steel]}"),
+    ],
+)  # fmt: skip
+def test_an_override_stands_in_place_of_the_files_value(write, text, overrides, same_as):
+    (study,) = load_studies(write(text), overrides=overrides)
+    (expected,) = load_studies(write(same_as))
+    assert (study.axes, study.cases) == (expected.axes, expected.cases)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (["joint"], "--set joint: needs the form key=value, such as joint=both"),
+        (["=both"], "--set =both: needs the form key=value, such as joint=both"),
+        (["joint="], "--set joint=: is empty"),
+        (["joint=[none"], "--set joint=[none: is no YAML: expected ',' or ']', "
+         "but got '<stream end>'"),
+        (["accuracy=fine"], "--set accuracy=fine: accuracy: unknown key; "
+         "did you mean solve.accuracy?"),
+        (["machine.rod_mass_kg=x"], "--set machine.rod_mass_kg=x: machine.rod_mass_kg: "
+         "needs a number, not 'x'"),
+        (["machine.rod.mass=1"], "--set machine.rod.mass=1: machine.rod.mass: unknown key; "
+         "did you mean machine.rod_mass_kg?"),
+        (["joint=none", "joint=both"], "--set joint=both: joint: is set twice"),
+        (["gas={exponent: 1}", "gas.exponent=1"], "--set gas.exponent=1: gas.exponent: "
+         "is set twice"),
+        (["gas.exponent=1", "gas={exponent: 1}"], "--set gas={exponent: 1}: gas: is set twice"),
+        (["clearance_mm=[1, 11]"], "--set clearance_mm=[1, 11]: clearance_mm: "
+         "11 mm exceeds the pin radius, 10 mm"),
+        (["name=x"], "--set name=x: name: a.yaml and b.yaml would be stored under one name, x"),
+    ],
+)  # fmt: skip
+def test_a_wrong_override_is_told_once(write, overrides, expected):
+    paths = [write(BIG_END, "a.yaml"), write(BIG_END, "b.yaml")]
+    assert mistakes(*paths, overrides=overrides) == [expected]
+
+
+def test_what_an_override_breaks_is_told_where_the_file_could_mend_it(write):
+    path = write("load: typical\ngas: {piston_radius_mm: 60}\n")
+    (message,) = mistakes(path, overrides=["gas.exponent=1.3"])
+    assert message.startswith("case.yaml:2:1: gas.switching: the printed corners hold for")
+
+
+# Hostile files
+
+
+def hostile(unit: str, before: str = "", after: str = "") -> str:
+    return before + unit * ((MAX_BYTES - len(before + after)) // len(unit)) + after
+
+
+@pytest.mark.parametrize(
+    ("text", "end"),
+    [
+        ("a: &a [x]\n" + "".join(f"{c}: &{c} [*a, *a]\n" for c in "bcdef"), "write the value out"),
+        ("[" * 5000, "nested deeper than 20 levels"),
+        (hostile("["), "nested deeper than 20 levels"),
+        (hostile("{"), "nested deeper than 20 levels"),
+        (hostile("- "), "nested deeper than 20 levels"),
+        (hostile("1,", "machine: {rod_mass_kg: [", "]}"), "is too long to be a case file"),
+        (hostile("k,", "machine: {", "}"), "is too long to be a case file"),
+        (hostile("9", "machine: {speed_rpm: ", "}"), "must be finite"),
+        (hostile("x", "name: "), "no leading dot"),
+        ("#" * (MAX_BYTES + 1), "is larger than 1 MiB: no case file"),
+    ],
+    ids=lambda value: value[:12],
+)
+def test_a_hostile_file_is_refused_soon(write, text, end):
+    path = write(text)
+    start = time.perf_counter()
+    assert mistakes(path)[-1].endswith(end)
+    assert time.perf_counter() - start < 30  # about 2 s on one slow core
+
+
+def test_an_alias_bomb_does_not_unfold(write):
+    text = "a0: &a0 x\n" + "".join(f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]\n" for i in range(1, 60))
+    found = mistakes(write(text))
+    assert len([line for line in found if "aliases (*)" in line]) == 2 * 59
+
+
+@pytest.mark.parametrize(
+    "text", ['"\\e[31m": 1', 'name: "\\e]0;owned\\a"', 'load: ["\\u202E"]', '"\\uD800": 1']
+)
+def test_a_hostile_file_cannot_write_to_the_terminal(write, text):
+    (message,) = mistakes(write(text))
+    assert message.isprintable()
+
+
+def test_a_hostile_file_name_cannot_either(write):
+    assert mistakes("\x1b[31m.yaml") == [
+        "\\x1b[31m.yaml: cannot be read: No such file or directory"
+    ]
+
+
+def test_long_keys_and_values_are_cut(write):
+    found = mistakes(write(f"{'k' * 500}: 1\nload: {'v' * 500}\n"))
+    assert all(len(line) < 140 for line in found)
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [(".", "Is a directory"), ("nul\0", "embedded null byte"), ("/dev/zero", "larger than 1 MiB")],
+)
+def test_what_is_no_file_is_a_located_problem(path, message):
+    (found,) = mistakes(path)
+    assert message in found
+
+
+def test_an_error_survives_the_way_between_processes(write):
+    with pytest.raises(CaseFileError) as caught:
+        load_cases(write("load: x"))
+    copied = pickle.loads(pickle.dumps(caught.value))
+    assert (str(copied), copied.problems) == (str(caught.value), caught.value.problems)
+
+
+WORDS = "joint load none both clearance_mm machine rod_mass_kg friction false contact materials"
+SIGNS = "steel 0.1 -1 1e400 ~ null &a *a !t << ? : - [ ] { } , | > ' \" % # --- ... \\UFFFFFFFF"
+GAPS = [": ", "- ", "\n", "\n  ", "\t", " ", "%YAML 1.3\n"]
+YAMLISH = st.lists(st.sampled_from([*WORDS.split(), *SIGNS.split(), *GAPS]), max_size=40)
+
+
+def refusal(path: str, *overrides: str) -> CaseFileError | None:
+    try:
+        load_studies(path, overrides=overrides)
+    except CaseFileError as error:
+        return error
+    return None
+
+
+@one_file
+@given(st.text() | st.binary() | YAMLISH.map("".join) | YAMLISH.map(" ".join))
+def test_any_file_is_read_or_refused(write, text):
+    content = text.encode(errors="replace") if isinstance(text, str) else text
+    error = refusal(write(content))
+    assert error is None or error.problems
+    for problem in error.problems if error else ():
+        assert str(problem).isprintable()
+        assert problem.place.line <= content.count(b"\n") + content.count(b"\r") + 2
+
+
+@one_file
+@given(st.text() | YAMLISH.map("".join).map("joint=".__add__))
+def test_any_override_is_read_or_refused(write, text):
+    error = refusal(write(BIG_END), text)
+    for problem in error.problems if error else ():
+        assert str(problem).startswith(("--set ", "case.yaml:"))
+
+
+# Writing a case
+
+
+def near(row):
+    """Values so near a row's default that they fit those of all other rows."""
+    if row.kind == "choice":
+        return st.sampled_from(row.choices)
+    if row.kind == "integer":
+        return st.integers(1, 10**12)
+    if not row.default:
+        return st.floats(0, 1, exclude_min=row.above)
+    return st.floats(0.95 * row.default, 1.05 * row.default)
+
+
+def group(name: str, *left_out: str):
+    rows = {k.partition(".")[2]: row for k, row in table().items() if k.startswith(f"{name}.")}
+    optional = {key: near(row) for key, row in rows.items() if key not in left_out}
+    return st.fixed_dictionaries({}, optional=optional)
+
+
+TIMES = [
+    {"duration_rev": 3, "output_step_deg": 0.5},
+    {"duration_s": 0.6, "output_step_s": 1e-4, "settle_rev": 0},
+]
+SOLVES = [{"accuracy": "draft"}, {"rtol": 1e-7}, {"method": "BDF", "max_steps": 7}]
+CASES = st.fixed_dictionaries(
+    {"name": st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", fullmatch=True)},
+    optional={
+        "load": st.sampled_from(["design", "typical", "none"]),
+        "initial_offset_mm": group("initial_offset_mm"),
+        "machine": group("machine"),
+        "gas": group("gas", "switching").map(lambda gas: gas | {"switching": "exact"}),
+        "spring": group("spring"),
+        "contact": group("contact", "materials", "exponent")
+        | st.just({"materials": ["steel", "copper"]}),
+        "friction": st.just(False) | group("friction"),
+        "solve": st.sampled_from([a | b for a in TIMES for b in SOLVES]),
+        "output": group("output"),
+    },
+)
+JOINTS = st.just({}) | st.fixed_dictionaries(
+    {
+        "joint": st.sampled_from(["big_end", "small_end", "both"]),
+        "clearance_mm": st.fixed_dictionaries(
+            dict.fromkeys(("big_end", "small_end"), st.floats(0, 5))
+        ),
+    }
+)
+
+
+@one_file
+@given(CASES, JOINTS)
+def test_a_case_reads_back_from_its_yaml(write, values, joints):
+    if values.get("load") == "typical":
+        values.setdefault("gas", {"switching": "exact"})
+    case = Case.from_values(values | joints)
+    (again,) = load_cases(write(to_yaml(case)))
+    assert again == case
+    assert again.key == case.key
+
+
+def test_what_is_written_stays_readable():
+    assert to_yaml(Case()).startswith("name: case\nload: design\njoint: none\ninitial_offset_mm:\n")
+
+
+# The table, and the house
+
+
+def test_the_table_has_a_row_for_every_key_and_six_columns():
+    lines = parameter_table(table().values()).splitlines()
+    assert [line.split("`")[1] for line in lines[2:]] == list(table())
+    assert {line.replace("\\|", "").count("|") for line in lines} == {7}
+    row = "| `machine.rod_mass_kg` | kg | 4.7 | (0, 1e+06] |"
+    assert any(line.startswith(row) for line in lines)
+
+
+def test_reading_needs_no_heavy_library():
+    code = "import sys, compressor.plan; print({'numpy', 'scipy', 'numba'} & set(sys.modules))"
+    run = [sys.executable, "-c", code]
+    assert subprocess.run(run, capture_output=True, text=True, check=True).stdout == "set()\n"
+
+
+def test_paths_may_be_of_any_kind(write, tmp_path):
+    path = write(BIG_END)
+    assert load_cases(tmp_path / path) == load_cases(path) == load_cases(os.fsencode(path))
