@@ -101,7 +101,7 @@ class Derivative:
     def __call__(self, t: float, z: np.ndarray) -> np.ndarray:
         self.z[:] = z
         out = np.empty_like(self.z)
-        derivative_with_flows(t, self.z, self.phase, self.p, self.row, out)
+        derivative_with_flows(t, self.z, self.phase, self.p, out)
         self.evaluations += 1
         if math.isfinite(out.sum()):
             self.bad = 0

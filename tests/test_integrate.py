@@ -71,8 +71,8 @@ def test_the_audit_sees_a_lost_flow(monkeypatch):
     from compressor import integrate
     from compressor.physics.observe import derivative_with_flows
 
-    def lossless(t, z, phase, p, row, out):
-        derivative_with_flows(t, z, phase, p, row, out)
+    def lossless(t, z, phase, p, out):
+        derivative_with_flows(t, z, phase, p, out)
         out[-2] = 0.0
 
     monkeypatch.setattr(integrate, "derivative_with_flows", lossless)

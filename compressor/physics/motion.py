@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 from compressor.physics._jit import jit
-from compressor.physics.contact import joint_contact
-from compressor.physics.kinematics import ideal
+from compressor.physics.contact import Contact, joint_contact
+from compressor.physics.kinematics import Motion, ideal
 from compressor.physics.loads import piston_force
 from compressor.physics.parameters import BIG_END as AT_BIG_END
 from compressor.physics.parameters import SMALL_END as AT_SMALL_END
@@ -21,6 +21,7 @@ from compressor.physics.parameters import Scene
 BIG_END = int(Scene.BIG_END)
 SMALL_END = int(Scene.SMALL_END)
 BOTH = int(Scene.BOTH)
+NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Turn(NamedTuple):
@@ -165,32 +166,66 @@ def ideal_centre_acceleration(motion, p):
     return -pin * motion.cos_theta - ax, ay - pin * motion.sin_theta
 
 
+class Instant(NamedTuple):
+    """Everything the forces and accelerations at one time and state depend on, evaluated once."""
+
+    motion: Motion
+    turn: Turn
+    load: float
+    big: Contact
+    small: Contact
+    a: float  # crosshead's acceleration
+    spin_up: float  # second derivative of phi
+    centre_x: float  # rod centre's acceleration; 0 unless it is an unknown of the scene
+    centre_y: float
+
+
+@jit
+def evaluate(t, y, phase, p):
+    """The `Instant` at time t (s) and state y, in the load's phase; y is zeros (4) when ideal."""
+    motion = ideal(t, p)
+    n = y.size // 2
+    turn = turned(motion, y[n - 1], y[2 * n - 1])
+    load = load_force(phase, y, motion, p)
+    big = NO_CONTACT
+    small = NO_CONTACT
+    a = motion.a
+    spin_up = motion.spin_up
+    centre_x = 0.0
+    centre_y = 0.0
+    if p.scene == BIG_END:
+        big = contact_big_end(y, motion, turn, p)
+        a, spin_up = solve_big_end(y, motion, turn, load, big, p)
+    elif p.scene == SMALL_END:
+        small = contact_small_end(y, motion, turn, p)
+        a, spin_up = solve_small_end(motion, turn, load, small, p)
+    elif p.scene == BOTH:
+        big, small = contacts_both(y, motion, turn, p)
+        a, centre_x, centre_y, spin_up = solve_both(motion, turn, load, big, small, p)
+    return Instant(motion, turn, load, big, small, a, spin_up, centre_x, centre_y)
+
+
+@jit
+def write_derivative(now, y, p, out):
+    """Write dy/dt at an evaluated instant into out."""
+    n = y.size // 2
+    for i in range(n):
+        out[i] = y[n + i]
+    out[n] = now.a - now.motion.a
+    if p.scene == BOTH:
+        ideal_x, ideal_y = ideal_centre_acceleration(now.motion, p)
+        out[n + 1] = now.centre_x - ideal_x
+        out[n + 2] = now.centre_y - ideal_y
+    out[2 * n - 1] = now.spin_up - now.motion.spin_up
+
+
 @jit
 def derivative(t, y, phase, p, out):
     """Write dy/dt of the record's scene into `out`.
 
     y and out: length 4 (one clearance joint) or 8 (both); `phase`: the load's phase, 0 to 3.
     """
-    motion = ideal(t, p)
-    load = load_force(phase, y, motion, p)
-    n = y.size // 2
-    turn = turned(motion, y[n - 1], y[2 * n - 1])
-    for i in range(n):
-        out[i] = y[n + i]
-    if p.scene == BIG_END:
-        contact = contact_big_end(y, motion, turn, p)
-        a, spin_up = solve_big_end(y, motion, turn, load, contact, p)
-    elif p.scene == SMALL_END:
-        contact = contact_small_end(y, motion, turn, p)
-        a, spin_up = solve_small_end(motion, turn, load, contact, p)
-    else:
-        big, small = contacts_both(y, motion, turn, p)
-        a, centre_x, centre_y, spin_up = solve_both(motion, turn, load, big, small, p)
-        ideal_x, ideal_y = ideal_centre_acceleration(motion, p)
-        out[n + 1] = centre_x - ideal_x
-        out[n + 2] = centre_y - ideal_y
-    out[n] = a - motion.a
-    out[2 * n - 1] = spin_up - motion.spin_up
+    write_derivative(evaluate(t, y, phase, p), y, p, out)
 
 
 @jit

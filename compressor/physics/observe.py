@@ -11,21 +11,13 @@ from enum import IntEnum
 import numpy as np
 
 from compressor.physics._jit import jit
-from compressor.physics.contact import Contact, power
-from compressor.physics.kinematics import ideal
+from compressor.physics.contact import power
 from compressor.physics.motion import (
-    contact_big_end,
-    contact_small_end,
-    contacts_both,
-    derivative,
     eccentricities_both,
     eccentricity_big_end,
     eccentricity_small_end,
-    load_force,
-    solve_big_end,
-    solve_both,
-    solve_small_end,
-    turned,
+    evaluate,
+    write_derivative,
 )
 from compressor.physics.parameters import Scene
 
@@ -68,8 +60,6 @@ CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
 DAMPING_POWER, FRICTION_POWER = int(Column.DAMPING_POWER), int(Column.FRICTION_POWER)
 KINETIC, POTENTIAL = int(Column.KINETIC), int(Column.POTENTIAL)
 
-NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
 
 def lobatto(n):
     """Nodes in [0, 1], both ends included, and weights of n-point Gauss-Lobatto quadrature."""
@@ -99,53 +89,55 @@ def eccentricity_row(y, turn, p, row):
 
 
 @jit
-def centre_motion(y, motion, turn, a, spin_up, centre_x, centre_y, p):
+def centre_motion(now, y, p):
     """Rod centre's velocity, acceleration (x, y each) and height (m): vx, vy, ax, ay, height."""
-    sin_phi = motion.sin_phi + turn.ds
-    cos_phi = motion.cos_phi + turn.dc
-    n = y.size // 2
-    rate = motion.rate + y[2 * n - 1]
+    motion = now.motion
+    sin_phi = motion.sin_phi + now.turn.ds
+    cos_phi = motion.cos_phi + now.turn.dc
+    rate = motion.rate + y[y.size - 1]
     crank = p.crank_radius * p.omega
     if p.scene == BIG_END:
         b = p.rod_length - p.rod_centre
         vx = motion.v + y[2] + b * sin_phi * rate
         vy = b * cos_phi * rate
-        ax = a + b * (cos_phi * rate * rate + sin_phi * spin_up)
-        ay = b * (cos_phi * spin_up - sin_phi * rate * rate)
+        ax = now.a + b * (cos_phi * rate * rate + sin_phi * now.spin_up)
+        ay = b * (cos_phi * now.spin_up - sin_phi * rate * rate)
         return vx, vy, ax, ay, b * sin_phi
     c = p.rod_centre
     height = p.crank_radius * motion.sin_theta - c * motion.sin_phi
     if p.scene == BOTH:
         vx = -crank * motion.sin_theta - c * motion.sin_phi * motion.rate + y[5]
         vy = crank * motion.cos_theta - c * motion.cos_phi * motion.rate + y[6]
-        return vx, vy, centre_x, centre_y, height + y[2]
+        return vx, vy, now.centre_x, now.centre_y, height + y[2]
     vx = -crank * motion.sin_theta - c * sin_phi * rate
     vy = crank * motion.cos_theta - c * cos_phi * rate
-    ax = -crank * p.omega * motion.cos_theta - c * (cos_phi * rate * rate + sin_phi * spin_up)
-    ay = -crank * p.omega * motion.sin_theta + c * (sin_phi * rate * rate - cos_phi * spin_up)
-    return vx, vy, ax, ay, height - c * turn.ds
+    ax = -crank * p.omega * motion.cos_theta - c * (cos_phi * rate * rate + sin_phi * now.spin_up)
+    ay = -crank * p.omega * motion.sin_theta + c * (sin_phi * rate * rate - cos_phi * now.spin_up)
+    return vx, vy, ax, ay, height - c * now.turn.ds
 
 
 @jit
-def joint_forces(big, small, load, a, spin_up, centre, sin_phi, cos_phi, p):
+def joint_forces(now, centre, p):
     """Forces on the rod at both joints: the contact's, or by inverse dynamics at an ideal joint.
 
     Newton-Euler of the rod with the crosshead's x balance; returns (big x, big y, small x, small
     y) in N.
     """
+    big, small = now.big, now.small
     across = p.rod_mass * centre[2]
     up = p.rod_mass * (centre[3] + p.gravity)
     if p.scene == BOTH:
         return big.fx, big.fy, small.fx, small.fy
     if p.scene == SMALL_END:
         return across - small.fx, up - small.fy, small.fx, small.fy
-    small_x = -load - p.reciprocating_mass * a
+    small_x = -now.load - p.reciprocating_mass * now.a
     if p.scene == BIG_END:
         return big.fx, big.fy, small_x, up - big.fy
     big_x = across - small_x
+    sin_phi, cos_phi = now.motion.sin_phi, now.motion.cos_phi
     c = p.rod_centre
     b = p.rod_length - c
-    small_y = -p.rod_inertia * spin_up + c * (cos_phi * up + sin_phi * big_x)
+    small_y = -p.rod_inertia * now.spin_up + c * (cos_phi * up + sin_phi * big_x)
     small_y = (small_y - b * sin_phi * small_x) / (p.rod_length * cos_phi)
     return big_x, up - small_y, small_x, small_y
 
@@ -172,27 +164,29 @@ def damping_power(contact, stiffness, p):
 
 
 @jit
-def energy_row(y, motion, load, big, small, centre, row, p):
-    """Write powers (W) and energies (J) into the row, once forces stand in it."""
-    n = y.size // 2
-    v = motion.v + y[n]
-    rate = motion.rate + y[2 * n - 1]
+def write_powers(now, y, forces, p, out):
+    """Write the four powers (W) into out[0:4]: of crank and load, lost to damping and friction."""
+    motion, big, small = now.motion, now.big, now.small
     crank = p.crank_radius * p.omega
-    row[CRANK_POWER] = crank * (motion.cos_theta * row[FORCE + 1] - motion.sin_theta * row[FORCE])
-    if p.scene == BIG_END or p.scene == BOTH:
-        row[CRANK_POWER] -= p.omega * (p.pin_radius - big.penetration) * big.friction
-    row[LOAD_POWER] = -load * v
-    row[DAMPING_POWER] = damping_power(big, p.stiffness[0], p) + damping_power(
-        small, p.stiffness[1], p
-    )
-    row[FRICTION_POWER] = -big.friction * big.slip - small.friction * small.slip
+    out[0] = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
+    if p.clearance[0] > 0.0:
+        out[0] -= p.omega * (p.pin_radius - big.penetration) * big.friction
+    out[1] = -now.load * (motion.v + y[y.size // 2])
+    out[2] = damping_power(big, p.stiffness[0], p) + damping_power(small, p.stiffness[1], p)
+    out[3] = -big.friction * big.slip - small.friction * small.slip
+
+
+@jit
+def write_energies(now, y, centre, p, row):
+    """Write kinetic and potential energy (J) into the row."""
+    v = now.motion.v + y[y.size // 2]
+    rate = now.motion.rate + y[y.size - 1]
     kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
     kinetic += p.rod_mass * (centre[0] * centre[0] + centre[1] * centre[1])
     row[KINETIC] = 0.5 * kinetic
-    row[POTENTIAL] = elastic_energy(big, p.stiffness[0], p) + elastic_energy(
-        small, p.stiffness[1], p
-    )
-    row[POTENTIAL] += p.rod_mass * p.gravity * centre[4]
+    potential = elastic_energy(now.big, p.stiffness[0], p)
+    potential += elastic_energy(now.small, p.stiffness[1], p)
+    row[POTENTIAL] = potential + p.rod_mass * p.gravity * centre[4]
 
 
 @jit
@@ -201,43 +195,25 @@ def observe(t, y, phase, p, row):
 
     In the ideal scene y is four zeros.
     """
-    motion = ideal(t, p)
-    n = y.size // 2
-    turn = turned(motion, y[n - 1], y[2 * n - 1])
-    load = load_force(phase, y, motion, p)
-    big = NO_CONTACT
-    small = NO_CONTACT
-    a = motion.a
-    spin_up = motion.spin_up
-    centre_x = 0.0
-    centre_y = 0.0
-    if p.scene == BIG_END:
-        big = contact_big_end(y, motion, turn, p)
-        a, spin_up = solve_big_end(y, motion, turn, load, big, p)
-    elif p.scene == SMALL_END:
-        small = contact_small_end(y, motion, turn, p)
-        a, spin_up = solve_small_end(motion, turn, load, small, p)
-    elif p.scene == BOTH:
-        big, small = contacts_both(y, motion, turn, p)
-        a, centre_x, centre_y, spin_up = solve_both(motion, turn, load, big, small, p)
-    centre = centre_motion(y, motion, turn, a, spin_up, centre_x, centre_y, p)
-    sin_phi = motion.sin_phi + turn.ds
-    cos_phi = motion.cos_phi + turn.dc
+    now = evaluate(t, y, phase, p)
+    motion, turn = now.motion, now.turn
+    centre = centre_motion(now, y, p)
+    forces = joint_forces(now, centre, p)
     row[DISPLACEMENT] = motion.x + y[0]
-    row[VELOCITY] = motion.v + y[n]
-    row[ACCELERATION] = a
-    row[ROD_ANGLE] = math.atan2(sin_phi, cos_phi)
-    row[PISTON_FORCE] = load
-    forces = joint_forces(big, small, load, a, spin_up, centre, sin_phi, cos_phi, p)
+    row[VELOCITY] = motion.v + y[y.size // 2]
+    row[ACCELERATION] = now.a
+    row[ROD_ANGLE] = math.atan2(motion.sin_phi + turn.ds, motion.cos_phi + turn.dc)
+    row[PISTON_FORCE] = now.load
     for i in range(4):
         row[FORCE + i] = forces[i]
     eccentricity_row(y, turn, p, row)
-    row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration
-    row[NORMAL], row[NORMAL + 1] = big.normal, small.normal
+    row[PENETRATION], row[PENETRATION + 1] = now.big.penetration, now.small.penetration
+    row[NORMAL], row[NORMAL + 1] = now.big.normal, now.small.normal
     row[FORCE_SIZE] = math.sqrt(forces[0] * forces[0] + forces[1] * forces[1])
     row[FORCE_SIZE + 1] = math.sqrt(forces[2] * forces[2] + forces[3] * forces[3])
-    row[DEVIATION] = a - motion.a
-    energy_row(y, motion, load, big, small, centre, row, p)
+    row[DEVIATION] = now.a - motion.a
+    write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
+    write_energies(now, y, centre, p, row)
 
 
 @jit
@@ -332,14 +308,14 @@ def add_flows(rows, span, flows):
 
 
 @jit
-def derivative_with_flows(t, z, phase, p, row, out):
-    """dz/dt of the motion and of its four energy flows, z = (y, flows); row is scratch."""
+def derivative_with_flows(t, z, phase, p, out):
+    """dz/dt of the motion and of its four energy flows, z = (y, flows)."""
     n = z.size - 4
     y = z[:n]
-    derivative(t, y, phase, p, out[:n])
-    observe(t, y, phase, p, row)
-    for k in range(4):
-        out[n + k] = row[CRANK_POWER + k]
+    now = evaluate(t, y, phase, p)
+    centre = centre_motion(now, y, p)
+    write_derivative(now, y, p, out[:n])
+    write_powers(now, y, joint_forces(now, centre, p), p, out[n:])
 
 
 @jit
