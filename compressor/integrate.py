@@ -1,8 +1,9 @@
-"""Integrate one record over time with SciPy's methods by name; the only door to scipy.integrate.
+"""Integrate one record over time: the compiled march, or SciPy's methods by name.
 
-Every load corner is a restart. Each accepted step's dense solution is observed at Gauss-Lobatto
-nodes for metrics and energy flows, and sampled on the output grid. SciPy is not trusted with
-states that go bad: its LSODA reports success with nan, and its Runge-Kutta methods hang on inf.
+Both call the same right-hand side, restart at every load corner, observe each accepted step's
+dense solution at Gauss-Lobatto nodes for the metrics, and sample it on the output grid. SciPy is
+not trusted with states that go bad: its LSODA reports success with nan, and its Runge-Kutta
+methods hang on inf. The only door to scipy.integrate.
 """
 
 import itertools
@@ -14,11 +15,12 @@ import numpy as np
 from scipy import integrate as scipy_integrate
 
 from compressor.physics.loads import sample_segments, segments
+from compressor.physics.march import Status, march, new_walker
 from compressor.physics.observe import (
     COLUMNS,
-    NODES,
     add_flows,
     derivative_with_flows,
+    lobatto,
     new_tally,
     observe,
     observe_all,
@@ -26,18 +28,21 @@ from compressor.physics.observe import (
     tally_step,
 )
 from compressor.physics.parameters import FREEDOMS, Load, Scene
+from compressor.physics.runge_kutta import FLOWS, STAGES, Pair
 
-METHODS = {
+COMPILED = {"auto": Pair.DOPRI5, "DOPRI5": Pair.DOPRI5, "TSIT5": Pair.TSIT5}
+SCIPY = {
     name: getattr(scipy_integrate, name) for name in ("LSODA", "Radau", "BDF", "DOP853", "RK45")
 }
-METHODS["auto"] = METHODS["DOP853"]
 # Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
 # revolution at the small end (LSODA up to 4 times, BDF 2.5, RK45 2), so they get a share of it.
 LOCAL = {"LSODA": 0.1, "BDF": 0.1, "RK45": 0.3}
 LEAST_RTOL = 2.3e-14  # SciPy's own floor
 BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
-FLOWS = 4  # energy flows integrated beside the motion
+NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
+CHUNK = 4096  # attempts of the march between two looks at the clock; tens of milliseconds
+CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 
 
@@ -72,6 +77,7 @@ class Trajectory:
     stop_time: float = math.nan
     stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
     steps: int = 0
+    rejected: int = 0
     evaluations: int = 0
     seconds: float = 0.0
 
@@ -157,24 +163,80 @@ def integrate(request: Request) -> Trajectory:
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)
     result = Trajectory(request.times, states, phases[owner], new_tally())
-    began = time.perf_counter()
-    right_hand_side = Derivative(request)
     z = np.append(request.start, np.zeros(FLOWS))
-    observe(0.0, request.start, int(phases[0]), request.p, right_hand_side.row)
-    tally_energy(right_hand_side.row, z[-FLOWS:], result.tally)
+    row = np.empty(COLUMNS)
+    observe(0.0, request.start, int(phases[0]), request.p, row)
+    tally_energy(row, z[-FLOWS:], result.tally)
+    began = time.perf_counter()
     try:
         # a trial step may leave the finite numbers; the steps taken are checked
         with np.errstate(all="ignore"):
-            for i, phase in enumerate(phases):
-                right_hand_side.phase = int(phase)
-                wanted = np.flatnonzero(owner == i)
-                segment = Segment(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
-                z = segment.run(z)
+            if request.method in COMPILED:
+                march_through(request, result, edges, phases, z)
+            else:
+                step_through(request, result, edges, phases, z)
     except Stop as stop:
         result.reason, result.detail = stop.reason, stop.detail
-    result.evaluations = right_hand_side.evaluations
     result.seconds = time.perf_counter() - began
     return result
+
+
+def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
+    """Integrate by the compiled loop, in chunks between which budgets are checked."""
+    deadline = time.monotonic() + request.timeout
+    walker = new_walker()
+    walker.pair, walker.rtol, walker.settle = COMPILED[request.method], request.rtol, request.settle
+    length, speed = scales(request.p)
+    walker.watch, walker.contact_step = 1, CONTACT_STEP * length / speed
+    walker.deepest = IMPLAUSIBLE * request.p.pin_radius
+    atol = absolute_tolerances(request.p, request.rtol)[:-FLOWS]
+    k = np.zeros((STAGES, z.size))
+    while walker.status == Status.RUNNING:
+        left = request.max_steps - walker.steps - walker.rejected
+        march(
+            walker, request.p, z, k, atol, edges, phases, request.times, result.states,
+            result.tally, min(CHUNK, left),
+        )  # fmt: skip
+        result.steps, result.rejected = int(walker.steps), int(walker.rejected)
+        result.evaluations = int(walker.evaluations)
+        if walker.status != Status.DONE:
+            result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
+            check_march(request, walker, float(result.tally.deepest), deadline)
+    result.stop_time = math.nan
+
+
+def check_march(request: Request, walker: np.record, deepest: float, deadline: float) -> None:
+    """Raise Stop where a march has stopped, or may go no further."""
+    status = Status(int(walker.status))
+    if status == Status.PENETRATION_IMPLAUSIBLE:
+        raise Stop("penetration_implausible", too_deep(deepest))
+    if status == Status.NON_FINITE:
+        raise Stop("non_finite", "the state or its rates are no longer finite")
+    if status == Status.STEP_UNDERFLOW:
+        raise Stop("step_underflow", f"the step has shrunk to {walker.h:.3g} s")
+    if walker.steps + walker.rejected >= request.max_steps:
+        raise Stop("budget_steps", f"more than {request.max_steps} steps")
+    if time.monotonic() > deadline:
+        raise Stop("budget_seconds", f"more than {request.timeout:g} s of wall time")
+
+
+def too_deep(deepest: float) -> str:
+    """What is wrong with a penetration (m)."""
+    return f"{deepest * 1e3:.3g} mm, more than a tenth of the pin radius"
+
+
+def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
+    """Integrate by one of SciPy's methods, segment by segment."""
+    right_hand_side = Derivative(request)
+    owner = sample_segments(request.times, edges)
+    try:
+        for i, phase in enumerate(phases):
+            right_hand_side.phase = int(phase)
+            wanted = np.flatnonzero(owner == i)
+            segment = Segment(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
+            z = segment.run(z)
+    finally:
+        result.evaluations = right_hand_side.evaluations
 
 
 class Segment:
@@ -191,7 +253,7 @@ class Segment:
         request, result = self.request, self.result
         result.stop_time, result.stop_state = self.begin, z[:-FLOWS]
         rtol = max(request.rtol * LOCAL.get(request.method, 1.0), LEAST_RTOL)
-        solver = METHODS[request.method](
+        solver = SCIPY[request.method](
             self.right_hand_side,
             self.begin,
             z,
@@ -239,7 +301,7 @@ class Segment:
         rows = np.empty((times.size, COLUMNS))
         phases = np.full(times.size, self.right_hand_side.phase)
         observe_all(times, states, phases, self.request.p, rows)
-        tally_step(times, rows, measured, self.result.tally, self.request.p)
+        tally_step(times, rows, WEIGHTS, measured, self.result.tally, self.request.p)
 
     def audit(self, solver) -> None:
         """Compare the energy at the step's end with the flows up to there."""
@@ -252,10 +314,7 @@ class Segment:
         """Raise Stop when a journal sinks in implausibly deep."""
         deepest, limit = self.result.tally.deepest, IMPLAUSIBLE * self.request.p.pin_radius
         if not deepest <= limit:
-            raise Stop(
-                "penetration_implausible",
-                f"{deepest * 1e3:.3g} mm, more than a tenth of the pin radius",
-            )
+            raise Stop("penetration_implausible", too_deep(deepest))
         self.right_hand_side.check_budget()
 
 
@@ -275,9 +334,9 @@ def closed_form(p: np.record, times: np.ndarray, settle: float) -> Trajectory:
         nodes = begin + (end - begin) * NODES
         observe_all(nodes, states, np.full(NODES.size, phase), p, rows)
         tally_energy(rows[0], flows, result.tally)
-        add_flows(rows, end - begin, flows)
+        add_flows(rows, WEIGHTS, end - begin, flows)
         tally_energy(rows[-1], flows, result.tally)
-        tally_step(nodes, rows, begin >= settle, result.tally, p)
+        tally_step(nodes, rows, WEIGHTS, begin >= settle, result.tally, p)
     result.seconds = time.perf_counter() - began
     return result
 

@@ -52,6 +52,7 @@ LEDGER = {
     "friction_loss": ("J", "energy lost to joint friction over the run"),
     "energy_residual": ("1", "worst energy imbalance relative to the contact's losses"),
     "steps": ("1", "accepted integration steps"),
+    "rejected": ("1", "rejected steps; SciPy's methods do not tell"),
     "evaluations": ("1", "evaluations of the right-hand side"),
     "seconds": ("s", "wall time of the solution"),
 }
@@ -85,7 +86,7 @@ def dataset(case: Case, p: np.record, trajectory: Trajectory) -> xr.Dataset:
     variables = ledger(case, p, trajectory) | metrics(p, trajectory)
     if case.output.keep == "series":
         variables |= series(p, trajectory)
-    coordinates = {
+    coordinates: dict[str, tuple] = {
         "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
         "axis": ("axis", list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
     }
@@ -150,6 +151,7 @@ def ledger(case: Case, p: np.record, trajectory: Trajectory) -> dict[str, tuple]
         tally.friction_loss,
         energy_residual(tally) if tally.started else math.nan,
         trajectory.steps,
+        trajectory.rejected,
         trajectory.evaluations,
         trajectory.seconds,
     )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import reference
 
-from compressor.case import ACCURACY, Case
-from compressor.integrate import METHODS, absolute_tolerances
+from compressor.case import ACCURACY, METHODS, Case
+from compressor.integrate import absolute_tolerances
 from compressor.physics.parameters import FREEDOMS
 from compressor.record import record, scene
 from compressor.simulate import simulate

@@ -70,9 +70,6 @@ def lobatto(n):
     return (nodes + 1.0) / 2.0, weights / 2.0
 
 
-NODES, WEIGHTS = lobatto(9)
-
-
 @jit
 def eccentricity_row(y, turn, p, row):
     """Write both eccentricities (m) into the row; an ideal joint has none."""
@@ -300,11 +297,11 @@ def tally_energy(row, flows, tally):
 
 
 @jit
-def add_flows(rows, span, flows):
+def add_flows(rows, weights, span, flows):
     """Add to flows, (4,) J, the quadrature of the powers at a step's nodes; span in s."""
     for k in range(4):
         for i in range(rows.shape[0]):
-            flows[k] += span * WEIGHTS[i] * rows[i, CRANK_POWER + k]
+            flows[k] += span * weights[i] * rows[i, CRANK_POWER + k]
 
 
 @jit
@@ -319,13 +316,13 @@ def derivative_with_flows(t, z, phase, p, out):
 
 
 @jit
-def tally_contact(joint, times, rows, span, measured, tally):
+def tally_contact(joint, rows, weights, span, measured, tally):
     """Add a step's contact loss, impacts and penetration at one joint."""
     lost = 0.0
-    for i in range(times.size):
+    for i in range(rows.shape[0]):
         apart = rows[i, NORMAL + joint] <= 0.0
         if apart:
-            lost += WEIGHTS[i]
+            lost += weights[i]
         elif measured and not tally.touching[joint]:
             tally.impacts[joint] += 1
         tally.touching[joint] = 0 if apart else 1
@@ -338,22 +335,23 @@ def tally_contact(joint, times, rows, span, measured, tally):
 
 
 @jit
-def tally_step(times, rows, measured, tally, p):
+def tally_step(times, rows, weights, measured, tally, p):
     """Add one step (or part of one) to the tally, from rows at its Lobatto nodes.
 
-    times: (9,) in s; rows: (9, COLUMNS); measured: whether the metrics count (after settling);
+    times: (m,) in s; rows: (m, COLUMNS); weights: (m,) of the nodes' quadrature;
+    measured: whether the metrics count (after settling);
     the depth of contact over the whole run always does.
     """
     span = times[-1] - times[0]
     if p.clearance[0] > 0.0:
-        tally_contact(0, times, rows, span, measured, tally)
+        tally_contact(0, rows, weights, span, measured, tally)
     if p.clearance[1] > 0.0:
-        tally_contact(1, times, rows, span, measured, tally)
+        tally_contact(1, rows, weights, span, measured, tally)
     if not measured:
         return
     tally.seconds += span
     for i in range(times.size):
-        weight = span * WEIGHTS[i]
+        weight = span * weights[i]
         tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
         tally.square_deviation += weight * rows[i, DEVIATION] ** 2
     tally.peak_acceleration = max(tally.peak_acceleration, peak_of(times, rows, ACCELERATION))

@@ -1,0 +1,120 @@
+"""When contact begins within a step: no pulse is stepped over, whatever the tolerance.
+
+Contact is F_N > 0. A journal that flies touches when its gap closes; one that is released, but
+not yet out of its bearing, is held off by the clamp and touches again when the unclamped force
+turns positive. Both are watched on the step's interpolant while F_N = 0.
+"""
+
+from compressor.physics._jit import jit
+from compressor.physics.contact import unclamped_force
+from compressor.physics.motion import evaluate
+from compressor.physics.runge_kutta import interpolate
+
+SAMPLES = 12  # intervals of a step that are looked at
+HALVINGS = 40
+NEVER = 2.0  # a fraction of the step beyond its end
+
+
+@jit
+def nearness(contact, stiffness, p):
+    """Positive in contact; otherwise how far from it: the gap (m), or the clamped force as one.
+
+    A clamped force is turned into a length by the contact's stiffness at the penetration of full
+    damping, so that both parts are small where contact is near.
+    """
+    if contact.penetration <= 0.0:
+        return contact.penetration
+    force = unclamped_force(contact.penetration, contact.rate, stiffness, p)
+    return force * p.full_damping / (stiffness * p.full_damping**p.exponent)
+
+
+@jit
+def nearness_at(joint, pair, s, t, h, z, k, phase, p, y):
+    """`nearness` of one joint at the fraction s of a step; y is scratch, shape (n,)."""
+    interpolate(pair, s, h, z, k, y)
+    now = evaluate(t + s * h, y, phase, p)
+    if joint == 0:
+        return nearness(now.big, p.stiffness[0], p)
+    return nearness(now.small, p.stiffness[1], p)
+
+
+@jit
+def crossing(joint, pair, low, high, t, h, z, k, phase, p, y):
+    """Fraction at which contact begins, between `low` (apart) and `high` (touching)."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if nearness_at(joint, pair, middle, t, h, z, k, phase, p, y) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@jit
+def touching_between(joint, pair, low, high, t, h, z, k, phase, p, y):
+    """A fraction in (low, high) at which there is contact, by golden section; NEVER if none.
+
+    For a bracket around a local maximum of the nearness whose ends are both apart.
+    """
+    golden = 0.6180339887498949
+    left = high - golden * (high - low)
+    right = low + golden * (high - low)
+    at_left = nearness_at(joint, pair, left, t, h, z, k, phase, p, y)
+    at_right = nearness_at(joint, pair, right, t, h, z, k, phase, p, y)
+    for _ in range(HALVINGS):
+        if at_left > 0.0:
+            return left
+        if at_right > 0.0:
+            return right
+        if at_left > at_right:
+            high, right, at_right = right, left, at_left
+            left = high - golden * (high - low)
+            at_left = nearness_at(joint, pair, left, t, h, z, k, phase, p, y)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + golden * (high - low)
+            at_right = nearness_at(joint, pair, right, t, h, z, k, phase, p, y)
+    return NEVER
+
+
+@jit
+def joint_onset(joint, pair, t, h, z, k, phase, p, y):
+    """First fraction of a step at which a joint that was apart touches, and until when it does.
+
+    Returns (begin, end); (NEVER, NEVER) without an onset, end = 1 where contact outlasts the step.
+    """
+    earlier = nearness_at(joint, pair, 0.0, t, h, z, k, phase, p, y)
+    before = earlier
+    begin = NEVER
+    for i in range(1, SAMPLES + 1):
+        s = i / SAMPLES
+        now = nearness_at(joint, pair, s, t, h, z, k, phase, p, y)
+        if begin < NEVER:
+            if now <= 0.0:
+                return begin, s
+        elif now > 0.0:
+            if before <= 0.0:
+                begin = crossing(joint, pair, s - 1.0 / SAMPLES, s, t, h, z, k, phase, p, y)
+        elif i > 1 and before >= earlier and before >= now and before <= 0.0:
+            low = s - 2.0 / SAMPLES
+            # a parabola's top lies at most an eighth of its two slopes above the middle
+            if before + abs(before - earlier) + abs(before - now) > 0.0:
+                inside = touching_between(joint, pair, low, s, t, h, z, k, phase, p, y)
+                if inside < NEVER:
+                    return crossing(joint, pair, low, inside, t, h, z, k, phase, p, y), s
+        earlier, before = before, now
+    if begin < NEVER:
+        return begin, 1.0
+    return NEVER, NEVER
+
+
+@jit
+def first_onset(pair, t, h, z, k, phase, p, y):
+    """`joint_onset` of whichever joint with clearance touches first."""
+    begin, end = NEVER, NEVER
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            found, until = joint_onset(joint, pair, t, h, z, k, phase, p, y)
+            if found < begin:
+                begin, end = found, until
+    return begin, end

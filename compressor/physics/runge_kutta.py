@@ -1,0 +1,145 @@
+"""Explicit Runge-Kutta pairs as tables, one step that serves them all, and its dense output.
+
+Both pairs have seven stages of which the last is the next step's first, order 5 with an embedded
+error estimate of order 4, and a continuous extension of order 4 without further stages.
+Sources: Dormand & Prince, J. Comput. Appl. Math. 6 (1980), with Shampine's interpolant, Math.
+Comp. 46 (1986); Tsitouras, Comput. Math. Appl. 62 (2011).
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+from compressor.physics._jit import jit
+from compressor.physics.observe import derivative_with_flows
+
+STAGES = 7
+FLOWS = 4
+
+
+class Pair(IntEnum):
+    """The explicit pairs: rows of the tables below."""
+
+    DOPRI5 = 0
+    TSIT5 = 1
+
+
+def _lower(rows):
+    """A (STAGES, STAGES) strictly lower triangular table from its rows."""
+    full = np.zeros((STAGES, STAGES))
+    for i, row in enumerate(rows, 1):
+        full[i, : len(row)] = row
+    return full
+
+
+_DOPRI5 = _lower(
+    [
+        [1 / 5],
+        [3 / 40, 9 / 40],
+        [44 / 45, -56 / 15, 32 / 9],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+_TSIT5 = _lower(
+    [
+        [0.161],
+        [-0.008480655492356989, 0.335480655492357],
+        [2.8971530571054935, -6.359448489975075, 4.3622954328695815],
+        [5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525],
+        [
+            5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401,
+            -0.028269050394068383,
+        ],
+        [
+            0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742,
+            -3.290069515436081, 2.324710524099774,
+        ],
+    ]
+)  # fmt: skip
+
+A = np.array([_DOPRI5, _TSIT5])  # the last row holds the weights of the step
+C = A.sum(axis=2)
+E = np.array(
+    [
+        [-71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40],
+        [
+            -0.00178001105222577714, -0.0008164344596567469, 0.007880878010261995,
+            -0.1447110071732629, 0.5823571654525552, -0.45808210592918697, 1 / 66,
+        ],
+    ]
+)  # fmt: skip
+# dense output: y(t + s h) = y + h sum_i k_i sum_j P[i, j] s^(j + 1)
+P = np.array(
+    [
+        [
+            [1, -8048581381 / 2820520608, 8663915743 / 2820520608, -12715105075 / 11282082432],
+            [0, 0, 0, 0],
+            [0, 131558114200 / 32700410799, -68118460800 / 10900136933,
+             87487479700 / 32700410799],
+            [0, -1754552775 / 470086768, 14199869525 / 1410260304, -10690763975 / 1880347072],
+            [0, 127303824393 / 49829197408, -318862633887 / 49829197408,
+             701980252875 / 199316789632],
+            [0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844],
+            [0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423],
+        ],
+        [
+            [1, -2.763706197274826, 2.9132554618219126, -1.0530884977290216],
+            [0, 0.13169999999999998, -0.2234, 0.1017],
+            [0, 3.9302962368947516, -5.941033872131505, 2.490627285651253],
+            [0, -12.411077166933676, 30.33818863028232, -16.548102889244902],
+            [0, 37.50931341651104, -88.1789048947664, 47.37952196281928],
+            [0, -27.896526289197286, 65.09189467479366, -34.87065786149661],
+            [0, 1.5, -4, 2.5],
+        ],
+    ]
+)  # fmt: skip
+
+
+@jit
+def take_step(pair, t, h, z, k, phase, p, new):
+    """Stages 1 to 6 of a step from (t, z) of length h into k, and the state at its end into new.
+
+    z and new: motion and flows, shape (n + 4,); k: (7, n + 4), its first row already dz/dt at t.
+    Only the motion enters the right-hand side, so flows are summed at the end alone.
+    """
+    n = z.size - FLOWS
+    for stage in range(1, STAGES):
+        size = z.size if stage == STAGES - 1 else n
+        for i in range(size):
+            total = 0.0
+            for j in range(stage):
+                total += A[pair, stage, j] * k[j, i]
+            new[i] = z[i] + h * total
+        derivative_with_flows(t + C[pair, stage] * h, new, phase, p, k[stage])
+
+
+@jit
+def error_norm(pair, h, z, new, k, rtol, atol):
+    """Root mean square over the motion of the estimated error over its tolerance."""
+    n = z.size - FLOWS
+    total = 0.0
+    for i in range(n):
+        error = 0.0
+        for j in range(STAGES):
+            error += E[pair, j] * k[j, i]
+        scale = atol[i] + rtol * max(abs(z[i]), abs(new[i]))
+        total += (h * error / scale) ** 2
+    return np.sqrt(total / n)
+
+
+@jit
+def interpolate(pair, s, h, z, k, out):
+    """The motion at the fraction s of a step into out, shape (n,)."""
+    for i in range(out.size):
+        out[i] = 0.0
+    for j in range(STAGES):
+        weight = P[pair, j, 3]
+        for m in range(2, -1, -1):
+            weight = weight * s + P[pair, j, m]
+        weight *= s * h
+        for i in range(out.size):
+            out[i] += weight * k[j, i]
+    for i in range(out.size):
+        out[i] += z[i]

@@ -1,0 +1,70 @@
+"""The compiled loop: resumable to the bit, lands on corners, and misses no contact."""
+
+import numpy as np
+import pytest
+import reference
+
+from compressor import integrate as integration
+from compressor.case import Case
+from compressor.integrate import Request, integrate
+from compressor.physics.motion import start
+from compressor.physics.observe import COLUMNS, Column, observe_all
+from compressor.physics.parameters import FREEDOMS
+from compressor.record import offsets, record, scene
+
+PULSES = {"load": "typical", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
+
+
+def request(rtol, duration=None, **values):
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **values})
+    p = record(case)
+    y = np.zeros(2 * FREEDOMS[scene(case)])
+    start(offsets(case), y, p)
+    times = (duration or case.duration) * np.arange(1201) / 1200
+    return Request(p, y, times, 0.0, rtol)
+
+
+def accelerations(found, p):
+    rows = np.empty((found.times.size, COLUMNS))
+    observe_all(found.times, found.states, found.phases, p, rows)
+    return rows[:, Column.ACCELERATION]
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+def test_chunks_change_nothing(joint, monkeypatch):
+    asked = request(1e-5, 0.12, joint=joint)
+    whole = integrate(asked)
+    monkeypatch.setattr(integration, "CHUNK", 7)
+    chunked = integrate(asked)
+    assert chunked.states.tobytes() == whole.states.tobytes()
+    assert chunked.tally.tobytes() == whole.tally.tobytes()
+    assert (chunked.steps, chunked.evaluations) == (whole.steps, whole.evaluations)
+
+
+PULSE_TIMES = [(0.2, 4.986e-3, 5.128e-3), (0.3, 5.878e-3, 5.931e-3), (0.3, 10.494e-3, 10.511e-3)]
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+@pytest.mark.parametrize(("clearance", "begin", "end"), PULSE_TIMES)
+def test_known_pulses_are_found(clearance, begin, end, rtol):
+    """DESIGN 2.6's pulses, down to 18 microseconds, show as contact in the sampled motion."""
+    asked = request(rtol, 0.012, clearance_mm=clearance, **PULSES)
+    asked.times = np.linspace(0, 0.012, 48001)
+    found = integrate(asked)
+    rows = np.empty((asked.times.size, COLUMNS))
+    observe_all(asked.times, found.states, found.phases, asked.p, rows)
+    # at a loose tolerance the pulse may come a little earlier or later
+    near = (asked.times > begin - 2e-4) & (asked.times < end + 2e-4)
+    assert (rows[near, Column.NORMAL] > 0).any()
+
+
+@pytest.mark.parametrize("clearance", [0.2, 0.3])
+def test_pulses_decide_the_accuracy(clearance):
+    params = reference.paper_params(
+        "typical", "big_end", clearance * 1e-3, rod_mass=3.0, rod_inertia=3 * 0.36 / 12,
+        reciprocating_mass=6.0,
+    )  # fmt: skip
+    asked = request(1e-7, 0.012, clearance_mm=clearance, **PULSES)
+    truth = reference.reference_solution(params, "big_end", asked.times, rtol=1e-10)["a"]
+    found = accelerations(integrate(asked), asked.p)
+    assert np.linalg.norm(found - truth) / np.linalg.norm(truth) < 1e-4

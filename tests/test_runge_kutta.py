@@ -1,0 +1,84 @@
+"""The explicit pairs: order conditions, order of convergence, dense output."""
+
+import numpy as np
+import pytest
+
+from compressor.case import Case
+from compressor.physics.observe import derivative_with_flows
+from compressor.physics.runge_kutta import (
+    FLOWS,
+    STAGES,
+    A,
+    C,
+    E,
+    P,
+    Pair,
+    interpolate,
+    take_step,
+)
+from compressor.record import record
+
+# a wide clearance and a short flight: a smooth motion without contact
+FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))
+BEGIN, SPAN = 0.09, 0.008
+
+
+def flow(pair, steps, k=None):
+    """State after `steps` equal steps of a free flight in the load's discharge phase."""
+    z = np.zeros(8 + FLOWS)
+    z[4:8] = 0.1, -0.2, 0.3, 0.5
+    k, new = np.zeros((STAGES, z.size)), np.zeros(z.size)
+    h = SPAN / steps
+    for i in range(steps):
+        derivative_with_flows(BEGIN + i * h, z, 3, FLIGHT, k[0])
+        take_step(pair, BEGIN + i * h, h, z, k, 3, FLIGHT, new)
+        z[:] = new
+    return z
+
+
+@pytest.mark.parametrize("pair", Pair)
+def test_order_conditions(pair):
+    """All eight up to order 4 and the quadrature conditions of order 5; the estimate's to 4."""
+    a, b, c = A[pair], A[pair, -1], C[pair]
+    for weights, target in ((b, 1.0), (b - E[pair], 1.0)):
+        assert weights.sum() == pytest.approx(target)
+        for power in range(1, 4):
+            assert weights @ c**power == pytest.approx(1 / (power + 1), abs=2e-14)
+        assert weights @ a @ c == pytest.approx(1 / 6, abs=2e-14)
+        assert weights @ (c * (a @ c)) == pytest.approx(1 / 8, abs=2e-14)
+        assert weights @ a @ c**2 == pytest.approx(1 / 12, abs=2e-14)
+        assert weights @ a @ a @ c == pytest.approx(1 / 24, abs=2e-14)
+    assert b @ c**4 == pytest.approx(1 / 5)
+    assert (b - E[pair]) @ c**4 != pytest.approx(1 / 5, abs=1e-4)  # the estimate is of order 4
+
+
+@pytest.mark.parametrize("pair", Pair)
+def test_dense_output_ends_at_the_step(pair):
+    assert P[pair].sum(axis=1) == pytest.approx(A[pair, -1], abs=1e-13)
+
+
+@pytest.mark.parametrize("pair", Pair)
+def test_order_of_convergence(pair):
+    exact = flow(pair, 512)
+    errors = [np.abs(flow(pair, n) - exact)[:8].max() for n in (8, 16, 32)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx(5, abs=0.2)
+
+
+@pytest.mark.parametrize("pair", Pair)
+def test_order_of_dense_output(pair):
+    errors = []
+    for h in (4e-3, 2e-3, 1e-3):
+        z = np.zeros(8 + FLOWS)
+        z[4:8] = 0.1, -0.2, 0.3, 0.5
+        k, new, y = np.zeros((STAGES, z.size)), np.zeros(z.size), np.zeros(8)
+        derivative_with_flows(BEGIN, z, 3, FLIGHT, k[0])
+        take_step(pair, BEGIN, h, z, k, 3, FLIGHT, new)
+        interpolate(pair, 0.4, h, z, k, y)
+        exact = np.zeros(z.size)
+        inner = np.zeros_like(k)
+        derivative_with_flows(BEGIN, z, 3, FLIGHT, inner[0])
+        take_step(pair, BEGIN, 0.4 * h, z, inner, 3, FLIGHT, exact)
+        errors.append(np.abs(y - exact[:8]).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx(5, abs=0.35)  # the local error of an extension of order 4
