@@ -1,0 +1,92 @@
+"""Files that are whole or absent: written under a temporary name, synced, then renamed.
+
+What the file system refuses is a StoreError, which says where and what to do about it.
+"""
+
+import contextlib
+import errno
+import os
+import time
+import uuid
+from pathlib import Path
+
+Folder = str | os.PathLike[str]
+
+LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
+
+FULL = "free some space there, then run the same command again"
+ELSEWHERE = "choose another folder"
+FORBIDDEN = f"get the permission to use it, or {ELSEWHERE}"
+REMEDIES = {
+    errno.ENOSPC: FULL,
+    errno.EDQUOT: FULL,
+    errno.EFBIG: FULL,
+    errno.EACCES: FORBIDDEN,
+    errno.EPERM: FORBIDDEN,
+    errno.EROFS: FORBIDDEN,
+    errno.ENOTDIR: ELSEWHERE,
+}
+
+
+class StoreError(Exception):
+    """What is wrong with the store: at which path, and what to do about it."""
+
+    def __init__(self, path: Folder, problem: str, remedy: str):
+        self.path, self.problem, self.remedy = os.fspath(path), problem, remedy
+        super().__init__(self.path, problem, remedy)
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}; {self.remedy}"
+
+
+def system_error(path: Folder, error: OSError) -> StoreError:
+    """The StoreError that says what the file system refused."""
+    remedy = REMEDIES.get(error.errno or 0, "check the disk, then run the same command again")
+    return StoreError(path, os.strerror(error.errno) if error.errno else str(error), remedy)
+
+
+def publish(path: Path, data: bytes) -> None:
+    """Put a whole file under its name, durably, or leave what was there."""
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+    try:
+        _make_folder(path.parent)
+        try:
+            with open(temporary, "xb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise system_error(path, error) from error
+
+
+def _make_folder(folder: Path) -> None:
+    """Make a folder and those above it, durably."""
+    if not folder.is_dir():
+        _make_folder(folder.parent)
+        try:
+            folder.mkdir(exist_ok=True)
+        except FileExistsError as error:
+            raise StoreError(folder, "is a file, where a folder is needed", ELSEWHERE) from error
+        _sync_folder(folder.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def discard_leftovers(folder: Folder) -> None:
+    """Remove the temporary files of writers that died long ago."""
+    for path in Path(folder).glob("*/.*.tmp"):
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
+                path.unlink()

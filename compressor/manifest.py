@@ -1,0 +1,111 @@
+"""The studies of a store: one JSON file each, with its axes and the keys of its jobs in C order."""
+
+import contextlib
+import datetime
+import itertools
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import compressor
+from compressor.case import MODEL_VERSION, table
+from compressor.durable import Folder, StoreError, publish, system_error
+from compressor.parameter import JOINTS
+
+if TYPE_CHECKING:
+    from compressor.plan import Axis, Study
+
+
+@dataclass(frozen=True)
+class StoredAxis:
+    """One swept key of a stored study, its values in the case file's unit."""
+
+    key: str
+    values: tuple[Any, ...]
+    units: str  # "" for words
+
+
+@dataclass(frozen=True)
+class StoredStudy:
+    """What a store knows of one study; `keys` are its jobs in C order over `axes`."""
+
+    name: str
+    case_file: str
+    axes: tuple[StoredAxis, ...]
+    keys: tuple[str, ...]
+    fixed: dict[str, Any]  # values of the first case, as in a case file
+    command: str
+    versions: dict[str, str]
+    written: str  # UTC
+
+
+def points(axes: "Sequence[Axis | StoredAxis]") -> Iterator[dict[str, Any]]:
+    """The swept values of each job by dotted key, in C order over the axes."""
+    for values in itertools.product(*(axis.values for axis in axes)):
+        yield {axis.key: value for axis, value in zip(axes, values, strict=True)}
+
+
+def write_study(folder: Folder, study: "Study", command: str = "") -> None:
+    """Store which jobs a study has; a study that is stored already is left as it is."""
+    axes = [StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes]
+    new = StoredStudy(
+        study.name,
+        os.path.abspath(study.path),
+        tuple(axes),
+        tuple(case.key for case in study.cases),
+        study.cases[0].values(),
+        command,
+        {"compsim": compressor.__version__, "model": MODEL_VERSION}
+        | {name: metadata.version(name) for name in ("numpy", "scipy", "numba", "h5py", "xarray")},
+        datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    )
+    path = Path(folder) / "studies" / f"{study.name}.json"
+    data = json.dumps(asdict(new), indent=1).encode()
+    with contextlib.suppress(StoreError, FileNotFoundError):
+        old = _read_study(path)
+        same = replace(new, command=old.command, versions=old.versions, written=old.written)
+        if same == old:
+            return
+    publish(path, data)
+
+
+def read_studies(folder: Folder) -> list[StoredStudy]:
+    """All studies of a store, by name."""
+    paths = sorted(Path(folder).glob("studies/*.json"))
+    if not paths:
+        remedy = "choose the folder of a sweep, or make one: compsim run CONFIG..."
+        raise StoreError(folder, "holds no study", remedy)
+    return [_read_study(path) for path in paths]
+
+
+def _read_study(path: Path) -> StoredStudy:
+    try:
+        plain = json.loads(path.read_bytes())
+        axes = (StoredAxis(a["key"], _frozen(a["values"]), a["units"]) for a in plain["axes"])
+        study = StoredStudy(**plain | {"axes": tuple(axes), "keys": tuple(plain["keys"])})
+        if len(study.keys) != sum(1 for _ in points(study.axes)):
+            raise ValueError
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise system_error(path, error) from error
+    except (ValueError, KeyError, TypeError) as error:
+        problem = "is damaged, or of another version of compsim"
+        raise StoreError(path, problem, "delete it and run its case file again") from error
+    return study
+
+
+def _frozen(values: Sequence[Any]) -> tuple[Any, ...]:
+    """Values as a case holds them; JSON makes lists of pairs."""
+    return tuple(tuple(value) if isinstance(value, list) else value for value in values)
+
+
+def _unit(key: str) -> str:
+    """The unit of a swept key, "" for words; `clearance_mm` stands for both its joints."""
+    row = table().get(key) or table().get(f"{key}.{JOINTS[0]}")
+    numeric = row and row.kind in ("number", "integer")
+    return (row.unit or "1") if row and numeric else ""
