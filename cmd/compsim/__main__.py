@@ -1,0 +1,5 @@
+"""`python -m compsim` is `compsim`."""
+
+from compsim.cli import main
+
+raise SystemExit(main())

@@ -1,0 +1,275 @@
+"""compsim on the command line: data on stdout, progress and messages on stderr.
+
+Nothing heavy is imported at the top: `compsim --help` answers at once.
+"""
+
+import contextlib
+import os
+import shlex
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import compressor
+
+if TYPE_CHECKING:
+    from compressor.sweep import Failure, Summary
+
+DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
+MOST_FAILURES = 20  # listed one by one
+
+# error -> what stands before its text, and the exit code
+FORESEEN = {
+    "CaseFileError": ("", USAGE),
+    "StoreError": ("compsim: ", STORE),
+    "WorkerDied": ("compsim: ", INTERNAL),
+}
+ADVICE = {
+    "budget_steps": "raise solve.max_steps",
+    "budget_seconds": "raise solve.timeout_s; the same command then tries again",
+    "penetration_implausible": "the contact is too soft for the forces: check contact.stiffness, "
+    "masses and speed, and their units",
+    "non_finite": "the motion leaves what the model can describe: check the values that are swept "
+    "furthest, and gas.head_clearance_mm",
+    "step_underflow": "try another solve.method, such as Radau",
+    "internal_error": "a bug of compsim: please report it; the job's file holds the traceback",
+}
+
+
+class Interrupted(BaseException):
+    """SIGINT, SIGTERM or SIGHUP has arrived."""
+
+    def __init__(self, number: int):
+        self.number = number
+        super().__init__(signal.Signals(number).name)
+
+
+class Screen:
+    """Progress on stderr: one line, rewritten, on a terminal; elsewhere a line now and then."""
+
+    def __init__(self, quiet: bool):
+        self.quiet, self.live = quiet, sys.stderr.isatty()
+        self.done = self.total = self.width = 0
+        self.began = self.told = time.monotonic()
+        self.before: int | None = None
+
+    def __call__(self, done: int, total: int, remark: str) -> None:
+        """Take note of a sweep's progress (`compressor.sweep.Progress`)."""
+        self.done, self.total = done, total
+        if self.before in (None, done):
+            self.before, self.began = done, time.monotonic()
+        text = f"{done} of {total} jobs, {100 * done // total} %{self.time_left()}"
+        if self.quiet:
+            return
+        if self.live:
+            line = f"{text}; {remark}" if remark else text
+            say(f"\r{line:<{self.width}}", end="")
+            self.width = len(line)
+        elif remark:
+            say(remark)
+        elif time.monotonic() - self.told > QUIET_SECONDS:
+            self.told = time.monotonic()
+            say(text)
+
+    def time_left(self) -> str:
+        """A guess from the jobs that this run has done."""
+        here = self.done - (self.before or 0)
+        if not here or self.done == self.total:
+            return ""
+        seconds = (time.monotonic() - self.began) / here * (self.total - self.done)
+        return f", {duration(seconds)} left"
+
+    def end(self) -> None:
+        """Leave the line of progress behind."""
+        if self.width and not self.quiet:
+            say(f"\r{'':<{self.width}}\r", end="")
+            self.width = 0
+
+
+def say(text: str, end: str = "\n") -> None:
+    """Write to stderr; nobody may be there to read it."""
+    with contextlib.suppress(OSError):
+        print(text, end=end, file=sys.stderr, flush=True)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them."""
+    if seconds < 100:
+        return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def plural(jobs: int) -> str:
+    """A number of jobs in words."""
+    return f"{jobs} job" + ("s" if jobs != 1 else "")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(compressor.__version__, prog_name="compsim")
+def cli() -> None:
+    """Sweep a reciprocating compressor over joint clearances, and draw what comes out.
+
+    Exit codes: 0 done, 1 internal error, 2 usage or case file, 3 some jobs failed, 5 store,
+    130/143/129 interrupted.
+    """
+
+
+@cli.command()
+@click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
+@click.option("-o", "--output", default="results", show_default=True, help="Folder of results.")
+@click.option(
+    "-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
+    help="Worker processes.",
+)  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Set a key in all case files, such as machine.speed_rpm=300.")  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
+@click.pass_context
+def run(
+    context: click.Context,
+    configs: tuple[str, ...],
+    output: str,
+    jobs: int,
+    overrides: tuple[str, ...],
+    quiet: bool,
+) -> int:
+    """Simulate what case files ask for, and store it.
+
+    Jobs that are stored already are not run again, so a run that was interrupted goes on where it
+    ended. A summary line for each study goes to stdout.
+    """
+    from compressor.plan import load_studies
+
+    studies = load_studies(*configs, overrides=overrides)
+    from compressor.sweep import sweep
+
+    screen = Screen(quiet)
+    try:
+        summary = sweep(studies, output, jobs, screen, context.obj)
+    except BaseException:
+        screen.end()
+        if screen.total:
+            say(f"{screen.done} of {screen.total} jobs are stored in {output}; "
+                "the same command goes on from there")  # fmt: skip
+        raise
+    screen.end()
+    report_run(summary, output, quiet)
+    return SOME_FAILED if summary.failed else DONE
+
+
+@cli.command()
+@click.option("-i", "--input", "results", default="results", show_default=True,
+              help="Folder of results.")  # fmt: skip
+@click.option("-o", "--output", default="report", show_default=True, help="Folder of the report.")
+@click.pass_context
+def report(context: click.Context, results: str, output: str) -> int:
+    """Draw figures and tables of stored studies; prints the path of the page."""
+    from compressor.report import write_report
+
+    click.echo(write_report(results, output, context.obj))
+    return DONE
+
+
+def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
+    """Say what a run did, what failed and what to do next."""
+    width = max(len(count.study) for count in summary.counts)
+    for count in summary.counts:
+        where = os.path.join(folder, "studies", f"{count.study}.json")
+        good = count.jobs - count.failed
+        click.echo(
+            f"{count.study:<{width}}  {plural(count.jobs):>9}  {good:>4} ok  "
+            f"{count.failed:>4} failed  {where}"
+        )
+    if not quiet:
+        if not summary.run_now:
+            say(f"nothing to do: all {plural(summary.total)} are stored in {folder}")
+        else:
+            again = f", {summary.done_before} were stored before" if summary.done_before else ""
+            say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
+    report_failures(summary.failed, folder)
+    if not quiet:
+        say(f"next: compsim report -i {shlex.quote(folder)}")
+
+
+def report_failures(failures: Sequence["Failure"], folder: str) -> None:
+    """List failed jobs, and what to do about each kind of failure."""
+    if not failures:
+        return
+    from compressor.reading import printable
+
+    say(f"{plural(len({failure.key for failure in failures}))} failed:")
+    for failure in failures[:MOST_FAILURES]:
+        point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
+        file = os.path.join(folder, "jobs", f"{failure.key}.h5")
+        say(f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}\n    {file}")
+    if len(failures) > MOST_FAILURES:
+        say(f"  and {len(failures) - MOST_FAILURES} more")
+    say("what to do:")
+    for reason, number in Counter(failure.reason for failure in failures).items():
+        say(f"  {reason} ({number}): {ADVICE.get(reason, 'see its detail above')}")
+    say("A changed case file runs as a new job. To run one again unchanged, delete its file.")
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Turn the signals that ask a program to end into Interrupted; a second one ends it at once."""
+
+    def interrupt(number: int, frame: Any) -> None:
+        for other in caught:
+            signal.signal(other, signal.SIG_DFL)
+        raise Interrupted(number)
+
+    caught = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
+    old = {number: signal.signal(number, interrupt) for number in caught}
+    try:
+        yield
+    finally:
+        for number, handler in old.items():
+            signal.signal(number, handler)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    command = shlex.join(["compsim", *arguments])
+    try:
+        with interruptible():
+            return cli.main(arguments, "compsim", standalone_mode=False, obj=command) or DONE
+    except Interrupted as signal_sent:
+        say(f"interrupted by {signal_sent}")
+        return 128 + signal_sent.number
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except Exception as error:
+        return told(error)
+
+
+def told(error: Exception) -> int:
+    """Say what went wrong and return the exit code; only what nobody foresaw has a traceback."""
+    for family in type(error).__mro__:  # by name: their modules are heavy
+        if family.__name__ in FORESEEN:
+            prefix, code = FORESEEN[family.__name__]
+            say(f"{prefix}{error}")
+            return code
+    lines = traceback.format_exception(error)
+    if os.environ.get("COMPSIM_DEBUG"):
+        say("".join(lines), end="")
+        return INTERNAL
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="compsim-", suffix=".txt", delete=False, encoding="utf-8", errors="replace"
+    ) as file:
+        file.writelines(lines)
+    say(f"compsim: internal error: {type(error).__name__}: {error}")
+    say(f"please report it, with {file.name}, which holds the traceback")
+    return INTERNAL

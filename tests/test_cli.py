@@ -1,0 +1,298 @@
+"""The command line: exit codes, what each screen says, and how a run ends when it is told to."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import types
+from pathlib import Path
+
+import pytest
+from compsim import cli
+
+from compressor import load_cases, store
+from compressor.analysis import paper_cases
+
+CONFIGS = Path(__file__).parent.parent / "configs"
+SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+HEAVY = ("numpy", "xarray", "scipy", "numba", "h5py", "joblib", "matplotlib", "yaml")
+
+
+@pytest.fixture
+def case_file(tmp_path, monkeypatch):
+    """Writes case files into the working directory (JSON is YAML)."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(name, **values):
+        values["solve"] = SOLVE | values.get("solve", {})
+        Path(name).write_text(json.dumps(values))
+        return name
+
+    return write
+
+
+def test_help_needs_nothing_heavy():
+    code = f"import sys, compsim.cli; print([m for m in {HEAVY} if m in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout == "[]\n"
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["--version"], ["run", "--help"]])
+def test_help_is_on_stdout(arguments, capsys):
+    assert cli.main(arguments) == 0
+    assert "compsim" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["run"], "Missing argument 'CONFIG...'"),
+        (["rum"], "No such command 'rum'"),
+        (["run", "a.yaml", "-j", "0"], "0 is not in the range"),
+        (["run", "a.yaml", "--force"], "No such option"),
+        (["run", "absent.yaml"], "absent.yaml: cannot be read: No such file"),
+        (["run", "configs/*.yaml"], "configs/*.yaml: cannot be read"),
+        (["run", "."], ".: cannot be read: Is a directory"),
+        (["run", "bad.yaml"], "bad.yaml:1:9: joint: 'bigend' is none of"),
+        (["run", "good.yaml", "--set", "joint"], "--set joint: needs the form key=value"),
+        (["run", "good.yaml", "--set", "jiont=both"], "--set jiont=both: jiont: unknown key"),
+    ],
+)
+def test_usage_errors(arguments, told, case_file, capsys):
+    case_file("good.yaml")
+    Path("bad.yaml").write_text("joint:  bigend\nload: none\n")
+    assert cli.main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert told in err
+    assert out == ""
+    assert not Path("results").exists()
+
+
+def test_all_mistakes_are_told_at_once(tmp_path, capsys):
+    (tmp_path / "bad.yaml").write_text("joint: knee\nload: heavy\nclearence_mm: 1\n")
+    assert cli.main(["run", str(tmp_path / "bad.yaml")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(":")[1] for line in lines] == ["1", "2", "3"]
+
+
+def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
+    case_file("two.yaml", load=["none", "design"])
+    case_file("one.yaml", load="typical")
+    assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1", "-o", "out dir"]) == 0
+    out, err = capsys.readouterr()
+    assert [line.split() for line in out.splitlines()] == [
+        ["two", "2", "jobs", "2", "ok", "0", "failed", "out", "dir/studies/two.json"],
+        ["one", "1", "job", "1", "ok", "0", "failed", "out", "dir/studies/one.json"],
+    ]
+    assert "3 jobs run in" in err
+    assert err.endswith("next: compsim report -i 'out dir'\n")
+    assert "\r" not in err
+    manifest = store.read_studies("out dir")[0]
+    assert manifest.command == "compsim run two.yaml one.yaml -j 1 -o 'out dir'"
+
+
+def test_a_second_run_does_nothing_and_says_so(case_file, capsys):
+    case_file("two.yaml", load=["none", "design"])
+    assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
+    first = capsys.readouterr().out
+    assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
+    out, err = capsys.readouterr()
+    assert out == first
+    assert err.startswith("nothing to do: all 2 jobs are stored in results\n")
+
+
+def test_configs_are_the_paper_s_cases_and_nothing_else():
+    found = load_cases(*CONFIGS.glob("*"))
+    assert sorted(case.key for case in found) == sorted(c.key for c in paper_cases().values())
+
+
+def test_set_changes_every_case_file(case_file):
+    case_file("a.yaml", load="none")
+    case_file("b.yaml", load="design")
+    assert cli.main(["run", "a.yaml", "b.yaml", "-j", "1", "--set", "load=[none, typical]"]) == 0
+    assert [study.axes[0].values for study in store.read_studies("results")] == [
+        ("none", "typical")
+    ] * 2
+    assert len(store.finished_keys("results")) == 2
+
+
+@pytest.mark.parametrize("quiet", [[], ["--quiet"]])
+def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, capsys):
+    case_file("mix.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": [5, 10**6]})
+    for _ in range(2):
+        assert cli.main(["run", "mix.yaml", "-j", "1", *quiet]) == 3
+        out, err = capsys.readouterr()
+        assert out == "mix     2 jobs     1 ok     1 failed  results/studies/mix.json\n"
+        assert "1 job failed:\n  mix solve.max_steps=5: budget_steps: more than 5 steps\n" in err
+        assert "budget_steps (1): raise solve.max_steps" in err
+        (file,) = (line.strip() for line in err.splitlines() if "results/jobs/" in line)
+        assert Path(file).exists()
+        assert "To run one again unchanged, delete its file." in err
+
+
+def test_quiet_says_nothing_when_all_is_well(case_file, capsys):
+    assert cli.main(["run", case_file("one.yaml"), "-j", "1", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_many_failures_are_counted(case_file, capsys):
+    rods = [4 + number / 100 for number in range(25)]
+    case_file("all.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": 5},
+              machine={"rod_mass_kg": rods})  # fmt: skip
+    assert cli.main(["run", "all.yaml", "-j", "1"]) == 3
+    err = capsys.readouterr().err
+    assert err.count("more than 5 steps") == cli.MOST_FAILURES
+    assert "and 5 more" in err
+    assert "budget_steps (25)" in err
+
+
+def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
+    Path("file").touch()
+    assert cli.main(["run", case_file("one.yaml"), "-o", "file"]) == 5
+    err = capsys.readouterr().err
+    place = Path("file").absolute()
+    assert err.startswith(f"compsim: {place}: is a file, where a folder is needed; choose another")
+
+
+@pytest.fixture
+def reporter(monkeypatch):
+    """Stands in for compressor.report, which draws for seconds."""
+
+    def write_report(results, report, command):
+        store.read_studies(results)
+        return Path(report, command)
+
+    module = types.ModuleType("compressor.report")
+    module.write_report = write_report
+    monkeypatch.setitem(sys.modules, "compressor.report", module)
+
+
+def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
+    assert cli.main(["run", case_file("one.yaml"), "-j", "1", "--quiet"]) == 0
+    capsys.readouterr()
+    assert cli.main(["report", "-o", "page"]) == 0
+    assert capsys.readouterr().out == "page/compsim report -o page\n"
+
+
+def test_report_of_nothing_says_what_to_do_first(reporter, case_file, capsys):
+    assert cli.main(["report", "-i", "elsewhere"]) == 5
+    err = capsys.readouterr().err
+    assert err.startswith("compsim: elsewhere: holds no study; ")
+    assert "compsim run CONFIG..." in err
+
+
+def break_simulation(monkeypatch):
+    def broken(*arguments, **options):
+        raise ZeroDivisionError("no reason")
+
+    monkeypatch.setattr("compressor.plan.load_studies", broken)
+
+
+def test_the_unforeseen_is_one_line_and_a_file(case_file, capsys, monkeypatch):
+    break_simulation(monkeypatch)
+    monkeypatch.delenv("COMPSIM_DEBUG", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", os.getcwd())
+    assert cli.main(["run", case_file("one.yaml")]) == 1
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == "compsim: internal error: ZeroDivisionError: no reason"
+    (file,) = Path().glob("compsim-*.txt")
+    assert str(file.resolve()) in second
+    assert "Traceback" in file.read_text()
+
+
+def test_the_unforeseen_is_shown_for_debugging(case_file, capsys, monkeypatch):
+    break_simulation(monkeypatch)
+    monkeypatch.setenv("COMPSIM_DEBUG", "1")
+    assert cli.main(["run", case_file("one.yaml")]) == 1
+    assert "in broken" in capsys.readouterr().err
+
+
+def test_a_terminal_gets_one_line_that_is_rewritten(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    screen = cli.Screen(quiet=False)
+    for event in [(2, 11, ""), (3, 11, ""), (11, 11, "")]:
+        screen(*event)
+    screen.end()
+    err = capsys.readouterr().err
+    assert "\r2 of 11 jobs, 18 %\r3 of 11 jobs, 27 %, " in err
+    assert " left\r11 of 11 jobs, 100 %" in err
+    assert err.endswith(" \r")
+    assert "\n" not in err
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.04, "0.0 s"), (9.9, "9.9 s"), (99, "99 s"), (101, "2 min"), (7200, "2 h 00 min")],
+)
+def test_durations(seconds, text):
+    assert cli.duration(seconds) == text
+
+
+# ---- signals ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("number", "code"), [("INT", 130), ("TERM", 143), ("HUP", 129)])
+def test_exit_codes_of_signals(number, code, case_file, capsys, monkeypatch):
+    number = signal.Signals[f"SIG{number}"]
+    before = signal.getsignal(number)
+    monkeypatch.setattr(
+        "compressor.plan.load_studies", lambda *_, **__: os.kill(os.getpid(), number)
+    )
+    assert cli.main(["run", case_file("one.yaml")]) == code
+    assert capsys.readouterr().err == f"interrupted by {number.name}\n"
+    assert signal.getsignal(number) == before
+
+
+def started(folder, jobs):
+    """A real `compsim run` in its own process group, with at least one job done."""
+    rods = [4 + number / 100 for number in range(jobs)]
+    values = {"joint": "both", "clearance_mm": 0.1, "machine": {"rod_mass_kg": rods}}
+    (folder / "many.yaml").write_text(
+        json.dumps(values | {"solve": SOLVE | {"duration_rev": 1, "method": "LSODA"}})
+    )
+    command = [sys.executable, "-c", "import sys; from compsim.cli import main; sys.exit(main())"]
+    process = subprocess.Popen(
+        [*command, "run", "many.yaml"],
+        cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while not store.finished_keys(folder / "results") and time.monotonic() < deadline:
+        assert process.poll() is None
+        time.sleep(0.05)
+    return process
+
+
+def group_is_gone(group, seconds):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("send", "number", "code"),
+    [
+        (os.killpg, signal.SIGINT, 130),  # Ctrl-C reaches the whole group
+        (os.kill, signal.SIGKILL, -9),
+    ],
+)
+def test_a_run_that_is_told_to_end(send, number, code, tmp_path):
+    process = started(tmp_path, 40)
+    send(process.pid, number)
+    err = process.communicate(timeout=10)[1]
+    assert process.returncode == code
+    assert group_is_gone(process.pid, 5)
+    kept = store.finished_keys(tmp_path / "results")
+    assert 0 < len(kept) < 40
+    assert {store.job_status(tmp_path / "results", key).status for key in kept} == {"ok"}
+    if code > 0:
+        goes_on = "of 40 jobs are stored in results; the same command goes on from there"
+        assert re.fullmatch(rf"\d+ {goes_on}\ninterrupted by {number.name}\n", err)

@@ -1,0 +1,173 @@
+"""Sweeps: only what is missing runs, and no failure of a job, or of us, costs another job."""
+
+import json
+import math
+import os
+
+import pytest
+
+import compressor.simulate
+from compressor import store
+from compressor.case import Case
+from compressor.plan import load_studies
+from compressor.sweep import COMPILING, Failure, sweep, wanted
+
+SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+BOTH = {"joint": "both", "clearance_mm": 0.1}
+LATE = {**BOTH, "solve": {"method": "LSODA", "timeout_s": 1e-9}}  # out of time at its first step
+
+
+@pytest.fixture
+def studies(tmp_path):
+    """Makes the studies of some values by name, lists being swept (JSON is YAML)."""
+
+    def make(**values):
+        for name, content in values.items():
+            content = {**content, "solve": SHORT | content.get("solve", {})}
+            (tmp_path / f"{name}.yaml").write_text(json.dumps(content))
+        return load_studies(*(tmp_path / f"{name}.yaml" for name in values))
+
+    return make
+
+
+def stamps(folder):
+    return {path.name: path.stat().st_mtime_ns for path in folder.glob("*/*")}
+
+
+def statuses(folder, study):
+    return [store.job_status(folder, case.key).status for case in study.cases]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_failed_job_leaves_the_others_be(workers, studies, tmp_path):
+    made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}, "load": ["none", "design"]})
+    summary = sweep(made, tmp_path / "out", workers)
+    assert statuses(tmp_path / "out", made[0]) == ["failed", "failed", "ok", "ok"]
+    assert (summary.total, summary.done_before, summary.run_now) == (4, 0, 4)
+    assert [(count.study, count.jobs, count.failed) for count in summary.counts] == [
+        ("budget", 4, 2)
+    ]
+    assert summary.failed[0] == Failure(
+        "budget",
+        {"solve.max_steps": 5, "load": "none"},
+        made[0].cases[0].key,
+        "budget_steps",
+        "more than 5 steps",
+    )
+
+
+def test_a_second_sweep_does_nothing_and_still_tells_what_failed(studies, tmp_path):
+    made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}})
+    first = sweep(made, tmp_path / "out", 1)
+    before = stamps(tmp_path / "out")
+    second = sweep(made, tmp_path / "out", 1)
+    assert (second.done_before, second.run_now) == (2, 0)
+    assert second.failed == first.failed
+    assert stamps(tmp_path / "out") == before
+
+
+def test_studies_share_jobs(studies, tmp_path):
+    made = studies(
+        one={"machine": {"rod_mass_kg": [4, 5]}}, two={"machine": {"rod_mass_kg": [5, 6]}}
+    )
+    summary = sweep(made, tmp_path / "out", 1)
+    assert summary.total == summary.run_now == len(store.finished_keys(tmp_path / "out")) == 3
+    assert [count.jobs for count in summary.counts] == [2, 2]
+    assert store.open_study(tmp_path / "out").sizes["job"] == 4
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "runs"),
+    [
+        ({"output": {"keep": "metrics"}}, {"output": {"keep": "series"}}, 1),
+        ({"output": {"keep": "series"}}, {"output": {"keep": "metrics"}}, 0),
+        ({"name": "one"}, {"name": "other"}, 0),
+        (LATE, {**LATE, "solve": LATE["solve"] | {"timeout_s": 100}}, 1),
+        (LATE, LATE, 0),
+        ({"machine": {"speed_rpm": 500}}, {"machine": {"speed_rpm": 501}}, 1),
+    ],
+)
+def test_what_a_changed_case_file_runs_again(first, then, runs, studies, tmp_path):
+    sweep(studies(one=first), tmp_path / "out", 1)
+    assert sweep(studies(one=then), tmp_path / "out", 1).run_now == runs
+    assert sweep(studies(one=then), tmp_path / "out", 1).run_now == 0
+
+
+def test_where_studies_share_a_job_the_greater_demand_counts(studies):
+    made = studies(
+        few={"output": {"keep": "metrics"}}, all={}, less={"output": {"keep": "metrics"}}
+    )
+    (case,) = wanted(made).values()
+    assert case.output.keep == "series"
+
+
+@pytest.mark.parametrize("content", [b"", b"not a job", b"\x89HDF\r\n\x1a\n"])
+def test_a_damaged_file_is_replaced(content, studies, tmp_path):
+    made = studies(one={"load": ["none", "design"]})
+    sweep(made, tmp_path / "out", 1)
+    store.job_path(tmp_path / "out", made[0].cases[1].key).write_bytes(content)
+    assert sweep(made, tmp_path / "out", 1).run_now == 1
+    assert statuses(tmp_path / "out", made[0]) == ["ok", "ok"]
+
+
+def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):
+    def breaking(case, real=compressor.simulate.simulate):
+        return real(case) if case.load != "none" else {}["the bug"]
+
+    monkeypatch.setattr(compressor.simulate, "simulate", breaking)
+    made = studies(one={"load": ["none", "design"]})
+    summary = sweep(made, tmp_path / "out", 1)
+    assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]
+    (failure,) = summary.failed
+    assert (failure.reason, failure.detail) == ("internal_error", "KeyError: 'the bug'")
+    job = store.read_job(tmp_path / "out", failure.key)
+    assert "in breaking" in job.attrs["traceback"]
+    assert Case.from_attribute(job.attrs["case"]).key == failure.key
+    assert sweep(made, tmp_path / "out", 1).run_now == 0
+    found = store.open_study(tmp_path / "out")
+    assert found.reason.values.tolist() == ["internal_error", ""]
+    assert math.isnan(found.peak_acceleration.sel(load="none"))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_job_that_cannot_be_stored_ends_the_sweep(workers, studies, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/jobs").symlink_to("nowhere")
+    with pytest.raises(store.StoreError, match=r"out/jobs: is a file, where a folder is needed"):
+        sweep(studies(one={"load": ["none", "design"]}), tmp_path / "out", workers)
+
+
+def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/jobs").write_text("in the way")
+    with pytest.raises(store.StoreError, match="Not a directory; choose another folder"):
+        sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
+
+
+def test_progress_counts_every_job_once(studies, tmp_path):
+    made = studies(one={"load": ["none", "design", "typical"]})
+    told = []
+    sweep(made, tmp_path / "out", 2, lambda *event: told.append(event))
+    assert [event for event in told if event[2] != COMPILING] == [(n, 3, "") for n in range(4)]
+
+
+def test_an_interrupted_sweep_keeps_its_jobs_and_goes_on(studies, tmp_path):
+    def stop(done, total, remark):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    made = studies(one={**BOTH, "machine": {"rod_mass_kg": [4, 5, 6, 7]}})
+    with pytest.raises(KeyboardInterrupt):
+        sweep(made, tmp_path / "out", 1, stop)
+    kept = stamps(tmp_path / "out")
+    assert len(store.finished_keys(tmp_path / "out")) == 1
+    summary = sweep(made, tmp_path / "out", 1)
+    assert (summary.done_before, summary.run_now) == (1, 3)
+    assert kept.items() <= stamps(tmp_path / "out").items()
+
+
+def test_a_relative_folder_is_the_one_of_the_start(studies, tmp_path, monkeypatch):
+    made = studies(one={})
+    monkeypatch.chdir(tmp_path)
+    sweep(made, "out", 1, lambda *event: os.chdir("/"))
+    assert store.finished_keys(tmp_path / "out") == {made[0].cases[0].key}
