@@ -15,7 +15,7 @@ import numpy as np
 from scipy import integrate as scipy_integrate
 
 from compressor.physics.loads import sample_segments, segments
-from compressor.physics.march import Status, march, new_walker
+from compressor.physics.march import Mode, Status, march, new_walker, new_work
 from compressor.physics.observe import (
     COLUMNS,
     add_flows,
@@ -28,9 +28,14 @@ from compressor.physics.observe import (
     tally_step,
 )
 from compressor.physics.parameters import FREEDOMS, Load, Scene
-from compressor.physics.runge_kutta import FLOWS, STAGES, Pair
+from compressor.physics.runge_kutta import FLOWS, Pair
 
-COMPILED = {"auto": Pair.DOPRI5, "DOPRI5": Pair.DOPRI5, "TSIT5": Pair.TSIT5}
+COMPILED = {
+    "auto": (Mode.AUTO, Pair.DOPRI5),
+    "DOPRI5": (Mode.EXPLICIT, Pair.DOPRI5),
+    "TSIT5": (Mode.EXPLICIT, Pair.TSIT5),
+    "RODAS": (Mode.STIFF, Pair.DOPRI5),
+}
 SCIPY = {
     name: getattr(scipy_integrate, name) for name in ("LSODA", "Radau", "BDF", "DOP853", "RK45")
 }
@@ -147,14 +152,18 @@ def scales(p: np.record) -> tuple[float, float]:
     return length, length * frequency
 
 
+def natural_sizes(p: np.record) -> np.ndarray:
+    """Size of each number of the motion, shape (2 n,): deviations (m, rad), their rates (per s)."""
+    length, speed = scales(p)
+    per_unit = np.ones(FREEDOMS[Scene(int(p.scene))])
+    per_unit[-1] = 1.0 / p.rod_length  # the last freedom is an angle
+    return np.concatenate((length * per_unit, speed * per_unit))
+
+
 def absolute_tolerances(p: np.record, rtol: float) -> np.ndarray:
     """SciPy's atol, shape (2 n + 4,), for the scene's deviations, their rates, energy flows."""
-    length, speed = scales(p)
-    n = FREEDOMS[Scene(int(p.scene))]
-    per_unit = np.ones(n)
-    per_unit[-1] = 1.0 / p.rod_length  # the last freedom is an angle
     energy = (p.reciprocating_mass + p.rod_mass) * (p.crank_radius * p.omega) ** 2 / 2
-    return rtol * np.concatenate((length * per_unit, speed * per_unit, np.full(FLOWS, energy)))
+    return rtol * np.concatenate((natural_sizes(p), np.full(FLOWS, energy)))
 
 
 def integrate(request: Request) -> Trajectory:
@@ -184,18 +193,19 @@ def integrate(request: Request) -> Trajectory:
 def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
     """Integrate by the compiled loop, in chunks between which budgets are checked."""
     deadline = time.monotonic() + request.timeout
-    walker = new_walker()
-    walker.pair, walker.rtol, walker.settle = COMPILED[request.method], request.rtol, request.settle
+    mode, pair = COMPILED[request.method]
+    walker = new_walker(mode)
+    walker.pair, walker.rtol, walker.settle = pair, request.rtol, request.settle
     length, speed = scales(request.p)
     walker.watch, walker.contact_step = 1, CONTACT_STEP * length / speed
     walker.deepest = IMPLAUSIBLE * request.p.pin_radius
-    atol = absolute_tolerances(request.p, request.rtol)[:-FLOWS]
-    k = np.zeros((STAGES, z.size))
+    size = natural_sizes(request.p)
+    work = new_work(size.size)
     while walker.status == Status.RUNNING:
         left = request.max_steps - walker.steps - walker.rejected
         march(
-            walker, request.p, z, k, atol, edges, phases, request.times, result.states,
-            result.tally, min(CHUNK, left),
+            walker, request.p, z, work, request.rtol * size, size, edges, phases, request.times,
+            result.states, result.tally, min(CHUNK, left),
         )  # fmt: skip
         result.steps, result.rejected = int(walker.steps), int(walker.rejected)
         result.evaluations = int(walker.evaluations)

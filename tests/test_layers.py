@@ -17,6 +17,7 @@ FLOORS = [
     "physics.observe",
     "physics.cam",
     "physics.runge_kutta",
+    "physics.rosenbrock",
     "physics.onset",
     "physics.march",
     "parameter",

@@ -13,6 +13,7 @@ from compressor.physics.runge_kutta import (
     E,
     P,
     Pair,
+    extend,
     interpolate,
     take_step,
 )
@@ -74,7 +75,9 @@ def test_order_of_dense_output(pair):
         k, new, y = np.zeros((STAGES, z.size)), np.zeros(z.size), np.zeros(8)
         derivative_with_flows(BEGIN, z, 3, FLIGHT, k[0])
         take_step(pair, BEGIN, h, z, k, 3, FLIGHT, new)
-        interpolate(pair, 0.4, h, z, k, y)
+        dense = np.zeros((5, 8))
+        extend(pair, h, z, k, dense)
+        interpolate(0.4, dense, y)
         exact = np.zeros(z.size)
         inner = np.zeros_like(k)
         derivative_with_flows(BEGIN, z, 3, FLIGHT, inner[0])

@@ -7,9 +7,11 @@ contact; the dense solution feeds the output grid and the tally.
 
 import math
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
+from compressor.physics import rosenbrock
 from compressor.physics._jit import jit
 from compressor.physics.observe import (
     COLUMNS,
@@ -21,14 +23,31 @@ from compressor.physics.observe import (
     tally_step,
 )
 from compressor.physics.onset import NEVER, first_onset
-from compressor.physics.runge_kutta import FLOWS, STAGES, error_norm, interpolate, take_step
+from compressor.physics.runge_kutta import (
+    FLOWS,
+    STAGES,
+    A,
+    error_norm,
+    extend,
+    interpolate,
+    take_step,
+)
 
-ORDER = 5
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
-PROPORTIONAL, INTEGRAL = 0.7 / ORDER, 0.4 / ORDER  # PI control, Hairer & Wanner II.IV.2
+PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
+EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NODES, WEIGHTS = lobatto(5)
+# stiffness: an explicit step is held by stability where h |lambda| exceeds the boundary
+BOUNDARY = 3.25  # of both pairs on the negative real axis, about
+SUSPECT = 0.6  # of the boundary: under PI control, steps held by stability swing around it
+STIFF_STEPS, CALM_STEPS = 15, 10  # in a row, before a change of method
+REST, LONGEST_REST = 500, 16000  # steps without a test after a change back; doubled after each
+SHORT_STAY = 100  # stiff steps or fewer
+
+rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
+rosenbrock_extend, spectral_radius = rosenbrock.extend, rosenbrock.spectral_radius
 
 
 class Status(IntEnum):
@@ -41,7 +60,16 @@ class Status(IntEnum):
     PENETRATION_IMPLAUSIBLE = 4
 
 
+class Mode(IntEnum):
+    """Which methods a walker may use."""
+
+    AUTO = 0  # explicit, and the stiff partner where stability holds the explicit steps
+    EXPLICIT = 1
+    STIFF = 2
+
+
 # numba wants plain integers
+AUTO, EXPLICIT, STIFF = map(int, Mode)
 RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE = map(int, Status)
 
 WALKER = np.dtype(
@@ -60,6 +88,14 @@ WALKER = np.dtype(
         ("rejected", "i8"),
         ("onsets", "i8"),
         ("watch", "i8"),  # whether onsets of contact are watched
+        ("mode", "i8"),  # Mode
+        ("stiff", "i8"),  # whether the present step is the stiff partner's
+        ("stiff_steps", "i8"),  # steps taken by the stiff partner
+        ("held", "i8"),  # explicit steps in a row that stability has held
+        ("calm", "i8"),  # stiff steps in a row that an explicit method could have taken
+        ("rest", "i8"),  # steps until stiffness is tested again
+        ("pause", "i8"),  # the rest after the last change back
+        ("stay", "i8"),  # stiff steps since the last change
         ("rtol", "f8"),
         ("settle", "f8"),
         ("contact_step", "f8"),  # s: a step that resolves the contact's own frequency
@@ -69,58 +105,103 @@ WALKER = np.dtype(
 )
 
 
-def new_walker():
+class Work(NamedTuple):
+    """Arrays that a march works in; only the first row of `k` carries over between calls."""
+
+    k: np.ndarray  # (7, n + 4): stages of the explicit pair, or increments of the stiff partner
+    new: np.ndarray  # (n + 4,)
+    column: np.ndarray  # (n + 4,)
+    jacobian: np.ndarray  # (n + 4, n)
+    dense: np.ndarray  # (5, n): the step's interpolant
+    y: np.ndarray  # (n,)
+    times: np.ndarray  # of a step's nodes
+    rows: np.ndarray  # observed there
+    row: np.ndarray
+
+
+def new_walker(mode):
     """A walker at the start of its first segment."""
     walker = np.zeros(1, dtype=WALKER).view(np.recarray)[0]
     walker.fresh = 1
     walker.error = 1e-4
+    walker.mode = mode
+    walker.pause = REST // 2
+    walker.stiff = mode == Mode.STIFF
     return walker
 
 
+def new_work(n):
+    """The arrays for a motion of n numbers (positions and rates)."""
+    size = n + FLOWS
+    return Work(
+        np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
+        np.zeros((5, n)), np.zeros(n), np.zeros(NODES.size), np.zeros((NODES.size, COLUMNS)),
+        np.zeros(COLUMNS),
+    )  # fmt: skip
+
+
 @jit
-def first_step(w, z, k, atol, scratch, phase, p, end):
+def first_step(w, z, work, atol, phase, p, end):
     """Length (s) of a first step that an order-5 method can take (Hairer, Norsett, Wanner II.4)."""
     n = z.size - FLOWS
+    rates, trial = work.k[0], work.column
     size = 0.0
     rate = 0.0
     for i in range(n):
         scale = atol[i] + w.rtol * abs(z[i])
         size += (z[i] / scale) ** 2
-        rate += (k[0, i] / scale) ** 2
+        rate += (rates[i] / scale) ** 2
     size, rate = math.sqrt(size / n), math.sqrt(rate / n)
     guess = 1e-6 if size < 1e-5 or rate < 1e-5 else 0.01 * size / rate
     guess = min(guess, end - w.t)
     for i in range(z.size):
-        scratch[i] = z[i] + guess * k[0, i]
-    derivative_with_flows(w.t + guess, scratch, phase, p, k[1])
+        work.new[i] = z[i] + guess * rates[i]
+    derivative_with_flows(w.t + guess, work.new, phase, p, trial)
     w.evaluations += 1
     change = 0.0
     for i in range(n):
         scale = atol[i] + w.rtol * abs(z[i])
-        change += ((k[1, i] - k[0, i]) / scale) ** 2
+        change += ((trial[i] - rates[i]) / scale) ** 2
     change = math.sqrt(change / n) / guess
     steepest = max(rate, change)
-    bold = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1.0 / ORDER)
+    bold = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** 0.2
     return min(100.0 * guess, bold, end - w.t)
 
 
 @jit
-def sample_grid(w, t_end, h, z, k, times, states):
-    """Fill the output samples up to t_end from the step's interpolant."""
-    while w.sample < times.size and times[w.sample] <= t_end:
-        s = (times[w.sample] - w.t) / h
-        interpolate(w.pair, min(1.0, max(0.0, s)), h, z, k, states[w.sample])
-        w.sample += 1
+def attempt(w, h, z, work, atol, size, phase, p):
+    """Take a step of length h by the walker's present method; returns its error norm."""
+    if w.stiff:
+        u = work.k[1:]
+        w.evaluations += size.size + 1 + rosenbrock.STAGES
+        if not rosenbrock_step(
+            w.t, h, z, work.k[0], size, phase, p, work.column, work.new, u, work.jacobian
+        ):
+            return math.inf
+        return rosenbrock_error(z, work.new, u, w.rtol, atol)
+    take_step(w.pair, w.t, h, z, work.k, phase, p, work.new)
+    w.evaluations += STAGES - 1
+    return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
 
 
 @jit
-def observe_step(w, begin, end, h, z, k, phase, p, y, times, rows):
+def look_at_step(w, h, z, work, phase, p):
+    """Lay the step's interpolant through and observe it at its nodes."""
+    if w.stiff:
+        rosenbrock_extend(z, work.new, work.k[1:], work.dense)
+    else:
+        extend(w.pair, h, z, work.k, work.dense)
+    observe_part(w, 0.0, 1.0, h, work, phase, p)
+
+
+@jit
+def observe_part(w, begin, end, h, work, phase, p):
     """Rows at the Lobatto nodes of [begin, end], fractions of the step."""
     for i in range(NODES.size):
         s = begin + (end - begin) * NODES[i]
-        interpolate(w.pair, s, h, z, k, y)
-        times[i] = w.t + s * h
-        observe(times[i], y, phase, p, rows[i])
+        interpolate(s, work.dense, work.y)
+        work.times[i] = w.t + s * h
+        observe(work.times[i], work.y, phase, p, work.rows[i])
 
 
 @jit
@@ -135,34 +216,23 @@ def apart(rows, p):
 
 
 @jit
-def controlled(w, h, error):
-    """The next step's length after an accepted step (PI control)."""
-    error = max(error, 1e-10)
-    factor = SAFETY * error**-PROPORTIONAL * w.error**INTEGRAL
-    w.error = max(error, 1e-4)
-    return h * min(GROW, max(SHRINK, factor))
-
-
-@jit
-def land_on_onset(w, h, z, k, phase, p, new, y, rows, node_times):
+def land_on_onset(w, h, z, work, atol, size, phase, p):
     """Shorten the step just taken so that it ends where contact begins; returns its length.
 
     Watched only when a node of the step shows a joint apart. The next step is kept within the
     pulse that begins, or to the contact's own time scale.
     """
-    observe_step(w, 0.0, 1.0, h, z, k, phase, p, y, node_times, rows)
     landed = w.landed
     w.landed = 0
-    if not w.watch or not apart(rows, p):
+    if not w.watch or not apart(work.rows, p):
         return h
-    begin, end = first_onset(w.pair, w.t, h, z, k, phase, p, y)
+    begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
     if begin >= 1.0 or begin == NEVER or (landed and begin < LANDED):
         return h
     onset = begin * h
     pulse = (end - begin) * h
-    take_step(w.pair, w.t, onset, z, k, phase, p, new)
-    w.evaluations += STAGES - 1
-    observe_step(w, 0.0, 1.0, onset, z, k, phase, p, y, node_times, rows)
+    attempt(w, onset, z, work, atol, size, phase, p)
+    look_at_step(w, onset, z, work, phase, p)
     w.landed = 1
     w.onsets += 1
     w.h = min(w.h, w.contact_step, 0.5 * pulse if end < 1.0 else w.contact_step)
@@ -170,19 +240,98 @@ def land_on_onset(w, h, z, k, phase, p, new, y, rows, node_times):
 
 
 @jit
-def take_in(w, h, z, k, new, phase, p, y, rows, node_times, row, tally):
-    """Tally an accepted step whose nodes stand in rows, and audit its energy."""
+def sample_grid(w, t_end, h, work, times, states):
+    """Fill the output samples up to t_end from the step's interpolant."""
+    while w.sample < times.size and times[w.sample] <= t_end:
+        s = (times[w.sample] - w.t) / h
+        interpolate(min(1.0, max(0.0, s)), work.dense, states[w.sample])
+        w.sample += 1
+
+
+@jit
+def take_in(w, h, work, phase, p, tally):
+    """Tally an accepted step that has been looked at, and audit its energy."""
     if w.t < w.settle < w.t + h:
         cut = (w.settle - w.t) / h
-        observe_step(w, 0.0, cut, h, z, k, phase, p, y, node_times, rows)
-        tally_step(node_times, rows, WEIGHTS, False, tally, p)
-        observe_step(w, cut, 1.0, h, z, k, phase, p, y, node_times, rows)
-        tally_step(node_times, rows, WEIGHTS, True, tally, p)
+        observe_part(w, 0.0, cut, h, work, phase, p)
+        tally_step(work.times, work.rows, WEIGHTS, False, tally, p)
+        observe_part(w, cut, 1.0, h, work, phase, p)
+        tally_step(work.times, work.rows, WEIGHTS, True, tally, p)
     else:
-        tally_step(node_times, rows, WEIGHTS, w.t >= w.settle, tally, p)
-    n = z.size - FLOWS
-    observe(w.t + h, new[:n], phase, p, row)
-    tally_energy(row, new[n:], tally)
+        tally_step(work.times, work.rows, WEIGHTS, w.t >= w.settle, tally, p)
+    n = work.y.size
+    observe(w.t + h, work.new[:n], phase, p, work.row)
+    tally_energy(work.row, work.new[n:], tally)
+
+
+@jit
+def controlled(w, h, error):
+    """The next step's length after an accepted step (PI control)."""
+    order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
+    error = max(error, 1e-10)
+    factor = SAFETY * error ** (-PROPORTIONAL / order) * w.error ** (INTEGRAL / order)
+    w.error = max(error, 1e-4)
+    return h * min(GROW, max(SHRINK, factor))
+
+
+@jit
+def refuse(w, h, error):
+    """Shorten the step after a refused attempt; a step that makes no way ends the walk."""
+    order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
+    w.rejected += 1
+    w.h = h * (max(SHRINK, SAFETY * error ** (-1.0 / order)) if error < math.inf else 0.1)
+
+
+@jit
+def stiff_rate(w, h, z, work, size):
+    """Estimate of the largest eigenvalue's size (1/s) from the step just taken.
+
+    Explicit: the last two stages stand at the same time, so their rates differ by the Jacobian
+    times the difference of their states (Hairer & Wanner II, IV.2). Stiff partner: power
+    iterations with the Jacobian itself.
+    """
+    n = size.size
+    if w.stiff:
+        for i in range(n):
+            work.y[i] = work.k[rosenbrock.STAGES, i] + 1e-3 * size[i]
+        return spectral_radius(work.jacobian, size, work.y, work.column[:n])
+    above = 0.0
+    below = 0.0
+    for i in range(n):
+        change = work.new[i] - z[i]
+        for j in range(STAGES - 2):
+            change -= h * A[w.pair, STAGES - 2, j] * work.k[j, i]
+        above += ((work.k[STAGES - 1, i] - work.k[STAGES - 2, i]) / size[i]) ** 2
+        below += (change / size[i]) ** 2
+    return math.sqrt(above / below) if below > 0.0 else 0.0
+
+
+@jit
+def choose_method(w, h, z, work, size):
+    """Change to the stiff partner where stability holds the explicit steps, and back.
+
+    A stiff step costs as much as `price` explicit ones; where it is not longer than that many
+    stable explicit steps for a while, the explicit pair comes back and rests from the test.
+    """
+    if w.mode != AUTO:
+        return
+    if w.rest > 0:
+        w.rest -= 1
+        return
+    reach = h * stiff_rate(w, h, z, work, size) / BOUNDARY
+    if w.stiff:
+        price = (size.size + rosenbrock.STAGES + 0.2 * size.size**2) / (STAGES - 1)
+        w.calm = w.calm + 1 if reach < price else 0
+        w.stay += 1
+        if w.calm >= CALM_STEPS:
+            w.stiff, w.calm, w.held = 0, 0, 0
+            w.pause = min(2 * w.pause, LONGEST_REST) if w.stay < SHORT_STAY else REST
+            w.rest = w.pause
+            w.h = min(w.h, h / max(reach, 1.0))
+    else:
+        w.held = w.held + 1 if reach > SUSPECT else max(0, w.held - 1)
+        if w.held >= STIFF_STEPS:
+            w.stiff, w.held, w.calm, w.stay = 1, 0, 0, 0
 
 
 @jit
@@ -195,61 +344,60 @@ def finite(new):
 
 
 @jit
-def march(w, p, z, k, atol, edges, phases, times, states, tally, limit):
+def advance(w, z, work, reached, was_stiff, at_edge, segments):
+    """Move the walker to the end of the step that was taken, and into the next segment."""
+    for i in range(z.size):
+        z[i] = work.new[i]
+        work.k[0, i] = work.k[STAGES - 1, i]  # of an explicit pair: the next step's first stage
+    w.t = reached
+    w.steps += 1
+    w.stiff_steps += was_stiff
+    w.fresh = 1 if was_stiff or at_edge else 0
+    if at_edge:
+        w.segment += 1
+        if w.segment == segments:
+            w.status = DONE
+
+
+@jit
+def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit):
     """Advance by at most `limit` step attempts; w.status tells how the walker stands then.
 
-    w: walker; p: record; z: motion and flows, (n + 4,); k: stages, (7, n + 4), the first row
-    being carried from step to step; atol: (n,); edges, phases: the load's segments; times,
-    states: output grid (m,) and (m, n); tally: gathers metrics. All but p, atol, edges, phases
-    and times are written.
+    w: walker; p: record; z: motion and flows, (n + 4,); work: scratch, carried between calls;
+    atol, size: absolute tolerance and natural size of each number of the motion, (n,); edges,
+    phases: the load's segments; times, states: output grid (m,) and (m, n); tally: gathers
+    metrics. z, w, work, states and tally are written.
     """
-    n = z.size - FLOWS
-    new = np.empty(z.size)
-    y = np.empty(n)
-    rows = np.empty((NODES.size, COLUMNS))
-    node_times = np.empty(NODES.size)
-    row = np.empty(COLUMNS)
     for _ in range(limit):
         if w.status != RUNNING:
             return
-        end = edges[w.segment + 1]
-        phase = phases[w.segment]
+        end, phase = edges[w.segment + 1], phases[w.segment]
         if w.fresh:
-            derivative_with_flows(w.t, z, phase, p, k[0])
+            derivative_with_flows(w.t, z, phase, p, work.k[0])
             w.evaluations += 1
             w.fresh = 0
         if w.h == 0.0:
-            w.h = first_step(w, z, k, atol, new, phase, p, end)
-        h = w.h
+            w.h = first_step(w, z, work, atol, phase, p, end)
+        h = min(w.h, end - w.t)
         if w.t + 1.01 * h >= end:
             h = end - w.t
-        take_step(w.pair, w.t, h, z, k, phase, p, new)
-        w.evaluations += STAGES - 1
-        error = error_norm(w.pair, h, z, new, k, w.rtol, atol)
+        error = attempt(w, h, z, work, atol, size, phase, p)
         if not error <= 1.0:
-            w.rejected += 1
-            shrink = max(SHRINK, SAFETY * error ** (-1.0 / ORDER)) if error < math.inf else 0.1
-            w.h = h * shrink
+            refuse(w, h, error)
             if w.h < LEAST_STEP * (w.t + 1.0 / p.omega):
-                w.status = STEP_UNDERFLOW if finite(k[0]) else NON_FINITE
+                w.status = STEP_UNDERFLOW if finite(work.k[0]) else NON_FINITE
             continue
-        w.h = max(w.h, controlled(w, h, error)) if h < w.h else controlled(w, h, error)
-        taken = land_on_onset(w, h, z, k, phase, p, new, y, rows, node_times)
-        take_in(w, taken, z, k, new, phase, p, y, rows, node_times, row, tally)
+        longer = controlled(w, h, error)
+        w.h = max(w.h, longer) if h < w.h else longer
+        look_at_step(w, h, z, work, phase, p)
+        taken = land_on_onset(w, h, z, work, atol, size, phase, p)
         at_edge = taken == h and h == end - w.t
-        sample_grid(w, end if at_edge else w.t + taken, taken, z, k, times, states)
-        for i in range(z.size):
-            z[i] = new[i]
-            k[0, i] = k[STAGES - 1, i]
-        w.steps += 1
-        if at_edge:
-            w.t = end
-            w.segment += 1
-            w.fresh = 1
-            if w.segment == phases.size:
-                w.status = DONE
-        else:
-            w.t += taken
+        reached = end if at_edge else w.t + taken
+        take_in(w, taken, work, phase, p, tally)
+        sample_grid(w, reached, taken, work, times, states)
+        was_stiff = w.stiff
+        choose_method(w, taken, z, work, size)
+        advance(w, z, work, reached, was_stiff, at_edge, phases.size)
         if tally.deepest > w.deepest:
             w.status = PENETRATION_IMPLAUSIBLE
         elif not finite(z):

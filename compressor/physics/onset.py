@@ -29,9 +29,9 @@ def nearness(contact, stiffness, p):
 
 
 @jit
-def nearness_at(joint, pair, s, t, h, z, k, phase, p, y):
-    """`nearness` of one joint at the fraction s of a step; y is scratch, shape (n,)."""
-    interpolate(pair, s, h, z, k, y)
+def nearness_at(joint, s, t, h, dense, phase, p, y):
+    """`nearness` of a joint at the fraction s of a step with interpolant `dense`; y: scratch."""
+    interpolate(s, dense, y)
     now = evaluate(t + s * h, y, phase, p)
     if joint == 0:
         return nearness(now.big, p.stiffness[0], p)
@@ -39,11 +39,11 @@ def nearness_at(joint, pair, s, t, h, z, k, phase, p, y):
 
 
 @jit
-def crossing(joint, pair, low, high, t, h, z, k, phase, p, y):
+def crossing(joint, low, high, t, h, dense, phase, p, y):
     """Fraction at which contact begins, between `low` (apart) and `high` (touching)."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if nearness_at(joint, pair, middle, t, h, z, k, phase, p, y) > 0.0:
+        if nearness_at(joint, middle, t, h, dense, phase, p, y) > 0.0:
             high = middle
         else:
             low = middle
@@ -51,7 +51,7 @@ def crossing(joint, pair, low, high, t, h, z, k, phase, p, y):
 
 
 @jit
-def touching_between(joint, pair, low, high, t, h, z, k, phase, p, y):
+def touching_between(joint, low, high, t, h, dense, phase, p, y):
     """A fraction in (low, high) at which there is contact, by golden section; NEVER if none.
 
     For a bracket around a local maximum of the nearness whose ends are both apart.
@@ -59,8 +59,8 @@ def touching_between(joint, pair, low, high, t, h, z, k, phase, p, y):
     golden = 0.6180339887498949
     left = high - golden * (high - low)
     right = low + golden * (high - low)
-    at_left = nearness_at(joint, pair, left, t, h, z, k, phase, p, y)
-    at_right = nearness_at(joint, pair, right, t, h, z, k, phase, p, y)
+    at_left = nearness_at(joint, left, t, h, dense, phase, p, y)
+    at_right = nearness_at(joint, right, t, h, dense, phase, p, y)
     for _ in range(HALVINGS):
         if at_left > 0.0:
             return left
@@ -69,39 +69,39 @@ def touching_between(joint, pair, low, high, t, h, z, k, phase, p, y):
         if at_left > at_right:
             high, right, at_right = right, left, at_left
             left = high - golden * (high - low)
-            at_left = nearness_at(joint, pair, left, t, h, z, k, phase, p, y)
+            at_left = nearness_at(joint, left, t, h, dense, phase, p, y)
         else:
             low, left, at_left = left, right, at_right
             right = low + golden * (high - low)
-            at_right = nearness_at(joint, pair, right, t, h, z, k, phase, p, y)
+            at_right = nearness_at(joint, right, t, h, dense, phase, p, y)
     return NEVER
 
 
 @jit
-def joint_onset(joint, pair, t, h, z, k, phase, p, y):
+def joint_onset(joint, t, h, dense, phase, p, y):
     """First fraction of a step at which a joint that was apart touches, and until when it does.
 
     Returns (begin, end); (NEVER, NEVER) without an onset, end = 1 where contact outlasts the step.
     """
-    earlier = nearness_at(joint, pair, 0.0, t, h, z, k, phase, p, y)
+    earlier = nearness_at(joint, 0.0, t, h, dense, phase, p, y)
     before = earlier
     begin = NEVER
     for i in range(1, SAMPLES + 1):
         s = i / SAMPLES
-        now = nearness_at(joint, pair, s, t, h, z, k, phase, p, y)
+        now = nearness_at(joint, s, t, h, dense, phase, p, y)
         if begin < NEVER:
             if now <= 0.0:
                 return begin, s
         elif now > 0.0:
             if before <= 0.0:
-                begin = crossing(joint, pair, s - 1.0 / SAMPLES, s, t, h, z, k, phase, p, y)
+                begin = crossing(joint, s - 1.0 / SAMPLES, s, t, h, dense, phase, p, y)
         elif i > 1 and before >= earlier and before >= now and before <= 0.0:
             low = s - 2.0 / SAMPLES
             # a parabola's top lies at most an eighth of its two slopes above the middle
             if before + abs(before - earlier) + abs(before - now) > 0.0:
-                inside = touching_between(joint, pair, low, s, t, h, z, k, phase, p, y)
+                inside = touching_between(joint, low, s, t, h, dense, phase, p, y)
                 if inside < NEVER:
-                    return crossing(joint, pair, low, inside, t, h, z, k, phase, p, y), s
+                    return crossing(joint, low, inside, t, h, dense, phase, p, y), s
         earlier, before = before, now
     if begin < NEVER:
         return begin, 1.0
@@ -109,12 +109,12 @@ def joint_onset(joint, pair, t, h, z, k, phase, p, y):
 
 
 @jit
-def first_onset(pair, t, h, z, k, phase, p, y):
+def first_onset(t, h, dense, phase, p, y):
     """`joint_onset` of whichever joint with clearance touches first."""
     begin, end = NEVER, NEVER
     for joint in range(2):
         if p.clearance[joint] > 0.0:
-            found, until = joint_onset(joint, pair, t, h, z, k, phase, p, y)
+            found, until = joint_onset(joint, t, h, dense, phase, p, y)
             if found < begin:
                 begin, end = found, until
     return begin, end

@@ -130,16 +130,22 @@ def error_norm(pair, h, z, new, k, rtol, atol):
 
 
 @jit
-def interpolate(pair, s, h, z, k, out):
+def extend(pair, h, z, k, dense):
+    """Coefficients of a step's interpolant into dense, (5, n): y(s) = sum_j dense[j] s^j."""
+    for i in range(dense.shape[1]):
+        dense[0, i] = z[i]
+        for j in range(4):
+            total = 0.0
+            for stage in range(STAGES):
+                total += P[pair, stage, j] * k[stage, i]
+            dense[j + 1, i] = h * total
+
+
+@jit
+def interpolate(s, dense, out):
     """The motion at the fraction s of a step into out, shape (n,)."""
     for i in range(out.size):
-        out[i] = 0.0
-    for j in range(STAGES):
-        weight = P[pair, j, 3]
-        for m in range(2, -1, -1):
-            weight = weight * s + P[pair, j, m]
-        weight *= s * h
-        for i in range(out.size):
-            out[i] += weight * k[j, i]
-    for i in range(out.size):
-        out[i] += z[i]
+        value = dense[4, i]
+        for j in range(3, -1, -1):
+            value = value * s + dense[j, i]
+        out[i] = value

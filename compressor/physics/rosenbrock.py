@@ -1,0 +1,203 @@
+"""The stiff partner: RODAS, a Rosenbrock method of order 4(3), six stages, stiffly accurate.
+
+Each step solves linear systems with one Jacobian of the compiled right-hand side, taken by
+differences; no iteration that could fail to converge. Coefficients: Hairer & Wanner, Solving
+Ordinary Differential Equations II, IV.7 and IV.10, with their continuous extension of order 3.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import jit
+from compressor.physics.observe import derivative_with_flows
+from compressor.physics.runge_kutta import FLOWS
+
+STAGES = 6
+GAMMA = 0.25
+# increments a_ij, couplings c_ij / h, nodes and the weights of df/dt
+A = np.zeros((STAGES, STAGES))
+A[1, :1] = 1.544
+A[2, :2] = 0.9466785280815826, 0.2557011698983284
+A[3, :3] = 3.314825187068521, 2.896124015972201, 0.9986419139977817
+A[4, :4] = 1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950
+A[5, :4] = A[4, :4]
+A[5, 4] = 1.0
+COUPLING = np.zeros((STAGES, STAGES))
+COUPLING[1, :1] = -5.6688
+COUPLING[2, :2] = -2.430093356833875, -0.2063599157091915
+COUPLING[3, :3] = -0.1073529058151375, -9.594562251023355, -20.47028614809616
+COUPLING[4, :4] = 7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160
+COUPLING[5, :5] = (
+    8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136,
+    -6.058818238834054,
+)  # fmt: skip
+NODES = np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0])
+TIME = np.array([0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0])
+DENSE = np.array(
+    [
+        [10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823,
+         1.025137723295662, 0.0],
+        [-0.6762803392806898, 6.087714651680015, 16.43084320892478, 24.76722511418386,
+         -6.594389125716872, 0.0],
+    ]
+)  # fmt: skip
+ROOT_EPSILON = 1.5e-8
+POWER_ITERATIONS = 8
+TIME_SHARE = 1e-3  # of a step, by which time is varied either way
+
+
+@jit
+def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, time_rate):
+    """Jacobian of motion and flows by the motion, (n + 4, n), and the rate of dz/dt in time.
+
+    By forward differences from `rates`, dz/dt at (t, z), with `size` (n,) the natural size of
+    each unknown; in time by central ones, on which the method's order depends. Costs n + 2
+    evaluations.
+    """
+    n = z.size - FLOWS
+    for i in range(z.size):
+        scratch[i] = z[i]
+    for j in range(n):
+        scratch[j] = z[j] + ROOT_EPSILON * max(abs(z[j]), size[j])
+        delta = scratch[j] - z[j]
+        derivative_with_flows(t, scratch, phase, p, column)
+        for i in range(z.size):
+            jacobian[i, j] = (column[i] - rates[i]) / delta
+        scratch[j] = z[j]
+    later, earlier = t + TIME_SHARE * h, t - TIME_SHARE * h
+    derivative_with_flows(later, scratch, phase, p, time_rate)
+    derivative_with_flows(earlier, scratch, phase, p, column)
+    for i in range(z.size):
+        time_rate[i] = (time_rate[i] - column[i]) / (later - earlier)
+
+
+@jit
+def factorize(matrix, pivots):
+    """LU of a small square matrix in place, with partial pivoting; False if it is singular."""
+    n = pivots.size
+    for j in range(n):
+        best = j
+        for i in range(j + 1, n):
+            if abs(matrix[i, j]) > abs(matrix[best, j]):
+                best = i
+        pivots[j] = best
+        if not abs(matrix[best, j]) > 0.0:
+            return False
+        if best != j:
+            for m in range(n):
+                matrix[j, m], matrix[best, m] = matrix[best, m], matrix[j, m]
+        for i in range(j + 1, n):
+            matrix[i, j] /= matrix[j, j]
+            for m in range(j + 1, n):
+                matrix[i, m] -= matrix[i, j] * matrix[j, m]
+    return True
+
+
+@jit
+def substitute(matrix, pivots, b):
+    """Solve with the factors of `factorize`, b (n,) being overwritten by the solution."""
+    n = pivots.size
+    for j in range(n):
+        b[j], b[pivots[j]] = b[pivots[j]], b[j]
+    for i in range(n):
+        for m in range(i):
+            b[i] -= matrix[i, m] * b[m]
+    for i in range(n - 1, -1, -1):
+        for m in range(i + 1, n):
+            b[i] -= matrix[i, m] * b[m]
+        b[i] /= matrix[i, i]
+
+
+@jit
+def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
+    """One step from (t, z); the state at its end into new, the increments (6, n + 4) into u.
+
+    rates: dz/dt at (t, z); size: as in `differentiate`; jacobian: (n + 4, n), written. The last
+    increment is the error estimate. Returns False where the linear system is singular.
+    """
+    n = z.size - FLOWS
+    time_rate = np.empty(z.size)
+    differentiate(t, h, z, rates, size, phase, p, new, work, jacobian, time_rate)
+    matrix = np.empty((n, n))
+    pivots = np.empty(n, dtype=np.int64)
+    for i in range(n):
+        for j in range(n):
+            matrix[i, j] = -jacobian[i, j]
+        matrix[i, i] += 1.0 / (h * GAMMA)
+    if not factorize(matrix, pivots):
+        return False
+    for stage in range(STAGES):
+        for i in range(z.size):
+            total = z[i]
+            for j in range(stage):
+                total += A[stage, j] * u[j, i]
+            new[i] = total
+        if stage == 0:
+            work[:] = rates
+        else:
+            derivative_with_flows(t + NODES[stage] * h, new, phase, p, work)
+        for i in range(z.size):
+            total = work[i] + h * TIME[stage] * time_rate[i]
+            for j in range(stage):
+                total += COUPLING[stage, j] / h * u[j, i]
+            u[stage, i] = total
+        substitute(matrix, pivots, u[stage, :n])
+        for i in range(n, z.size):  # a flow feeds on the motion and nothing feeds on it
+            for j in range(n):
+                u[stage, i] += jacobian[i, j] * u[stage, j]
+            u[stage, i] *= h * GAMMA
+    for i in range(z.size):
+        new[i] += u[STAGES - 1, i]
+    return True
+
+
+@jit
+def spectral_radius(jacobian, size, v, w):
+    """Estimate of the largest eigenvalue's size (1/s) by a few power iterations.
+
+    v: a start (n,), overwritten; w: scratch (n,).
+    """
+    n = size.size
+    growth = 0.0
+    for _ in range(POWER_ITERATIONS):
+        before = 0.0
+        after = 0.0
+        for i in range(n):
+            w[i] = 0.0
+            for j in range(n):
+                w[i] += jacobian[i, j] * v[j]
+            before += (v[i] / size[i]) ** 2
+            after += (w[i] / size[i]) ** 2
+        if not before > 0.0 or not after > 0.0:
+            return growth
+        growth = math.sqrt(after / before)
+        for i in range(n):
+            v[i] = w[i] / growth
+    return growth
+
+
+@jit
+def error_norm(z, new, u, rtol, atol):
+    """Root mean square over the motion of the estimated error over its tolerance."""
+    n = z.size - FLOWS
+    total = 0.0
+    for i in range(n):
+        total += (u[STAGES - 1, i] / (atol[i] + rtol * max(abs(z[i]), abs(new[i])))) ** 2
+    return math.sqrt(total / n)
+
+
+@jit
+def extend(z, new, u, dense):
+    """Coefficients of the step's cubic interpolant into dense, (5, n), as in runge_kutta."""
+    for i in range(dense.shape[1]):
+        first = 0.0
+        second = 0.0
+        for j in range(STAGES):
+            first += DENSE[0, j] * u[j, i]
+            second += DENSE[1, j] * u[j, i]
+        dense[0, i] = z[i]
+        dense[1, i] = new[i] - z[i] + first
+        dense[2, i] = second - first
+        dense[3, i] = -second
+        dense[4, i] = 0.0

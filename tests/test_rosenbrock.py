@@ -1,0 +1,104 @@
+"""The stiff partner: its Jacobian, linear algebra and orders; and when `auto` calls it."""
+
+import numpy as np
+import pytest
+
+from compressor.case import Case
+from compressor.physics import rosenbrock
+from compressor.physics.observe import derivative_with_flows
+from compressor.physics.runge_kutta import FLOWS, interpolate
+from compressor.record import record
+from compressor.simulate import simulate
+
+FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))
+BEGIN, SPAN, PHASE = 0.09, 0.008, 3
+SIZE = np.full(8, 1e-3)
+
+
+def start():
+    z = np.zeros(8 + FLOWS)
+    z[4:8] = 0.1, -0.2, 0.3, 0.5
+    return z
+
+
+def step(z, t, h, u, jacobian):
+    rates, work, new = (np.zeros(z.size) for _ in range(3))
+    derivative_with_flows(t, z, PHASE, FLIGHT, rates)
+    assert rosenbrock.take_step(t, h, z, rates, SIZE, PHASE, FLIGHT, work, new, u, jacobian)
+    return new
+
+
+def flow(steps):
+    z, u, jacobian = start(), np.zeros((6, 12)), np.zeros((12, 8))
+    for i in range(steps):
+        z = step(z, BEGIN + i * SPAN / steps, SPAN / steps, u, jacobian)
+    return z
+
+
+def test_order_of_convergence():
+    exact = flow(512)
+    errors = [np.abs(flow(n) - exact)[:8].max() for n in (16, 32, 64)]
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.2)
+
+
+def test_flows_converge_with_the_motion():
+    exact = flow(512)
+    errors = [np.abs(flow(n) - exact)[8:].max() for n in (2, 4, 8, 16)]
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.4)
+
+
+def test_dense_output_joins_the_ends_and_is_of_order_three():
+    errors = []
+    for h in (4e-3, 2e-3, 1e-3):
+        u, jacobian, dense, y = np.zeros((6, 12)), np.zeros((12, 8)), np.zeros((5, 8)), np.zeros(8)
+        new = step(start(), BEGIN, h, u, jacobian)
+        rosenbrock.extend(start(), new, u, dense)
+        assert dense.sum(axis=0) == pytest.approx(new[:8], abs=1e-15)
+        interpolate(0.4, dense, y)
+        exact = step(start(), BEGIN, 0.4 * h, u, jacobian)
+        errors.append(np.abs(y - exact[:8]).max())
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.35)
+
+
+@pytest.mark.parametrize("n", [4, 8])
+def test_factors_solve_the_system(n):
+    rng = np.random.default_rng(n)
+    for _ in range(20):
+        matrix, b = rng.normal(size=(n, n)), rng.normal(size=n)
+        factors, pivots, x = matrix.copy(), np.zeros(n, dtype=np.int64), b.copy()
+        assert rosenbrock.factorize(factors, pivots)
+        rosenbrock.substitute(factors, pivots, x)
+        assert matrix @ x == pytest.approx(b, abs=1e-10)
+
+
+def test_a_singular_system_is_told():
+    assert not rosenbrock.factorize(np.zeros((4, 4)), np.zeros(4, dtype=np.int64))
+
+
+STIFF = {
+    "viscous contact": {"contact": {"damping_N_s_per_mm": 336e3}},
+    "tiny stiction velocity": {"friction": {"stiction_velocity_mm_per_s": 0.01}},
+}
+
+
+@pytest.mark.parametrize("values", STIFF.values(), ids=STIFF)
+def test_auto_turns_to_the_stiff_partner(values):
+    solve = {"duration_rev": 0.5, "settle_rev": 0, "rtol": 1e-4}
+    runs = {
+        method: simulate(
+            Case.from_values(
+                {
+                    "joint": "both",
+                    "clearance_mm": 0.2,
+                    **values,
+                    "solve": {**solve, "method": method},
+                }
+            )
+        )
+        for method in ("auto", "DOPRI5", "RODAS")
+    }
+    assert {str(run["status"].values) for run in runs.values()} == {"ok"}
+    evaluations = {method: int(run["evaluations"]) for method, run in runs.items()}
+    assert evaluations["auto"] <= 1.5 * min(evaluations.values())
+    a = [run["acceleration"].values for run in runs.values()]
+    assert np.linalg.norm(a[0] - a[2]) / np.linalg.norm(a[2]) < 0.05
