@@ -16,19 +16,10 @@ from scipy import integrate as scipy_integrate
 
 from compressor.physics.loads import sample_segments, segments
 from compressor.physics.march import Mode, Status, march, new_walker, new_work
-from compressor.physics.observe import (
-    COLUMNS,
-    add_flows,
-    derivative_with_flows,
-    lobatto,
-    new_tally,
-    observe,
-    observe_all,
-    tally_energy,
-    tally_step,
-)
+from compressor.physics.observe import COLUMNS, derivative_with_flows, observe, observe_all
 from compressor.physics.parameters import FREEDOMS, Load, Scene
 from compressor.physics.runge_kutta import FLOWS, Pair
+from compressor.physics.tally import add_flows, lobatto, new_tally, tally_energy, tally_step
 
 COMPILED = {
     "auto": (Mode.AUTO, Pair.DOPRI5),

@@ -15,6 +15,7 @@ FLOORS = [
     "physics.contact",
     "physics.motion",
     "physics.observe",
+    "physics.tally",
     "physics.cam",
     "physics.runge_kutta",
     "physics.rosenbrock",

@@ -1,4 +1,4 @@
-"""Outputs recomputed from (t, y): inverse dynamics, power balance, quadrature, peaks."""
+"""Outputs recomputed from (t, y): inverse dynamics, power balance, eccentricities."""
 
 import math
 
@@ -7,19 +7,9 @@ import pytest
 
 from compressor.case import Case
 from compressor.physics.motion import derivative, start
-from compressor.physics.observe import (
-    COLUMNS,
-    Column,
-    lobatto,
-    new_tally,
-    observe,
-    observe_all,
-    peak_of,
-    tally_step,
-)
+from compressor.physics.observe import COLUMNS, Column, observe, observe_all
 from compressor.record import offsets, record
 
-NODES, WEIGHTS = lobatto(9)
 JOINTS = ("big_end", "small_end", "both")
 
 
@@ -39,13 +29,6 @@ def random_state(joint, rng):
     scale = np.full(n, 2.5e-4)
     scale[-1] = 5e-4
     return np.concatenate((rng.normal(size=n) * scale, rng.normal(size=n) * scale * 500))
-
-
-@pytest.mark.parametrize("n", [3, 5, 9])
-def test_lobatto_is_exact_for_polynomials(n):
-    nodes, weights = lobatto(n)
-    for degree in range(2 * n - 2):
-        assert weights @ nodes**degree == pytest.approx(1 / (degree + 1), rel=1e-12)
 
 
 @pytest.mark.parametrize("joint", JOINTS)
@@ -144,28 +127,6 @@ def test_rows_of_a_free_flight_show_no_contact():
     assert row[Column.PENETRATION] == pytest.approx(-2e-4)
     assert row[Column.NORMAL] == 0
     assert row[Column.FORCE : Column.FORCE + 2].tolist() == [0, 0]
-
-
-@pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
-def test_peak_between_nodes_is_found(middle):
-    rows = np.zeros((NODES.size, COLUMNS))
-    rows[:, 2] = -7.0 + 3 * (NODES - middle) ** 2
-    assert peak_of(NODES, rows, 2) == pytest.approx(7.0, rel=1e-12)
-
-
-def test_tally_of_a_known_step():
-    p = record(case("big_end"))
-    rows = np.zeros((NODES.size, COLUMNS))
-    rows[:, Column.ACCELERATION] = 3.0
-    rows[:, Column.NORMAL] = np.where(NODES > 0.5, 10.0, 0.0)
-    rows[:, Column.PENETRATION] = NODES - 0.5
-    tally = new_tally()
-    tally_step(NODES * 1e-4, rows, WEIGHTS, True, tally, p)
-    assert tally.seconds == pytest.approx(1e-4)
-    assert tally.square_acceleration == pytest.approx(9e-4)
-    assert tally.impacts.tolist() == [1, 0]
-    assert tally.max_penetration[0] == pytest.approx(0.5)
-    assert tally.loss_seconds[0] == pytest.approx(1e-4 * WEIGHTS[NODES <= 0.5].sum())
 
 
 def test_observe_all_is_observe_in_turn():

@@ -81,6 +81,7 @@ STIFF = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", STIFF.values(), ids=STIFF)
 def test_auto_turns_to_the_stiff_partner(values):
     solve = {"duration_rev": 0.5, "settle_rev": 0, "rtol": 1e-4}

@@ -13,15 +13,7 @@ import numpy as np
 
 from compressor.physics import rosenbrock
 from compressor.physics._jit import jit
-from compressor.physics.observe import (
-    COLUMNS,
-    NORMAL,
-    derivative_with_flows,
-    lobatto,
-    observe,
-    tally_energy,
-    tally_step,
-)
+from compressor.physics.observe import COLUMNS, NORMAL, derivative_with_flows, observe
 from compressor.physics.onset import NEVER, first_onset
 from compressor.physics.runge_kutta import (
     FLOWS,
@@ -32,6 +24,7 @@ from compressor.physics.runge_kutta import (
     interpolate,
     take_step,
 )
+from compressor.physics.tally import lobatto, tally_energy, tally_step
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)

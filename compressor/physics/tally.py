@@ -1,0 +1,164 @@
+"""Metrics and energy ledger of a run, gathered step by step from observed rows.
+
+`tally_step` takes rows at the Gauss-Lobatto nodes of a step's dense solution, so that a peak
+between two output samples counts; `tally_energy` audits the energy at every step's end.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import jit
+from compressor.physics.observe import (
+    ACCELERATION,
+    CRANK_POWER,
+    DEVIATION,
+    FORCE,
+    FORCE_SIZE,
+    KINETIC,
+    NORMAL,
+    PENETRATION,
+    POTENTIAL,
+)
+
+
+def lobatto(n):
+    """Nodes in [0, 1], both ends included, and weights of n-point Gauss-Lobatto quadrature."""
+    legendre = np.polynomial.legendre.Legendre.basis(n - 1)
+    inner = np.sort(legendre.deriv().roots().real)
+    nodes = np.concatenate(([-1.0], inner, [1.0]))
+    weights = 2.0 / (n * (n - 1) * legendre(nodes) ** 2)
+    return (nodes + 1.0) / 2.0, weights / 2.0
+
+
+TALLY = np.dtype(
+    [
+        ("seconds", "f8"),  # of machine time measured
+        ("square_acceleration", "f8"),
+        ("square_deviation", "f8"),
+        ("peak_acceleration", "f8"),
+        ("peak_force", "f8", (2,)),
+        ("peak_force_axis", "f8", (4,)),  # (joint, axis), flat
+        ("max_penetration", "f8", (2,)),
+        ("loss_seconds", "f8", (2,)),
+        ("impacts", "i8", (2,)),
+        ("touching", "i8", (2,)),
+        ("deepest", "f8"),  # penetration over the whole run
+        ("energy", "f8"),  # at the start
+        ("crank_work", "f8"),
+        ("load_work", "f8"),
+        ("damping_loss", "f8"),
+        ("friction_loss", "f8"),
+        ("worst_imbalance", "f8"),  # J
+        ("peak_kinetic", "f8"),
+        ("started", "i8"),
+    ],
+    align=True,
+)
+
+
+def new_tally():
+    """An empty tally; a joint counts as touching until it is seen apart."""
+    tally = np.zeros(1, dtype=TALLY).view(np.recarray)[0]
+    tally.touching[:] = 1
+    tally.max_penetration[:] = -math.inf
+    tally.deepest = -math.inf
+    return tally
+
+
+@jit
+def peak_of(times, rows, column):
+    """Largest |value| of a column over a step: its nodes, and the parabola through the best."""
+    last = times.size - 1
+    best = 0
+    for i in range(1, last + 1):
+        if abs(rows[i, column]) > abs(rows[best, column]):
+            best = i
+    top = abs(rows[best, column])
+    i = min(max(best, 1), last - 1)
+    left, mid, right = times[i - 1] - times[i], abs(rows[i, column]), times[i + 1] - times[i]
+    slope_left = (abs(rows[i - 1, column]) - mid) / left
+    slope_right = (abs(rows[i + 1, column]) - mid) / right
+    curvature = (slope_right - slope_left) / (right - left)
+    if curvature < 0.0:
+        slope = slope_left - curvature * left
+        at = -0.5 * slope / curvature
+        if left < at < right:
+            top = max(top, mid + 0.5 * slope * at)
+    return top
+
+
+@jit
+def tally_energy(row, flows, tally):
+    """Keep the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
+
+    `row` is observed at the end of a step; the first call, with flows of zero, sets the start.
+    """
+    energy = row[KINETIC] + row[POTENTIAL]
+    if not tally.started:
+        tally.energy = energy
+        tally.started = 1
+    tally.crank_work, tally.load_work = flows[0], flows[1]
+    tally.damping_loss, tally.friction_loss = flows[2], flows[3]
+    tally.peak_kinetic = max(tally.peak_kinetic, row[KINETIC])
+    imbalance = abs(energy - tally.energy - flows[0] - flows[1] + flows[2] + flows[3])
+    # a comparison with nan is false: keep the nan
+    if not imbalance <= tally.worst_imbalance:
+        tally.worst_imbalance = imbalance
+
+
+@jit
+def add_flows(rows, weights, span, flows):
+    """Add to flows, (4,) J, the quadrature of the powers at a step's nodes; span in s."""
+    for k in range(4):
+        for i in range(rows.shape[0]):
+            flows[k] += span * weights[i] * rows[i, CRANK_POWER + k]
+
+
+@jit
+def tally_contact(joint, rows, weights, span, measured, tally):
+    """Add a step's contact loss, impacts and penetration at one joint."""
+    lost = 0.0
+    for i in range(rows.shape[0]):
+        apart = rows[i, NORMAL + joint] <= 0.0
+        if apart:
+            lost += weights[i]
+        elif measured and not tally.touching[joint]:
+            tally.impacts[joint] += 1
+        tally.touching[joint] = 0 if apart else 1
+        depth = rows[i, PENETRATION + joint]
+        tally.deepest = max(tally.deepest, depth)
+        if measured:
+            tally.max_penetration[joint] = max(tally.max_penetration[joint], depth)
+    if measured:
+        tally.loss_seconds[joint] += lost * span
+
+
+@jit
+def tally_step(times, rows, weights, measured, tally, p):
+    """Add one step (or part of one) to the tally, from rows at its Lobatto nodes.
+
+    times: (m,) in s; rows: (m, COLUMNS); weights: (m,) of the nodes' quadrature;
+    measured: whether the metrics count (after settling);
+    the depth of contact over the whole run always does.
+    """
+    span = times[-1] - times[0]
+    if p.clearance[0] > 0.0:
+        tally_contact(0, rows, weights, span, measured, tally)
+    if p.clearance[1] > 0.0:
+        tally_contact(1, rows, weights, span, measured, tally)
+    if not measured:
+        return
+    tally.seconds += span
+    for i in range(times.size):
+        weight = span * weights[i]
+        tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
+        tally.square_deviation += weight * rows[i, DEVIATION] ** 2
+    tally.peak_acceleration = max(tally.peak_acceleration, peak_of(times, rows, ACCELERATION))
+    for joint in range(2):
+        size = peak_of(times, rows, FORCE_SIZE + joint)
+        tally.peak_force[joint] = max(tally.peak_force[joint], size)
+        for axis in range(2):
+            k = 2 * joint + axis
+            top = peak_of(times, rows, FORCE + k)
+            tally.peak_force_axis[k] = max(tally.peak_force_axis[k], top)

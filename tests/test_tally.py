@@ -1,0 +1,66 @@
+"""The tally: quadrature, peaks between nodes, contact and energy of known steps."""
+
+import numpy as np
+import pytest
+
+from compressor.case import Case
+from compressor.physics.observe import COLUMNS, Column
+from compressor.physics.tally import (
+    add_flows,
+    lobatto,
+    new_tally,
+    peak_of,
+    tally_energy,
+    tally_step,
+)
+from compressor.record import record
+
+NODES, WEIGHTS = lobatto(9)
+
+
+@pytest.mark.parametrize("n", [3, 5, 9])
+def test_lobatto_is_exact_for_polynomials(n):
+    nodes, weights = lobatto(n)
+    for degree in range(2 * n - 2):
+        assert weights @ nodes**degree == pytest.approx(1 / (degree + 1), rel=1e-12)
+
+
+@pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
+def test_peak_between_nodes_is_found(middle):
+    rows = np.zeros((NODES.size, COLUMNS))
+    rows[:, 2] = -7.0 + 3 * (NODES - middle) ** 2
+    assert peak_of(NODES, rows, 2) == pytest.approx(7.0, rel=1e-12)
+
+
+def test_tally_of_a_known_step():
+    p = record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2}))
+    rows = np.zeros((NODES.size, COLUMNS))
+    rows[:, Column.ACCELERATION] = 3.0
+    rows[:, Column.NORMAL] = np.where(NODES > 0.5, 10.0, 0.0)
+    rows[:, Column.PENETRATION] = NODES - 0.5
+    tally = new_tally()
+    tally_step(NODES * 1e-4, rows, WEIGHTS, True, tally, p)
+    assert tally.seconds == pytest.approx(1e-4)
+    assert tally.square_acceleration == pytest.approx(9e-4)
+    assert tally.impacts.tolist() == [1, 0]
+    assert tally.max_penetration[0] == pytest.approx(0.5)
+    assert tally.loss_seconds[0] == pytest.approx(1e-4 * WEIGHTS[NODES <= 0.5].sum())
+
+
+def test_energy_ledger_of_a_known_step():
+    rows = np.zeros((NODES.size, COLUMNS))
+    rows[:, Column.CRANK_POWER] = 50 * NODES
+    rows[:, Column.DAMPING_POWER] = 10.0
+    rows[:, Column.KINETIC] = 100 + 15 * NODES
+    tally, flows = new_tally(), np.zeros(4)
+    tally_energy(rows[0], flows, tally)
+    add_flows(rows, WEIGHTS, 1.0, flows)
+    assert flows == pytest.approx([25, 0, 10, 0])
+    tally_energy(rows[-1], flows, tally)
+    assert tally.worst_imbalance == pytest.approx(0, abs=1e-12)
+    rows[-1, Column.KINETIC] += 0.5
+    tally_energy(rows[-1], flows, tally)
+    assert tally.worst_imbalance == pytest.approx(0.5)
+    rows[-1, Column.KINETIC] = np.nan
+    tally_energy(rows[-1], flows, tally)
+    assert np.isnan(tally.worst_imbalance)
