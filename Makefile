@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy clean
+.PHONY: help install run figures test test-pure check format accuracy claims readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -29,8 +29,9 @@ test: install  ## run the whole test suite
 	$(BIN)/python -m pytest -n 2
 
 test-pure: install  ## run the physics tests on the same source with the JIT off
-	COMPSIM_JIT=0 $(BIN)/python -m pytest -m 'not slow' tests/test_kinematics.py tests/test_loads.py \
-	  tests/test_contact.py tests/test_cam.py tests/test_observe.py tests/test_motion.py
+	COMPSIM_JIT=0 $(BIN)/python -m pytest -n 2 -m 'not slow' tests/test_kinematics.py \
+	  tests/test_loads.py tests/test_contact.py tests/test_cam.py tests/test_motion.py \
+	  tests/test_observe.py tests/test_tally.py tests/test_runge_kutta.py tests/test_rosenbrock.py
 
 check: install  ## ruff (format and lint) and mypy
 	$(BIN)/ruff format --check .
@@ -41,8 +42,14 @@ format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-accuracy: install  ## measure the errors behind the words of `accuracy` (about 10 minutes)
+accuracy: install  ## measure the errors behind the words of `accuracy` (about a minute)
 	$(BIN)/python tests/measure_accuracy.py tests/results/accuracy.json
+
+claims: install  ## measure the paper's claims over a range of masses (seconds)
+	$(BIN)/python tests/measure_claims.py tests/results/claims.json
+
+readme: install  ## write the README's generated tables
+	$(BIN)/python tests/readme_tables.py README.md
 
 clean:  ## remove results, report and caches; .venv stays
 	rm -rf results report .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from compressor.case import Case
     from compressor.plan import load_cases
-    from compressor.simulate import simulate
+    from compressor.simulation import simulate
     from compressor.store import open_study
 
 __version__ = "0.1.0"
 __all__ = ["Case", "load_cases", "open_study", "simulate"]
 
-HOMES = {"Case": "case", "load_cases": "plan", "simulate": "simulate", "open_study": "store"}
+HOMES = {"Case": "case", "load_cases": "plan", "simulate": "simulation", "open_study": "store"}
 
 
 def __getattr__(name: str) -> Any:

@@ -62,7 +62,7 @@ def _machine(case: Case, p: np.record) -> None:
     p.rod_length = to_si(machine.rod_length_mm, "mm")
     p.rod_mass = machine.rod_mass_kg
     p.rod_centre = to_si(machine.rod_centre_mm or 0.0, "mm")
-    p.rod_inertia = machine.rod_inertia_kg_m2
+    p.rod_inertia = machine.rod_inertia_kg_m2 or 0.0
     p.reciprocating_mass = machine.reciprocating_mass_kg
     p.gravity = machine.gravity_m_per_s2
     p.pin_radius = to_si(machine.pin_radius_mm, "mm")

@@ -156,7 +156,7 @@ def outcome(
 
 def warm_up(remark: Callable[[], None]) -> None:
     """Compile the equations before the workers start, or each of them would do so."""
-    from compressor.simulate import simulate  # needs numba: only where something is simulated
+    from compressor.simulation import simulate  # needs numba: only where something is simulated
 
     timer = threading.Timer(PATIENCE, remark)
     timer.daemon = True
@@ -209,7 +209,7 @@ def run_job(folder: str, case: Case, parent: int) -> JobStatus:
     """Simulate and store one case, in a worker; whatever breaks is a failed job, too."""
     follow(parent)
     try:
-        from compressor.simulate import simulate
+        from compressor.simulation import simulate
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result

@@ -16,7 +16,7 @@ import reference
 from joblib import Parallel, delayed
 
 from compressor.case import ACCURACY, Case
-from compressor.simulate import simulate
+from compressor.simulation import simulate
 
 RTOLS = [10.0**-k for k in range(3, 11)]
 CASES = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]

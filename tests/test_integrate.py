@@ -8,7 +8,7 @@ from compressor.case import ACCURACY, METHODS, Case
 from compressor.integrate import absolute_tolerances
 from compressor.physics.parameters import FREEDOMS
 from compressor.record import record, scene
-from compressor.simulate import simulate
+from compressor.simulation import simulate
 
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
 PROMISED = {"draft": 2e-2, "standard": 5e-3, "fine": 1e-4, "reference": 1e-6}

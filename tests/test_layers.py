@@ -26,7 +26,7 @@ FLOORS = [
     "case",
     "record",
     "integrate",
-    "simulate",
+    "simulation",
     "reading",
     "plan",
     "durable",

@@ -8,7 +8,7 @@ from compressor.physics import rosenbrock
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, interpolate
 from compressor.record import record
-from compressor.simulate import simulate
+from compressor.simulation import simulate
 
 FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))
 BEGIN, SPAN, PHASE = 0.09, 0.008, 3

@@ -19,7 +19,7 @@ import xarray as xr
 from compressor import labels, store
 from compressor.case import Case, table
 from compressor.plan import load_studies
-from compressor.simulate import METRICS, simulate
+from compressor.simulation import METRICS, simulate
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 

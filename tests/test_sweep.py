@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-import compressor.simulate
+import compressor.simulation
 from compressor import store
 from compressor.case import Case
 from compressor.plan import load_studies
@@ -111,10 +111,10 @@ def test_a_damaged_file_is_replaced(content, studies, tmp_path):
 
 
 def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):
-    def breaking(case, real=compressor.simulate.simulate):
+    def breaking(case, real=compressor.simulation.simulate):
         return real(case) if case.load != "none" else {}["the bug"]
 
-    monkeypatch.setattr(compressor.simulate, "simulate", breaking)
+    monkeypatch.setattr(compressor.simulation, "simulate", breaking)
     made = studies(one={"load": ["none", "design"]})
     summary = sweep(made, tmp_path / "out", 1)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]

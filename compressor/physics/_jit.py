@@ -21,7 +21,8 @@ if ENABLED:
         IEEE arithmetic is kept (no fast-math) and a division by zero gives inf or nan, not an
         exception, so that the caller can judge a state that went wrong.
         """
-        return numba.njit(cache=True, error_model="numpy")(function)
+        compiled: Any = numba.njit(cache=True, error_model="numpy")(function)
+        return compiled
 
 else:
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compressor.case import Case
-from compressor.simulate import LEDGER, METRICS, SERIES, simulate
+from compressor.simulation import LEDGER, METRICS, SERIES, simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 

@@ -1,0 +1,120 @@
+"""How figures look: one style, and lines that differ in lightness as well as in dashes.
+
+Figures are made on the Agg canvas without pyplot, and inside a style context, so that neither a
+user's matplotlibrc nor a user's own figures are touched.
+"""
+
+import functools
+import io
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+from matplotlib import style
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+DPI = 150
+WIDTH = 9.6  # inches, of every figure
+LEGEND_WIDTH = 130  # characters, in a row of a legend
+
+STYLE: dict[str, Any] = {
+    "font.size": 9.5,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.5,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.xmargin": 0.0,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "legend.fontsize": 9.5,
+    "legend.frameon": False,
+    "legend.handlelength": 3.2,
+    "lines.dash_capstyle": "butt",
+    "agg.path.chunksize": 20000,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "compsim",
+    "savefig.dpi": DPI,
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """How one curve is drawn; a higher `zorder` lies on top."""
+
+    color: str
+    linestyle: Any = "-"
+    linewidth: float = 1.2
+    zorder: float = 2.0
+
+    def properties(self) -> dict[str, Any]:
+        """The keywords of `Axes.plot`."""
+        return asdict(self)
+
+
+# from dark to light: lightness (CIE L*) 0, 30, 54, 77
+BLACK, BLUE, RED, GOLD = "#000000", "#1f4488", "#d0583b", "#ecb44a"
+GREY = "#b5b5b5"
+IDEAL = Line(BLACK, (0, (1, 1.2)), 1.3, 2.4)
+BY_CLEARANCE = {
+    0.1: Line(BLUE, (0, (4.5, 1.2)), 0.9, 2.3),
+    0.2: Line(RED, (0, (6, 1, 1.2, 1)), 1.0, 2.2),
+    0.3: Line(GOLD, "-", 1.6, 2.1),
+}
+BY_LOAD = {
+    "typical": Line(GOLD, "-", 2.6, 2.1),
+    "design": Line(BLUE, (0, (4.5, 1.6)), 1.3, 2.2),
+}
+# for a handful of curves of any meaning
+CYCLE = (
+    Line(BLUE, "-", 1.4),
+    Line(RED, (0, (6, 1.5)), 1.4),
+    Line(GOLD, (0, (6, 1.2, 1.2, 1.2)), 1.8),
+    Line(BLACK, (0, (1, 1.2)), 1.5),
+    Line("#8c8c8c", (0, (3, 1.2)), 1.6),
+)
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Run a drawing function in this module's style, whatever the user's defaults are."""
+
+    @functools.wraps(draw)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> R:
+        with style.context(STYLE, after_reset=True):
+            return draw(*args, **kwargs)
+
+    return inside
+
+
+def sheet(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, np.ndarray]:
+    """A figure of the common width and its axes, shape (rows, columns); height in inches."""
+    layout = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.06, wspace=0.03)
+    figure = Figure(figsize=(WIDTH, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, squeeze=False, **more)
+
+
+def legend_above(figure: Figure, handles: list[Any]) -> None:
+    """A legend in the margin above all axes, where it covers nothing."""
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    columns = min(len(handles), max(1, LEGEND_WIDTH // (longest + 9)))
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+@styled
+def render(figure: Figure, kind: str) -> bytes:
+    """A figure as the bytes of a `png` or `svg` file, which tell nothing of when they were made."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else {})
+    return stream.getvalue()

@@ -1,0 +1,68 @@
+"""The README's generated tables: `make readme` writes them, tests/test_readme.py compares them."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+from compressor.case import table
+from compressor.parameter import parameter_table
+
+ROOT = Path(__file__).parent.parent
+RESULTS = ROOT / "tests" / "results"
+
+
+def kept(name):
+    """A kept measurement of tests/results."""
+    return json.loads((RESULTS / name).read_text(encoding="utf-8"))
+
+
+def accuracy_table():
+    lines = ["| accuracy | rtol | worst error of acceleration, relative L2 | of its peak |",
+             "|---|---|---|---|"]  # fmt: skip
+    for word, row in kept("accuracy.json")["words"].items():
+        lines.append(
+            f"| {word} | {row['rtol']:g} | {row['acceleration_error']:.1e} "
+            f"| {row['peak_error']:.1e} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def claims_table():
+    measured = kept("claims.json")
+    default = next(
+        row for row in measured["masses"]
+        if (row["rod_mass_kg"], row["reciprocating_mass_kg"]) == (4.7, 14.0)
+    )  # fmt: skip
+    lines = ["| claim | at the default masses | over the mass sets |", "|---|---|---|"]
+    for claim, held in zip(measured["claims"], default["held"], strict=True):
+        verdict = "held" if held else "not held"
+        lines.append(
+            f"| {claim['claim']}. {claim['statement']} | {verdict} "
+            f"| {claim['held']} of {claim['of']} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+TABLES = {
+    "parameters": lambda: parameter_table(table().values()),
+    "accuracy": accuracy_table,
+    "claims": claims_table,
+}
+
+
+def block(name):
+    """Pattern of a generated block: its opening comment, the table, its closing comment."""
+    return re.compile(rf"(<!-- {name}: [^>]*-->\n)(.*?)(<!-- end of {name} -->)", re.DOTALL)
+
+
+def main(path):
+    text = Path(path).read_text(encoding="utf-8")
+    for name, make in TABLES.items():
+        text, count = block(name).subn(lambda m, make=make: m[1] + make() + m[3], text)
+        assert count == 1, f"{path} has no block for {name}"
+    Path(path).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,168 @@
+"""Relations and claims: on data whose answer is known, and on the paper's cases as data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compressor.analysis import (
+    CLEARANCES,
+    FAULT_LABELS,
+    RULES,
+    active_share,
+    case_of,
+    claims,
+    force_relation,
+    held_share,
+    ideal_motion,
+    paper_cases,
+    settled,
+)
+
+
+@pytest.fixture
+def run(paper_runs):
+    """A copy of one run whose series may be changed."""
+    return paper_runs["big_end 0.2"].copy(deep=True)
+
+
+def judged(runs, number):
+    return claims(runs)[number - 1]
+
+
+def test_eleven_cases_in_the_paper():
+    cases = paper_cases()
+    assert len(cases) == 11
+    assert len({case.key for case in cases.values()}) == 11
+    assert paper_cases(rod_mass_kg=3)["both 0.1"].machine.rod_mass_kg == 3
+
+
+def test_settled_leaves_out_the_first_revolution(run):
+    kept = settled(run)
+    assert kept["time"].values[0] == pytest.approx(0.12)
+    assert kept.sizes["time"] == 3601
+
+
+def test_force_relation_of_a_line(run):
+    force = 3.5 * run["acceleration"].values + 7
+    run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = force
+    relation = force_relation(run, "big_end")
+    assert (relation.slope, relation.intercept, relation.r2) == pytest.approx((3.5, 7, 1))
+
+
+def test_ideal_motion_is_the_ideal_machine_s(paper_runs):
+    _, _, a = ideal_motion(paper_runs["design"])
+    assert a == pytest.approx(paper_runs["design"]["acceleration"].values, abs=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_active_share_of_a_known_vibration(run, share):
+    _, _, ideal = ideal_motion(run)
+    angle = np.degrees(run["crank_angle"].values) % 360
+    shaking = 100 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
+    run["acceleration"].values[:] = ideal + shaking
+    assert active_share(run) == pytest.approx(share, abs=0.02)
+
+
+def test_claims_without_runs_are_not_judged():
+    for claim, rule in zip(claims({}), RULES, strict=True):
+        assert claim.held is None
+        assert claim.measured == [("missing", ", ".join(rule.needs))]
+
+
+def test_every_claim_is_judged_with_numbers(paper_runs):
+    for number, claim in enumerate(claims(paper_runs), 1):
+        assert claim.number == number
+        assert claim.held in (True, False)
+        assert claim.measured
+        assert claim.threshold
+
+
+def altered(runs, label, name, change):
+    """The runs with one variable of one run changed."""
+    other = runs[label].copy(deep=True)
+    other[name] = other[name].copy(data=change(other[name].values))
+    return {**runs, label: other}
+
+
+@pytest.mark.parametrize(
+    ("number", "label", "name", "change"),
+    [
+        (1, "typical", "acceleration", lambda a: a * (1 + 1e-9)),
+        (2, "design", "piston_force", lambda f: 0.9 * f),
+        (3, "both 0.3", "displacement", lambda x: 0.6 + 1.02 * (x - 0.6)),
+        (6, "small_end 0.1", "acceleration", lambda a: a[::-1] ** 2),
+    ],
+)
+def test_a_claim_that_holds_can_fail(paper_runs, number, label, name, change):
+    assert judged(paper_runs, number).held
+    assert not judged(altered(paper_runs, label, name, change), number).held
+
+
+def with_metric(runs, name, value):
+    """The fault runs with a scalar metric that depends on (fault, clearance)."""
+    changed = dict(runs)
+    for label in FAULT_LABELS:
+        fault, clearance = label.split()
+        changed = altered(
+            changed,
+            label,
+            name,
+            lambda v, f=fault, c=clearance: np.full_like(v, value(f, float(c))),
+        )
+    return changed
+
+
+def test_growing_peaks_hold_exactly_when_all_grow(paper_runs):
+    def grows(_, c):
+        return 1000 * c
+
+    growing = with_metric(with_metric(paper_runs, "peak_acceleration", grows),
+                          "peak_contact_force", grows)  # fmt: skip
+    assert judged(growing, 4).held
+    stalled = altered(growing, "both 0.3", "peak_acceleration", lambda v: 0 * v + 200)
+    assert not judged(stalled, 4).held
+
+
+def test_horizontal_force_needs_a_ratio_of_three(paper_runs):
+    for ratio, held in ((3.1, True), (2.9, False)):
+        runs = paper_runs
+        for label in FAULT_LABELS:
+            peaks = np.array([[ratio, 1.0], [ratio, 1.0]])
+            runs = altered(runs, label, "peak_contact_force_axis", lambda _, p=peaks: p)
+        assert judged(runs, 5).held is held
+
+
+def test_two_clearances_must_exceed_both_single_ones(paper_runs):
+    worse = {"big_end": 1.0, "small_end": 2.0, "both": 3.0}
+    runs = paper_runs
+    for name in ("peak_acceleration", "rms_acceleration_deviation"):
+        runs = with_metric(runs, name, lambda f, _: worse[f])
+    assert judged(runs, 8).held
+    even = altered(runs, "both 0.2", "peak_acceleration", lambda v: 0 * v + 2)
+    assert not judged(even, 8).held
+
+
+def test_continuity_compares_the_active_shares(paper_runs):
+    runs = dict(paper_runs)
+    for clearance in CLEARANCES:
+        for joint, share in (("big_end", 0.8), ("small_end", 0.2)):
+            run = runs[f"{joint} {clearance:g}"].copy(deep=True)
+            _, _, ideal = ideal_motion(run)
+            angle = np.degrees(run["crank_angle"].values) % 360
+            shaking = 100 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
+            run["acceleration"] = run["acceleration"].copy(data=ideal + shaking)
+            runs[f"{joint} {clearance:g}"] = run
+    assert judged(runs, 7).held
+
+
+def test_held_share_counts_what_was_judged(paper_runs):
+    once = claims(paper_runs)
+    flipped = [replace(claim, held=not claim.held) for claim in once]
+    for number, held, of in held_share([once, flipped, claims({})]):
+        assert (held, of) == (1, 2), number
+
+
+def test_the_case_of_a_run_is_recovered(paper_runs):
+    cases = paper_cases()
+    assert case_of(paper_runs["both 0.3"]).physics_key == cases["both 0.3"].physics_key

@@ -1,0 +1,416 @@
+"""The figures: every line is the stored series, and every panel can be read."""
+
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Rectangle
+
+from compressor.analysis import paper_cases
+from compressor.figures import FIGURES, curves, style, sweep_metric
+from compressor.figures.response import MOTION
+from compressor.physics import cam
+from compressor.record import record
+
+FIGURE = {figure.number: figure for figure in FIGURES}
+SETTLED = slice(1200, None)  # 0.3 degrees a sample: the first revolution is start-up
+SIZES = ("0.1", "0.2", "0.3")
+JOINTS = {9: ("big_end", "big_end"), 12: ("small_end", "small_end"),
+          15: ("both", "big_end"), 16: ("both", "small_end")}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def drawn(paper_runs):
+    """All figures of the paper by number."""
+    return {number: figure.draw(paper_runs) for number, figure in FIGURE.items()}
+
+
+def lines(panel):
+    """The data of a panel's lines, lowest first."""
+    return [line.get_data() for line in sorted(panel.lines, key=lambda line: -line.zorder)]
+
+
+def check_lines(panel, expected):
+    found = lines(panel)
+    assert len(found) == len(expected)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-10)
+
+
+def curve(run, values, factor):
+    """Crank angle from the second top dead centre, and values in a unit."""
+    angle = run["crank_angle"].values[SETTLED] * 180 / np.pi - 360
+    return angle, values.values[SETTLED] * factor
+
+
+def responses(fault):
+    return ["design", *(f"{fault} {size}" for size in SIZES)]
+
+
+# ---- the registry -----------------------------------------------------------------------------
+
+
+def test_the_registry_has_the_papers_figures():
+    assert [figure.number for figure in FIGURES] == [3, 4, *range(6, 17)]
+
+
+@pytest.mark.parametrize("number", FIGURE)
+def test_figures_are_described(number):
+    figure = FIGURE[number]
+    assert set(figure.needs) <= set(paper_cases())
+    assert figure.title
+    assert len(figure.caption) > 80
+    assert figure.caption.endswith(".")
+    assert "{" not in figure.caption
+
+
+def test_needs_are_all_that_is_read(paper_runs):
+    for figure in FIGURES:
+        figure.draw({name: paper_runs[name] for name in figure.needs})
+
+
+# ---- lines ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("number", "labels"),
+    [(6, ["design", "typical"])] + [(n, responses(f)) for n, f in
+                                    ((8, "big_end"), (11, "small_end"), (14, "both"))],
+)  # fmt: skip
+def test_response_lines(drawn, paper_runs, number, labels):
+    panels = drawn[number].axes
+    series = [("displacement", 1000), ("velocity", 1), ("acceleration", 1)]
+    for i, (name, factor) in enumerate(series):
+        expected = [curve(paper_runs[k], paper_runs[k][name], factor) for k in labels]
+        check_lines(panels[2 * i], expected)
+        check_lines(panels[2 * i + 1], expected)
+
+
+@pytest.mark.parametrize("number", JOINTS)
+def test_contact_force_lines(drawn, paper_runs, number):
+    fault, joint = JOINTS[number]
+    panels = drawn[number].axes
+    for i, axis in enumerate("xy"):
+        expected = [
+            curve(run, run["contact_force"].sel(joint=joint, axis=axis), 1 / 1000)
+            for run in (paper_runs[f"{fault} {size}"] for size in SIZES)
+        ]
+        check_lines(panels[2 * i], expected)
+        check_lines(panels[2 * i + 1], expected)
+
+
+def test_piston_force_lines(drawn, paper_runs):
+    expected = [
+        curve(paper_runs[k], paper_runs[k]["piston_force"], 1e-3) for k in ("design", "typical")
+    ]
+    check_lines(drawn[7].axes[0], expected)
+
+
+@pytest.mark.parametrize(("number", "joint"), [(10, "big_end"), (13, "small_end")])
+def test_relation(drawn, paper_runs, number, joint):
+    for panel, size in zip(drawn[number].axes, SIZES, strict=True):
+        run = paper_runs[f"{joint} {size}"]
+        a = run["acceleration"].values[SETTLED]
+        force = run["contact_force"].sel(joint=joint, axis="x").values[SETTLED]
+        dots, fit = panel.lines
+        np.testing.assert_allclose(dots.get_data(), (force / 1000, a), rtol=1e-13)
+        slope, intercept = np.polyfit(a, force, 1)
+        kilonewton, ends = fit.get_data()
+        assert kilonewton * 1000 == pytest.approx(slope * ends + intercept)
+        r = np.corrcoef(a, force)[0, 1]
+        (words,) = [text.get_text() for text in panel.texts]
+        assert f"r = {r:.3f},  r² = {r * r:.3f}".replace("-", "−") in words
+        assert f"{slope:.1f} kg".replace("-", "−") in words
+
+
+def test_pressure_volume(drawn, paper_runs):
+    (panel,) = drawn[3].axes
+    run = paper_runs["typical"]
+    area = np.pi * 0.05**2
+    volume = area * (0.740 - run["displacement"].values[SETTLED]) * 1000
+    check_lines(panel, [(volume, run["piston_force"].values[SETTLED] / area / 1e6)])
+    names = {text.get_text() for text in panel.texts} - {""}
+    assert names == {"expansion", "suction", "compression", "discharge"}
+
+
+@pytest.mark.parametrize(
+    ("name", "volume", "pressure"),
+    [("expansion", (0.16, 0.40), (0.11, 0.39)), ("suction", (0.41, 2.04), (0.104, 0.106)),
+     ("compression", (0.8, 2.04), (0.11, 0.39)), ("discharge", (0.16, 0.79), (0.39, 0.396))],
+)  # fmt: skip
+def test_phases_are_named_where_they_are(drawn, name, volume, pressure):
+    (text,) = [t for t in drawn[3].axes[0].texts if t.get_text() == name]
+    assert volume[0] < text.xy[0] < volume[1]
+    assert pressure[0] < text.xy[1] < pressure[1]
+
+
+def test_arrows_point_along_time(drawn):
+    arrows = [t for t in drawn[3].axes[0].texts if not t.get_text()]
+    ways = [np.sign(np.subtract(arrow.xy, arrow.xyann)) for arrow in arrows]
+    assert [tuple(way) for way in np.round(ways)] == [(1, -1), (1, 0), (-1, 1), (-1, 0)]
+
+
+def test_cam(drawn):
+    contour, follower = drawn[4].axes
+    p = record(paper_cases()["design"])
+    turn = np.radians(np.linspace(0, 360, 1441))
+    circle, path = (line.get_data() for line in sorted(contour.lines, key=lambda ln: ln.zorder)
+                    if len(line.get_xdata()) > 2)  # fmt: skip
+    assert np.hypot(*circle) == pytest.approx(200)
+    np.testing.assert_allclose(path, np.multiply(cam.contour(p, turn, 0.2), 1000), atol=1e-9)
+    assert contour.get_aspect() == 1
+    before, after, closed = follower.lines
+    np.testing.assert_allclose(closed.get_ydata(), cam.cam_profile(p, turn) * 1000, atol=1e-9)
+    for printed in (before, after):
+        angle = np.radians(printed.get_xdata())
+        np.testing.assert_allclose(printed.get_ydata(), cam.printed_profile(p, angle) * 1000)
+    assert before.get_ydata().max() == pytest.approx(208.7, abs=0.05)
+    assert after.get_ydata().max() == pytest.approx(81.3, abs=0.05)
+    words = " ".join(text.get_text() for text in follower.texts)
+    assert "208.7 mm" in words
+    assert "81.3 mm" in words
+
+
+# ---- enlarged views ---------------------------------------------------------------------------
+
+
+def pairs(figure):
+    """Full and enlarged panels."""
+    return zip(figure.axes[::2], figure.axes[1::2], strict=True)
+
+
+@pytest.mark.parametrize("number", [6, 8, 9, 11, 12, 14, 15, 16])
+def test_enlarged_views_are_marked_and_hold_their_curves(drawn, number):
+    for full, enlarged in pairs(drawn[number]):
+        (mark,) = [patch for patch in full.patches if isinstance(patch, Rectangle)]
+        (left, right), (low, high) = enlarged.get_xlim(), enlarged.get_ylim()
+        assert (mark.get_x(), mark.get_x() + mark.get_width()) == pytest.approx((left, right))
+        assert mark.get_y() <= low + 1e-9
+        assert mark.get_y() + mark.get_height() >= high - 1e-9
+        for x, y in lines(enlarged):
+            inside = (x >= left) & (x <= right)
+            assert inside.sum() > 50
+            assert y[inside].min() > low
+            assert y[inside].max() < high
+
+
+@pytest.mark.parametrize("number", [8, 11, 14])
+def test_acceleration_is_enlarged_where_it_differs_most(drawn, number):
+    full, enlarged = drawn[number].axes[4:]
+    spread = np.ptp([y for _, y in lines(full)], axis=0)
+    angle = lines(full)[0][0]
+    left, right = enlarged.get_xlim()
+    inside = (angle >= left) & (angle <= right)
+    assert spread[inside].max() >= 0.98 * spread.max()
+
+
+def test_models_without_clearance_are_said_to_coincide(drawn):
+    titles = [panel.get_title(loc="left") for panel in drawn[6].axes]
+    assert ["coincide" in title for title in titles] == [False, True] * 3
+    assert not any("coincide" in p.get_title(loc="left") for p in drawn[8].axes)
+
+
+def made_curve(values):
+    """A curve of three revolutions, a degree a sample, of acceleration."""
+    angle = np.radians(np.arange(360, 1441))
+    run = xr.Dataset({"crank_angle": ("time", angle), "acceleration": ("time", values)})
+    return curves.Curve("", run, style.IDEAL)
+
+
+@pytest.mark.parametrize("place", [30, 333, 1050])
+def test_the_window_finds_a_bump(place):
+    angle = np.arange(1081.0)
+    smooth = 100 * np.cos(np.radians(angle))
+    bump = smooth + 40 * np.exp(-(((angle - place) / 3) ** 2))
+    part, differs = curves.differing_part([made_curve(smooth), made_curve(bump)], MOTION[2])
+    assert differs
+    assert part.start <= place < part.stop
+    assert part.stop - part.start == 41
+
+
+def test_of_equal_differences_the_first_is_enlarged():
+    angle = np.arange(1081.0)
+    ring = 40 * np.exp(-((((angle % 360) - 200) / 3) ** 2)) * (1 + angle / 1e5)
+    part, _ = curves.differing_part([made_curve(0 * angle), made_curve(ring)], MOTION[2])
+    assert part.start <= 200 < part.stop
+
+
+def test_steep_curves_are_enlarged_where_the_difference_shows():
+    angle = np.arange(1081.0)
+    x = 100 * np.cos(np.radians(angle))
+    apart = (
+        x + 0.5 + 0.4 * np.abs(np.sin(np.radians(angle)))
+    )  # most at mid-stroke, where x is steep
+    steep = curves.Quantity("acceleration", "", "", window=24.0, steep=True)
+    part, _ = curves.differing_part([made_curve(x), made_curve(apart)], steep)
+    middle = (part.start + part.stop) / 2 % 180
+    assert min(middle, 180 - middle) < 10
+
+
+# ---- how they look ----------------------------------------------------------------------------
+
+
+def lightness(color):
+    """CIE L* of a colour."""
+    rgb = np.array(to_rgb(color))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return 116 * np.cbrt(linear @ [0.2126, 0.7152, 0.0722]) - 16
+
+
+@pytest.mark.parametrize(
+    "group",
+    [[style.IDEAL, *style.BY_CLEARANCE.values()], [*style.BY_LOAD.values()], [*style.CYCLE]],
+)
+def test_curves_survive_greyscale(group):
+    shades = sorted(lightness(line.color) for line in group)
+    assert np.diff(shades).min() >= 3
+    assert shades[-1] <= 80
+    assert len({str(line.linestyle) for line in group}) == len(group)
+    if len(group) < 5:
+        assert np.diff(shades).min() >= 18
+
+
+@pytest.mark.parametrize("number", FIGURE)
+def test_axes_name_their_units(drawn, number):
+    figure = drawn[number]
+    labels = [panel.get_xlabel() for panel in figure.axes]
+    labels += [panel.get_ylabel() for panel in figure.axes]
+    assert sum(bool(label) for label in labels) >= 2
+    for label in filter(None, labels):
+        assert "(" in label, label
+    for panel in figure.axes:
+        has_label = panel.get_ylabel() or "enlarged" in panel.get_title(loc="left")
+        assert has_label or number in (10, 13)  # these share their axis
+
+
+@pytest.mark.parametrize("number", FIGURE)
+def test_legends_cover_no_panel(drawn, number):
+    figure = drawn[number]
+    figure.draw_without_rendering()
+    legends = [*figure.legends, *(p.get_legend() for p in figure.axes if p.get_legend())]
+    assert legends or number in (3, 10, 13)
+    for legend in legends:
+        box = legend.get_window_extent()
+        assert not any(box.overlaps(panel.get_window_extent()) for panel in figure.axes)
+        assert figure.bbox.x0 <= box.x0
+        assert box.x1 <= figure.bbox.x1
+
+
+def test_a_users_settings_neither_matter_nor_change(paper_runs):
+    with matplotlib.rc_context({"axes.facecolor": "red", "font.size": 30.0, "axes.grid": False}):
+        before = dict(matplotlib.rcParams)
+        figure = FIGURE[7].draw(paper_runs)
+        mine = style.render(figure, "svg")
+        assert dict(matplotlib.rcParams) == before
+    assert mine == style.render(FIGURE[7].draw(paper_runs), "svg")
+
+
+def test_rendered_files_are_what_they_are_called(drawn):
+    assert style.render(drawn[3], "png").startswith(b"\x89PNG")
+    assert ElementTree.fromstring(style.render(drawn[3], "svg")).tag.endswith("}svg")
+
+
+def test_pyplot_is_never_imported():
+    code = "import sys, compressor.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+# ---- sweeps -----------------------------------------------------------------------------------
+
+
+def study(masses=(8.0, 14.0), status=None, clearances=(0.1, 0.2, 0.4)):
+    """A study over clearance and mass, at the big end alone, with made-up metrics."""
+    shape = (len(clearances), len(masses))
+    peak = 100.0 + np.arange(np.prod(shape)).reshape(shape) ** 2
+    both = np.stack([peak, 2 * peak], axis=-1)
+    dims = ("clearance_mm", "reciprocating_mass_kg")
+    return xr.Dataset(
+        {
+            "status": (dims, np.full(shape, "ok", dtype="U7") if status is None else status),
+            "peak_acceleration": (dims, peak),
+            "peak_contact_force": ((*dims, "joint"), both * 1e3),
+            "max_penetration": ((*dims, "joint"), both * [1e-6, 0.0]),
+            "impact_count": ((*dims, "joint"), both * [1.0, 0.0]),
+            "acceleration": ((*dims, "time"), np.zeros((*shape, 4))),
+        },
+        {"clearance_mm": list(clearances), "reciprocating_mass_kg": list(masses),
+         "joint": ["big_end", "small_end"]},
+    )  # fmt: skip
+
+
+def titled(figure):
+    return {panel.get_title(loc="left"): panel for panel in figure.axes}
+
+
+def test_a_line_for_each_combination():
+    data = study()
+    panels = titled(sweep_metric.draw_metrics(data, "clearance_mm"))
+    first, second = panels["peak acceleration (m/s²)"].lines
+    np.testing.assert_array_equal(first.get_data(), ([0.1, 0.2, 0.4], data.peak_acceleration[:, 0]))
+    np.testing.assert_array_equal(second.get_ydata(), data.peak_acceleration[:, 1])
+    force = panels["peak contact force, small end (kN)"].lines[1]
+    np.testing.assert_allclose(force.get_ydata(), 2 * data.peak_acceleration[:, 1])
+    across = titled(sweep_metric.draw_metrics(data, "reciprocating_mass_kg"))
+    np.testing.assert_array_equal(
+        across["peak acceleration (m/s²)"].lines[2].get_ydata(), data.peak_acceleration[2]
+    )
+
+
+def test_units_of_sweeps():
+    panels = titled(sweep_metric.draw_metrics(study(), "clearance_mm"))
+    depth = panels["greatest penetration, big end (µm)"].lines[0].get_ydata()
+    np.testing.assert_allclose(depth, study().peak_acceleration[:, 0])
+
+
+def test_contact_in_an_ideal_joint_is_not_shown():
+    names = titled(sweep_metric.draw_metrics(study(), "clearance_mm"))
+    assert "times contact began, big end" in names
+    assert not {"times contact began, small end", "greatest penetration, small end (µm)"} & {*names}
+
+
+def test_the_legend_names_the_other_axes():
+    (legend,) = sweep_metric.draw_metrics(study(), "clearance_mm").legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["reciprocating_mass_kg 8", "reciprocating_mass_kg 14"]
+
+
+def test_many_combinations_have_a_median():
+    data = study(masses=tuple(range(1, 10)))
+    figure = sweep_metric.draw_metrics(data, "clearance_mm")
+    plotted = titled(figure)["peak acceleration (m/s²)"].lines
+    assert len(plotted) == 10
+    np.testing.assert_allclose(
+        plotted[-1].get_ydata(), data.peak_acceleration.median("reciprocating_mass_kg")
+    )
+    assert "median" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_failed_jobs_are_marked():
+    status = np.array([["ok", "ok"], ["ok", "failed"], ["missing", "ok"]])
+    data = study(status=status)
+    data = data.where(data.status == "ok").assign(status=data.status)
+    figure = sweep_metric.draw_metrics(data, "clearance_mm")
+    for panel in figure.axes:
+        marks = {line.get_marker(): list(line.get_xdata()) for line in panel.lines}
+        assert marks["x"] == [0.2]
+        assert [0.4] in [list(line.get_xdata()) for line in panel.lines]
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names[-2:] == ["a job failed here", "a job was not run"]
+
+
+def test_words_are_ticks():
+    data = study().assign_coords(clearance_mm=["big_end", "none", "both"])
+    panel = sweep_metric.draw_metrics(data, "clearance_mm").axes[0]
+    assert [tick.get_text() for tick in panel.get_xticklabels()] == ["big_end", "none", "both"]
+
+
+@pytest.mark.parametrize(("clearances", "scale"), [((0.1, 0.2, 0.4), "linear"),
+                                                   ((0.001, 0.02, 0.4), "log")])  # fmt: skip
+def test_axes_over_decades_are_logarithmic(clearances, scale):
+    figure = sweep_metric.draw_metrics(study(clearances=clearances), "clearance_mm")
+    assert {panel.get_xscale() for panel in figure.axes} == {scale}

@@ -1,0 +1,78 @@
+"""What the README says is executed or compared."""
+
+import re
+import shlex
+import subprocess
+import sys
+
+import pytest
+import readme_tables
+
+import compressor
+
+README = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
+MAKEFILE = (readme_tables.ROOT / "Makefile").read_text(encoding="utf-8")
+QUICK = ["--set", "solve.duration_rev=0.25", "--set", "solve.settle_rev=0"]
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.mark.parametrize("name", readme_tables.TABLES)
+def test_generated_tables_are_current(name):
+    written = readme_tables.block(name).search(README)
+    assert written, f"no block for {name}"
+    assert written[2] == readme_tables.TABLES[name](), "stale: run make readme"
+
+
+@pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:`|^)make ([a-z-]+)", README, re.M))))
+def test_make_verbs_exist(verb):
+    assert re.search(rf"^{verb}:", MAKEFILE, re.MULTILINE), f"make {verb}"
+
+
+def expanded(place, word):
+    """What a shell makes of a word."""
+    return sorted(map(str, place.glob(word))) if "*" in word else [word]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder as the README's reader would have it: its case file, and our configs."""
+    place = tmp_path_factory.mktemp("readme")
+    (text,) = blocks("yaml")
+    name = re.match(r"# (\S+\.yaml)", text)[1]
+    (place / name).write_text(text, encoding="utf-8")
+    (place / "configs").symlink_to(readme_tables.ROOT / "configs")
+    for command in (line for text in blocks("console") for line in text.splitlines()):
+        if not command.startswith("compsim "):
+            continue
+        words = shlex.split(command)
+        words = [w for word in words for w in expanded(place, word)]
+        more = QUICK if words[1] == "run" else []
+        call = [sys.executable, "-m", "compsim", *words[1:], *more]
+        done = subprocess.run(call, cwd=place, capture_output=True, text=True)
+        assert done.returncode == 0, f"{command}\n{done.stderr}"
+    return place
+
+
+@pytest.mark.slow
+def test_console_commands_work(folder):
+    assert (folder / "report" / "index.html").exists()
+    assert len(list((folder / "results" / "jobs").glob("*.h5"))) == 11
+    assert (folder / "wear-report" / "index.html").exists()
+
+
+@pytest.mark.slow
+def test_python_example_works(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    (text,) = blocks("python")
+    names = {}
+    exec(text, names)
+    assert names["a"].attrs["units"] == "m/s2"
+    assert names["run"].attrs["complete"] == 1
+    assert "clearance_mm" in capsys.readouterr().out
+
+
+def test_the_table_of_contents_of_the_package():
+    assert {"load_cases", "simulate", "open_study"} <= set(compressor.__all__)

@@ -1,0 +1,408 @@
+"""The report: what is on the page, what is not, and that nothing on it escapes or reaches out."""
+
+import html.parser
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import CONFIGS, store
+
+from compressor import page, report
+from compressor.analysis import paper_cases
+from compressor.case import Case
+from compressor.plan import load_cases, load_studies
+from compressor.report import find_paper_runs, paper_candidates, write_report
+from compressor.store import (
+    StoreError,
+    finished_keys,
+    job_path,
+    read_job,
+    read_studies,
+    write_job,
+    write_study,
+)
+
+SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
+DRAFT = ["solve.accuracy=draft"]
+VOID = {"meta", "img", "br"}
+EVIL = "<script>alert('1')</script>&amp;"
+
+
+class Reader(html.parser.HTMLParser):
+    """What a page is made of; asserts that its elements are closed in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.links, self.sources, self.ids, self.words = [], [], [], [], []
+        self.rows, self.tags = [], set()
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        self.tags.add(tag)
+        self.links += [attrs["href"]] if "href" in attrs else []
+        self.sources += [attrs[name] for name in ("src", "srcset", "data") if name in attrs]
+        self.ids += [attrs["id"]] if "id" in attrs else []
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "tr":
+            self.rows.append((attrs.get("class"), []))
+        if tag in ("td", "th"):
+            self.rows[-1][1].append("")
+        assert tag != "img" or attrs.get("alt")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if {"td", "th"} & {*self.open}:
+            self.rows[-1][1][-1] += data
+        if "style" not in self.open:
+            self.words.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+def read(folder):
+    text = (folder / "index.html").read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>")
+    return Reader(text)
+
+
+@pytest.fixture(scope="module")
+def full(once, paper_store):
+    """The folder of a report on all of the paper's cases."""
+    command = f"compsim report {EVIL}"
+    return once("full-report", lambda folder: write_report(paper_store, folder, command))
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A store with a short sweep, none of it the paper's: 2 x 2 jobs."""
+    file = tmp_path / "own.yaml"
+    file.write_text("joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {rod_mass_kg: [3, 5]}\n")
+    store(tmp_path / "results", file, overrides=[*SHORT, *DRAFT])
+    return tmp_path / "results"
+
+
+def fail(folder, key, reason, detail):
+    """Make a stored job one that failed."""
+    with read_job(folder, key) as run:
+        bad = run.load()
+    metrics = {n: v * np.nan for n, v in bad.items() if "time" not in v.dims and v.dtype == float}
+    bad = bad.assign(status="failed", reason=reason, **metrics)
+    bad.attrs |= {"detail": detail, "complete": 0}
+    write_job(folder, bad)
+
+
+# ---- the paper's report -----------------------------------------------------------------------
+
+
+def test_every_figure_is_drawn_and_shown(full):
+    numbers = [3, 4, *range(6, 17)]
+    names = {f"figure-{n:02d}.{kind}" for n in numbers for kind in ("png", "svg")}
+    assert {path.name for path in full.iterdir()} == names | {"index.html"}
+    found = read(full)
+    assert len(found.sources) == 13
+    for number in numbers:
+        assert f"Figure {number}:" in found.text
+        assert f"figure-{number:02d}" in found.ids
+
+
+def test_the_page_reaches_for_nothing_outside(full):
+    found = read(full)
+    assert all(source.startswith("data:image/png;base64,") for source in found.sources)
+    anchors = [link[1:] for link in found.links if link.startswith("#")]
+    assert set(anchors) <= set(found.ids)
+    assert len(anchors) >= 18
+    files = [link for link in found.links if not link.startswith("#")]
+    assert all((full / link).exists() and "/" not in link for link in files)
+    assert not found.tags & {"script", "link", "iframe", "object", "embed", "base"}
+    text = (full / "index.html").read_text(encoding="utf-8")
+    assert not re.search(r"https?:|@import|url\(", text)
+    assert len(found.ids) == len(set(found.ids))
+
+
+def test_every_case_has_a_row(full, paper_runs):
+    rows = {cells[0]: cells for _, cells in read(full).rows}
+    case = rows["both joints, 0.3 mm"]
+    run = paper_runs["both 0.3"]
+    assert case[1] == "ok"
+    assert float(case[2]) == pytest.approx(float(run["peak_acceleration"]), rel=1e-3)
+    big, small = (float(word) for word in case[5].split("|"))
+    assert [big, small] == pytest.approx(run["peak_contact_force"].values / 1e3, rel=1e-3)
+    assert case[-1] == run.attrs["key"]
+    assert len([name for name in rows if name.endswith((" no clearance", " mm"))]) == 11
+    assert rows["big end, 0.1 mm"][6].endswith("| –")
+
+
+def test_every_claim_has_a_verdict(full):
+    rows = [cells for _, cells in read(full).rows if cells[0].startswith("(")]
+    assert [cells[0][1] for cells in rows] == list("12345678")
+    assert {cells[1] for cells in rows} <= {"held", "not held"}
+    assert rows[0][1] == "held"
+    assert "by construction" in rows[0][0]
+    assert all(cells[2] and cells[3] for cells in rows)
+
+
+@pytest.mark.parametrize(
+    "words", ["rod 4.7 kg", "14 kg", "clearance is radial", "cam of the design load is a "
+              "reconstruction", "Claim (1) holds by construction", "numpy ", "model ", "Python ",
+              "big-end.yaml", f"compsim report {EVIL}"],
+)  # fmt: skip
+def test_the_page_says(full, words):
+    assert words in read(full).text
+
+
+def test_every_hash_is_there(full, paper_store):
+    text = read(full).text
+    assert all(key in text for key in finished_keys(paper_store))
+
+
+def test_no_study_of_the_paper_is_told_twice(full):
+    assert not [anchor for anchor in read(full).ids if anchor.startswith("study-")]
+    assert "could not be drawn" not in read(full).text
+
+
+# ---- what is missing --------------------------------------------------------------------------
+
+
+def part_of(paper_store, tmp_path, *names):
+    """A store with some of the paper's studies."""
+    for study in read_studies(paper_store):
+        if study.name in names:
+            (tmp_path / "part" / "studies").mkdir(parents=True, exist_ok=True)
+            (tmp_path / "part" / "jobs").mkdir(exist_ok=True)
+            shutil.copy(paper_store / "studies" / f"{study.name}.json", tmp_path / "part/studies")
+            for key in study.keys:
+                shutil.copy(job_path(paper_store, key), tmp_path / "part" / "jobs")
+    return tmp_path / "part"
+
+
+def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
+    part = part_of(paper_store, tmp_path, "design", "typical", "big-end")
+    gone = next(s for s in read_studies(part) if s.name == "big-end").keys[1]
+    job_path(part, gone).unlink()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "figure-09.svg").write_text("an earlier report's")
+    write_report(part, tmp_path / "out")
+    assert {p.name for p in (tmp_path / "out").glob("figure-*.png")} == {
+        f"figure-0{n}.png" for n in (3, 4, 6, 7)
+    }
+    assert not (tmp_path / "out" / "figure-09.svg").exists()
+    found = read(tmp_path / "out")
+    assert "Figure 9, Contact force at the big end: big end, 0.2 mm (not stored)" in found.text
+    assert "Figure 7, " not in found.text
+    raw = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    *files, command = re.findall("<pre>(.*?)</pre>", raw, re.DOTALL)
+    paths = []
+    for text in files:
+        paths.append(tmp_path / re.match(r"# (\S+)", text)[1])
+        paths[-1].write_text(text)
+    given = {case.physics_key for case in load_cases(*paths)}
+    have = {"design", "typical", "big_end 0.1", "big_end 0.3"}
+    assert given == {case.physics_key for k, case in paper_cases().items() if k not in have}
+    assert command.split() == ["compsim", "run", *(p.name for p in paths), "-o", str(part)]
+    rows = {cells[0]: kind for kind, cells in found.rows}
+    assert rows["big end, 0.2 mm"] == "missing"
+    assert rows["big end, 0.1 mm"] is None
+
+
+def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
+    part = part_of(paper_store, tmp_path, "design", "typical")
+    key = next(s for s in read_studies(part) if s.name == "design").keys[0]
+    fail(part, key, "non_finite", EVIL)
+    paper = find_paper_runs(part, read_studies(part))
+    assert paper.absent["design"] == "failed: non_finite"
+    assert "design" not in paper.usable
+    write_report(part, tmp_path / "out")
+    found = read(tmp_path / "out")
+    assert "design model, no clearance (failed: non_finite)" in found.text
+    assert ("failed", "failed: non_finite") in [(k, c[1]) for k, c in found.rows if len(c) > 1]
+    assert [p.name for p in (tmp_path / "out").glob("*.png")] == ["figure-03.png"]
+
+
+def test_metrics_without_series_have_tables_but_no_figures(paper_store, tmp_path):
+    part = part_of(paper_store, tmp_path, "typical")
+    (key,) = finished_keys(part)
+    with read_job(part, key) as run:
+        kept = run.load().drop_dims("time")
+    write_job(part, kept)
+    write_report(part, tmp_path / "out")
+    found = read(tmp_path / "out")
+    assert "stored without its time series" in found.text
+    assert not found.sources
+    (row,) = [cells for _, cells in found.rows if cells[0] == "typical model, no clearance"]
+    assert row[2] == "394.8"
+
+
+def test_the_most_exact_run_is_shown(paper_store, tmp_path):
+    part = part_of(paper_store, tmp_path, "typical")
+    (tmp_path / "exact.yaml").write_text("load: typical\nsolve: {rtol: [1e-3, 1e-9]}\n")
+    store(part, tmp_path / "exact.yaml")
+    assert find_paper_runs(part, read_studies(part)).usable["typical"].attrs["rtol"] == 1e-9
+
+
+# ---- finding the paper's cases ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [("joint: big_end\nclearance_mm: 0.1\nmachine: {rod_mass_kg: [3, 4.7]}\n", 1),
+     ("joint: big_end\nclearance_mm: 0.1\nmachine: {rod_length_mm: [500, 600]}\n", 1),
+     ("joint: [big_end, both, small_end]\nclearance_mm: 0.2\n", 3),
+     ("load: [typical, design]\n", 2),
+     ("friction: false\nload: [typical, design]\n", 0),
+     ("solve: {rtol: [1e-4, 1e-5]}\n", 2),
+     ("solve: {duration_s: 0.48}\n", 1),
+     ("solve: {duration_rev: 3}\n", 0),
+     ("machine: {speed_rpm: 499}\n", 0)],
+)  # fmt: skip
+def test_only_likely_jobs_are_opened(tmp_path, text, count):
+    (tmp_path / "some.yaml").write_text(text)
+    studies = load_studies(tmp_path / "some.yaml")
+    write_study(tmp_path, studies[0])
+    (study,) = read_studies(tmp_path)
+    likely = set(paper_candidates(study))
+    assert len(likely) == count
+    ours = {case.physics_key for case in paper_cases().values()}
+    paper = {case.key for case in studies[0].cases if case.physics_key in ours}
+    assert paper <= likely
+
+
+# ---- a user's own sweep -----------------------------------------------------------------------
+
+
+def test_a_sweep_has_its_table_and_plots(own, tmp_path):
+    path = write_report(own, tmp_path / "out")
+    assert path == tmp_path / "out" / "index.html"
+    drawn = {"sweep-own-clearance_mm", "sweep-own-rod_mass_kg"}
+    assert {p.stem for p in (tmp_path / "out").glob("*.png")} == drawn
+    found = read(tmp_path / "out")
+    assert len(found.sources) == 2
+    head = next(cells for _, cells in found.rows if cells[0] == "clearance_mm")
+    assert head[:4] == ["clearance_mm", "rod_mass_kg", "status", "peak acceleration (m/s²)"]
+    rows = {cells[-1]: cells for _, cells in found.rows}
+    (study,) = read_studies(own)
+    for key, point in zip(study.keys, [(0.1, 3), (0.1, 5), (0.2, 3), (0.2, 5)], strict=True):
+        with read_job(own, key) as run:
+            peak = float(run["peak_acceleration"])
+        assert (float(rows[key][0]), float(rows[key][1])) == point
+        assert float(rows[key][3]) == pytest.approx(peak, rel=1e-3)
+    assert "4 jobs: 4 ok, 0 failed." in found.text
+    assert "Figure 16" in found.text  # among those that could not be drawn
+    assert found.ids.index("study-own") < found.ids.index("missing")
+
+
+def test_failed_jobs_are_highlighted_and_everything_is_escaped(own, tmp_path):
+    manifest = own / "studies" / "own.json"
+    plain = json.loads(manifest.read_text())
+    fail(own, plain["keys"][2], EVIL, f"detail {EVIL}")
+    job_path(own, plain["keys"][3]).unlink()
+    plain |= {"name": EVIL, "case_file": f"/{EVIL}.yaml", "command": EVIL}
+    manifest.write_text(json.dumps(plain))
+    write_report(own, tmp_path / "out", EVIL)
+    text = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    found = Reader(text)
+    assert "<script" not in text
+    assert "script" not in found.tags
+    assert f"Study {EVIL}" in found.text
+    assert f"clearance_mm 0.2, rod_mass_kg 3: {EVIL}: detail {EVIL}" in found.text
+    assert "4 jobs: 2 ok, 1 failed, 1 not run." in found.text
+    kinds = {cells[-1]: kind for kind, cells in found.rows}
+    assert [kinds[key] for key in plain["keys"]] == [None, None, "failed", "missing"]
+    assert all("<" not in p.name and "/" not in p.name for p in (tmp_path / "out").iterdir())
+
+
+def test_long_tables_are_cut_and_say_so(own, tmp_path, monkeypatch):
+    monkeypatch.setattr(page, "MOST_ROWS", 3)
+    write_report(own, tmp_path / "out")
+    found = read(tmp_path / "out")
+    assert "The first 3 of 4 jobs" in found.text
+    (study,) = read_studies(own)
+    assert [cells[-1] in study.keys for _, cells in found.rows].count(True) == 3
+
+
+def test_a_study_whose_jobs_all_broke_has_a_page(own, tmp_path):
+    for key in finished_keys(own):
+        attrs = {"key": key, "detail": "ValueError: a bug", "case": json.dumps(Case().values())}
+        write_job(own, xr.Dataset({"status": "failed", "reason": "internal_error"}, attrs=attrs))
+    write_report(own, tmp_path / "out")
+    found = read(tmp_path / "out")
+    assert found.text.count("internal_error: ValueError: a bug") == 4
+    assert not found.sources
+
+
+# ---- files ------------------------------------------------------------------------------------
+
+
+def test_an_interrupted_report_leaves_the_old_one(own, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    write_report(own, out, "first")
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def interrupt(figure, kind):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(report, "render", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write_report(own, out, "second")
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_progress_goes_to_stderr(own, tmp_path, capsys):
+    write_report(own, tmp_path / "out")
+    out, err = capsys.readouterr()
+    assert not out
+    assert err.splitlines() == [
+        f"drawing own: metrics against {axis}" for axis in ("clearance_mm", "rod_mass_kg")
+    ]
+
+
+@pytest.mark.parametrize("made", [False, True])
+def test_no_results_is_an_error_with_a_remedy(tmp_path, made):
+    folder = tmp_path / "results"
+    if made:
+        folder.mkdir()
+    with pytest.raises(StoreError, match="compsim run"):
+        write_report(folder, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_report_that_cannot_be_written_is_an_error(own, tmp_path):
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(StoreError, match="out"):
+        write_report(own, tmp_path / "out")
+
+
+# ---- pieces of a page -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(394.784, "394.8"), (1076.7, "1077"), (12345.6, "12346"), (0.0, "0"), (3.0, "3"),
+     (67.5, "67.50"), (0.20641, "0.2064"), (7.15e-12, "7.15e-12"), (float("nan"), "–"),
+     (-394.784, "-394.8"), (2.5e9, "2.50e+09"), (float("inf"), "inf")],
+)  # fmt: skip
+def test_numbers(value, shown):
+    assert page.number(value) == shown
+
+
+def test_elements_escape_text_and_attributes():
+    made = page.element("p", EVIL, title='a"b', class_="c", aria_label="d")
+    assert made == (
+        "<p title=\"a&quot;b\" class=\"c\" aria-label=\"d\">"
+        "&lt;script&gt;alert(&#x27;1&#x27;)&lt;/script&gt;&amp;amp;</p>"
+    )  # fmt: skip
+    assert page.element("b", made) == f"<b>{made}</b>"
+
+
+def test_configs_are_the_papers_cases():
+    ours = {case.physics_key for case in load_cases(*CONFIGS)}
+    assert ours == {case.physics_key for case in paper_cases().values()}
