@@ -192,6 +192,9 @@ def test_enlarged_views_are_marked_and_hold_their_curves(drawn, number):
         assert (mark.get_x(), mark.get_x() + mark.get_width()) == pytest.approx((left, right))
         assert mark.get_y() <= low + 1e-9
         assert mark.get_y() + mark.get_height() >= high - 1e-9
+        bottom, top = full.get_ylim()
+        assert bottom < mark.get_y()
+        assert mark.get_y() + mark.get_height() < top
         for x, y in lines(enlarged):
             inside = (x >= left) & (x <= right)
             assert inside.sum() > 50

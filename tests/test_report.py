@@ -214,6 +214,18 @@ def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
     assert rows["big end, 0.1 mm"] is None
 
 
+@pytest.mark.parametrize(
+    ("names", "first"),
+    [(["big-end"], "study-big-end"), (["big-end", "typical"], "figures")],
+)
+def test_what_is_drawn_of_the_paper_comes_first(paper_store, tmp_path, names, first):
+    part = part_of(paper_store, tmp_path, *names)
+    job_path(part, next(s for s in read_studies(part) if s.name == "big-end").keys[0]).unlink()
+    write_report(part, tmp_path / "out")
+    ids = [i for i in read(tmp_path / "out").ids if i in ("study-big-end", "figures", "cases")]
+    assert ids[0] == first
+
+
 def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
     part = part_of(paper_store, tmp_path, "design", "typical")
     key = next(s for s in read_studies(part) if s.name == "design").keys[0]

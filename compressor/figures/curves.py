@@ -104,10 +104,12 @@ def plot_enlarged(
     enlarged.set_xlim(angle[0], angle[-1])
     enlarged.set_ylim(low, high)
     bottom, top = full.get_ylim()
-    full.set_ylim(bottom, top)
     lift = max(0.0, LEAST_MARK * (top - bottom) - (high - low)) / 2
-    size = angle[-1] - angle[0], high - low + 2 * lift
-    full.add_patch(Rectangle((angle[0], low - lift), *size, fill=False, linewidth=1.1, zorder=3))
+    low, high = low - lift, high + lift
+    room = 0.01 * (top - bottom)
+    full.set_ylim(min(bottom, low - room), max(top, high + room))
+    size = angle[-1] - angle[0], high - low
+    full.add_patch(Rectangle((angle[0], low), *size, fill=False, linewidth=1.1, zorder=3))
 
 
 def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:
