@@ -45,6 +45,8 @@ from compressor.page import (
     table,
 )
 from compressor.parameter import CaseError
+from compressor.physics.cam import comparisons
+from compressor.record import record
 from compressor.store import DamagedJob, has_job, job_status, open_study, read_job
 
 MOST_DETAILS = 20
@@ -225,6 +227,19 @@ def paper_sections(paper: PaperRuns, plates: Sequence[Plate]) -> Iterator[Sectio
     if paper.stored:
         yield Section("cases", "The paper's cases", paper_table(paper))
         yield Section("claims", "The paper's claims", claims_body(paper.usable))
+        yield Section("printed", "Spring and cam: what is printed, what follows", printed_table())
+
+
+def printed_table() -> Html:
+    """The paper's numbers of the design load beside those that follow from its equations."""
+    rows = [
+        row([f"{c.quantity} ({c.unit})", math.nan if c.printed is None else c.printed, c.follows,
+             c.source])
+        for c in comparisons(record(Case()))
+    ]  # fmt: skip
+    words = "Simulated is the closed cam with Table 1's spring. A dash: the paper gives no number."
+    head = ["quantity", "printed", "follows", "from"]
+    return joined([element("p", words), table(head, rows)])
 
 
 def claims_body(runs: Mapping[str, xr.Dataset]) -> Html:

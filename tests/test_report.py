@@ -418,3 +418,9 @@ def test_elements_escape_text_and_attributes():
 def test_configs_are_the_papers_cases():
     ours = {case.physics_key for case in load_cases(*CONFIGS)}
     assert ours == {case.physics_key for case in paper_cases().values()}
+
+
+def test_printed_numbers_stand_beside_what_follows(paper_store, tmp_path):
+    page = write_report(paper_store, tmp_path).read_text(encoding="utf-8")
+    found = re.search(r"fall, gas corners \(mm\)</td>(.*?)</tr>", page, re.DOTALL)
+    assert re.findall(r">([\d.]+)<", found[1])[:2] == ["120", "81.28"]
