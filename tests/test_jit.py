@@ -8,6 +8,8 @@ import sys
 import numpy as np
 import pytest
 
+from compressor.physics import _jit
+
 PROBE = """
 import json
 import numpy as np
@@ -48,3 +50,18 @@ def test_compiled_and_pure_agree():
     for one, other in zip(compiled["rows"], pure["rows"], strict=True):
         scale = np.abs(other).max()
         assert one == pytest.approx(other, rel=1e-7, abs=1e-9 * scale)
+
+
+def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
+    for name in ("_jit.py", "contact.py"):
+        (tmp_path / name).write_text("K = 1\n", encoding="utf-8")
+    monkeypatch.setattr(_jit, "HERE", tmp_path)
+    first = _jit.cache_folder()
+    first.mkdir(parents=True)
+    assert _jit.cache_folder() == first
+    (tmp_path / "contact.py").write_text("K = 2\n", encoding="utf-8")
+    assert _jit.cache_folder() != first
+    _jit.discard_old(first)
+    assert first.exists()
+    _jit.discard_old(_jit.cache_folder())
+    assert not first.exists()

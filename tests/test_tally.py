@@ -29,7 +29,9 @@ def test_lobatto_is_exact_for_polynomials(n):
 def test_peak_between_nodes_is_found(middle):
     rows = np.zeros((NODES.size, COLUMNS))
     rows[:, 2] = -7.0 + 3 * (NODES - middle) ** 2
-    assert peak_of(NODES, rows, 2) == pytest.approx(7.0, rel=1e-12)
+    assert peak_of(NODES, rows, 2, 0.0) == pytest.approx(7.0, rel=1e-12)
+    assert peak_of(NODES, rows, 2, 6.9) == pytest.approx(7.0, rel=1e-12)
+    assert peak_of(NODES, rows, 2, 50.0) == 50.0
 
 
 def test_tally_of_a_known_step():

@@ -1,19 +1,57 @@
 """The one door to numba.
 
 ``COMPSIM_JIT=0`` switches compilation off: the same source then runs as plain Python, for
-coverage and for debugging (``make test-pure``).
+coverage and for debugging (``make test-pure``). Machine code is kept on disk in a folder named by
+a hash of all sources here: numba itself would go on using a caller's old code after a change of
+what it calls in another file.
 """
 
+import hashlib
 import os
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 ENABLED = os.environ.get("COMPSIM_JIT", "1") != "0"
+HERE = Path(__file__).parent
+
+
+def sources_hash() -> str:
+    """Hash of the compiled modules' sources."""
+    digest = hashlib.sha256()
+    for path in sorted(HERE.glob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Where machine code is kept: beside the sources, or under the user's cache folder."""
+    beside = HERE / "__pycache__"
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compsim"
+    base = beside if os.access(beside if beside.exists() else HERE, os.W_OK) else user
+    return base / f"numba-{sources_hash()}"
+
+
+def discard_old(folder: Path) -> None:
+    """Remove the machine code of other sources, when that of the present ones is first made."""
+    if not folder.exists():
+        for old in folder.parent.glob("numba-*"):
+            shutil.rmtree(old, ignore_errors=True)
+
 
 if ENABLED:
     import numba
+
+    if not numba.config.CACHE_DIR:  # type: ignore[attr-defined]
+        discard_old(cache_folder())
+        numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]
+
+    def _compiled(function: Function, **options: Any) -> Function:
+        made: Any = numba.njit(cache=True, error_model="numpy", **options)(function)
+        return made
 
     def jit(function: Function) -> Function:
         """Compile `function` on its first call and keep the machine code on disk.
@@ -21,11 +59,19 @@ if ENABLED:
         IEEE arithmetic is kept (no fast-math) and a division by zero gives inf or nan, not an
         exception, so that the caller can judge a state that went wrong.
         """
-        compiled: Any = numba.njit(cache=True, error_model="numpy")(function)
-        return compiled
+        return _compiled(function)
+
+    def inlined(function: Function) -> Function:
+        """`jit`, written into each caller: for what returns many numbers to a hot loop.
+
+        Measured: a right-hand side takes 60 ns with `evaluate` inlined, 90 ns without.
+        """
+        return _compiled(function, inline="always")
 
 else:
 
     def jit(function: Function) -> Function:
         """Leave `function` as it is (``COMPSIM_JIT=0``)."""
         return function
+
+    inlined = jit

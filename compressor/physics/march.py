@@ -36,7 +36,7 @@ NODES, WEIGHTS = lobatto(5)
 BOUNDARY = 3.25  # of both pairs on the negative real axis, about
 SUSPECT = 0.6  # of the boundary: under PI control, steps held by stability swing around it
 STIFF_STEPS, CALM_STEPS = 15, 10  # in a row, before a change of method
-REST, LONGEST_REST = 500, 16000  # steps without a test after a change back; doubled after each
+REST, LONGEST_REST = 50, 500  # steps without a test after a change back; doubled after each
 SHORT_STAY = 100  # stiff steps or fewer
 
 rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
@@ -73,6 +73,7 @@ WALKER = np.dtype(
         ("h", "f8"),  # the next step's length; 0: to be chosen
         ("error", "f8"),  # of the last accepted step
         ("fresh", "i8"),  # whether dz/dt at t is still to be evaluated
+        ("observed", "i8"),  # whether work.row holds what is observed at t, in this phase
         ("landed", "i8"),  # whether the last step ended on an onset
         ("segment", "i8"),
         ("sample", "i8"),  # next output sample
@@ -184,7 +185,20 @@ def look_at_step(w, h, z, work, phase, p):
         rosenbrock_extend(z, work.new, work.k[1:], work.dense)
     else:
         extend(w.pair, h, z, work.k, work.dense)
-    observe_part(w, 0.0, 1.0, h, work, phase, p)
+    last = NODES.size - 1
+    n = work.y.size
+    if w.observed:  # the last step's end is this step's begin
+        for j in range(COLUMNS):
+            work.rows[0, j] = work.row[j]
+    else:
+        interpolate(0.0, work.dense, work.y)
+        observe(w.t, work.y, phase, p, work.rows[0])
+    for i in range(1, last):
+        interpolate(NODES[i], work.dense, work.y)
+        observe(w.t + NODES[i] * h, work.y, phase, p, work.rows[i])
+    observe(w.t + h, work.new[:n], phase, p, work.rows[last])
+    for i in range(last + 1):
+        work.times[i] = w.t + NODES[i] * h
 
 
 @jit
@@ -244,6 +258,12 @@ def sample_grid(w, t_end, h, work, times, states):
 @jit
 def take_in(w, h, work, phase, p, tally):
     """Tally an accepted step that has been looked at, and audit its energy."""
+    last = NODES.size - 1
+    for j in range(COLUMNS):
+        work.row[j] = work.rows[last, j]
+    w.observed = 1
+    n = work.y.size
+    tally_energy(work.row, work.new[n:], tally)
     if w.t < w.settle < w.t + h:
         cut = (w.settle - w.t) / h
         observe_part(w, 0.0, cut, h, work, phase, p)
@@ -252,9 +272,6 @@ def take_in(w, h, work, phase, p, tally):
         tally_step(work.times, work.rows, WEIGHTS, True, tally, p)
     else:
         tally_step(work.times, work.rows, WEIGHTS, w.t >= w.settle, tally, p)
-    n = work.y.size
-    observe(w.t + h, work.new[:n], phase, p, work.row)
-    tally_energy(work.row, work.new[n:], tally)
 
 
 @jit
@@ -347,6 +364,7 @@ def advance(w, z, work, reached, was_stiff, at_edge, segments):
     w.stiff_steps += was_stiff
     w.fresh = 1 if was_stiff or at_edge else 0
     if at_edge:
+        w.observed = 0
         w.segment += 1
         if w.segment == segments:
             w.status = DONE

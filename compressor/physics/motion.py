@@ -10,7 +10,7 @@ subtracting two cosines, so that a clearance of a nanometre keeps its digits.
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import inlined, jit
 from compressor.physics.contact import Contact, joint_contact
 from compressor.physics.kinematics import Motion, ideal
 from compressor.physics.loads import piston_force
@@ -34,11 +34,20 @@ class Turn(NamedTuple):
 
 
 @jit
+def small_angle(angle):
+    """Sine and cosine; below a hundredth of a radian by their series, which are exact there."""
+    if abs(angle) > 0.01:
+        return math.sin(angle), math.cos(angle)
+    square = angle * angle
+    sine = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0))
+    cosine = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0))
+    return angle * sine, cosine
+
+
+@jit
 def turned(motion, eta, eta_rate):
     """`Turn` of the rod from the ideal angle phi by the deviation eta, without cancellation."""
-    half = 0.5 * eta
-    sin_half = math.sin(half)
-    cos_half = math.cos(half)
+    sin_half, cos_half = small_angle(0.5 * eta)
     dc = -2.0 * sin_half * (motion.sin_phi * cos_half + motion.cos_phi * sin_half)
     ds = 2.0 * sin_half * (motion.cos_phi * cos_half - motion.sin_phi * sin_half)
     dc_rate = -ds * motion.rate - (motion.sin_phi + ds) * eta_rate
@@ -180,7 +189,7 @@ class Instant(NamedTuple):
     centre_y: float
 
 
-@jit
+@inlined
 def evaluate(t, y, phase, p):
     """The `Instant` at time t (s) and state y, in the load's phase; y is zeros (4) when ideal."""
     motion = ideal(t, p)
@@ -205,7 +214,7 @@ def evaluate(t, y, phase, p):
     return Instant(motion, turn, load, big, small, a, spin_up, centre_x, centre_y)
 
 
-@jit
+@inlined
 def write_derivative(now, y, p, out):
     """Write dy/dt at an evaluated instant into out."""
     n = y.size // 2

@@ -67,14 +67,20 @@ def new_tally():
 
 
 @jit
-def peak_of(times, rows, column):
-    """Largest |value| of a column over a step: its nodes, and the parabola through the best."""
+def peak_of(times, rows, column, known):
+    """The greater of `known` and the largest |value| of a column over a step.
+
+    The step's nodes count, and the parabola through the best: it cannot rise above twice the
+    best node, so that most steps need no parabola.
+    """
     last = times.size - 1
     best = 0
     for i in range(1, last + 1):
         if abs(rows[i, column]) > abs(rows[best, column]):
             best = i
     top = abs(rows[best, column])
+    if 2.0 * top < known:
+        return known
     i = min(max(best, 1), last - 1)
     left, mid, right = times[i - 1] - times[i], abs(rows[i, column]), times[i + 1] - times[i]
     slope_left = (abs(rows[i - 1, column]) - mid) / left
@@ -85,7 +91,7 @@ def peak_of(times, rows, column):
         at = -0.5 * slope / curvature
         if left < at < right:
             top = max(top, mid + 0.5 * slope * at)
-    return top
+    return max(top, known)
 
 
 @jit
@@ -154,11 +160,8 @@ def tally_step(times, rows, weights, measured, tally, p):
         weight = span * weights[i]
         tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
         tally.square_deviation += weight * rows[i, DEVIATION] ** 2
-    tally.peak_acceleration = max(tally.peak_acceleration, peak_of(times, rows, ACCELERATION))
+    tally.peak_acceleration = peak_of(times, rows, ACCELERATION, tally.peak_acceleration)
     for joint in range(2):
-        size = peak_of(times, rows, FORCE_SIZE + joint)
-        tally.peak_force[joint] = max(tally.peak_force[joint], size)
-        for axis in range(2):
-            k = 2 * joint + axis
-            top = peak_of(times, rows, FORCE + k)
-            tally.peak_force_axis[k] = max(tally.peak_force_axis[k], top)
+        tally.peak_force[joint] = peak_of(times, rows, FORCE_SIZE + joint, tally.peak_force[joint])
+    for k in range(4):
+        tally.peak_force_axis[k] = peak_of(times, rows, FORCE + k, tally.peak_force_axis[k])
