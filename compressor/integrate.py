@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import integrate as scipy_integrate
 
+from compressor.physics.control import Mode
 from compressor.physics.loads import sample_segments, segments
-from compressor.physics.march import Mode, Status, march, new_walker, new_work
+from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.observe import COLUMNS, derivative_with_flows, observe, observe_all
 from compressor.physics.parameters import FREEDOMS, Load, Scene
 from compressor.physics.runge_kutta import FLOWS, Pair

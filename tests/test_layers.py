@@ -20,6 +20,7 @@ FLOORS = [
     "physics.runge_kutta",
     "physics.rosenbrock",
     "physics.onset",
+    "physics.control",
     "physics.march",
     "parameter",
     "conflicts",

@@ -13,12 +13,19 @@ import numpy as np
 
 from compressor.physics import rosenbrock
 from compressor.physics._jit import jit
+from compressor.physics.control import (
+    REST,
+    Mode,
+    choose_method,
+    controlled,
+    first_step,
+    refuse,
+)
 from compressor.physics.observe import COLUMNS, NORMAL, derivative_with_flows, observe
 from compressor.physics.onset import NEVER, first_onset
 from compressor.physics.runge_kutta import (
     FLOWS,
     STAGES,
-    A,
     error_norm,
     extend,
     interpolate,
@@ -26,21 +33,12 @@ from compressor.physics.runge_kutta import (
 )
 from compressor.physics.tally import lobatto, tally_energy, tally_step
 
-SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
-PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
-EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NODES, WEIGHTS = lobatto(5)
-# stiffness: an explicit step is held by stability where h |lambda| exceeds the boundary
-BOUNDARY = 3.25  # of both pairs on the negative real axis, about
-SUSPECT = 0.6  # of the boundary: under PI control, steps held by stability swing around it
-STIFF_STEPS, CALM_STEPS = 15, 10  # in a row, before a change of method
-REST, LONGEST_REST = 50, 500  # steps without a test after a change back; doubled after each
-SHORT_STAY = 100  # stiff steps or fewer
 
 rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
-rosenbrock_extend, spectral_radius = rosenbrock.extend, rosenbrock.spectral_radius
+rosenbrock_extend = rosenbrock.extend
 
 
 class Status(IntEnum):
@@ -53,16 +51,7 @@ class Status(IntEnum):
     PENETRATION_IMPLAUSIBLE = 4
 
 
-class Mode(IntEnum):
-    """Which methods a walker may use."""
-
-    AUTO = 0  # explicit, and the stiff partner where stability holds the explicit steps
-    EXPLICIT = 1
-    STIFF = 2
-
-
 # numba wants plain integers
-AUTO, EXPLICIT, STIFF = map(int, Mode)
 RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE = map(int, Status)
 
 WALKER = np.dtype(
@@ -132,34 +121,6 @@ def new_work(n):
         np.zeros((5, n)), np.zeros(n), np.zeros(NODES.size), np.zeros((NODES.size, COLUMNS)),
         np.zeros(COLUMNS),
     )  # fmt: skip
-
-
-@jit
-def first_step(w, z, work, atol, phase, p, end):
-    """Length (s) of a first step that an order-5 method can take (Hairer, Norsett, Wanner II.4)."""
-    n = z.size - FLOWS
-    rates, trial = work.k[0], work.column
-    size = 0.0
-    rate = 0.0
-    for i in range(n):
-        scale = atol[i] + w.rtol * abs(z[i])
-        size += (z[i] / scale) ** 2
-        rate += (rates[i] / scale) ** 2
-    size, rate = math.sqrt(size / n), math.sqrt(rate / n)
-    guess = 1e-6 if size < 1e-5 or rate < 1e-5 else 0.01 * size / rate
-    guess = min(guess, end - w.t)
-    for i in range(z.size):
-        work.new[i] = z[i] + guess * rates[i]
-    derivative_with_flows(w.t + guess, work.new, phase, p, trial)
-    w.evaluations += 1
-    change = 0.0
-    for i in range(n):
-        scale = atol[i] + w.rtol * abs(z[i])
-        change += ((trial[i] - rates[i]) / scale) ** 2
-    change = math.sqrt(change / n) / guess
-    steepest = max(rate, change)
-    bold = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** 0.2
-    return min(100.0 * guess, bold, end - w.t)
 
 
 @jit
@@ -272,76 +233,6 @@ def take_in(w, h, work, phase, p, tally):
         tally_step(work.times, work.rows, WEIGHTS, True, tally, p)
     else:
         tally_step(work.times, work.rows, WEIGHTS, w.t >= w.settle, tally, p)
-
-
-@jit
-def controlled(w, h, error):
-    """The next step's length after an accepted step (PI control)."""
-    order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
-    error = max(error, 1e-10)
-    factor = SAFETY * error ** (-PROPORTIONAL / order) * w.error ** (INTEGRAL / order)
-    w.error = max(error, 1e-4)
-    return h * min(GROW, max(SHRINK, factor))
-
-
-@jit
-def refuse(w, h, error):
-    """Shorten the step after a refused attempt; a step that makes no way ends the walk."""
-    order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
-    w.rejected += 1
-    w.h = h * (max(SHRINK, SAFETY * error ** (-1.0 / order)) if error < math.inf else 0.1)
-
-
-@jit
-def stiff_rate(w, h, z, work, size):
-    """Estimate of the largest eigenvalue's size (1/s) from the step just taken.
-
-    Explicit: the last two stages stand at the same time, so their rates differ by the Jacobian
-    times the difference of their states (Hairer & Wanner II, IV.2). Stiff partner: power
-    iterations with the Jacobian itself.
-    """
-    n = size.size
-    if w.stiff:
-        for i in range(n):
-            work.y[i] = work.k[rosenbrock.STAGES, i] + 1e-3 * size[i]
-        return spectral_radius(work.jacobian, size, work.y, work.column[:n])
-    above = 0.0
-    below = 0.0
-    for i in range(n):
-        change = work.new[i] - z[i]
-        for j in range(STAGES - 2):
-            change -= h * A[w.pair, STAGES - 2, j] * work.k[j, i]
-        above += ((work.k[STAGES - 1, i] - work.k[STAGES - 2, i]) / size[i]) ** 2
-        below += (change / size[i]) ** 2
-    return math.sqrt(above / below) if below > 0.0 else 0.0
-
-
-@jit
-def choose_method(w, h, z, work, size):
-    """Change to the stiff partner where stability holds the explicit steps, and back.
-
-    A stiff step costs as much as `price` explicit ones; where it is not longer than that many
-    stable explicit steps for a while, the explicit pair comes back and rests from the test.
-    """
-    if w.mode != AUTO:
-        return
-    if w.rest > 0:
-        w.rest -= 1
-        return
-    reach = h * stiff_rate(w, h, z, work, size) / BOUNDARY
-    if w.stiff:
-        price = (size.size + rosenbrock.STAGES + 0.2 * size.size**2) / (STAGES - 1)
-        w.calm = w.calm + 1 if reach < price else 0
-        w.stay += 1
-        if w.calm >= CALM_STEPS:
-            w.stiff, w.calm, w.held = 0, 0, 0
-            w.pause = min(2 * w.pause, LONGEST_REST) if w.stay < SHORT_STAY else REST
-            w.rest = w.pause
-            w.h = min(w.h, h / max(reach, 1.0))
-    else:
-        w.held = w.held + 1 if reach > SUSPECT else max(0, w.held - 1)
-        if w.held >= STIFF_STEPS:
-            w.stiff, w.held, w.calm, w.stay = 1, 0, 0, 0
 
 
 @jit
