@@ -11,6 +11,8 @@ from compressor.physics.motion import evaluate
 from compressor.physics.runge_kutta import interpolate
 
 SAMPLES = 12  # intervals of a step that are looked at
+EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
+LOOKS = SAMPLES + 2
 HALVINGS = 40
 NEVER = 2.0  # a fraction of the step beyond its end
 
@@ -78,6 +80,16 @@ def touching_between(joint, low, high, t, h, dense, phase, p, y):
 
 
 @jit
+def place(i):
+    """The fraction of a step at which look i, 0 to LOOKS, is taken."""
+    if i <= 1:
+        return i * EDGE
+    if i >= LOOKS - 1:
+        return 1.0 - (LOOKS - i) * EDGE
+    return (i - 1) / SAMPLES
+
+
+@jit
 def joint_onset(joint, t, h, dense, phase, p, y):
     """First fraction of a step at which a joint that was apart touches, and until when it does.
 
@@ -86,19 +98,21 @@ def joint_onset(joint, t, h, dense, phase, p, y):
     earlier = nearness_at(joint, 0.0, t, h, dense, phase, p, y)
     before = earlier
     begin = NEVER
-    for i in range(1, SAMPLES + 1):
-        s = i / SAMPLES
+    for i in range(1, LOOKS + 1):
+        s = place(i)
         now = nearness_at(joint, s, t, h, dense, phase, p, y)
         if begin < NEVER:
             if now <= 0.0:
                 return begin, s
         elif now > 0.0:
             if before <= 0.0:
-                begin = crossing(joint, s - 1.0 / SAMPLES, s, t, h, dense, phase, p, y)
+                begin = crossing(joint, place(i - 1), s, t, h, dense, phase, p, y)
         elif i > 1 and before >= earlier and before >= now and before <= 0.0:
-            low = s - 2.0 / SAMPLES
-            # a parabola's top lies at most an eighth of its two slopes above the middle
-            if before + abs(before - earlier) + abs(before - now) > 0.0:
+            low, middle = place(i - 2), place(i - 1)
+            # where the nearness is concave, its top lies below the two chords prolonged
+            rise = (before - earlier) * (s - middle) / (middle - low)
+            fall = (before - now) * (middle - low) / (s - middle)
+            if before + rise + fall > 0.0:
                 inside = touching_between(joint, low, s, t, h, dense, phase, p, y)
                 if inside < NEVER:
                     return crossing(joint, low, inside, t, h, dense, phase, p, y), s

@@ -1,0 +1,354 @@
+"""No contact missed: onsets on hand-made interpolants, and 1,000 constructed re-engagements."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from compressor.analysis import paper_cases
+from compressor.case import Case
+from compressor.integrate import COMPILED as METHODS
+from compressor.integrate import CONTACT_STEP, natural_sizes, scales
+from compressor.physics._jit import ENABLED
+from compressor.physics.contact import Contact, unclamped_force
+from compressor.physics.loads import segments
+from compressor.physics.march import Status, march, new_walker, new_work
+from compressor.physics.motion import evaluate, start
+from compressor.physics.observe import COLUMNS, Column, derivative_with_flows, observe_all
+from compressor.physics.onset import (
+    NEVER,
+    crossing,
+    first_onset,
+    joint_onset,
+    nearness,
+    nearness_at,
+    touching_between,
+)
+from compressor.physics.parameters import FREEDOMS, SMALL_END
+from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, take_step
+from compressor.physics.tally import new_tally
+from compressor.record import offsets, record, scene
+
+H = 1e-3  # s, of the hand-made steps
+CLEARANCE = 2e-4  # m
+SHALLOWEST = 1e-10  # m: less is no pulse but a chance coincidence of accelerations
+FAR = 5e-3  # m: a clearance that no flight here crosses
+COUNT = 1000 if ENABLED else 20
+TOLERANCES = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9]
+
+
+def parameters(joint="small_end", load="none", millimetres=CLEARANCE * 1e3):
+    return record(Case.from_values({"joint": joint, "load": load, "clearance_mm": millimetres}))
+
+
+# ---- hand-made interpolants: the journals move along x, the rod does not turn
+
+
+def path(coefficients):
+    """Coefficients of s^j in m -> positions and rates of an interpolant, (5,) each."""
+    position = np.zeros(5)
+    position[: len(coefficients)] = coefficients
+    rate = np.zeros(5)
+    rate[:4] = position[1:] * np.arange(1, 5) / H
+    return position, rate
+
+
+def hump(top, height, half_width):
+    """A parabola: the journal is `height` m beyond its bearing at s = top (negative: short of)."""
+    curvature = abs(height) / half_width**2
+    return [CLEARANCE + height - curvature * top**2, 2 * curvature * top, -curvature]
+
+
+def small_end_only(coefficients):
+    dense = np.zeros((5, 4))
+    dense[:, 0], dense[:, 2] = path(coefficients)
+    return dense
+
+
+def both_ends(big, small):
+    dense = np.zeros((5, 8))
+    dense[:, 1], dense[:, 5] = path(big)
+    dense[:, 0], dense[:, 4] = dense[:, 1] + path(small)[0], dense[:, 5] + path(small)[1]
+    return dense
+
+
+APART, INSIDE = [0.5 * CLEARANCE], [1.1 * CLEARANCE]
+CLOSING = [0.5 * CLEARANCE, CLEARANCE]  # touches at s = 0.5
+RELEASE = [1.2 * CLEARANCE, -0.4 * CLEARANCE]  # at 0.08 m/s, out at s = 0.5
+RELEASED = 0.477775  # where K delta^1.5 outgrows STEP(delta) 0.08 m/s
+WIDTH = 1e-3  # half of a pulse, in steps
+PULSE = 1e-10  # m, its height
+
+ONSETS = {
+    "apart": (APART, NEVER, NEVER),
+    "inside": (INSIDE, NEVER, NEVER),  # was touching before
+    "closing": (CLOSING, 0.5, 1.0),
+    "leaving, still pushed": ([1.2 * CLEARANCE, -0.04 * CLEARANCE], NEVER, NEVER),
+    "let go, pushed again": (RELEASE, RELEASED, None),
+    "long pulse": (hump(0.5, 1e-7, 0.2), 0.3, 0.75),
+    "near miss": (hump(0.52, -1e-6, 0.2), NEVER, NEVER),
+    **{
+        f"pulse at {top}": (hump(top, PULSE, WIDTH), top - WIDTH, None)
+        for top in (0.0015, 0.01, 0.04, 0.05, 0.1, 0.52, 0.9, 0.95, 0.97, 0.99, 0.9985)
+    },
+}
+
+
+@pytest.mark.parametrize(("coefficients", "begin", "end"), ONSETS.values(), ids=ONSETS)
+def test_first_onset_of_a_joint(coefficients, begin, end):
+    dense = small_end_only(coefficients)
+    found, until = joint_onset(SMALL_END, 0.0, H, dense, 0, parameters(), np.zeros(4))
+    assert found == pytest.approx(begin, abs=1e-6)
+    if end is None:
+        assert begin + 2 * WIDTH <= until <= begin + 0.25
+    else:
+        assert until == pytest.approx(end, abs=1e-9)
+
+
+def test_crossing_is_found_to_the_last_digits():
+    dense = small_end_only(CLOSING)
+    found = crossing(SMALL_END, 0.25, 1.0, 0.0, H, dense, 0, parameters(), np.zeros(4))
+    assert found == pytest.approx(0.5, abs=1e-11)
+    assert nearness_at(SMALL_END, found, 0.0, H, dense, 0, parameters(), np.zeros(4)) > 0
+
+
+@pytest.mark.parametrize("height", [PULSE, 1e-14, -1e-14, -PULSE])
+def test_a_maximum_is_searched_for_contact(height):
+    dense = small_end_only(hump(0.37, height, WIDTH))
+    found = touching_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, parameters(), np.zeros(4))
+    if height > 0:
+        assert found == pytest.approx(0.37, abs=WIDTH)
+    else:
+        assert found == NEVER
+
+
+FIRST = {
+    "neither": (APART, APART, NEVER),
+    "big end": (hump(0.4, PULSE, WIDTH), APART, 0.4 - WIDTH),
+    "small end": (APART, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH),
+    "big end first": (hump(0.4, PULSE, WIDTH), CLOSING, 0.4 - WIDTH),
+    "small end first": (CLOSING, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH),
+    "one stays inside": (INSIDE, CLOSING, 0.5),
+}
+
+
+@pytest.mark.parametrize(("big", "small", "begin"), FIRST.values(), ids=FIRST)
+def test_first_onset_of_both_joints(big, small, begin):
+    p = parameters("both")
+    found, _ = first_onset(0.0, H, both_ends(big, small), 0, p, np.zeros(8))
+    assert found == pytest.approx(begin, abs=1e-6)
+
+
+def test_an_ideal_joint_never_touches():
+    p = parameters("both")
+    p.clearance[SMALL_END] = 0.0
+    assert first_onset(0.0, H, both_ends(APART, CLOSING), 0, p, np.zeros(8)) == (NEVER, NEVER)
+
+
+@pytest.mark.parametrize("penetration", [-1e-3, -1e-9, 0.0, 1e-9, 1e-6, 2e-5, 5e-5, 2e-4])
+@pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
+def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
+    p = parameters()
+    near = nearness(Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, rate, 0.0), p.stiffness[1], p)
+    pushes = penetration > 0 and unclamped_force(penetration, rate, p.stiffness[1], p) > 0
+    assert (near > 0) == pushes
+
+
+# ---- constructed re-engagements: a free flight drawn backwards from its contact
+
+
+class Pulse(NamedTuple):
+    """A flight that meets its bearing for `length` s; state and phase at its begin, and its end."""
+
+    p: np.record
+    begin: float
+    y: np.ndarray
+    end: float
+    phase: int
+    depth: float  # m: of its largest penetration, or of that at which the clamp lets go
+    length: float
+    clamped: bool
+
+
+def contact_at(joint, t, y, phase, p):
+    now = evaluate(t, y, phase, p)
+    return now.small if joint == SMALL_END else now.big
+
+
+def with_radial_rate(joint, t, y, phase, p, wanted):
+    """The state with the least change of its rates that gives the journal a radial rate."""
+    n = y.size // 2
+    changes = np.zeros((n, y.size))
+    changes[:, n:] = np.eye(n)
+    rate = contact_at(joint, t, y, phase, p).rate
+    slopes = np.array([contact_at(joint, t, y + d, phase, p).rate - rate for d in changes])
+    return y + (wanted - rate) / (slopes @ slopes) * slopes @ changes
+
+
+def flown(t, y, time, phase, p):
+    """The state at `time`, earlier or later, of the flight that is at y at t: short RK steps."""
+    count = 1 + int(abs(time - t) / 1e-4)
+    h = (time - t) / count
+    z, k = np.append(y, np.zeros(FLOWS)), np.zeros((STAGES, y.size + FLOWS))
+    for i in range(count):
+        new = np.zeros(z.size)
+        derivative_with_flows(t + i * h, z, phase, p, k[0])
+        take_step(Pair.DOPRI5, t + i * h, h, z, k, phase, p, new)
+        z = new
+    return z[: y.size]
+
+
+def graze(rng, length, joint, t, y, phase, p):
+    """A state with the journal at its largest eccentricity, and the clearance that is then crossed
+    for `length`; None where the eccentricity is at its least."""
+    y = with_radial_rate(joint, t, y, phase, p, 0.0)
+
+    def depth(time):
+        return contact_at(joint, time, flown(t, y, time, phase, p), phase, p).penetration
+
+    def unbalance(lag):
+        return depth(t - lag) - depth(t - lag + length)
+
+    if depth(t + 0.1 * length) > depth(t) or unbalance(0.0) * unbalance(length) >= 0:
+        return None
+    edge = depth(t - brentq(unbalance, 0.0, length, xtol=1e-13))
+    return (y, FAR + edge, depth(t) - edge) if depth(t) - edge > SHALLOWEST else None
+
+
+def release(rng, length, joint, t, y, phase, p):
+    """A state of clamped release, pushed again for the last `length` s, and its clearance."""
+    stiffness = p.stiffness[joint]
+
+    def force(speed):
+        return unclamped_force(speed * length, -speed, stiffness, p)
+
+    speed = brentq(force, 1e-3, 0.5 * p.full_damping / length)
+    y = with_radial_rate(joint, t, y, phase, p, -speed)
+    depth = speed * length
+    return y, FAR + contact_at(joint, t, y, phase, p).penetration - depth, depth
+
+
+def construct(rng, length, clamped):
+    """One `Pulse`; None where the draw does not make one, or makes two."""
+    joint = int(rng.integers(2))
+    where = rng.choice([("big_end", "small_end")[joint], "both"])
+    p = parameters(where, rng.choice(["none", "typical", "design"]))
+    p.clearance[p.clearance > 0] = FAR
+    n = FREEDOMS[int(p.scene)]
+    t = rng.uniform(0.002, 0.1)
+    edges, phases = segments(p, 0.12)
+    phase = int(phases[np.searchsorted(edges, t) - 1])
+    y = np.concatenate((rng.normal(0.0, 1e-4, n), rng.normal(0.0, 0.05, n)))
+    y[[n - 1, -1]] /= p.rod_length
+    made = (release if clamped else graze)(rng, length, joint, t, y, phase, p)
+    if made is None:
+        return None
+    y, clearance, depth = made
+    before, after = np.exp(rng.uniform(np.log(3e-5), np.log(2e-3), 2))
+    begin, end = t - before - length, t + after + length
+    first = y = flown(t, y, begin, phase, p)
+    p.clearance[joint] = FAR  # flies on as if nothing were met
+    times = np.linspace(begin, end, 25)
+    path = [first]
+    for now, later in itertools.pairwise(times):
+        path.append(flown(now, path[-1], later, phase, p))
+    p.clearance[joint] = clearance
+    for time, y in zip(times, path, strict=True):
+        if abs(time - t) > length and contact_at(joint, time, y, phase, p).normal > 0:
+            return None  # another contact
+    return Pulse(p, begin, first, end, phase, depth, length, clamped)
+
+
+@pytest.fixture(scope="module")
+def pulses():
+    """Grazes and clamped releases in turn, of 5 to 500 microseconds."""
+    rng = np.random.default_rng(3)
+    lengths = np.exp(rng.uniform(np.log(5e-6), np.log(5e-4), COUNT))
+    made = []
+    while len(made) < COUNT:
+        pulse = construct(rng, lengths[len(made)], len(made) % 2 == 1)
+        made += [pulse] if pulse else []
+    return made
+
+
+def walk(p, y, begin, edges, phases, rtol, watch, times=None, method=METHODS["DOPRI5"]):
+    """March from y at `begin` to the last edge; returns walker, states at `times` and impacts."""
+    mode, pair = method
+    times = edges[-1:] if times is None else times
+    walker, work, size = new_walker(mode), new_work(y.size), natural_sizes(p)
+    length, speed = scales(p)
+    walker.pair, walker.rtol, walker.watch, walker.t = pair, rtol, watch, begin
+    walker.contact_step, walker.deepest = CONTACT_STEP * length / speed, p.pin_radius
+    tally = new_tally()
+    z, states = np.append(y, np.zeros(FLOWS)), np.empty((times.size, y.size))
+    march(
+        walker, p, z, work, rtol * size, size, edges, phases, times, states, tally, 10**6
+    )  # fmt: skip
+    assert walker.status == Status.DONE
+    return walker, states, int(tally.impacts.sum())
+
+
+def walk_pulse(pulse, rtol, watch, times=None, method=METHODS["DOPRI5"]):
+    edges, phases = np.array([pulse.begin, pulse.end]), np.array([pulse.phase])
+    return walk(pulse.p, pulse.y, pulse.begin, edges, phases, rtol, watch, times, method)
+
+
+def passes_by(pulse, rtol, method):
+    """Whether the computed motion itself, looked at every 0.2 microseconds, never touches."""
+    times = np.linspace(pulse.begin, pulse.end, 20001)
+    _, states, _ = walk_pulse(pulse, rtol, 1, times, method)
+    rows = np.empty((times.size, COLUMNS))
+    observe_all(times, states, np.full(times.size, pulse.phase), pulse.p, rows)
+    return not (rows[:, [Column.NORMAL, Column.NORMAL + 1]] > 0).any()
+
+
+def missed(pulses, rtol, method=METHODS["DOPRI5"]):
+    return [q for q in pulses if walk_pulse(q, rtol, 1, None, method)[0].onsets == 0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "rtol"),
+    [*(("DOPRI5", rtol) for rtol in TOLERANCES), ("TSIT5", 1e-5), ("RODAS", 1e-5)],
+)
+def test_no_constructed_pulse_is_stepped_over(pulses, method, rtol):
+    """An onset is landed on, unless a graze shallower than the tolerance is not there at all."""
+    left = missed(pulses, rtol, METHODS[method])
+    assert len(left) <= 0.01 * COUNT
+    for pulse in left:
+        assert not pulse.clamped
+        assert pulse.depth < 10 * rtol * scales(pulse.p)[0]
+        assert passes_by(pulse, rtol, METHODS[method])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rtol", "share"), [(1e-3, 0.5), (1e-6, 0.4), (1e-9, 0.3)])
+def test_pulses_are_stepped_over_unless_watched(pulses, rtol, share):
+    """The constructed pulses are what they should be: short in comparison with the steps."""
+    over = 0
+    for pulse in pulses:
+        walker, _, impacts = walk_pulse(pulse, rtol, 0)
+        assert walker.onsets == 0
+        over += impacts == 0
+    assert over > share * len(pulses)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rtol", TOLERANCES)
+def test_watching_costs_few_evaluations(rtol):
+    """In all over the paper's nine cases, with no step capped, at most 5 % more."""
+    evaluations = np.zeros(2)
+    for case in paper_cases().values():
+        if case.joint == "none":
+            continue
+        p = record(case)
+        y = np.zeros(2 * FREEDOMS[scene(case)])
+        start(offsets(case), y, p)
+        edges, phases = segments(p, case.duration)
+        for watch in (0, 1):
+            walker, _, _ = walk(p, y, 0.0, edges, phases, rtol, watch)
+            evaluations[watch] += walker.evaluations
+            assert (walker.onsets > 0) == watch
+    assert evaluations[1] < 1.05 * evaluations[0]
