@@ -38,7 +38,7 @@ LEAST_RTOL = 2.3e-14  # SciPy's own floor
 BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
 NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
-CHUNK = 4096  # attempts of the march between two looks at the clock; tens of milliseconds
+CHUNK = 4096  # attempts of the march between two looks at the clock; about ten milliseconds
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 

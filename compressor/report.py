@@ -245,8 +245,8 @@ def printed_table() -> Html:
 def claims_body(runs: Mapping[str, xr.Dataset]) -> Html:
     """The table of claims, and how it is meant."""
     words = (
-        "Each claim is measured against a threshold that was written down before the first run. "
-        "One whose cases are not all stored is not measured."
+        "Each claim is measured against a threshold that was written down before the first "
+        "comparison. One whose cases are not all stored is not measured."
     )
     return joined([element("p", words), claims_table(claims(runs))])
 

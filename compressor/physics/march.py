@@ -73,7 +73,6 @@ WALKER = np.dtype(
         ("watch", "i8"),  # whether onsets of contact are watched
         ("mode", "i8"),  # Mode
         ("stiff", "i8"),  # whether the present step is the stiff partner's
-        ("stiff_steps", "i8"),  # steps taken by the stiff partner
         ("held", "i8"),  # explicit steps in a row that stability has held
         ("calm", "i8"),  # stiff steps in a row that an explicit method could have taken
         ("rest", "i8"),  # steps until stiffness is tested again
@@ -89,7 +88,7 @@ WALKER = np.dtype(
 
 
 class Work(NamedTuple):
-    """Arrays that a march works in; only the first row of `k` carries over between calls."""
+    """Arrays that a march works in; between calls the first row of `k` and `row` carry over."""
 
     k: np.ndarray  # (7, n + 4): stages of the explicit pair, or increments of the stiff partner
     new: np.ndarray  # (n + 4,)
@@ -252,7 +251,6 @@ def advance(w, z, work, reached, was_stiff, at_edge, segments):
         work.k[0, i] = work.k[STAGES - 1, i]  # of an explicit pair: the next step's first stage
     w.t = reached
     w.steps += 1
-    w.stiff_steps += was_stiff
     w.fresh = 1 if was_stiff or at_edge else 0
     if at_edge:
         w.observed = 0
