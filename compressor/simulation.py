@@ -3,6 +3,7 @@
 import json
 import math
 from importlib import metadata
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,8 +16,7 @@ from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS, Scene
 from compressor.record import offsets, record, scene
-
-AXES = ("x", "y")
+from compressor.schema import AXES, ROW, Outcome
 
 # name: (column, extra dimensions, unit, long name)
 SERIES = {
@@ -33,29 +33,6 @@ SERIES = {
         Column.PENETRATION, ("joint",), "m", "contact penetration, negative where there is a gap",
     ),
 }  # fmt: skip
-# name: (dimensions, unit, long name)
-METRICS = {
-    "peak_acceleration": ((), "m/s2", "greatest |acceleration|"),
-    "rms_acceleration": ((), "m/s2", "root mean square of acceleration"),
-    "rms_acceleration_deviation": ((), "m/s2", "rms of acceleration less the ideal machine's"),
-    "peak_contact_force": (("joint",), "N", "greatest joint force on the rod"),
-    "peak_contact_force_axis": (("joint", "axis"), "N", "greatest joint force along an axis"),
-    "max_penetration": (("joint",), "m", "greatest penetration; negative: never touched"),
-    "contact_loss_fraction": (("joint",), "1", "share of time without contact (F_N = 0)"),
-    "impact_count": (("joint",), "1", "times that contact began"),
-}
-# energy flows and how the run went
-LEDGER = {
-    "crank_work": ("J", "work put in by the crank over the run"),
-    "load_work": ("J", "work put in by the piston force over the run"),
-    "contact_damping_loss": ("J", "energy lost to contact damping over the run"),
-    "friction_loss": ("J", "energy lost to joint friction over the run"),
-    "energy_residual": ("1", "worst energy imbalance relative to the contact's losses"),
-    "steps": ("1", "accepted integration steps"),
-    "rejected": ("1", "rejected steps; SciPy's methods do not tell"),
-    "evaluations": ("1", "evaluations of the right-hand side"),
-    "seconds": ("s", "wall time of the solution"),
-}
 
 
 def simulate(case: Case) -> xr.Dataset:
@@ -65,34 +42,35 @@ def simulate(case: Case) -> xr.Dataset:
     `status` is "failed", `reason` says why by a stable name, and its series are nan from where it
     stopped. Metrics are taken over the dense solution after `settle_rev`.
     """
-    p = record(case)
-    times = case.duration * (np.arange(round(case.steps) + 1) / round(case.steps))
-    if scene(case) == Scene.IDEAL:
-        trajectory = closed_form(p, times, case.settle)
-    else:
-        y = np.zeros(2 * FREEDOMS[scene(case)])
-        start(offsets(case), y, p)
-        solve = case.solve
-        trajectory = integrate(
-            Request(
-                p, y, times, case.settle, case.rtol, solve.method, solve.max_steps, solve.timeout_s
-            )
-        )
-    return dataset(case, p, trajectory)
-
-
-def dataset(case: Case, p: np.record, trajectory: Trajectory) -> xr.Dataset:
-    """Name what a trajectory holds."""
-    variables = ledger(case, p, trajectory) | metrics(p, trajectory)
-    if case.output.keep == "series":
-        variables |= series(p, trajectory)
+    p, trajectory = solve(case)
+    variables = outcome(case, p, trajectory).variables()
     coordinates: dict[str, tuple] = {
         "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
         "axis": ("axis", list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
     }
     if case.output.keep == "series":
+        variables |= series(p, trajectory)
         coordinates["time"] = ("time", trajectory.times, {"units": "s", "long_name": "time"})
     return xr.Dataset(variables, coordinates, attributes(case, trajectory))
+
+
+def measure(case: Case) -> Outcome:
+    """Simulate one case for its `Outcome` alone: what `simulate` gives less the time series."""
+    return outcome(case, *solve(case))
+
+
+def solve(case: Case) -> tuple[np.record, Trajectory]:
+    """A case's record and its motion."""
+    p = record(case)
+    times = case.duration * (np.arange(round(case.steps) + 1) / round(case.steps))
+    if scene(case) == Scene.IDEAL:
+        return p, closed_form(p, times, case.settle)
+    y = np.zeros(2 * FREEDOMS[scene(case)])
+    start(offsets(case), y, p)
+    how = case.solve
+    return p, integrate(
+        Request(p, y, times, case.settle, case.rtol, how.method, how.max_steps, how.timeout_s)
+    )
 
 
 def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
@@ -111,12 +89,23 @@ def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
     return variables
 
 
-def metrics(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
-    """The metrics as xarray variables; nan when the run did not reach its end."""
-    tally = trajectory.tally
+def outcome(case: Case, p: np.record, trajectory: Trajectory) -> Outcome:
+    """What is kept of a trajectory without its series."""
+    numbers = np.full(1, math.nan, dtype=ROW)[0]
+    if not trajectory.reason:
+        for name, value in metrics(p, trajectory.tally).items():
+            numbers[name] = value
+    for name, value in ledger(trajectory).items():
+        numbers[name] = value
+    status = "failed" if trajectory.reason else "ok"
+    return Outcome(status, trajectory.reason, numbers, attributes(case, trajectory))
+
+
+def metrics(p: np.record, tally: np.record) -> dict[str, Any]:
+    """The metrics by name, from what was tallied after settling."""
     ideal = p.clearance == 0
     seconds = tally.seconds or math.nan
-    values = {
+    return {
         "peak_acceleration": tally.peak_acceleration,
         "rms_acceleration": math.sqrt(tally.square_acceleration / seconds),
         "rms_acceleration_deviation": math.sqrt(tally.square_deviation / seconds),
@@ -126,13 +115,6 @@ def metrics(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
         "contact_loss_fraction": np.where(ideal, 0.0, tally.loss_seconds / seconds),
         "impact_count": np.where(ideal, 0.0, tally.impacts),
     }
-    variables = {}
-    for name, (dims, unit, phrase) in METRICS.items():
-        value = np.array(values[name], dtype=float)
-        if trajectory.reason:
-            value[...] = math.nan
-        variables[name] = (dims, value, {"units": unit, "long_name": phrase})
-    return variables
 
 
 def energy_residual(tally: np.record) -> float:
@@ -141,27 +123,20 @@ def energy_residual(tally: np.record) -> float:
     return float(tally.worst_imbalance / max(lost, 1e-3 * tally.peak_kinetic))
 
 
-def ledger(case: Case, p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
-    """Status, energy flows and counts as xarray scalars."""
+def ledger(trajectory: Trajectory) -> dict[str, float]:
+    """Energy flows and counts by name."""
     tally = trajectory.tally
-    values = (
-        tally.crank_work,
-        tally.load_work,
-        tally.damping_loss,
-        tally.friction_loss,
-        energy_residual(tally) if tally.started else math.nan,
-        trajectory.steps,
-        trajectory.rejected,
-        trajectory.evaluations,
-        trajectory.seconds,
-    )
-    variables: dict[str, tuple] = {
-        "status": ((), "failed" if trajectory.reason else "ok", {"long_name": "ok or failed"}),
-        "reason": ((), trajectory.reason, {"long_name": "why a run failed, by a stable name"}),
+    return {
+        "crank_work": tally.crank_work,
+        "load_work": tally.load_work,
+        "contact_damping_loss": tally.damping_loss,
+        "friction_loss": tally.friction_loss,
+        "energy_residual": energy_residual(tally) if tally.started else math.nan,
+        "steps": trajectory.steps,
+        "rejected": trajectory.rejected,
+        "evaluations": trajectory.evaluations,
+        "seconds": trajectory.seconds,
     }
-    for (name, (unit, phrase)), value in zip(LEDGER.items(), values, strict=True):
-        variables[name] = ((), value, {"units": unit, "long_name": phrase})
-    return variables
 
 
 def attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:

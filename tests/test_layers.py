@@ -26,6 +26,7 @@ FLOORS = [
     "conflicts",
     "case",
     "record",
+    "schema",
     "integrate",
     "simulation",
     "reading",

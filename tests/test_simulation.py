@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from compressor.case import Case
-from compressor.simulation import LEDGER, METRICS, SERIES, simulate
+from compressor.schema import NUMBERS
+from compressor.simulation import SERIES, measure, simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 
@@ -37,9 +38,17 @@ def test_undamped_design_force_peaks_at_the_spring_s_3200_newtons():
 
 
 def test_every_variable_has_unit_and_long_name(faulty):
-    for name in [*SERIES, *METRICS, *LEDGER, "crank_angle", "time"]:
+    for name in [*SERIES, *NUMBERS, "crank_angle", "time"]:
         assert faulty[name].attrs["units"], name
         assert faulty[name].attrs["long_name"], name
+
+
+def test_an_outcome_is_the_dataset_without_its_series(faulty):
+    found = measure(Case.from_attribute(faulty.attrs["case"]))
+    assert found.key == faulty.attrs["key"]
+    assert (found.status, found.reason) == ("ok", "")
+    for name in set(NUMBERS) - {"seconds"}:
+        np.testing.assert_array_equal(found.numbers[name], faulty[name].values)
 
 
 def test_dims_are_the_same_in_all_scenes(faulty):

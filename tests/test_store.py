@@ -19,7 +19,8 @@ import xarray as xr
 from compressor import labels, store
 from compressor.case import Case, table
 from compressor.plan import load_studies
-from compressor.simulation import METRICS, simulate
+from compressor.schema import METRICS
+from compressor.simulation import simulate
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 
