@@ -191,6 +191,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     length, speed = scales(request.p)
     walker.watch, walker.contact_step = 1, CONTACT_STEP * length / speed
     walker.deepest = IMPLAUSIBLE * request.p.pin_radius
+    edges, phases = cut(edges, phases, request.settle)
     size = natural_sizes(request.p)
     work = new_work(size.size)
     while walker.status == Status.RUNNING:
@@ -205,6 +206,14 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
             check_march(request, walker, float(result.tally.deepest), deadline)
     result.stop_time = math.nan
+
+
+def cut(edges: np.ndarray, phases: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Segments that end at a time as well; a step then lies before it or after it."""
+    i = int(np.searchsorted(edges, time))
+    if i == 0 or i == edges.size or edges[i] == time:
+        return edges, phases
+    return np.insert(edges, i, time), np.insert(phases, i, phases[i - 1])
 
 
 def check_march(request: Request, walker: np.record, deepest: float, deadline: float) -> None:
@@ -303,7 +312,7 @@ class Segment:
         rows = np.empty((times.size, COLUMNS))
         phases = np.full(times.size, self.right_hand_side.phase)
         observe_all(times, states, phases, self.request.p, rows)
-        tally_step(times, rows, WEIGHTS, measured, self.result.tally, self.request.p)
+        tally_step(end - begin, NODES, WEIGHTS, rows, measured, self.result.tally, self.request.p)
 
     def audit(self, solver) -> None:
         """Compare the energy at the step's end with the flows up to there."""
@@ -338,7 +347,7 @@ def closed_form(p: np.record, times: np.ndarray, settle: float) -> Trajectory:
         tally_energy(rows[0], flows, result.tally)
         add_flows(rows, WEIGHTS, end - begin, flows)
         tally_energy(rows[-1], flows, result.tally)
-        tally_step(nodes, rows, WEIGHTS, begin >= settle, result.tally, p)
+        tally_step(end - begin, NODES, WEIGHTS, rows, begin >= settle, result.tally, p)
     result.seconds = time.perf_counter() - began
     return result
 

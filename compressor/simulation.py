@@ -106,11 +106,11 @@ def metrics(p: np.record, tally: np.record) -> dict[str, Any]:
     ideal = p.clearance == 0
     seconds = tally.seconds or math.nan
     return {
-        "peak_acceleration": tally.peak_acceleration,
+        "peak_acceleration": tally.peak[0],
         "rms_acceleration": math.sqrt(tally.square_acceleration / seconds),
         "rms_acceleration_deviation": math.sqrt(tally.square_deviation / seconds),
-        "peak_contact_force": tally.peak_force,
-        "peak_contact_force_axis": tally.peak_force_axis.reshape(2, 2),
+        "peak_contact_force": tally.peak[5:],
+        "peak_contact_force_axis": tally.peak[1:5].reshape(2, 2),
         "max_penetration": np.where(ideal, 0.0, tally.max_penetration),
         "contact_loss_fraction": np.where(ideal, 0.0, tally.loss_seconds / seconds),
         "impact_count": np.where(ideal, 0.0, tally.impacts),

@@ -12,7 +12,8 @@ from compressor.case import Case
 from compressor.integrate import COMPILED as METHODS
 from compressor.integrate import CONTACT_STEP, natural_sizes, scales
 from compressor.physics._jit import ENABLED
-from compressor.physics.contact import Contact, unclamped_force
+from compressor.physics.contact import Contact, impact, nearness
+from compressor.physics.kinematics import ideal
 from compressor.physics.loads import segments
 from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.motion import evaluate, start
@@ -22,7 +23,6 @@ from compressor.physics.onset import (
     crossing,
     first_onset,
     joint_onset,
-    nearness,
     nearness_at,
     touching_between,
 )
@@ -151,9 +151,9 @@ def test_an_ideal_joint_never_touches():
 @pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
 def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     p = parameters()
-    near = nearness(Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, rate, 0.0), p.stiffness[1], p)
-    pushes = penetration > 0 and unclamped_force(penetration, rate, p.stiffness[1], p) > 0
-    assert (near > 0) == pushes
+    normal, elastic, unclamped = impact(penetration, rate, p.stiffness[1], p)
+    contact = Contact(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
+    assert (nearness(contact, p.stiffness[1], p) > 0) == (normal > 0)
 
 
 # ---- constructed re-engagements: a free flight drawn backwards from its contact
@@ -173,7 +173,7 @@ class Pulse(NamedTuple):
 
 
 def contact_at(joint, t, y, phase, p):
-    now = evaluate(t, y, phase, p)
+    now = evaluate(ideal(t, p), y, phase, p)
     return now.small if joint == SMALL_END else now.big
 
 
@@ -192,10 +192,11 @@ def flown(t, y, time, phase, p):
     count = 1 + int(abs(time - t) / 1e-4)
     h = (time - t) / count
     z, k = np.append(y, np.zeros(FLOWS)), np.zeros((STAGES, y.size + FLOWS))
+    row = np.zeros(COLUMNS)
     for i in range(count):
         new = np.zeros(z.size)
         derivative_with_flows(t + i * h, z, phase, p, k[0])
-        take_step(Pair.DOPRI5, t + i * h, h, z, k, phase, p, new)
+        take_step(Pair.DOPRI5, t + i * h, h, z, k, phase, p, new, row)
         z = new
     return z[: y.size]
 
@@ -222,7 +223,7 @@ def release(rng, length, joint, t, y, phase, p):
     stiffness = p.stiffness[joint]
 
     def force(speed):
-        return unclamped_force(speed * length, -speed, stiffness, p)
+        return impact(speed * length, -speed, stiffness, p)[2]
 
     speed = brentq(force, 1e-3, 0.5 * p.full_damping / length)
     y = with_radial_rate(joint, t, y, phase, p, -speed)

@@ -41,7 +41,7 @@ def test_tally_of_a_known_step():
     rows[:, Column.NORMAL] = np.where(NODES > 0.5, 10.0, 0.0)
     rows[:, Column.PENETRATION] = NODES - 0.5
     tally = new_tally()
-    tally_step(NODES * 1e-4, rows, WEIGHTS, True, tally, p)
+    tally_step(1e-4, NODES, WEIGHTS, rows, True, tally, p)
     assert tally.seconds == pytest.approx(1e-4)
     assert tally.square_acceleration == pytest.approx(9e-4)
     assert tally.impacts.tolist() == [1, 0]

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import inlined, jit
 
 # Table 2 of the paper: density (kg/m^3), Young's modulus (Pa), Poisson's ratio
 MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326)}
@@ -39,18 +39,17 @@ def power(base, exponent):
 
 
 @jit
-def unclamped_force(penetration, rate, stiffness, p):
-    """K delta^p + STEP(delta; 0, 0; d_max, C_max) delta' (N) for delta > 0, before the clamp."""
-    damping = step(penetration, 0.0, 0.0, p.full_damping, p.damping)
-    return stiffness * power(penetration, p.exponent) + damping * rate
+def impact(penetration, rate, stiffness, p):
+    """ADAMS's IMPACT at a penetration (m) and its rate (m/s): F_N, elastic part, unclamped (N).
 
-
-@jit
-def normal_force(penetration, rate, stiffness, p):
-    """Normal force (N) of the IMPACT law, never pulling; 0 unless penetration (m) > 0."""
+    Elastic: K delta^p; unclamped: with STEP(delta; 0, 0; d_max, C_max) delta' added; F_N is that,
+    but never pulling. All are 0 unless the penetration is positive.
+    """
     if penetration <= 0.0:
-        return 0.0
-    return max(0.0, unclamped_force(penetration, rate, stiffness, p))
+        return 0.0, 0.0, 0.0
+    elastic = stiffness * power(penetration, p.exponent)
+    unclamped = elastic + step(penetration, 0.0, 0.0, p.full_damping, p.damping) * rate
+    return max(0.0, unclamped), elastic, unclamped
 
 
 class Contact(NamedTuple):
@@ -64,9 +63,11 @@ class Contact(NamedTuple):
     penetration: float  # delta; negative: a gap
     rate: float  # of the penetration
     slip: float  # v_t
+    elastic: float  # K delta^p
+    unclamped: float  # normal force before the clamp at zero
 
 
-@jit
+@inlined
 def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
     """Contact between a joint's journal and the rod's bore.
 
@@ -78,20 +79,35 @@ def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
     distance = math.sqrt(ex * ex + ey * ey)
     penetration = distance - clearance
     if distance == 0.0:
-        return Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0)
-    nx = ex / distance
-    ny = ey / distance
+        return Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0)
+    per_distance = 1.0 / distance
+    nx = ex * per_distance
+    ny = ey * per_distance
     rate = ex_rate * nx + ey_rate * ny
     bore = p.pin_radius + clearance
     arm = p.pin_radius - penetration
     slip = ey_rate * nx - ex_rate * ny + journal_spin * arm - rod_spin * bore
-    normal = normal_force(penetration, rate, p.stiffness[joint], p)
+    normal, elastic, unclamped = impact(penetration, rate, p.stiffness[joint], p)
     friction = 0.0
     if p.friction and normal > 0.0:
         friction = -friction_coefficient(slip, p) * normal
     fx = normal * nx + friction * ny
     fy = normal * ny - friction * nx
-    return Contact(fx, fy, -bore * friction, normal, friction, penetration, rate, slip)
+    moment = -bore * friction
+    return Contact(fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped)
+
+
+@jit
+def nearness(contact, stiffness, p):
+    """Positive in contact; otherwise how far from it: the gap (m), or the clamped force as one.
+
+    A clamped force is turned into a length by the contact's stiffness at the penetration of full
+    damping, so that both parts are small where contact is near.
+    """
+    if contact.penetration <= 0.0:
+        return contact.penetration
+    full = p.full_damping
+    return contact.unclamped * full / (stiffness * power(full, p.exponent))
 
 
 def contact_stiffness(first, second, journal_radius, bearing_radius):

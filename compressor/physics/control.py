@@ -8,16 +8,18 @@ import math
 from enum import IntEnum
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import jit
+from compressor.physics._jit import inlined, jit
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
+LEAST_ERROR = math.log(1e-4)  # that the control remembers
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 # stiffness: an explicit step is held by stability where h |lambda| exceeds the boundary
 BOUNDARY = 3.25  # of both pairs on the negative real axis, about
 SUSPECT = 0.6  # of the boundary: under PI control, steps held by stability swing around it
+EVERY = 4  # explicit steps from one test to the next
 STIFF_STEPS, CALM_STEPS = 15, 10  # in a row, before a change of method
 REST, LONGEST_REST = 50, 500  # steps without a test after a change back; doubled after each
 SHORT_STAY = 100  # stiff steps or fewer
@@ -65,17 +67,17 @@ def first_step(w, z, work, atol, phase, p, end):
     return min(100.0 * guess, bold, end - w.t)
 
 
-@jit
+@inlined
 def controlled(w, h, error):
     """The next step's length after an accepted step (PI control)."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
-    error = max(error, 1e-10)
-    factor = SAFETY * error ** (-PROPORTIONAL / order) * w.error ** (INTEGRAL / order)
-    w.error = max(error, 1e-4)
+    now = math.log(max(error, 1e-10))
+    factor = SAFETY * math.exp((INTEGRAL * w.error - PROPORTIONAL * now) / order)
+    w.error = max(now, LEAST_ERROR)
     return h * min(GROW, max(SHRINK, factor))
 
 
-@jit
+@inlined
 def refuse(w, h, error):
     """Shorten the step after a refused attempt; a step that makes no way ends the walk."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
@@ -107,7 +109,7 @@ def stiff_rate(w, h, z, work, size):
     return math.sqrt(above / below) if below > 0.0 else 0.0
 
 
-@jit
+@inlined
 def choose_method(w, h, z, work, size):
     """Change to the stiff partner where stability holds the explicit steps, and back.
 
@@ -118,6 +120,8 @@ def choose_method(w, h, z, work, size):
         return
     if w.rest > 0:
         w.rest -= 1
+        return
+    if not w.stiff and w.steps % EVERY:
         return
     reach = h * stiff_rate(w, h, z, work, size) / BOUNDARY
     if w.stiff:
@@ -130,6 +134,6 @@ def choose_method(w, h, z, work, size):
             w.rest = w.pause
             w.h = min(w.h, h / max(reach, 1.0))
     else:
-        w.held = w.held + 1 if reach > SUSPECT else max(0, w.held - 1)
+        w.held = w.held + EVERY if reach > SUSPECT else max(0, w.held - EVERY)
         if w.held >= STIFF_STEPS:
             w.stiff, w.held, w.calm, w.stay = 1, 0, 0, 0

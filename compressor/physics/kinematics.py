@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import inlined, jit
+
+SIXTH, TWELFTH, THIRTIETH, FORTY_SECOND = 1 / 6, 1 / 12, 1 / 30, 1 / 42  # faster than to divide
 
 
 class Motion(NamedTuple):
@@ -30,19 +32,48 @@ class Motion(NamedTuple):
 def ideal(t, p):
     """Ideal `Motion` at time t (s): Eq. 1 exactly, with its derivatives."""
     theta = p.omega * t
-    cos_theta = math.cos(theta)
-    sin_theta = math.sin(theta)
+    return ideal_at(math.cos(theta), math.sin(theta), p)
+
+
+@inlined
+def ideal_at(cos_theta, sin_theta, p):
+    """Ideal `Motion` at a crank angle given by its cosine and sine."""
     ratio = p.crank_radius / p.rod_length
     sin_phi = ratio * sin_theta
     cos_phi = math.sqrt((1.0 - sin_phi) * (1.0 + sin_phi))
-    rate = ratio * p.omega * cos_theta / cos_phi
-    spin_up = sin_phi * (rate * rate - p.omega * p.omega) / cos_phi
+    per_cos = 1.0 / cos_phi
+    rate = ratio * p.omega * cos_theta * per_cos
+    spin_up = sin_phi * (rate * rate - p.omega * p.omega) * per_cos
     reach = p.rod_length * cos_phi
     crank = p.crank_radius * p.omega
     x = p.crank_radius * cos_theta + reach
     v = -crank * sin_theta - p.rod_length * sin_phi * rate
     a = -crank * p.omega * cos_theta - reach * rate * rate - p.rod_length * sin_phi * spin_up
     return Motion(cos_theta, sin_theta, sin_phi, cos_phi, rate, spin_up, x, v, a)
+
+
+@inlined
+def small_angle(angle):
+    """Sine and cosine; below a hundredth of a radian by their series, which are exact there."""
+    if abs(angle) > 0.01:
+        sine, cosine = math.sin(angle), math.cos(angle)
+    else:
+        square = angle * angle
+        sine = angle * (
+            1.0 - square * SIXTH * (1.0 - square * 0.05 * (1.0 - square * FORTY_SECOND))
+        )
+        cosine = 1.0 - square * 0.5 * (1.0 - square * TWELFTH * (1.0 - square * THIRTIETH))
+    return sine, cosine
+
+
+@inlined
+def ideal_after(base, span, p):
+    """Ideal `Motion` a time (s) after the crank angle whose (cosine, sine) is the base.
+
+    A step turns the crank by little, so that these need no sine and cosine of their own.
+    """
+    sine, cosine = small_angle(p.omega * span)
+    return ideal_at(base[0] * cosine - base[1] * sine, base[1] * cosine + base[0] * sine, p)
 
 
 def motion(theta, crank_radius, rod_length, omega):

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import jit
+from compressor.physics._jit import borrowed, inlined, jit
 from compressor.physics.control import (
+    LEAST_ERROR,
     REST,
     Mode,
     choose_method,
@@ -21,8 +22,9 @@ from compressor.physics.control import (
     first_step,
     refuse,
 )
-from compressor.physics.observe import COLUMNS, NORMAL, derivative_with_flows, observe
-from compressor.physics.onset import NEVER, first_onset
+from compressor.physics.kinematics import ideal, ideal_after
+from compressor.physics.observe import COLUMNS, NEARNESS, derivative_with_flows, gauge
+from compressor.physics.onset import first_onset
 from compressor.physics.runge_kutta import (
     FLOWS,
     STAGES,
@@ -60,9 +62,10 @@ WALKER = np.dtype(
         ("status", "i8"),
         ("t", "f8"),
         ("h", "f8"),  # the next step's length; 0: to be chosen
-        ("error", "f8"),  # of the last accepted step
+        ("error", "f8"),  # of the last accepted step: logarithm of its norm
         ("fresh", "i8"),  # whether dz/dt at t is still to be evaluated
         ("observed", "i8"),  # whether work.row holds what is observed at t, in this phase
+        ("landing", "f8"),  # length of the step that ends on the onset ahead, or 0
         ("landed", "i8"),  # whether the last step ended on an onset
         ("segment", "i8"),
         ("sample", "i8"),  # next output sample
@@ -74,7 +77,7 @@ WALKER = np.dtype(
         ("mode", "i8"),  # Mode
         ("stiff", "i8"),  # whether the present step is the stiff partner's
         ("held", "i8"),  # explicit steps in a row that stability has held
-        ("calm", "i8"),  # stiff steps in a row that an explicit method could have taken
+        ("calm", "i8"),  # stiff steps in a row that an explicit method could have h
         ("rest", "i8"),  # steps until stiffness is tested again
         ("pause", "i8"),  # the rest after the last change back
         ("stay", "i8"),  # stiff steps since the last change
@@ -96,8 +99,7 @@ class Work(NamedTuple):
     jacobian: np.ndarray  # (n + 4, n)
     dense: np.ndarray  # (5, n): the step's interpolant
     y: np.ndarray  # (n,)
-    times: np.ndarray  # of a step's nodes
-    rows: np.ndarray  # observed there
+    rows: np.ndarray  # gauged at a step's nodes
     row: np.ndarray
 
 
@@ -105,7 +107,7 @@ def new_walker(mode):
     """A walker at the start of its first segment."""
     walker = np.zeros(1, dtype=WALKER).view(np.recarray)[0]
     walker.fresh = 1
-    walker.error = 1e-4
+    walker.error = LEAST_ERROR
     walker.mode = mode
     walker.pause = REST // 2
     walker.stiff = mode == Mode.STIFF
@@ -117,12 +119,12 @@ def new_work(n):
     size = n + FLOWS
     return Work(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
-        np.zeros((5, n)), np.zeros(n), np.zeros(NODES.size), np.zeros((NODES.size, COLUMNS)),
+        np.zeros((5, n)), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
         np.zeros(COLUMNS),
     )  # fmt: skip
 
 
-@jit
+@inlined
 def attempt(w, h, z, work, atol, size, phase, p):
     """Take a step of length h by the walker's present method; returns its error norm."""
     if w.stiff:
@@ -133,80 +135,71 @@ def attempt(w, h, z, work, atol, size, phase, p):
         ):
             return math.inf
         return rosenbrock_error(z, work.new, u, w.rtol, atol)
-    take_step(w.pair, w.t, h, z, work.k, phase, p, work.new)
+    take_step(w.pair, w.t, h, z, work.k, phase, p, work.new, work.rows[NODES.size - 1])
     w.evaluations += STAGES - 1
     return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
 
 
-@jit
+@inlined
 def look_at_step(w, h, z, work, phase, p):
-    """Lay the step's interpolant through and observe it at its nodes."""
-    if w.stiff:
-        rosenbrock_extend(z, work.new, work.k[1:], work.dense)
-    else:
-        extend(w.pair, h, z, work.k, work.dense)
+    """Lay the step's interpolant through and gauge it at its nodes; an explicit step's end is."""
     last = NODES.size - 1
     n = work.y.size
+    if w.stiff:
+        rosenbrock_extend(z, work.new, work.k[1:], work.dense)
+        gauge(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
+    else:
+        extend(w.pair, h, z, work.k, work.dense)
     if w.observed:  # the last step's end is this step's begin
         for j in range(COLUMNS):
             work.rows[0, j] = work.row[j]
     else:
         interpolate(0.0, work.dense, work.y)
-        observe(w.t, work.y, phase, p, work.rows[0])
+        gauge(ideal(w.t, p), work.y, phase, p, work.rows[0])
+    base = (math.cos(p.omega * w.t), math.sin(p.omega * w.t))
     for i in range(1, last):
         interpolate(NODES[i], work.dense, work.y)
-        observe(w.t + NODES[i] * h, work.y, phase, p, work.rows[i])
-    observe(w.t + h, work.new[:n], phase, p, work.rows[last])
-    for i in range(last + 1):
-        work.times[i] = w.t + NODES[i] * h
+        gauge(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
 
 
-@jit
-def observe_part(w, begin, end, h, work, phase, p):
-    """Rows at the Lobatto nodes of [begin, end], fractions of the step."""
-    for i in range(NODES.size):
-        s = begin + (end - begin) * NODES[i]
-        interpolate(s, work.dense, work.y)
-        work.times[i] = w.t + s * h
-        observe(work.times[i], work.y, phase, p, work.rows[i])
+@inlined
+def may_touch(rows, p):
+    """Whether contact may begin within a step, by the nearness at its nodes.
 
-
-@jit
-def apart(rows, p):
-    """Whether a joint with clearance is out of contact at one of a step's nodes."""
+    A quartic, as the step's interpolant is, rises above its greatest value at five Lobatto nodes
+    by less than a third of their range; a whole range is allowed for here.
+    """
     for joint in range(2):
         if p.clearance[joint] > 0.0:
+            low, high = math.inf, -math.inf
             for i in range(rows.shape[0]):
-                if rows[i, NORMAL + joint] <= 0.0:
-                    return True
+                low = min(low, rows[i, NEARNESS + joint])
+                high = max(high, rows[i, NEARNESS + joint])
+            if low <= 0.0 < high + (high - low):
+                return True
     return False
 
 
-@jit
-def land_on_onset(w, h, z, work, atol, size, phase, p):
-    """Shorten the step just taken so that it ends where contact begins; returns its length.
+@inlined
+def onset_ahead(w, h, work, phase, p):
+    """Whether contact begins within the step just taken; it is then to be h again, to there.
 
-    Watched only when a node of the step shows a joint apart. The next step is kept within the
-    pulse that begins, or to the contact's own time scale.
+    Looked for only where the nodes of the step let it be. The step after the landing is kept
+    within the pulse that begins, or to the contact's own time scale.
     """
-    landed = w.landed
+    found = False
+    if w.watch and may_touch(work.rows, p):
+        begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
+        if begin < 1.0 and not (w.landed and begin < LANDED):
+            found = True
+            w.landing = begin * h
+            pulse = (end - begin) * h if end < 1.0 else math.inf
+            w.h = min(w.h, w.contact_step, 0.5 * pulse)
     w.landed = 0
-    if not w.watch or not apart(work.rows, p):
-        return h
-    begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
-    if begin >= 1.0 or begin == NEVER or (landed and begin < LANDED):
-        return h
-    onset = begin * h
-    pulse = (end - begin) * h
-    attempt(w, onset, z, work, atol, size, phase, p)
-    look_at_step(w, onset, z, work, phase, p)
-    w.landed = 1
-    w.onsets += 1
-    w.h = min(w.h, w.contact_step, 0.5 * pulse if end < 1.0 else w.contact_step)
-    return onset
+    return found
 
 
-@jit
+@inlined
 def sample_grid(w, t_end, h, work, times, states):
     """Fill the output samples up to t_end from the step's interpolant."""
     while w.sample < times.size and times[w.sample] <= t_end:
@@ -215,7 +208,7 @@ def sample_grid(w, t_end, h, work, times, states):
         w.sample += 1
 
 
-@jit
+@inlined
 def take_in(w, h, work, phase, p, tally):
     """Tally an accepted step that has been looked at, and audit its energy."""
     last = NODES.size - 1
@@ -224,14 +217,7 @@ def take_in(w, h, work, phase, p, tally):
     w.observed = 1
     n = work.y.size
     tally_energy(work.row, work.new[n:], tally)
-    if w.t < w.settle < w.t + h:
-        cut = (w.settle - w.t) / h
-        observe_part(w, 0.0, cut, h, work, phase, p)
-        tally_step(work.times, work.rows, WEIGHTS, False, tally, p)
-        observe_part(w, cut, 1.0, h, work, phase, p)
-        tally_step(work.times, work.rows, WEIGHTS, True, tally, p)
-    else:
-        tally_step(work.times, work.rows, WEIGHTS, w.t >= w.settle, tally, p)
+    tally_step(h, NODES, WEIGHTS, work.rows, w.t >= w.settle, tally, p)
 
 
 @jit
@@ -243,7 +229,7 @@ def finite(new):
     return math.isfinite(total)
 
 
-@jit
+@inlined
 def advance(w, z, work, reached, was_stiff, at_edge, segments):
     """Move the walker to the end of the step that was taken, and into the next segment."""
     for i in range(z.size):
@@ -268,6 +254,12 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
     phases: the load's segments; times, states: output grid (m,) and (m, n); tally: gathers
     metrics. z, w, work, states and tally are written.
     """
+    work = Work(
+        borrowed(work.k), borrowed(work.new), borrowed(work.column), borrowed(work.jacobian),
+        borrowed(work.dense), borrowed(work.y), borrowed(work.rows), borrowed(work.row),
+    )  # fmt: skip
+    z, atol, size = borrowed(z), borrowed(atol), borrowed(size)
+    times, states = borrowed(times), borrowed(states)
     for _ in range(limit):
         if w.status != RUNNING:
             return
@@ -281,22 +273,31 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         h = min(w.h, end - w.t)
         if w.t + 1.01 * h >= end:
             h = end - w.t
+        landing = w.landing > 0.0
+        if landing:
+            h = w.landing
         error = attempt(w, h, z, work, atol, size, phase, p)
-        if not error <= 1.0:
-            refuse(w, h, error)
-            if w.h < LEAST_STEP * (w.t + 1.0 / p.omega):
-                w.status = STEP_UNDERFLOW if finite(work.k[0]) else NON_FINITE
-            continue
-        longer = controlled(w, h, error)
-        w.h = max(w.h, longer) if h < w.h else longer
+        if not landing:
+            if not error <= 1.0:
+                refuse(w, h, error)
+                if w.h < LEAST_STEP * (w.t + 1.0 / p.omega):
+                    w.status = STEP_UNDERFLOW if finite(work.k[0]) else NON_FINITE
+                continue
+            longer = controlled(w, h, error)
+            w.h = max(w.h, longer) if h < w.h else longer
         look_at_step(w, h, z, work, phase, p)
-        taken = land_on_onset(w, h, z, work, atol, size, phase, p)
-        at_edge = taken == h and h == end - w.t
-        reached = end if at_edge else w.t + taken
-        take_in(w, taken, work, phase, p, tally)
-        sample_grid(w, reached, taken, work, times, states)
+        if landing:
+            w.landing = 0.0
+            w.landed = 1
+            w.onsets += 1
+        elif onset_ahead(w, h, work, phase, p):
+            continue
+        at_edge = not landing and h == end - w.t
+        reached = end if at_edge else w.t + h
+        take_in(w, h, work, phase, p, tally)
+        sample_grid(w, reached, h, work, times, states)
         was_stiff = w.stiff
-        choose_method(w, taken, z, work, size)
+        choose_method(w, h, z, work, size)
         advance(w, z, work, reached, was_stiff, at_edge, phases.size)
         if tally.deepest > w.deepest:
             w.status = PENETRATION_IMPLAUSIBLE

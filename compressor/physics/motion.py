@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from compressor.physics._jit import inlined, jit
 from compressor.physics.contact import Contact, joint_contact
-from compressor.physics.kinematics import Motion, ideal
+from compressor.physics.kinematics import Motion, ideal, small_angle
 from compressor.physics.loads import piston_force
 from compressor.physics.parameters import BIG_END as AT_BIG_END
 from compressor.physics.parameters import SMALL_END as AT_SMALL_END
@@ -21,7 +21,7 @@ from compressor.physics.parameters import Scene
 BIG_END = int(Scene.BIG_END)
 SMALL_END = int(Scene.SMALL_END)
 BOTH = int(Scene.BOTH)
-NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Turn(NamedTuple):
@@ -31,17 +31,6 @@ class Turn(NamedTuple):
     ds: float
     dc_rate: float
     ds_rate: float
-
-
-@jit
-def small_angle(angle):
-    """Sine and cosine; below a hundredth of a radian by their series, which are exact there."""
-    if abs(angle) > 0.01:
-        return math.sin(angle), math.cos(angle)
-    square = angle * angle
-    sine = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0))
-    cosine = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0))
-    return angle * sine, cosine
 
 
 @jit
@@ -107,9 +96,9 @@ def solve_big_end(y, motion, turn, load, contact, p):
     push = contact.fx - load - p.rod_mass * b * cos_phi * rate * rate
     moment = p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
     moment -= p.rod_mass * p.gravity * b * cos_phi
-    determinant = mass * inertia - coupling * coupling
-    a = (inertia * push - coupling * moment) / determinant
-    spin_up = (mass * moment - coupling * push) / determinant
+    per_determinant = 1.0 / (mass * inertia - coupling * coupling)
+    a = (inertia * push - coupling * moment) * per_determinant
+    spin_up = (mass * moment - coupling * push) * per_determinant
     return a, spin_up
 
 
@@ -133,29 +122,30 @@ def solve_both(motion, turn, load, big, small, p):
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
     a = (-load - small.fx) / p.reciprocating_mass
-    centre_x = (big.fx + small.fx) / p.rod_mass
-    centre_y = (big.fy + small.fy) / p.rod_mass - p.gravity
+    per_mass = 1.0 / p.rod_mass
+    centre_x = (big.fx + small.fx) * per_mass
+    centre_y = (big.fy + small.fy) * per_mass - p.gravity
     moment = p.rod_centre * (cos_phi * big.fy + sin_phi * big.fx)
     moment -= (p.rod_length - p.rod_centre) * (cos_phi * small.fy + sin_phi * small.fx)
     moment -= big.moment + small.moment
     return a, centre_x, centre_y, moment / p.rod_inertia
 
 
-@jit
+@inlined
 def contact_big_end(y, motion, turn, p):
     """`joint_contact` of the big end in scene big_end."""
     ex, ey, ex_rate, ey_rate = eccentricity_big_end(y, turn, p)
     return joint_contact(AT_BIG_END, ex, ey, ex_rate, ey_rate, p.omega, -motion.rate - y[3], p)
 
 
-@jit
+@inlined
 def contact_small_end(y, motion, turn, p):
     """`joint_contact` of the small end in scene small_end."""
     ex, ey, ex_rate, ey_rate = eccentricity_small_end(y, turn, p)
     return joint_contact(AT_SMALL_END, ex, ey, ex_rate, ey_rate, 0.0, -motion.rate - y[3], p)
 
 
-@jit
+@inlined
 def contacts_both(y, motion, turn, p):
     """`joint_contact` of the big end and of the small end in scene both."""
     big, small = eccentricities_both(y, turn, p)
@@ -190,9 +180,11 @@ class Instant(NamedTuple):
 
 
 @inlined
-def evaluate(t, y, phase, p):
-    """The `Instant` at time t (s) and state y, in the load's phase; y is zeros (4) when ideal."""
-    motion = ideal(t, p)
+def evaluate(motion, y, phase, p):
+    """The `Instant` of a state around the ideal motion, in the load's phase.
+
+    motion: `Motion` at the time; y: zeros (4) in the ideal scene.
+    """
     n = y.size // 2
     turn = turned(motion, y[n - 1], y[2 * n - 1])
     load = load_force(phase, y, motion, p)
@@ -234,7 +226,7 @@ def derivative(t, y, phase, p, out):
 
     y and out: length 4 (one clearance joint) or 8 (both); `phase`: the load's phase, 0 to 3.
     """
-    write_derivative(evaluate(t, y, phase, p), y, p, out)
+    write_derivative(evaluate(ideal(t, p), y, phase, p), y, p, out)
 
 
 @jit

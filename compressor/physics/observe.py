@@ -7,8 +7,9 @@ The right-hand side records nothing. `observe` writes one row of quantities; the
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import jit
-from compressor.physics.contact import power
+from compressor.physics._jit import inlined, jit
+from compressor.physics.contact import nearness
+from compressor.physics.kinematics import ideal
 from compressor.physics.motion import (
     eccentricities_both,
     eccentricity_big_end,
@@ -29,29 +30,31 @@ class Column(IntEnum):
 
     DISPLACEMENT = 0
     VELOCITY = 1
-    ACCELERATION = 2
-    ROD_ANGLE = 3
-    PISTON_FORCE = 4
-    FORCE = 5  # four: (joint, axis)
-    ECCENTRICITY = 9  # four: (joint, axis)
-    PENETRATION = 13  # two
-    NORMAL = 15  # two
-    FORCE_SIZE = 17  # two
-    DEVIATION = 19  # of the acceleration from the ideal motion
-    CRANK_POWER = 20  # put into the mechanism by the crank
-    LOAD_POWER = 21  # put into the mechanism by the piston force
-    DAMPING_POWER = 22  # lost in the contacts' normal direction
-    FRICTION_POWER = 23  # lost to friction
-    KINETIC = 24
-    POTENTIAL = 25  # contacts' springs and gravity
+    ROD_ANGLE = 2
+    PISTON_FORCE = 3
+    ECCENTRICITY = 4  # four: (joint, axis)
+    ACCELERATION = 8  # from here on: what `gauge` writes
+    FORCE = 9  # four: (joint, axis)
+    FORCE_SIZE = 13  # two
+    DEVIATION = 15  # of the acceleration from the ideal motion
+    PENETRATION = 16  # two
+    NORMAL = 18  # two
+    NEARNESS = 20  # two: of contact
+    CRANK_POWER = 22  # put into the mechanism by the crank
+    LOAD_POWER = 23  # put into the mechanism by the piston force
+    DAMPING_POWER = 24  # lost in the contacts' normal direction
+    FRICTION_POWER = 25  # lost to friction
+    KINETIC = 26
+    POTENTIAL = 27  # contacts' springs and gravity
 
 
-COLUMNS = 26
+COLUMNS = 28
 # numba wants plain integers
-DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, 2
+DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, int(Column.ACCELERATION)
 ROD_ANGLE, PISTON_FORCE = int(Column.ROD_ANGLE), int(Column.PISTON_FORCE)
 FORCE, ECCENTRICITY = int(Column.FORCE), int(Column.ECCENTRICITY)
 PENETRATION, NORMAL = int(Column.PENETRATION), int(Column.NORMAL)
+NEARNESS = int(Column.NEARNESS)
 FORCE_SIZE, DEVIATION = int(Column.FORCE_SIZE), int(Column.DEVIATION)
 CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
 DAMPING_POWER, FRICTION_POWER = int(Column.DAMPING_POWER), int(Column.FRICTION_POWER)
@@ -73,7 +76,7 @@ def eccentricity_row(y, turn, p, row):
         row[ECCENTRICITY + 2], row[ECCENTRICITY + 3] = small[0], small[1]
 
 
-@jit
+@inlined
 def centre_motion(now, y, p):
     """Rod centre's velocity, acceleration (x, y each) and height (m): vx, vy, ax, ay, height."""
     motion = now.motion
@@ -101,7 +104,7 @@ def centre_motion(now, y, p):
     return vx, vy, ax, ay, height - c * now.turn.ds
 
 
-@jit
+@inlined
 def joint_forces(now, centre, p):
     """Forces on the rod at both joints: the contact's, or by inverse dynamics at an ideal joint.
 
@@ -128,27 +131,18 @@ def joint_forces(now, centre, p):
 
 
 @jit
-def elastic_energy(contact, stiffness, p):
+def elastic_energy(contact, p):
     """Energy (J) in a contact's spring, K delta^(p+1) / (p+1)."""
-    if contact.penetration <= 0.0:
-        return 0.0
-    return (
-        stiffness
-        * power(contact.penetration, p.exponent)
-        * contact.penetration
-        / (p.exponent + 1.0)
-    )
+    return contact.elastic * contact.penetration / (p.exponent + 1.0)
 
 
 @jit
-def damping_power(contact, stiffness, p):
+def damping_power(contact):
     """Power (W) a contact loses in its normal direction, the clamp's included; never negative."""
-    if contact.penetration <= 0.0:
-        return 0.0
-    return (contact.normal - stiffness * power(contact.penetration, p.exponent)) * contact.rate
+    return (contact.normal - contact.elastic) * contact.rate
 
 
-@jit
+@inlined
 def write_powers(now, y, forces, p, out):
     """Write the four powers (W) into out[0:4]: of crank and load, lost to damping and friction."""
     motion, big, small = now.motion, now.big, now.small
@@ -157,7 +151,7 @@ def write_powers(now, y, forces, p, out):
     if p.clearance[0] > 0.0:
         out[0] -= p.omega * (p.pin_radius - big.penetration) * big.friction
     out[1] = -now.load * (motion.v + y[y.size // 2])
-    out[2] = damping_power(big, p.stiffness[0], p) + damping_power(small, p.stiffness[1], p)
+    out[2] = damping_power(big) + damping_power(small)
     out[3] = -big.friction * big.slip - small.friction * small.slip
 
 
@@ -169,9 +163,25 @@ def write_energies(now, y, centre, p, row):
     kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
     kinetic += p.rod_mass * (centre[0] * centre[0] + centre[1] * centre[1])
     row[KINETIC] = 0.5 * kinetic
-    potential = elastic_energy(now.big, p.stiffness[0], p)
-    potential += elastic_energy(now.small, p.stiffness[1], p)
+    potential = elastic_energy(now.big, p) + elastic_energy(now.small, p)
     row[POTENTIAL] = potential + p.rod_mass * p.gravity * centre[4]
+
+
+@inlined
+def write_gauged(now, y, centre, forces, p, row):
+    """Write the columns from ACCELERATION on into the row."""
+    row[ACCELERATION] = now.a
+    for i in range(4):
+        row[FORCE + i] = forces[i]
+    row[FORCE_SIZE] = math.sqrt(forces[0] * forces[0] + forces[1] * forces[1])
+    row[FORCE_SIZE + 1] = math.sqrt(forces[2] * forces[2] + forces[3] * forces[3])
+    row[DEVIATION] = now.a - now.motion.a
+    row[PENETRATION], row[PENETRATION + 1] = now.big.penetration, now.small.penetration
+    row[NORMAL], row[NORMAL + 1] = now.big.normal, now.small.normal
+    row[NEARNESS] = nearness(now.big, p.stiffness[0], p)
+    row[NEARNESS + 1] = nearness(now.small, p.stiffness[1], p)
+    write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
+    write_energies(now, y, centre, p, row)
 
 
 @jit
@@ -180,25 +190,24 @@ def observe(t, y, phase, p, row):
 
     In the ideal scene y is four zeros.
     """
-    now = evaluate(t, y, phase, p)
-    motion, turn = now.motion, now.turn
-    centre = centre_motion(now, y, p)
-    forces = joint_forces(now, centre, p)
+    motion = ideal(t, p)
+    now = evaluate(motion, y, phase, p)
+    turn = now.turn
     row[DISPLACEMENT] = motion.x + y[0]
     row[VELOCITY] = motion.v + y[y.size // 2]
-    row[ACCELERATION] = now.a
     row[ROD_ANGLE] = math.atan2(motion.sin_phi + turn.ds, motion.cos_phi + turn.dc)
     row[PISTON_FORCE] = now.load
-    for i in range(4):
-        row[FORCE + i] = forces[i]
     eccentricity_row(y, turn, p, row)
-    row[PENETRATION], row[PENETRATION + 1] = now.big.penetration, now.small.penetration
-    row[NORMAL], row[NORMAL + 1] = now.big.normal, now.small.normal
-    row[FORCE_SIZE] = math.sqrt(forces[0] * forces[0] + forces[1] * forces[1])
-    row[FORCE_SIZE + 1] = math.sqrt(forces[2] * forces[2] + forces[3] * forces[3])
-    row[DEVIATION] = now.a - motion.a
-    write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
-    write_energies(now, y, centre, p, row)
+    centre = centre_motion(now, y, p)
+    write_gauged(now, y, centre, joint_forces(now, centre, p), p, row)
+
+
+@inlined
+def gauge(motion, y, phase, p, row):
+    """`observe` without the columns before ACCELERATION: what a step is judged and tallied by."""
+    now = evaluate(motion, y, phase, p)
+    centre = centre_motion(now, y, p)
+    write_gauged(now, y, centre, joint_forces(now, centre, p), p, row)
 
 
 @jit
@@ -211,9 +220,28 @@ def observe_all(times, states, phases, p, rows):
 @jit
 def derivative_with_flows(t, z, phase, p, out):
     """dz/dt of the motion and of its four energy flows, z = (y, flows)."""
+    write_flowing_derivative(ideal(t, p), z, phase, p, out)
+
+
+@inlined
+def write_flowing_derivative(motion, z, phase, p, out):
+    """`derivative_with_flows` around an ideal motion that is known, written into its caller."""
     n = z.size - 4
     y = z[:n]
-    now = evaluate(t, y, phase, p)
+    now = evaluate(motion, y, phase, p)
     centre = centre_motion(now, y, p)
     write_derivative(now, y, p, out[:n])
     write_powers(now, y, joint_forces(now, centre, p), p, out[n:])
+
+
+@inlined
+def derivative_and_gauge(motion, z, phase, p, out, row):
+    """`derivative_with_flows` and `gauge` from one evaluation."""
+    n = z.size - 4
+    y = z[:n]
+    now = evaluate(motion, y, phase, p)
+    centre = centre_motion(now, y, p)
+    write_derivative(now, y, p, out[:n])
+    write_gauged(now, y, centre, joint_forces(now, centre, p), p, row)
+    for i in range(4):
+        out[n + i] = row[CRANK_POWER + i]

@@ -6,7 +6,8 @@ turns positive. Both are watched on the step's interpolant while F_N = 0.
 """
 
 from compressor.physics._jit import jit
-from compressor.physics.contact import unclamped_force
+from compressor.physics.contact import nearness
+from compressor.physics.kinematics import ideal
 from compressor.physics.motion import evaluate
 from compressor.physics.runge_kutta import interpolate
 
@@ -18,23 +19,10 @@ NEVER = 2.0  # a fraction of the step beyond its end
 
 
 @jit
-def nearness(contact, stiffness, p):
-    """Positive in contact; otherwise how far from it: the gap (m), or the clamped force as one.
-
-    A clamped force is turned into a length by the contact's stiffness at the penetration of full
-    damping, so that both parts are small where contact is near.
-    """
-    if contact.penetration <= 0.0:
-        return contact.penetration
-    force = unclamped_force(contact.penetration, contact.rate, stiffness, p)
-    return force * p.full_damping / (stiffness * p.full_damping**p.exponent)
-
-
-@jit
 def nearness_at(joint, s, t, h, dense, phase, p, y):
     """`nearness` of a joint at the fraction s of a step with interpolant `dense`; y: scratch."""
     interpolate(s, dense, y)
-    now = evaluate(t + s * h, y, phase, p)
+    now = evaluate(ideal(t + s * h, p), y, phase, p)
     if joint == 0:
         return nearness(now.big, p.stiffness[0], p)
     return nearness(now.small, p.stiffness[1], p)

@@ -6,12 +6,14 @@ Sources: Dormand & Prince, J. Comput. Appl. Math. 6 (1980), with Shampine's inte
 Comp. 46 (1986); Tsitouras, Comput. Math. Appl. 62 (2011).
 """
 
+import math
 from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import jit
-from compressor.physics.observe import derivative_with_flows
+from compressor.physics._jit import inlined
+from compressor.physics.kinematics import ideal_after
+from compressor.physics.observe import derivative_and_gauge, write_flowing_derivative
 
 STAGES = 7
 FLOWS = 4
@@ -97,25 +99,31 @@ P = np.array(
 )  # fmt: skip
 
 
-@jit
-def take_step(pair, t, h, z, k, phase, p, new):
+@inlined
+def take_step(pair, t, h, z, k, phase, p, new, row):
     """Stages 1 to 6 of a step from (t, z) of length h into k, and the state at its end into new.
 
-    z and new: motion and flows, shape (n + 4,); k: (7, n + 4), its first row already dz/dt at t.
+    z and new: motion and flows, shape (n + 4,); k: (7, n + 4), its first row already dz/dt at t;
+    row: (COLUMNS,), gauged at the step's end, where the last stage stands.
     Only the motion enters the right-hand side, so flows are summed at the end alone.
     """
     n = z.size - FLOWS
+    base = (math.cos(p.omega * t), math.sin(p.omega * t))
     for stage in range(1, STAGES):
+        motion = ideal_after(base, C[pair, stage] * h, p)
         size = z.size if stage == STAGES - 1 else n
         for i in range(size):
             total = 0.0
             for j in range(stage):
                 total += A[pair, stage, j] * k[j, i]
             new[i] = z[i] + h * total
-        derivative_with_flows(t + C[pair, stage] * h, new, phase, p, k[stage])
+        if stage < STAGES - 1:
+            write_flowing_derivative(motion, new, phase, p, k[stage])
+        else:
+            derivative_and_gauge(motion, new, phase, p, k[stage], row)
 
 
-@jit
+@inlined
 def error_norm(pair, h, z, new, k, rtol, atol):
     """Root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
@@ -129,7 +137,7 @@ def error_norm(pair, h, z, new, k, rtol, atol):
     return np.sqrt(total / n)
 
 
-@jit
+@inlined
 def extend(pair, h, z, k, dense):
     """Coefficients of a step's interpolant into dense, (5, n): y(s) = sum_j dense[j] s^j."""
     for i in range(dense.shape[1]):
@@ -141,7 +149,7 @@ def extend(pair, h, z, k, dense):
             dense[j + 1, i] = h * total
 
 
-@jit
+@inlined
 def interpolate(s, dense, out):
     """The motion at the fraction s of a step into out, shape (n,)."""
     for i in range(out.size):

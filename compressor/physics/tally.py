@@ -8,18 +8,18 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import inlined, jit
 from compressor.physics.observe import (
     ACCELERATION,
     CRANK_POWER,
     DEVIATION,
-    FORCE,
-    FORCE_SIZE,
     KINETIC,
     NORMAL,
     PENETRATION,
     POTENTIAL,
 )
+
+PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
 
 
 def lobatto(n):
@@ -36,9 +36,8 @@ TALLY = np.dtype(
         ("seconds", "f8"),  # of machine time measured
         ("square_acceleration", "f8"),
         ("square_deviation", "f8"),
-        ("peak_acceleration", "f8"),
-        ("peak_force", "f8", (2,)),
-        ("peak_force_axis", "f8", (4,)),  # (joint, axis), flat
+        ("peak", "f8", (PEAKED,)),  # of acceleration, of FORCE (joint, axis) and of FORCE_SIZE
+        ("top", "f8", (PEAKED,)),  # the same at the present step's nodes
         ("max_penetration", "f8", (2,)),
         ("loss_seconds", "f8", (2,)),
         ("impacts", "i8", (2,)),
@@ -67,22 +66,19 @@ def new_tally():
 
 
 @jit
-def peak_of(times, rows, column, known):
+def peak_of(nodes, rows, column, known):
     """The greater of `known` and the largest |value| of a column over a step.
 
-    The step's nodes count, and the parabola through the best: it cannot rise above twice the
-    best node, so that most steps need no parabola.
+    The step's nodes count, and the parabola through the best.
     """
-    last = times.size - 1
+    last = nodes.size - 1
     best = 0
     for i in range(1, last + 1):
         if abs(rows[i, column]) > abs(rows[best, column]):
             best = i
     top = abs(rows[best, column])
-    if 2.0 * top < known:
-        return known
     i = min(max(best, 1), last - 1)
-    left, mid, right = times[i - 1] - times[i], abs(rows[i, column]), times[i + 1] - times[i]
+    left, mid, right = nodes[i - 1] - nodes[i], abs(rows[i, column]), nodes[i + 1] - nodes[i]
     slope_left = (abs(rows[i - 1, column]) - mid) / left
     slope_right = (abs(rows[i + 1, column]) - mid) / right
     curvature = (slope_right - slope_left) / (right - left)
@@ -94,7 +90,7 @@ def peak_of(times, rows, column, known):
     return max(top, known)
 
 
-@jit
+@inlined
 def tally_energy(row, flows, tally):
     """Keep the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
 
@@ -121,7 +117,7 @@ def add_flows(rows, weights, span, flows):
             flows[k] += span * weights[i] * rows[i, CRANK_POWER + k]
 
 
-@jit
+@inlined
 def tally_contact(joint, rows, weights, span, measured, tally):
     """Add a step's contact loss, impacts and penetration at one joint."""
     lost = 0.0
@@ -140,15 +136,14 @@ def tally_contact(joint, rows, weights, span, measured, tally):
         tally.loss_seconds[joint] += lost * span
 
 
-@jit
-def tally_step(times, rows, weights, measured, tally, p):
-    """Add one step (or part of one) to the tally, from rows at its Lobatto nodes.
+@inlined
+def tally_step(span, nodes, weights, rows, measured, tally, p):
+    """Add one step (or part of one) of length span (s) to the tally.
 
-    times: (m,) in s; rows: (m, COLUMNS); weights: (m,) of the nodes' quadrature;
-    measured: whether the metrics count (after settling);
-    the depth of contact over the whole run always does.
+    nodes, weights: (m,) of the Lobatto quadrature; rows: (m, COLUMNS), observed at the nodes;
+    measured: whether the metrics count (after settling); the depth of contact over the whole run
+    always does.
     """
-    span = times[-1] - times[0]
     if p.clearance[0] > 0.0:
         tally_contact(0, rows, weights, span, measured, tally)
     if p.clearance[1] > 0.0:
@@ -156,12 +151,15 @@ def tally_step(times, rows, weights, measured, tally, p):
     if not measured:
         return
     tally.seconds += span
-    for i in range(times.size):
+    for i in range(nodes.size):
         weight = span * weights[i]
         tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
         tally.square_deviation += weight * rows[i, DEVIATION] ** 2
-    tally.peak_acceleration = peak_of(times, rows, ACCELERATION, tally.peak_acceleration)
-    for joint in range(2):
-        tally.peak_force[joint] = peak_of(times, rows, FORCE_SIZE + joint, tally.peak_force[joint])
-    for k in range(4):
-        tally.peak_force_axis[k] = peak_of(times, rows, FORCE + k, tally.peak_force_axis[k])
+    for k in range(PEAKED):
+        tally.top[k] = 0.0
+    for i in range(nodes.size):
+        for k in range(PEAKED):
+            tally.top[k] = max(tally.top[k], abs(rows[i, ACCELERATION + k]))
+    for k in range(PEAKED):
+        if 2.0 * tally.top[k] >= tally.peak[k]:  # a parabola rises to less than twice its nodes
+            tally.peak[k] = peak_of(nodes, rows, ACCELERATION + k, tally.peak[k])
