@@ -183,7 +183,7 @@ class Solve:
         None, "", (1e-13, 0.1), "ours", "relative tolerance, in place of accuracy", optional=True
     )
     method: str = choice(
-        "auto", METHODS, "ours", "integrator: compiled (auto is DOPRI5), or SciPy's"
+        "auto", METHODS, "ours", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
     )
     max_steps: int = parameter(
         5_000_000, "", (1, 10**12), "ours", "budget of integration steps", kind="integer"

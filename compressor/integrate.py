@@ -23,7 +23,7 @@ from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.tally import add_flows, lobatto, new_tally, tally_energy, tally_step
 
 COMPILED = {
-    "auto": (Mode.AUTO, Pair.DOPRI5),
+    "auto": (Mode.AUTO, Pair.TSIT5),
     "DOPRI5": (Mode.EXPLICIT, Pair.DOPRI5),
     "TSIT5": (Mode.EXPLICIT, Pair.TSIT5),
     "RODAS": (Mode.STIFF, Pair.DOPRI5),
