@@ -3,10 +3,10 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench readme clean
 
 help:  ## show this help
-	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 install: $(STAMP)  ## create .venv with compsim and what its tests need
 
@@ -47,6 +47,9 @@ accuracy: install  ## measure the errors behind the words of `accuracy` (about a
 
 claims: install  ## measure the paper's claims over a range of masses (seconds)
 	$(BIN)/python tests/measure_claims.py tests/results/claims.json
+
+store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
+	$(BIN)/python tests/measure_store.py tests/results/store.json
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md

@@ -203,6 +203,13 @@ class Output:
     """What is stored of a job; not part of its identity."""
 
     keep: str = choice("series", ("series", "metrics"), "ours", "time series too, or metrics only")
+    precision: str = choice(
+        "double",
+        ("double", "single"),
+        "ours",
+        "of the time series; time and crank angle are double",
+    )
+    compress: bool = choice(False, (), "ours", "time series shuffled and gzipped", kind="flag")
 
 
 GROUPS: dict[str, type] = {

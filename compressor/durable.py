@@ -49,7 +49,7 @@ def publish(path: Path, data: bytes) -> None:
     """Put a whole file under its name, durably, or leave what was there."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     try:
-        _make_folder(path.parent)
+        make_folder(path.parent)
         try:
             with open(temporary, "xb") as file:
                 file.write(data)
@@ -65,10 +65,10 @@ def publish(path: Path, data: bytes) -> None:
         raise system_error(path, error) from error
 
 
-def _make_folder(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
     """Make a folder and those above it, durably."""
     if not folder.is_dir():
-        _make_folder(folder.parent)
+        make_folder(folder.parent)
         try:
             folder.mkdir(exist_ok=True)
         except FileExistsError as error:
@@ -86,7 +86,7 @@ def _sync_folder(folder: Path) -> None:
 
 def discard_leftovers(folder: Folder) -> None:
     """Remove the temporary files of writers that died long ago."""
-    for path in Path(folder).glob("*/.*.tmp"):
+    for path in Path(folder).glob("**/.*.tmp"):
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
                 path.unlink()

@@ -3,9 +3,10 @@
 How a job's file is read is handed in by `compressor.store`.
 """
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,10 +14,10 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from compressor.case import table
+from compressor.hdf5 import DamagedJob
 from compressor.manifest import StoredStudy, points
-
-if TYPE_CHECKING:
-    from compressor.store import JobStatus
+from compressor.schema import NUMBERS, coordinates
+from compressor.segments import Rows
 
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
 UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
@@ -94,68 +95,70 @@ def _fixed_value(fixed: Mapping[str, Any], key: str, missing: Any) -> Any:
 
 
 def labelled(
-    layout: Layout,
-    known: Mapping[str, "JobStatus | None"],
-    template: xr.Dataset | None,
-    values: Values,
+    layout: Layout, rows: Rows, job: Callable[[str], xr.Dataset], values: Values
 ) -> xr.Dataset:
-    """The Dataset of a layout; `template` is a job with all the variables that any of them has."""
-    jobs = [job for job in known.values() if job]
-    variables = _outcomes(layout, known)
-    if template is not None:
-        variables |= _metrics(layout, template, {job.key for job in jobs}, values)
-        variables |= _series(layout, template, [job for job in jobs if job.samples], values)
-        variables |= {name: template[name].variable for name in ("joint", "axis")}
-    coordinates = ["key", "study", "joint", "axis", "time", *layout.coordinates]
+    """The Dataset of a layout, from the rows of a store and its jobs with time series."""
+    positions = rows.find(layout.keys)
+    variables = _outcomes(layout, rows, positions)
+    found = np.unique(positions[positions >= 0])
+    if (rows.words["reason"][found] != "internal_error").any():
+        variables |= _metrics(layout, rows, positions)
+        variables |= {n: xr.Variable(*parts) for n, parts in coordinates().items()}
+    whole = found[rows.columns["samples"][found] > 0]
+    if whole.size:
+        variables |= _series(layout, rows, positions, whole, job, values)
+    names = ["key", "study", "joint", "axis", "time", *layout.coordinates]
     dataset = xr.Dataset(variables | layout.coordinates)
-    return dataset.set_coords([name for name in coordinates if name in dataset])
+    return dataset.set_coords([name for name in names if name in dataset])
 
 
-def _outcomes(layout: Layout, known: Mapping[str, "JobStatus | None"]) -> dict[str, xr.Variable]:
+def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
     """Key, status and reason of every job."""
-    ends = [known[key] for key in layout.keys.flat]
+    there = positions >= 0
+    status = np.where(there, _taken(rows.words["status"], positions), "missing")
+    reason = np.where(there, _taken(rows.words["reason"], positions), "")
     texts = {
-        "key": (list(layout.keys.flat), "a job's identity and the name of its file"),
-        "status": ([job.status if job else "missing" for job in ends], "ok, failed or missing"),
-        "reason": ([job.reason if job else "" for job in ends], "why a run failed"),
+        "key": (layout.keys, "a job's identity"),
+        "status": (status, "ok, failed or missing"),
+        "reason": (reason, "why a run failed"),
     }
     return {
-        name: xr.Variable(
-            layout.dims, np.array(values).reshape(layout.keys.shape), {"long_name": phrase}
-        )
+        name: xr.Variable(layout.dims, values, {"long_name": phrase})
         for name, (values, phrase) in texts.items()
     }
 
 
-def _metrics(
-    layout: Layout, template: xr.Dataset, stored: set[str], values: Values
-) -> dict[str, xr.Variable]:
-    """All numbers that are no series; nan where a job has none."""
-    wanted = [
-        str(name)
-        for name, item in template.items()
-        if "time" not in item.dims and item.dtype.kind in "fi"
-    ]
-    read = {key: values(key, wanted) for key in stored}
+def _taken(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Values at positions; anything where a position is -1."""
+    return values[positions] if values.size else np.full(positions.shape, "")
+
+
+def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
+    """All numbers of the rows; nan where a job has none."""
     found = {}
-    for name in wanted:
-        item = template[name]
-        out = np.full((*layout.keys.shape, *item.shape), np.nan)
-        for point, key in np.ndenumerate(layout.keys):
-            out[point] = read.get(str(key), {}).get(name, np.nan)
-        found[name] = xr.Variable((*layout.dims, *item.dims), out, item.attrs)
+    for name, (dims, unit, phrase) in NUMBERS.items():
+        values = np.array(rows.numbers[name][positions])
+        values[positions < 0] = np.nan
+        attrs = {"units": unit, "long_name": phrase}
+        found[name] = xr.Variable((*layout.dims, *dims), values, attrs)
     return found
 
 
 def _series(
-    layout: Layout, template: xr.Dataset, jobs: Sequence["JobStatus"], values: Values
+    layout: Layout,
+    rows: Rows,
+    positions: np.ndarray,
+    whole: np.ndarray,
+    job: Callable[[str], xr.Dataset],
+    values: Values,
 ) -> dict[str, xr.Variable]:
-    """The time series of all jobs, none of which is read yet."""
-    if "time" not in template.dims:
+    """The time series of all jobs; none but one of the longest is read yet."""
+    samples, ends = rows.columns["samples"], rows.columns["end"]
+    template = _first_readable(rows.columns["key"][whole[np.argsort(-samples[whole])]], job)
+    if not template:
         return {}
-    shared = len({(job.samples, job.end) for job in jobs}) == 1
-    stored = {job.key for job in jobs}
-    keys = np.vectorize(lambda key: key if key in stored else "", otypes=[object])(layout.keys)
+    shared = len({*zip(samples[whole].tolist(), ends[whole].tolist(), strict=True)}) == 1
+    keys = np.where(np.isin(positions, whole), layout.keys, "").astype(object)
     found = {"time": template["time"].variable} if shared else {}
     for name, item in template.variables.items():
         if "time" in item.dims and name not in found:
@@ -163,6 +166,14 @@ def _series(
             lazy = indexing.LazilyIndexedArray(StudySeries(values, str(name), keys, item.shape))
             found[str(name)] = xr.Variable(dims, lazy, item.attrs)
     return found
+
+
+def _first_readable(keys: np.ndarray, job: Callable[[str], xr.Dataset]) -> xr.Dataset:
+    """The first of some jobs that is not damaged; who reads the others is told."""
+    for key in keys:
+        with contextlib.suppress(DamagedJob):
+            return job(key.decode())
+    return xr.Dataset()
 
 
 class StudySeries(BackendArray):

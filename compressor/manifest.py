@@ -4,9 +4,10 @@ import contextlib
 import datetime
 import itertools
 import json
+import math
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import compressor
 from compressor.case import MODEL_VERSION, table
 from compressor.durable import Folder, StoreError, publish, system_error
+from compressor.hdf5 import digest
 from compressor.parameter import JOINTS
 
 if TYPE_CHECKING:
@@ -64,30 +66,46 @@ def write_study(folder: Folder, study: "Study", command: str = "") -> None:
         datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
     )
     path = Path(folder) / "studies" / f"{study.name}.json"
-    data = json.dumps(asdict(new), indent=1).encode()
     with contextlib.suppress(StoreError, FileNotFoundError):
-        old = _read_study(path)
+        old = read_study(path)
         same = replace(new, command=old.command, versions=old.versions, written=old.written)
         if same == old:
             return
-    publish(path, data)
+    publish(path, encode(new))
+
+
+def encode(study: StoredStudy) -> bytes:
+    """The text of a study's file; its last entry is the digest of what stands before it."""
+    text = json.dumps(vars(study) | {"axes": [vars(axis) for axis in study.axes]}, indent=1)
+    head = text.removesuffix("\n}").encode()
+    return head + f',\n "digest": "{digest(head)}"\n}}\n'.encode()
+
+
+def study_paths(folder: Folder) -> list[Path]:
+    """The files of all studies of a store."""
+    return sorted(Path(folder).glob("studies/*.json"))
 
 
 def read_studies(folder: Folder) -> list[StoredStudy]:
     """All studies of a store, by name."""
-    paths = sorted(Path(folder).glob("studies/*.json"))
+    paths = study_paths(folder)
     if not paths:
         remedy = "choose the folder of a sweep, or make one: compsim run CONFIG..."
         raise StoreError(folder, "holds no study", remedy)
-    return [_read_study(path) for path in paths]
+    return [read_study(path) for path in paths]
 
 
-def _read_study(path: Path) -> StoredStudy:
+def read_study(path: Path) -> StoredStudy:
+    """A study from its file. Raises StoreError where the file is not what was written."""
     try:
-        plain = json.loads(path.read_bytes())
+        data = path.read_bytes()
+        plain = json.loads(data)
+        del plain["digest"]
         axes = (StoredAxis(a["key"], _frozen(a["values"]), a["units"]) for a in plain["axes"])
         study = StoredStudy(**plain | {"axes": tuple(axes), "keys": tuple(plain["keys"])})
-        if len(study.keys) != sum(1 for _ in points(study.axes)):
+        if len(study.keys) != math.prod(len(axis.values) for axis in study.axes):
+            raise ValueError
+        if encode(study) != data:
             raise ValueError
     except FileNotFoundError:
         raise

@@ -83,7 +83,7 @@ class Parameter:
     above: bool  # whether `low` itself is excluded
     source: str
     phrase: str
-    kind: str  # number | integer | choice | text | offset | materials
+    kind: str  # number | integer | choice | flag | text | materials
     choices: tuple[str, ...] = ()
     optional: bool = False
 
@@ -92,6 +92,8 @@ class Parameter:
         """The allowed values, for a table or an error."""
         if self.kind == "choice":
             return " | ".join(self.choices)
+        if self.kind == "flag":
+            return "true | false"
         if self.kind == "materials":
             return "two of " + ", ".join(self.choices)
         if self.kind == "text":
@@ -105,6 +107,8 @@ class Parameter:
             return self._check_text(value)
         if self.kind == "materials":
             return self._check_materials(value)
+        if self.kind == "flag":
+            return None if isinstance(value, bool) else f"needs true or false, not {shown(value)}"
         if isinstance(value, bool) or not isinstance(value, int | float):
             return f"needs a number, not {shown(value)}"
         if not _is_finite(value):
@@ -169,7 +173,7 @@ def parameter_table(rows: Iterable[Parameter]) -> str:
     lines = ["| key | unit | default | range | source | what it is |", "|---|---|---|---|---|---|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)
-        default = default.removesuffix(".0")
+        default = str(row.default).lower() if row.kind == "flag" else default.removesuffix(".0")
         cells = (f"`{row.key}`", row.unit, default, row.range, row.source, row.phrase)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

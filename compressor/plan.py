@@ -32,7 +32,13 @@ from compressor.reading import (
 
 MAX_JOBS = 10_000
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
-UNSWEPT = ("name", "solve.timeout_s", "output.keep")  # no part of a job's identity
+UNSWEPT = (  # no part of a job's identity
+    "name",
+    "solve.timeout_s",
+    "output.keep",
+    "output.precision",
+    "output.compress",
+)
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 

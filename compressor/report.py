@@ -5,12 +5,11 @@ report which is interrupted leaves the one before as it was.
 """
 
 import contextlib
-import copy
 import math
 import re
 import shlex
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +22,7 @@ from compressor.durable import Folder, publish
 from compressor.figures import FIGURES, Drawing
 from compressor.figures.style import render
 from compressor.figures.sweep_metric import MEASURES, Measure, draw_metrics, measures, swept
-from compressor.manifest import StoredStudy, points, read_studies
+from compressor.manifest import StoredStudy, read_studies
 from compressor.page import (
     Html,
     Plate,
@@ -44,15 +43,11 @@ from compressor.page import (
     study_table,
     table,
 )
-from compressor.parameter import CaseError
 from compressor.physics.cam import comparisons
 from compressor.record import record
-from compressor.store import DamagedJob, has_job, job_status, open_study, read_job
+from compressor.store import DamagedJob, Stored, open_study, read_store
 
 MOST_DETAILS = 20
-# what a job of the paper may have of its own, or has worked out from its other values
-ASIDE = ("name", "load", "joint", "clearance_mm", "output")
-DERIVED = ("rod_centre_mm", "rod_inertia_kg_m2")
 
 TITLE = "Reciprocating compressor with joint clearance"
 LEAD = (
@@ -102,12 +97,12 @@ def write_report(results: Folder, report: Folder, command: str = "") -> Path:
 
 def compose(results: Folder, command: str) -> tuple[list[Plate], str]:
     """All figures of a report, drawn, and its page."""
-    studies = read_studies(results)
-    paper = find_paper_runs(results, studies)
+    studies, stored = read_studies(results), read_store(results)
+    paper = find_paper_runs(stored, studies)
     plates = draw_paper(paper)
     of_paper = [*paper_sections(paper, plates)]
     shown = {run.attrs["key"] for run in paper.stored.values()}
-    told = [study_section(results, s) for s in studies if not shown.issuperset(s.keys)]
+    told = [study_section(stored, s) for s in studies if not shown.issuperset(s.keys)]
     of_studies = [section for section, _ in told]
     sections = [
         Section("assumptions", "What to keep in mind", listing(ASSUMPTIONS)),
@@ -130,56 +125,30 @@ def remove_stale(report: Path, drawn: set[str]) -> None:
 # ---- the paper's cases ------------------------------------------------------------------------
 
 
-def find_paper_runs(results: Folder, studies: Sequence[StoredStudy]) -> PaperRuns:
+def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns:
     """The runs with the physics of the paper's cases; of several, the most exact."""
     labels = {case.physics_key: name for name, case in paper_cases().items()}
     found: dict[str, xr.Dataset] = {}
-    for key in {key: None for study in studies for key in paper_candidates(study)}:
-        run = stored_run(results, key)
-        name = labels.get(physics_of(run)) if run is not None else None
-        if run is not None and name and (name not in found or rank(run) > rank(found[name])):
-            found[name] = run
+    for key in paper_candidates(stored, studies, labels):
+        with contextlib.suppress(DamagedJob):
+            run = stored.job(key)
+            name = labels[run.attrs["physics_key"]]
+            if name not in found or rank(run) > rank(found[name]):
+                found[name] = run
     usable = {name: run for name, run in found.items() if rank(run)[:2] == (True, True)}
     absent = {n: why_absent(found.get(n)) for n in labels.values() if n not in usable}
     return PaperRuns({n: found[n] for n in labels.values() if n in found}, usable, absent)
 
 
-def paper_candidates(study: StoredStudy) -> Iterator[str]:
-    """Keys of a study's jobs that differ from the paper's, by its manifest, in the fault alone."""
-    ours = Case().physics_key
-    for point, key in zip(points(study.axes), study.keys, strict=True):
-        values = copy.deepcopy(study.fixed)
-        for name in DERIVED:
-            values.get("machine", {}).pop(name, None)
-        for dotted, value in point.items():
-            group, dot, name = dotted.partition(".")
-            if dot and isinstance(values.get(group), dict):
-                values[group][name] = value
-            elif not dot:
-                values[group] = value
-        kept = {name: value for name, value in values.items() if name not in ASIDE}
-        with contextlib.suppress(CaseError):
-            if Case.from_values(kept).physics_key == ours:
-                yield key
-
-
-def stored_run(results: Folder, key: str) -> xr.Dataset | None:
-    """A job's Dataset, read whole; None where there is none, or a damaged one."""
-    if not has_job(results, key):
-        return None
-    try:
-        with read_job(results, key) as run:
-            return run.load()
-    except DamagedJob:
-        return None
-
-
-def physics_of(run: xr.Dataset) -> str:
-    """The hash of what a run simulates; a run that broke does not store it."""
-    try:
-        return run.attrs.get("physics_key") or Case.from_attribute(run.attrs["case"]).physics_key
-    except CaseError:
-        return ""
+def paper_candidates(
+    stored: Stored, studies: Sequence[StoredStudy], physics: Collection[str]
+) -> list[str]:
+    """The keys of the studies' stored jobs that simulate some physics, in the studies' order."""
+    keys = list(dict.fromkeys(key for study in studies for key in study.keys))
+    positions = stored.rows.find(keys)
+    wanted = np.array([*physics], "S")
+    same = np.isin(stored.rows.columns["physics_key"], wanted)
+    return [key for key, at in zip(keys, positions, strict=True) if at >= 0 and same[at]]
 
 
 def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
@@ -288,12 +257,12 @@ def spoken(name: str) -> str:
     return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
 
 
-def study_section(results: Folder, study: StoredStudy) -> tuple[Section, list[Plate]]:
+def study_section(stored: Stored, study: StoredStudy) -> tuple[Section, list[Plate]]:
     """A user's own study: its table, its failures, and each metric against each swept axis."""
-    with open_study(results, study.name) as data:
+    with open_study(stored.folder, study.name) as data:
         body = [
             element("p", joined(["Case file ", element("code", study.case_file), "."], "")),
-            failures(results, data),
+            failures(stored, data),
             study_table(data),
         ]
         plates = []
@@ -307,7 +276,7 @@ def study_section(results: Folder, study: StoredStudy) -> tuple[Section, list[Pl
     return Section(anchor, f"Study {study.name}", joined(body)), plates
 
 
-def failures(results: Folder, data: xr.Dataset) -> Html:
+def failures(stored: Stored, data: xr.Dataset) -> Html:
     """How many jobs of a study failed or are missing, and what is known of the failures."""
     status = data["status"].values.ravel()
     failed, missing = np.flatnonzero(status == "failed"), int((status == "missing").sum())
@@ -315,7 +284,7 @@ def failures(results: Folder, data: xr.Dataset) -> Html:
     body = [element("p", counts + (f", {missing} not run." if missing else "."))]
     items = []
     for place in failed[:MOST_DETAILS]:
-        job = job_status(results, str(data["key"].values.flat[place]))
+        job = stored.status(str(data["key"].values.flat[place]))
         point = [f"{name} {plain(values[place])}" for name, values in axes(data).items()]
         items.append(f"{', '.join(point)}: {outcome(job.reason, job.detail) if job else 'gone'}")
     if len(failed) > MOST_DETAILS:

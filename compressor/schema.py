@@ -45,22 +45,39 @@ ROW = np.dtype(
 
 
 @dataclass(frozen=True)
+class SeriesFile:
+    """The file that holds a job's time series."""
+
+    samples: int
+    end: float  # last time, s
+    precision: str  # double | single
+    digest: str  # of the file's bytes, part of its name
+
+
+@dataclass(frozen=True)
 class Outcome:
     """How a job ended, without its time series.
 
     `numbers`: a scalar of dtype ROW, metrics nan unless `status` is "ok"; `reason`: a stable name,
-    empty when ok; `attributes`: those of the job's Dataset, its `key` among them.
+    empty when ok; `attributes`: those of the job's Dataset, its `key` among them; `series`: where
+    the time series are stored, if they are.
     """
 
     status: str
     reason: str
     numbers: np.void
     attributes: dict[str, Any]
+    series: SeriesFile | None = None
 
     @property
     def key(self) -> str:
         """The job's identity."""
         return str(self.attributes["key"])
+
+    @property
+    def detail(self) -> str:
+        """What is known of a failure beyond its reason."""
+        return str(self.attributes.get("detail", ""))
 
     def variables(self) -> dict[str, tuple]:
         """Status, reason and numbers as xarray variables: (dims, values, attributes)."""
@@ -71,3 +88,11 @@ class Outcome:
         for name, (dims, unit, phrase) in NUMBERS.items():
             named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
         return named
+
+
+def coordinates() -> dict[str, tuple]:
+    """The coordinates of joint and axis as xarray variables."""
+    return {
+        "joint": (("joint",), list(JOINTS), {"long_name": "joint of the rod"}),
+        "axis": (("axis",), list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
+    }

@@ -2,6 +2,7 @@
 
 import json
 import math
+from functools import cache
 from importlib import metadata
 from typing import Any
 
@@ -11,12 +12,11 @@ import xarray as xr
 import compressor
 from compressor.case import MODEL_VERSION, Case
 from compressor.integrate import Request, Trajectory, closed_form, integrate
-from compressor.parameter import JOINTS
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS, Scene
 from compressor.record import offsets, record, scene
-from compressor.schema import AXES, ROW, Outcome
+from compressor.schema import ROW, Outcome, coordinates
 
 # name: (column, extra dimensions, unit, long name)
 SERIES = {
@@ -42,16 +42,18 @@ def simulate(case: Case) -> xr.Dataset:
     `status` is "failed", `reason` says why by a stable name, and its series are nan from where it
     stopped. Metrics are taken over the dense solution after `settle_rev`.
     """
+    return observe(case)[1]
+
+
+def observe(case: Case) -> tuple[Outcome, xr.Dataset]:
+    """Simulate one case for its `Outcome` and its Dataset (see `simulate`)."""
     p, trajectory = solve(case)
-    variables = outcome(case, p, trajectory).variables()
-    coordinates: dict[str, tuple] = {
-        "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
-        "axis": ("axis", list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
-    }
+    found = outcome(case, p, trajectory)
+    variables, coords = found.variables(), coordinates()
     if case.output.keep == "series":
         variables |= series(p, trajectory)
-        coordinates["time"] = ("time", trajectory.times, {"units": "s", "long_name": "time"})
-    return xr.Dataset(variables, coordinates, attributes(case, trajectory))
+        coords["time"] = ("time", trajectory.times, {"units": "s", "long_name": "time"})
+    return found, xr.Dataset(variables, coords, found.attributes)
 
 
 def measure(case: Case) -> Outcome:
@@ -153,9 +155,7 @@ def attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
         "method": case.solve.method,
         "model_version": MODEL_VERSION,
         "program": f"compsim {compressor.__version__}",
-        "libraries": ", ".join(
-            f"{name} {metadata.version(name)}" for name in ("numpy", "scipy", "numba")
-        ),
+        "libraries": libraries(),
     }
     if trajectory.reason:
         attrs["detail"] = trajectory.detail
@@ -164,6 +164,12 @@ def attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
         attrs["stop_state"] = trajectory.stop_state
         attrs["stop_state_names"] = ", ".join(STATE_NAMES[trajectory.stop_state.size])
     return attrs
+
+
+@cache
+def libraries() -> str:
+    """The libraries that results depend on, with their versions."""
+    return ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy", "numba"))
 
 
 STATE_NAMES = {

@@ -1,58 +1,57 @@
 """The store: a folder of finished jobs and of the studies they belong to.
 
-    <folder>/jobs/<key>.h5        one job, netCDF-4 as xarray, h5py and ncdump read it
-    <folder>/studies/<name>.json  one study: its axes and the keys of its jobs, in C order
+    <folder>/rows/<number>-<digest>.h5   how many jobs ended, and their numbers: `segments`
+    <folder>/jobs/<key>-<digest>.h5      one job with its time series, where kept: `jobfiles`
+    <folder>/studies/<name>.json         one study: axes, keys of its jobs in C order: `manifest`
+    <folder>/shards/<shard>/{rows,jobs}  the same of a run that is one of several
 
-A file appears under its name only when all of it is on disk, so whatever has a name is whole.
-Studies share the jobs that they have in common. Only this module imports h5py.
+A job is stored when it has a row and, if the row tells of time series, their file. Every file
+appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
+no index: what is stored is read from the rows. `compressor.writer` writes them.
 """
 
-import contextlib
 import json
 import os
-import re
-from collections.abc import Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any
 
-import h5py
 import numpy as np
 import xarray as xr
 
 from compressor.case import Case
-from compressor.durable import Folder, StoreError, discard_leftovers, publish, system_error
+from compressor.durable import Folder, StoreError, discard_leftovers, system_error
+from compressor.hdf5 import DamagedJob
+from compressor.jobfiles import KEY, read_series, read_values, write_series
 from compressor.labels import grid, labelled, table_of_jobs
 from compressor.manifest import StoredAxis, StoredStudy, points, read_studies, write_study
+from compressor.schema import Outcome, coordinates
+from compressor.segments import NAME, Cut, Rows, Segment, read_segment
 
 __all__ = [
     "DamagedJob",
     "Folder",
     "JobStatus",
     "StoreError",
+    "Stored",
     "StoredAxis",
     "StoredStudy",
     "discard_leftovers",
     "finished_keys",
-    "has_job",
-    "job_path",
     "job_status",
-    "known_status",
     "open_study",
     "points",
     "read_job",
+    "read_series",
+    "read_store",
     "read_studies",
-    "write_job",
+    "read_values",
+    "write_series",
     "write_study",
 ]
 
-TEXT = h5py.string_dtype()  # variable-length UTF-8
-KEY = re.compile(r"[0-9a-f]{20}")
-
-
-class DamagedJob(StoreError):
-    """A file among the jobs that is no finished job; a run replaces it."""
+ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 
 
 @dataclass(frozen=True)
@@ -64,132 +63,152 @@ class JobStatus:
     reason: str  # a stable name; empty when ok
     detail: str
     samples: int  # of the time series; 0 where only metrics are kept
-    end: float  # last time of the series, s
-    timeout: float  # wall time that the job was given, s
+    precision: str  # of the time series: double | single
+    timeout: float  # wall time that a job was given which ran out of it, s; 0 for others
+    numbers: np.void  # dtype schema.ROW
 
     def serves(self, case: Case) -> bool:
-        """Whether a case needs no new run: neither what is kept nor `timeout_s` is in its key."""
+        """Whether a case needs no new run.
+
+        The one place that knows of what a case may ask for without it being in its key.
+        """
+        if self.reason == "internal_error":
+            return True
         if self.reason == "budget_seconds" and case.solve.timeout_s > self.timeout:
             return False
-        if self.samples or case.output.keep == "metrics":
+        if case.output.keep == "metrics":
             return True
-        return self.reason == "internal_error"
+        return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
 
 
-def job_path(folder: Folder, key: str) -> Path:
-    """Where a job's file stands."""
-    if not KEY.fullmatch(key):
-        raise StoreError(folder, f"{key!r} is no job's key", "a key is 20 hexadecimal digits")
-    return Path(folder) / "jobs" / f"{key}.h5"
+class Stored:
+    """What a folder held when it was read: `rows`, and the segments that are `damaged`."""
+
+    def __init__(self, folder: Path, segments: Sequence[Segment], damaged: Sequence[DamagedJob]):
+        self.folder, self.segments, self.damaged = folder, segments, damaged
+        self.rows = Rows.of(segments, _usable)
+
+    def keys(self) -> set[str]:
+        """The keys of all stored jobs, failed ones included."""
+        return {key.decode() for key in self.rows.columns["key"]}
+
+    def position(self, key: str) -> int | None:
+        """Where a job stands in `rows`; None where it is not stored."""
+        position = int(self.rows.find([key])[0])
+        return position if position >= 0 else None
+
+    def status(self, key: str) -> JobStatus | None:
+        """How a stored job ended; None where it is not stored."""
+        position = self.position(key)
+        return None if position is None else self.status_at(position)
+
+    def status_at(self, position: int) -> JobStatus:
+        """How the job at a position of `rows` ended."""
+        rows = self.rows
+        words = {name: str(values[position]) for name, values in rows.words.items()}
+        attributes = rows.attributes(position) if words["status"] != "ok" else {}
+        timed_out = words["reason"] == "budget_seconds"
+        return JobStatus(
+            rows.columns["key"][position].decode(),
+            words["status"],
+            words["reason"],
+            str(attributes.get("detail", "")),
+            int(rows.columns["samples"][position]),
+            words["precision"],
+            json.loads(attributes["case"])["solve"]["timeout_s"] if timed_out else 0.0,
+            rows.numbers[position],
+        )
+
+    def outcome(self, position: int) -> Outcome:
+        """The outcome of the job at a position of `rows`."""
+        words = {name: str(values[position]) for name, values in self.rows.words.items()}
+        attributes = self.rows.attributes(position)
+        return Outcome(words["status"], words["reason"], self.rows.numbers[position], attributes)
+
+    def job(self, key: str) -> xr.Dataset:
+        """A stored job's Dataset. Raises StoreError where there is none, or a damaged one."""
+        if not KEY.fullmatch(key):
+            raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
+        position = self.position(key)
+        if position is None:
+            raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
+        path = self.rows.path(position)
+        if path is not None:
+            return read_series(path)
+        found = self.outcome(position)
+        return xr.Dataset(found.variables(), coordinates(), found.attributes)
+
+    def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Some variables of a stored job's time series."""
+        position = self.position(key)
+        path = None if position is None else self.rows.path(position)
+        return {} if path is None else read_values(path, names)
 
 
-def write_job(folder: Folder, dataset: xr.Dataset) -> Path:
-    """Store a job's Dataset, as `compressor.simulate` returns it; an older one is replaced."""
-    path = job_path(folder, dataset.attrs["key"])
-    publish(path, _image(dataset))
-    return path
+def _usable(segment: Segment) -> np.ndarray:
+    """Which rows of a segment count: not those whose time series are gone."""
+    columns = segment.columns
+    kept = columns["samples"] > 0
+    if not kept.any():
+        return ~kept
+    names = np.array(_names(segment.place / "jobs"), "S")
+    wanted = np.char.add(np.char.add(np.char.add(columns["key"], b"-"), columns["digest"]), b".h5")
+    return ~kept | np.isin(wanted, names)
+
+
+def _names(folder: Path) -> list[str]:
+    """The files of a folder that may not be there."""
+    try:
+        return os.listdir(folder)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise system_error(folder, error) from error
+
+
+def places(folder: Folder) -> list[Path]:
+    """The folders that hold `rows` and `jobs`: the store's own, and its shards'."""
+    shards = sorted(_names(Path(folder) / "shards"))
+    return [Path(folder), *(Path(folder) / "shards" / name for name in shards)]
+
+
+def segment_paths(place: Path) -> list[Path]:
+    """The segments of one place, in the order of their numbers."""
+    return [place / "rows" / n for n in sorted(_names(place / "rows")) if NAME.fullmatch(n)]
+
+
+def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
+    """What a folder holds. Damage that is `bearable` is kept in `damaged`, other is raised."""
+    folder = Path(os.path.abspath(folder))
+    for _ in range(ATTEMPTS):
+        segments, damaged = [], []
+        try:
+            for path in (path for place in places(folder) for path in segment_paths(place)):
+                try:
+                    segments.append(read_segment(path))
+                except bearable as error:
+                    damaged.append(error)
+        except FileNotFoundError:
+            continue  # merged with others meanwhile
+        except OSError as error:
+            raise system_error(folder, error) from error
+        return Stored(folder, segments, damaged)
+    raise StoreError(folder, "changes faster than it can be read", "try again")
 
 
 def read_job(folder: Folder, key: str) -> xr.Dataset:
-    """A stored job's Dataset, its variables read from the file when they are used."""
-    path = job_path(folder, key)
-    try:
-        with _damage_named(path), contextlib.ExitStack() as unless_good:
-            dataset = unless_good.enter_context(xr.open_dataset(path, engine="h5netcdf"))
-            if dataset.attrs.get("key") != key:
-                raise ValueError
-            unless_good.pop_all()
-            return dataset
-    except FileNotFoundError as error:
-        raise StoreError(path, "is not stored", "run its study first") from error
+    """A stored job's Dataset (`Stored.job`); who reads many jobs keeps a `Stored`."""
+    return read_store(folder).job(key)
 
 
-def has_job(folder: Folder, key: str) -> bool:
-    """Whether a job is stored, failed ones included."""
-    return job_path(folder, key).exists()
+def job_status(folder: Folder, key: str) -> JobStatus | None:
+    """How a stored job ended (`Stored.status`); None where it is not stored."""
+    return read_store(folder).status(key)
 
 
 def finished_keys(folder: Folder) -> set[str]:
     """The keys of all stored jobs, failed ones included."""
-    try:
-        names = os.listdir(Path(folder) / "jobs")
-    except FileNotFoundError:
-        return set()
-    except OSError as error:
-        raise system_error(Path(folder) / "jobs", error) from error
-    return {name[:-3] for name in names if name.endswith(".h5") and KEY.fullmatch(name[:-3])}
-
-
-def job_status(folder: Folder, key: str) -> JobStatus | None:
-    """How a stored job ended; None where there is none. Raises DamagedJob."""
-    path = job_path(folder, key)
-    try:
-        with _damage_named(path), h5py.File(path) as file:
-            if file.attrs["key"] != key:
-                raise ValueError
-            times = file.get("time")
-            return JobStatus(
-                key,
-                file["status"].asstr()[()],
-                file["reason"].asstr()[()],
-                str(file.attrs.get("detail", "")),
-                0 if times is None else times.size,
-                0.0 if times is None else float(times[-1]),
-                json.loads(file.attrs["case"])["solve"]["timeout_s"],
-            )
-    except FileNotFoundError:
-        return None
-
-
-def known_status(folder: Folder, key: str) -> JobStatus | None:
-    """`job_status`, but None for a damaged file too, which a run replaces."""
-    try:
-        return job_status(folder, key)
-    except DamagedJob:
-        return None
-
-
-@contextlib.contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
-    """Turn the many ways in which a file can fail to be a job into StoreError."""
-    try:
-        yield
-    except FileNotFoundError:
-        raise
-    except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-        if isinstance(error, OSError) and error.errno:
-            raise system_error(path, error) from error
-        problem = "is no finished job of compsim: cut short, damaged, or foreign"
-        raise DamagedJob(path, problem, "run its study again, which replaces it") from error
-
-
-def _image(dataset: xr.Dataset) -> bytes:
-    """A Dataset as the bytes of a netCDF-4 file.
-
-    Built in memory, since HDF5 can crash the process when a disk fills up while it writes.
-    """
-    with h5py.File("job", "w", driver="core", backing_store=False, track_order=True) as file:
-        for name, variable in dataset.variables.items():
-            values = variable.to_numpy()
-            dtype = TEXT if values.dtype.kind in "OU" else values.dtype
-            stored = file.create_dataset(str(name), data=values.astype(dtype), dtype=dtype)
-            _set_attributes(stored, variable.attrs)
-            if variable.dims == (name,):
-                stored.make_scale(str(name))
-        for name, variable in dataset.variables.items():
-            for number, dim in enumerate(variable.dims):
-                if dim != name:
-                    file[str(name)].dims[number].attach_scale(file[str(dim)])
-        _set_attributes(file, dataset.attrs)
-        file.flush()
-        return file.id.get_file_image()
-
-
-def _set_attributes(stored: Any, attributes: Mapping[Any, Any]) -> None:
-    for name, value in attributes.items():
-        if isinstance(value, str):  # HDF5 text holds neither NUL nor lone surrogates
-            value = value.encode(errors="replace").decode().replace("\0", "\ufffd")
-        stored.attrs[name] = value
+    return read_store(folder).keys()
 
 
 def open_study(folder: Folder, name: str | None = None) -> xr.Dataset:
@@ -198,8 +217,8 @@ def open_study(folder: Folder, name: str | None = None) -> xr.Dataset:
     One study (that of `name`, or the only one) has its axes as dimensions: the last part of each
     swept key, such as `clearance_mm`, in the case file's unit; a swept `joint` is called `fault`.
     Several studies have a `job` dimension with coordinates `study`, `fault`, `load` and each
-    swept key. `key` names every job's file (see `read_job`), `status` is ok, failed or missing,
-    and metrics are nan where a job is not ok.
+    swept key. `key` names every job (see `read_job`), `status` is ok, failed or missing, and
+    metrics are nan where a job is not ok.
 
     Series have the dimension `time`. If the jobs have different output grids (a swept speed),
     they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.
@@ -211,20 +230,10 @@ def open_study(folder: Folder, name: str | None = None) -> xr.Dataset:
         studies = [study for study in studies if study.name == name]
         if not studies:
             raise StoreError(folder, f"holds no study {name!r}", f"it holds {known}")
+    stored = read_store(folder)
+    for damage in stored.damaged:
+        warnings.warn(f"{damage}: its jobs count as missing", stacklevel=2)
     layout = grid(studies[0]) if len(studies) == 1 else table_of_jobs(studies)
-    ends = {str(key): known_status(folder, key) for key in layout.keys.flat}
-    whole = [job for job in ends.values() if job and job.reason != "internal_error"]
-    values = partial(_values, folder)
-    if whole:
-        with read_job(folder, max(whole, key=lambda job: job.samples).key) as template:
-            dataset = labelled(layout, ends, template, values)
-    else:
-        dataset = labelled(layout, ends, None, values)
+    dataset = labelled(layout, stored.rows, stored.job, stored.values)
     dataset.attrs = {"folder": folder, "studies": [study.name for study in studies]}
     return dataset
-
-
-def _values(folder: str, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Variables of a stored job by name, without those that it does not have."""
-    with _damage_named(job_path(folder, key)), h5py.File(job_path(folder, key)) as file:
-        return {name: file[name][()] for name in names if name in file}

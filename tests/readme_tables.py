@@ -44,10 +44,31 @@ def claims_table():
     return "\n".join(lines) + "\n"
 
 
+def store_table():
+    found = kept("store.json")
+    lines = ["| time series | file, kB | writing, ms | reading, ms | rounding of acceleration |",
+             "|---|---|---|---|---|"]  # fmt: skip
+    for row in found["series"]:
+        words = row["precision"] + (", shuffle and gzip" if row["compress"] else "")
+        lines.append(
+            f"| {words} | {row['bytes'] / 1000:.0f} | {row['write_ms']:.0f} | {row['read_ms']:.0f} "
+            f"| {row['acceleration_rounding']:g} |"
+        )
+    rows = found["rows"]
+    lines += [
+        "",
+        f"{rows['jobs']:,} jobs without time series: {rows['jobs_per_s']:,} written a second, each "
+        f"on disk within {rows['greatest_wait_s']:.1f} s; {rows['bytes_a_job']} bytes a job in "
+        f"{rows['segments']} files; `open_study` takes {rows['open_study_s']:.1f} s.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
     "claims": claims_table,
+    "store": store_table,
 }
 
 

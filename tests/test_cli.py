@@ -15,6 +15,7 @@ from compsim import cli
 
 from compressor import load_cases, store
 from compressor.analysis import paper_cases
+from compressor.writer import Writer
 
 CONFIGS = Path(__file__).parent.parent / "configs"
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
@@ -128,9 +129,53 @@ def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, capsys):
         assert out == "mix     2 jobs     1 ok     1 failed  results/studies/mix.json\n"
         assert "1 job failed:\n  mix solve.max_steps=5: budget_steps: more than 5 steps\n" in err
         assert "budget_steps (1): raise solve.max_steps" in err
-        (file,) = (line.strip() for line in err.splitlines() if "results/jobs/" in line)
-        assert Path(file).exists()
-        assert "To run one again unchanged, delete its file." in err
+        (key,) = re.findall(r"^    job ([0-9a-f]{20})$", err, re.MULTILINE)
+        assert store.job_status("results", key).reason == "budget_steps"
+        assert "--retry-failed runs failed ones again unchanged." in err
+
+
+def test_failed_jobs_run_again_on_request(case_file, capsys):
+    case_file("mix.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": [5, 10**6]})
+    assert cli.main(["run", "mix.yaml", "-j", "1"]) == 3
+    capsys.readouterr()
+    assert cli.main(["run", "mix.yaml", "-j", "1", "--retry-failed"]) == 3
+    assert "1 job run in" in capsys.readouterr().err
+
+
+def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
+    case_file("two.yaml", load=["none", "design"])
+    assert cli.main(["run", "two.yaml", "-j", "1", "--quiet"]) == 0
+    capsys.readouterr()
+    assert cli.main(["verify"]) == 0
+    assert capsys.readouterr() == ("", "no damage\n")
+    file = sorted(Path("results/jobs").glob("*"))[0].absolute()
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 4
+    file.write_bytes(data)
+    assert cli.main(["verify"]) == 5
+    out, err = capsys.readouterr()
+    key = file.name[:20]
+    assert out == f"{file}: is damaged\n  job {key}\n"
+    assert err.startswith("1 damaged file, 1 job lost; to mend: compsim run CONFIG...")
+    assert cli.main(["verify", "--json"]) == 5
+    out, _ = capsys.readouterr()
+    assert json.loads(out) == [{"path": str(file), "problem": "is damaged", "jobs": [key]}]
+    assert cli.main(["run", "two.yaml", "-j", "1", "--quiet"]) == 0
+    assert cli.main(["verify"]) == 0
+
+
+def test_verify_of_nothing_says_so(tmp_path, capsys):
+    assert cli.main(["verify", "-i", str(tmp_path)]) == 5
+    assert "holds no study" in capsys.readouterr().err
+
+
+def test_a_second_run_in_one_folder_stops(case_file, capsys):
+    with Writer("results", command="compsim run other.yaml"):
+        assert cli.main(["run", case_file("one.yaml"), "-j", "1"]) == 5
+    err = capsys.readouterr().err
+    assert f"the store is in use by process {os.getpid()} on " in err
+    assert ": compsim run other.yaml; wait for it to end" in err
+    assert not Path("results/studies").exists()
 
 
 def test_quiet_says_nothing_when_all_is_well(case_file, capsys):

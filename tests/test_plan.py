@@ -499,6 +499,8 @@ def test_any_override_is_read_or_refused(write, text):
 
 def near(row):
     """Values so near a row's default that they fit those of all other rows."""
+    if row.kind == "flag":
+        return st.booleans()
     if row.kind == "choice":
         return st.sampled_from(row.choices)
     if row.kind == "integer":

@@ -4,20 +4,19 @@ import errno
 import json
 import os
 import shutil
-import signal
 import subprocess
-import sys
 import tempfile
-import textwrap
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import keep
 
-from compressor import labels, store
-from compressor.case import Case, table
+from compressor import hdf5, labels, store
+from compressor.case import Case, Output, table
+from compressor.jobfiles import series_path
 from compressor.plan import load_studies
 from compressor.schema import METRICS
 from compressor.simulation import simulate
@@ -37,16 +36,18 @@ def fill(folder, *studies, skip=()):
     """Store studies and all their jobs, but for the jobs at some positions."""
     for one in studies:
         store.write_study(folder, one, "by hand")
-        for number, case in enumerate(one.cases):
-            if number not in skip:
-                store.write_job(folder, simulate(case))
+        keep(folder, *(simulate(c) for n, c in enumerate(one.cases) if n not in skip))
 
 
 JOBS = {
     "ok": {},
     "metrics": {"output": {"keep": "metrics"}},
     "failed": {"joint": "both", "clearance_mm": 0.1, "solve": {**SHORT, "max_steps": 5}},
-}
+    "failed metrics": {
+        "joint": "both", "clearance_mm": 0.1, "solve": {**SHORT, "max_steps": 5},
+        "output": {"keep": "metrics"},
+    },
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=list(JOBS))
@@ -59,17 +60,25 @@ def ideal():
     return simulate(Case.from_values({"solve": SHORT}))
 
 
+def file_of(folder, dataset):
+    """The file with a stored job's time series."""
+    (path,) = folder.glob(f"jobs/{dataset.attrs['key']}-*.h5")
+    return path
+
+
 # ---- one job ------------------------------------------------------------------------------------
 
 
 def test_a_job_comes_back_identical(job, tmp_path):
-    path = store.write_job(tmp_path, job)
+    keep(tmp_path, job)
     xr.testing.assert_identical(store.read_job(tmp_path, job.attrs["key"]), job)
-    xr.testing.assert_identical(xr.open_dataset(path, engine="h5netcdf"), job)
+    if "time" in job.dims:
+        path = file_of(tmp_path, job)
+        xr.testing.assert_identical(xr.open_dataset(path, engine="h5netcdf"), job)
 
 
 def test_numbers_keep_their_kind_and_every_bit(ideal, tmp_path):
-    store.write_job(tmp_path, ideal)
+    keep(tmp_path, ideal)
     back = store.read_job(tmp_path, ideal.attrs["key"])
     for name, item in ideal.variables.items():
         if item.dtype.kind in "fi":
@@ -77,23 +86,34 @@ def test_numbers_keep_their_kind_and_every_bit(ideal, tmp_path):
             assert back[name].values.tobytes() == item.values.tobytes(), name
 
 
-def test_ncdump_reads_a_job(job, tmp_path):
+@pytest.mark.parametrize("values", [{}, {"precision": "single", "compress": True}])
+def test_ncdump_reads_a_job_and_a_segment(values, job, tmp_path):
     if not shutil.which("ncdump"):
         pytest.skip("ncdump is not installed (Debian: netcdf-bin)")
-    path = store.write_job(tmp_path, job)
+    kept = job
+    if "time" in job.dims:
+        store.write_series(tmp_path, kept, Output(**values))
+        name = file_of(tmp_path, job)
+        dump = ["ncdump", "-v", "acceleration", str(name)]
+        text = subprocess.run(dump, capture_output=True, text=True, check=True).stdout
+        assert "joint = 2 ;" in text
+        assert "string joint(joint) ;" in text
+        assert 'string peak_contact_force:units = "N" ;' in text
+        assert "double peak_contact_force_axis(joint, axis) ;" in text
+        kind = "float" if values else "double"
+        assert f"{kind} contact_force(time, joint, axis) ;" in text
+    keep(tmp_path, job)
+    (rows,) = tmp_path.glob("rows/*.h5")
     header = subprocess.run(
-        ["ncdump", "-h", str(path)], capture_output=True, text=True, check=True
+        ["ncdump", "-h", str(rows)], capture_output=True, text=True, check=True
     ).stdout
-    assert "joint = 2 ;" in header
-    assert "string joint(joint) ;" in header
-    assert 'string peak_contact_force:units = "N" ;' in header
-    assert "double peak_contact_force_axis(joint, axis) ;" in header
-    assert ("double contact_force(time, joint, axis) ;" in header) == ("time" in job.dims)
+    assert "row = 1 ;" in header
+    assert "double peak_contact_force(row, joint) ;" in header
 
 
 def test_ten_lines_of_h5py_read_a_job(ideal, tmp_path):
-    path = store.write_job(tmp_path, ideal)
-    with h5py.File(path) as file:
+    keep(tmp_path, ideal)
+    with h5py.File(file_of(tmp_path, ideal)) as file:
         force = file["contact_force"]
         dims = [dim[0].name for dim in force.dims]
         joints = list(file["joint"].asstr())
@@ -105,107 +125,201 @@ def test_ten_lines_of_h5py_read_a_job(ideal, tmp_path):
     assert peak == ideal.contact_force.sel(joint="small_end", axis="x").max()
 
 
+@pytest.mark.parametrize("compress", [False, True])
+def test_single_precision_rounds_series_alone(compress, ideal, tmp_path):
+    double = store.write_series(tmp_path / "double", ideal, Output())
+    single = store.write_series(tmp_path, ideal, Output(precision="single", compress=compress))
+    path = series_path(tmp_path, ideal.attrs["key"], single.digest)
+    full = series_path(tmp_path / "double", ideal.attrs["key"], double.digest)
+    back = xr.open_dataset(path, engine="h5netcdf")
+    assert path.stat().st_size < full.stat().st_size or compress  # chunks cost a small file more
+    for name, item in ideal.variables.items():
+        rounded = "time" in item.dims and name not in ("time", "crank_angle")
+        expected = item.values.astype("f4") if rounded else item.values
+        np.testing.assert_array_equal(back[name].values, expected)
+    with h5py.File(path) as file:
+        assert (file["acceleration"].compression == "gzip") == compress
+        assert file["acceleration"].shuffle == compress
+
+
+def test_compression_loses_nothing(ideal, tmp_path):
+    output = {"output": {"compress": True}}
+    packed = ideal.assign_attrs(case=json.dumps(json.loads(ideal.attrs["case"]) | output))
+    keep(tmp_path, packed)
+    xr.testing.assert_identical(store.read_job(tmp_path, ideal.attrs["key"]), packed)
+
+
 @pytest.mark.parametrize("text", ["", "nul \0 in it", "lone \udc80 surrogate", "Größe µ 漢"])
-def test_any_text_can_be_stored(text, ideal, tmp_path):
-    store.write_job(tmp_path, ideal.assign_attrs(detail=text))
-    back = store.job_status(tmp_path, ideal.attrs["key"]).detail
-    assert back == text.replace("\0", "\ufffd").replace("\udc80", "?")
+@pytest.mark.parametrize("kept", ["series", "metrics"])
+def test_any_text_can_be_stored(kept, text, ideal, tmp_path):
+    dataset = ideal if kept == "series" else ideal.drop_dims("time")
+    bad = dataset.assign(status="failed").assign_attrs(detail=text)
+    keep(tmp_path, bad)
+    assert store.job_status(tmp_path, ideal.attrs["key"]).detail == text
+    assert store.read_job(tmp_path, ideal.attrs["key"]).attrs["detail"] in (
+        text,
+        text.replace("\0", "\ufffd").replace("\udc80", "?"),
+    )
 
 
 def test_status_of_a_job(job, tmp_path):
-    store.write_job(tmp_path, job)
+    keep(tmp_path, job)
     end = store.job_status(tmp_path, job.attrs["key"])
     assert (end.status, end.reason) == (str(job.status.values), str(job.reason.values))
     assert end.samples == job.sizes.get("time", 0)
     assert end.detail == job.attrs.get("detail", "")
-    assert end.timeout == 600
+    assert end.numbers["steps"] == job.steps
 
 
 def test_what_is_not_stored_is_no_job(tmp_path):
     key = Case().key
     assert store.job_status(tmp_path, key) is None
-    assert not store.has_job(tmp_path, key)
     assert store.finished_keys(tmp_path) == set()
     with pytest.raises(store.StoreError, match="is not stored; run its study first"):
         store.read_job(tmp_path, key)
 
 
-def test_finished_keys_are_whole_files(ideal, tmp_path):
-    store.write_job(tmp_path, ideal)
-    for name in (f".{Case().key}.h5.1.tmp", "notes.h5", f"{Case().key}.txt"):
-        (tmp_path / "jobs" / name).touch()
+def test_a_job_without_row_or_without_file_is_not_stored(ideal, tmp_path):
+    store.write_series(tmp_path, ideal, Output())
+    assert store.finished_keys(tmp_path) == set()
+    keep(tmp_path, ideal)
     assert store.finished_keys(tmp_path) == {ideal.attrs["key"]}
+    file_of(tmp_path, ideal).unlink()
+    assert store.finished_keys(tmp_path) == set()
 
 
 @pytest.mark.parametrize("key", ["../../etc/passwd", "", "0" * 19, "0" * 21, "G" * 20])
-def test_a_key_cannot_lead_out_of_the_store(key, tmp_path):
-    with pytest.raises(store.StoreError, match="no job's key"):
-        store.job_path(tmp_path, key)
+def test_a_key_cannot_lead_out_of_the_store(key, ideal, tmp_path):
+    with pytest.raises(store.StoreError, match="key is 20 hexadecimal digits"):
+        store.read_job(tmp_path, key)
+    with pytest.raises(store.StoreError, match="key is 20 hexadecimal digits"):
+        store.write_series(tmp_path, ideal.assign_attrs(key=key), Output())
 
 
-def foreign(path):
-    with h5py.File(path, "w") as file:
-        file["x"] = 1.0
+SERVING = [  # output and timeout of what is stored, reason, output and timeout of the case, serves
+    ("series", "double", 1, "", "metrics", "double", 9, True),
+    ("metrics", "double", 1, "", "series", "double", 1, False),
+    ("series", "single", 1, "", "series", "double", 1, False),
+    ("series", "double", 1, "", "series", "single", 1, True),
+    ("metrics", "double", 1, "budget_seconds", "metrics", "double", 9, False),
+    ("metrics", "double", 9, "budget_seconds", "metrics", "double", 9, True),
+    ("metrics", "double", 1, "internal_error", "series", "double", 9, True),
+]
 
 
-DAMAGE = {
-    "empty": lambda path: path.write_bytes(b""),
-    "cut short": lambda path: path.write_bytes(path.read_bytes()[:-1]),
-    "cut to half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
-    "no HDF5": lambda path: path.write_text("not a job"),
-    "another's HDF5": foreign,
-    "another job's": lambda path: path.write_bytes(
-        store._image(xr.Dataset({"status": "ok", "reason": ""}, attrs={"key": "0" * 20}))
+@pytest.mark.parametrize("row", SERVING)
+def test_what_a_stored_job_serves(row, ideal, tmp_path):
+    keeps, precision, timeout, reason, asks, exact, more, serves = row
+    values = {"output": {"keep": keeps, "precision": precision}, "solve": {"timeout_s": timeout}}
+    text = json.dumps(Case.from_values(values).values())
+    dataset = ideal if keeps == "series" else ideal.drop_dims("time")
+    dataset = dataset.assign(status="failed" if reason else "ok", reason=reason)
+    keep(tmp_path, dataset.assign_attrs(case=text))
+    case = Case.from_values(
+        {"output": {"keep": asks, "precision": exact}, "solve": {"timeout_s": more}}
+    )
+    assert store.job_status(tmp_path, ideal.attrs["key"]).serves(case) == serves
+
+
+# ---- what a file may hold -----------------------------------------------------------------------
+
+
+def linked(file, kind):
+    file["x"] = kind
+
+
+def filtered(file):
+    data = np.zeros(100)
+    file.create_dataset("x", data=data, chunks=(10,), scaleoffset=3)
+
+
+def virtual(file):
+    layout = h5py.VirtualLayout((3,), "f8")
+    layout[:] = h5py.VirtualSource("/etc/passwd", "x", (3,))
+    file.create_virtual_dataset("x", layout)
+
+
+FOREIGN = {
+    "soft link": lambda file: linked(file, h5py.SoftLink("/status")),
+    "external link": lambda file: linked(file, h5py.ExternalLink("/etc/passwd", "/")),
+    "group": lambda file: file.create_group("x"),
+    "external storage": lambda file: file.create_dataset(
+        "x", (3,), "u1", external=[("/etc/passwd", 0, 3)]
     ),
+    "virtual dataset": virtual,
+    "foreign filter": filtered,
+    "references": lambda file: file.create_dataset("x", data=file.ref, dtype=h5py.ref_dtype),
+    "compound": lambda file: file.create_dataset("x", data=np.zeros(2, "i4,f8")),
+    "opaque": lambda file: file.create_dataset("x", data=np.void(b"pickle")),
+    "bomb": lambda file: file.create_dataset("x", (10**12,), "f8"),
 }
 
 
-@pytest.mark.parametrize("damage", list(DAMAGE))
-@pytest.mark.parametrize("read", [store.job_status, store.read_job])
-def test_a_damaged_file_is_named_with_a_remedy(damage, read, ideal, tmp_path):
-    path = store.write_job(tmp_path, ideal)
-    DAMAGE[damage](path)
-    with pytest.raises(store.DamagedJob) as error:
-        read(tmp_path, ideal.attrs["key"])
-    assert str(path) in str(error.value)
-    assert "run its study again" in str(error.value)
-    assert store.known_status(tmp_path, ideal.attrs["key"]) is None
+def changed(dataset, change):
+    """The bytes of a job's file after a change to what it holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        kept = store.write_series(Path(folder), dataset, Output())
+        path = series_path(Path(folder), dataset.attrs["key"], kept.digest)
+        with h5py.File(path, "a") as file:
+            change(file)
+        return path.read_bytes()
+
+
+def planted(folder, dataset, data):
+    """Store a job whose file holds other bytes, with a digest that fits."""
+    keep(folder, dataset)
+    path = file_of(folder, dataset)
+    path.unlink()
+    new = series_path(folder, dataset.attrs["key"], hdf5.digest(data))
+    new.write_bytes(data)
+    return new
+
+
+@pytest.mark.parametrize("change", list(FOREIGN))
+def test_what_a_file_must_not_hold_is_refused(change, ideal, tmp_path):
+    path = planted(tmp_path, ideal, changed(ideal, FOREIGN[change]))
+    for read in (store.read_series, lambda path: store.read_values(path, ["acceleration"])):
+        with pytest.raises(store.DamagedJob, match=r"is refused: x .*; run its study again"):
+            read(path)
+
+
+SCHEMA = {
+    "another's HDF5": lambda file: [file.__delitem__(name) for name in list(file)],
+    "another job's": lambda file: file.attrs.__setitem__("key", "0" * 20),
+    "no key": lambda file: file.attrs.__delitem__("key"),
+    "no status": lambda file: file.__delitem__("status"),
+    "text for numbers": lambda file: (
+        file.__delitem__("peak_acceleration"), file.__setitem__("peak_acceleration", "high")
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", list(SCHEMA))
+def test_a_file_that_is_no_job_is_refused(change, ideal, tmp_path):
+    path = planted(tmp_path, ideal, changed(ideal, SCHEMA[change]))
+    with pytest.raises(store.DamagedJob, match="is no finished job of compsim"):
+        store.read_series(path)
+
+
+@pytest.mark.parametrize("data", [b"", b"not a job", b"\x89HDF\r\n\x1a\n", b"\x80\x04."])
+def test_what_is_no_hdf5_is_refused(data, ideal, tmp_path):
+    path = planted(tmp_path, ideal, data)
+    with pytest.raises(store.DamagedJob, match="is no finished job of compsim"):
+        store.read_series(path)
 
 
 # ---- durability ---------------------------------------------------------------------------------
 
-DYING_WRITER = """
-    import os, signal, sys
-    from compressor import labels, store
-    folder, key, call = sys.argv[1:]
-    dataset = store.read_job(folder, key).load()
-    real, calls = getattr(os, call), []
-    def dying(*arguments):
-        os.kill(os.getpid(), signal.SIGKILL)
-    setattr(os, call, dying)
-    store.write_job(folder, dataset.assign_attrs(detail="the second writing"))
-"""
-
-
-@pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_killed_writer_leaves_the_old_file_whole(call, ideal, tmp_path):
-    key = ideal.attrs["key"]
-    store.write_job(tmp_path, ideal.assign_attrs(detail="the first writing"))
-    writer = [sys.executable, "-c", textwrap.dedent(DYING_WRITER), str(tmp_path), key, call]
-    assert subprocess.run(writer).returncode == -signal.SIGKILL
-    assert store.job_status(tmp_path, key).detail == "the first writing"
-    assert store.finished_keys(tmp_path) == {key}
-
 
 def test_old_leftovers_are_removed_and_young_ones_kept(ideal, tmp_path):
-    folder = store.write_job(tmp_path, ideal).parent
-    old, young = folder / ".a.h5.1.tmp", folder / ".b.h5.2.tmp"
+    keep(tmp_path, ideal)
+    old, young = tmp_path / "jobs/.a.h5.1.tmp", tmp_path / "jobs/.b.h5.2.tmp"
     for path in (old, young):
         path.touch()
     os.utime(old, (0, 0))
     store.discard_leftovers(tmp_path)
     assert (old.exists(), young.exists()) == (False, True)
-    assert store.has_job(tmp_path, ideal.attrs["key"])
+    assert store.finished_keys(tmp_path)
 
 
 def test_file_and_folders_are_synced(ideal, tmp_path, monkeypatch):
@@ -213,11 +327,14 @@ def test_file_and_folders_are_synced(ideal, tmp_path, monkeypatch):
     monkeypatch.setattr(
         os, "fsync", lambda fd: (synced.append(os.readlink(f"/proc/self/fd/{fd}")), real(fd))
     )
-    store.write_job(tmp_path / "new", ideal)
-    assert [path for path in synced if path.endswith(".tmp")]
-    for folder in (tmp_path, tmp_path / "new", tmp_path / "new" / "jobs"):
-        assert str(folder) in synced
-    assert synced[-1] == str(tmp_path / "new" / "jobs")  # after the file has its name
+    keep(tmp_path / "new", ideal)
+    for name in ("jobs", "rows"):
+        folder = str(tmp_path / "new" / name)
+        files = [n for n, p in enumerate(synced) if p.startswith(folder) and p.endswith(".tmp")]
+        assert len(files) == 1
+        assert folder in synced[files[0] :]  # after the file has its name
+    assert str(tmp_path) in synced
+    assert synced[-1] == str(tmp_path / "new" / "rows")  # the row last
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
@@ -234,21 +351,21 @@ def test_file_system_errors_have_a_remedy(call, number, remedy, ideal, tmp_path,
     def refuse(*arguments):
         raise OSError(number, os.strerror(number))
 
-    store.write_job(tmp_path, ideal)
+    keep(tmp_path, ideal)
     monkeypatch.setattr(os, call, refuse)
     with pytest.raises(store.StoreError) as error:
-        store.write_job(tmp_path, ideal.assign_attrs(detail="new"))
+        keep(tmp_path, ideal.assign_attrs(detail="new"))
     monkeypatch.undo()
     assert os.strerror(number) in str(error.value)
     assert remedy in str(error.value)
-    assert store.job_status(tmp_path, ideal.attrs["key"]).detail == ""
+    xr.testing.assert_identical(store.read_job(tmp_path, ideal.attrs["key"]), ideal)
     assert list(tmp_path.glob("jobs/.*")) == []
 
 
 def test_a_file_where_a_folder_is_needed(ideal, tmp_path):
     (tmp_path / "results").write_text("mine")
     with pytest.raises(store.StoreError, match="is a file, where a folder is needed"):
-        store.write_job(tmp_path / "results", ideal)
+        keep(tmp_path / "results", ideal)
 
 
 # ---- studies ------------------------------------------------------------------------------------

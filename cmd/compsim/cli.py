@@ -4,6 +4,7 @@ Nothing heavy is imported at the top: `compsim --help` answers at once.
 """
 
 import contextlib
+import json
 import os
 import shlex
 import signal
@@ -41,7 +42,8 @@ ADVICE = {
     "non_finite": "the motion leaves what the model can describe: check the values that are swept "
     "furthest, and gas.head_clearance_mm",
     "step_underflow": "try another solve.method, such as Radau",
-    "internal_error": "a bug of compsim: please report it; the job's file holds the traceback",
+    "internal_error": "a bug of compsim: please report it, with what Python prints for "
+    "compressor.store.read_job(FOLDER, JOB).traceback",
 }
 
 
@@ -133,6 +135,7 @@ def cli() -> None:
 )  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Set a key in all case files, such as machine.speed_rpm=300.")  # fmt: skip
+@click.option("--retry-failed", is_flag=True, help="Run failed jobs again, too.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
 def run(
@@ -141,6 +144,7 @@ def run(
     output: str,
     jobs: int,
     overrides: tuple[str, ...],
+    retry_failed: bool,
     quiet: bool,
 ) -> int:
     """Simulate what case files ask for, and store it.
@@ -155,7 +159,7 @@ def run(
 
     screen = Screen(quiet)
     try:
-        summary = sweep(studies, output, jobs, screen, context.obj)
+        summary = sweep(studies, output, jobs, screen, context.obj, retry_failed)
     except BaseException:
         screen.end()
         if screen.total:
@@ -180,6 +184,35 @@ def report(context: click.Context, results: str, output: str) -> int:
     return DONE
 
 
+@cli.command()
+@click.option("-i", "--input", "results", default="results", show_default=True,
+              help="Folder of results.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="A list of {path, problem, jobs} on stdout.")
+def verify(results: str, as_json: bool) -> int:
+    """Compare every stored file with its checksum; exit code 5 if any is damaged.
+
+    Damaged files are listed with the jobs that are lost with them, which the next run of their
+    case files computes again.
+    """
+    from compressor.verification import verify as compare
+
+    damages = compare(results)
+    if as_json:
+        found = [{"path": str(d.path), "problem": d.problem, "jobs": d.keys} for d in damages]
+        click.echo(json.dumps(found, indent=1))
+    for damage in () if as_json else damages:
+        click.echo(f"{damage.path}: {damage.problem}")
+        for key in damage.keys:
+            click.echo(f"  job {key}")
+    if damages:
+        lost = len({key for damage in damages for key in damage.keys})
+        files = f"{len(damages)} damaged file" + ("s" if len(damages) != 1 else "")
+        say(f"{files}, {plural(lost)} lost; to mend: compsim run CONFIG... with the case files")
+        return STORE
+    say("no damage")
+    return DONE
+
+
 def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
     """Say what a run did, what failed and what to do next."""
     width = max(len(count.study) for count in summary.counts)
@@ -196,12 +229,12 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
         else:
             again = f", {summary.done_before} were stored before" if summary.done_before else ""
             say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
-    report_failures(summary.failed, folder)
+    report_failures(summary.failed)
     if not quiet:
         say(f"next: compsim report -i {shlex.quote(folder)}")
 
 
-def report_failures(failures: Sequence["Failure"], folder: str) -> None:
+def report_failures(failures: Sequence["Failure"]) -> None:
     """List failed jobs, and what to do about each kind of failure."""
     if not failures:
         return
@@ -210,14 +243,16 @@ def report_failures(failures: Sequence["Failure"], folder: str) -> None:
     say(f"{plural(len({failure.key for failure in failures}))} failed:")
     for failure in failures[:MOST_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
-        file = os.path.join(folder, "jobs", f"{failure.key}.h5")
-        say(f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}\n    {file}")
+        say(
+            f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}\n"
+            f"    job {failure.key}"
+        )
     if len(failures) > MOST_FAILURES:
         say(f"  and {len(failures) - MOST_FAILURES} more")
     say("what to do:")
     for reason, number in Counter(failure.reason for failure in failures).items():
         say(f"  {reason} ({number}): {ADVICE.get(reason, 'see its detail above')}")
-    say("A changed case file runs as a new job. To run one again unchanged, delete its file.")
+    say("A changed case file runs as a new job; --retry-failed runs failed ones again unchanged.")
 
 
 @contextlib.contextmanager

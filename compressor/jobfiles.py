@@ -1,0 +1,94 @@
+"""Files with the time series of one job: netCDF-4 that xarray, h5py and ncdump read.
+
+    <folder>/jobs/<key>-<digest>.h5    everything of one job, the numbers of its row included
+
+The digest of the file's bytes is in its name and in the job's row, and compared whenever the file
+is read. A job that is run again gets a new name, so that its old result stays whole until the new
+row is on disk.
+"""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from compressor import hdf5
+from compressor.case import Output
+from compressor.durable import StoreError, publish
+from compressor.hdf5 import REMEDY, DamagedJob, digest, opened
+from compressor.schema import NUMBERS, SeriesFile
+
+KEY = re.compile(r"[0-9a-f]{20}")
+NAME = re.compile(r"([0-9a-f]{20})-([0-9a-f]{20})\.h5")
+ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
+
+
+def series_path(place: Path, key: str, checksum: str) -> Path:
+    """Where a job's time series stand; `place` is the folder that holds `jobs`."""
+    if not KEY.fullmatch(key):
+        raise StoreError(place, f"{key!r} is no job's key", "a key is 20 hexadecimal digits")
+    return place / "jobs" / f"{key}-{checksum}.h5"
+
+
+def write_series(place: Path, dataset: xr.Dataset, output: Output) -> SeriesFile:
+    """Store a job's Dataset, as `compressor.simulate` returns it, durably."""
+    series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
+    rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
+    data = hdf5.image(
+        {
+            str(name): (
+                tuple(map(str, item.dims)),
+                item.to_numpy().astype("f4") if name in rounded else item.to_numpy(),
+                item.attrs,
+            )
+            for name, item in dataset.variables.items()
+        },
+        {str(name): value for name, value in dataset.attrs.items()},
+        series if output.compress else (),
+    )
+    checksum, times = digest(data), dataset["time"].values
+    publish(series_path(place, dataset.attrs["key"], checksum), data)
+    return SeriesFile(times.size, float(times[-1]), output.precision, checksum)
+
+
+def intact(path: Path) -> bool:
+    """Whether a file's bytes are those that were written."""
+    named = NAME.fullmatch(path.name)
+    try:
+        return named is not None and digest(path.read_bytes()) == named[2]
+    except OSError:
+        return False
+
+
+def _bytes(path: Path) -> bytes:
+    named = NAME.fullmatch(path.name)
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise StoreError(path, "is not there any more", "run its study again") from error
+    if named is None or digest(data) != named[2]:
+        raise DamagedJob(path, "is damaged: its bytes are not those that were written", REMEDY)
+    return data
+
+
+def read_series(path: Path) -> xr.Dataset:
+    """A job's Dataset, from a file. Raises DamagedJob."""
+    with opened(_bytes(path), path) as file:
+        attributes = hdf5.attributes(file)
+        if attributes["key"] != path.name[:20]:
+            raise ValueError
+        dataset = xr.Dataset(hdf5.variables(file), attrs=attributes)
+        for name, (dims, _, _) in NUMBERS.items():
+            if name in dataset and (dataset[name].dims, dataset[name].dtype.kind) != (dims, "f"):
+                raise ValueError
+        if not {"status", "reason", "time"} <= set(dataset.variables):
+            raise ValueError
+        return dataset
+
+
+def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Some variables of a job's file by name, without those that it does not have."""
+    with opened(_bytes(path), path) as file:
+        return {name: file[name][()] for name in names if name in file}

@@ -1,0 +1,399 @@
+"""Rows: what is acknowledged stays, the last one counts, damage is found, one writer at a time."""
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from compressor import hdf5, segments, store, writer
+from compressor.manifest import StoredAxis, StoredStudy, encode
+from compressor.schema import NUMBERS, ROW, Outcome
+from compressor.simulation import simulate
+from compressor.verification import verify
+from compressor.writer import Writer
+
+
+def key(number):
+    return f"{number:020x}"
+
+
+def outcome(number, value=None, reason="", **attributes):
+    """A made-up outcome; `value` is its peak acceleration (default: its number)."""
+    numbers = np.zeros(1, ROW)[0]
+    numbers["peak_acceleration"] = number if value is None else value
+    numbers["peak_contact_force_axis"] = [[number, 2], [3, 4]]
+    attributes = {"key": key(number), "case": '{"solve": {"timeout_s": 1}}', **attributes}
+    return Outcome("failed" if reason else "ok", reason, numbers, attributes)
+
+
+def put(folder, *outcomes, **options):
+    """Store outcomes in one segment."""
+    with Writer(folder, **options) as open_writer:
+        open_writer.flushed = time.monotonic()
+        for item in outcomes:
+            open_writer.add(item)
+
+
+def peaks(folder):
+    rows = store.read_store(folder).rows
+    found = zip(rows.columns["key"].tolist(), rows.numbers["peak_acceleration"], strict=True)
+    return {int(name, 16): value for name, value in found}
+
+
+def plan(folder, *axes, count):
+    """Store a study of the made-up jobs."""
+    keys = tuple(key(number) for number in range(count))
+    study = StoredStudy("made", "made.yaml", axes, keys, {}, "", {}, "")
+    (folder / "studies").mkdir(parents=True, exist_ok=True)
+    (folder / "studies" / "made.json").write_bytes(encode(study))
+
+
+# ---- rows ---------------------------------------------------------------------------------------
+
+
+def test_outcomes_come_back_in_every_part(tmp_path):
+    state = np.array([1.5, -0.0, np.nan])
+    given = outcome(7, reason="non_finite", detail="µ \0 \udc80", stop_state=state, complete=0)
+    put(tmp_path, given, outcome(3))
+    found = store.read_store(tmp_path)
+    back = found.outcome(found.position(key(7)))
+    assert (back.status, back.reason, back.key) == ("failed", "non_finite", key(7))
+    assert back.numbers.tobytes() == given.numbers.tobytes()
+    assert back.attributes.keys() == given.attributes.keys()
+    assert back.attributes["stop_state"].tobytes() == state.tobytes()
+    assert (back.attributes["detail"], back.attributes["complete"]) == ("µ \0 \udc80", 0)
+    assert found.position(key(8)) is None
+
+
+def test_the_last_row_of_a_job_counts(tmp_path):
+    put(tmp_path, outcome(1, 10), outcome(2, 20))
+    put(tmp_path, outcome(1, 11))
+    put(tmp_path, outcome(3, 30), outcome(3, 31))
+    assert peaks(tmp_path) == {1: 11, 2: 20, 3: 31}
+
+
+def test_xarray_reads_a_segment(tmp_path):
+    put(tmp_path, *(outcome(number) for number in range(5)))
+    (path,) = tmp_path.glob("rows/*.h5")
+    with xr.open_dataset(path, engine="h5netcdf") as found:
+        assert found.peak_contact_force_axis.dims == ("row", "joint", "axis")
+        assert found.peak_acceleration.values.tolist() == [0, 1, 2, 3, 4]
+        assert found.peak_acceleration.attrs["units"] == "m/s2"
+        assert set(NUMBERS) <= set(found)
+
+
+def test_a_segment_of_an_older_version_lacks_a_number(tmp_path, monkeypatch):
+    older = {name: row for name, row in NUMBERS.items() if name != "crank_work"}
+    monkeypatch.setattr(segments, "NUMBERS", older)
+    put(tmp_path, outcome(1))
+    monkeypatch.undo()
+    put(tmp_path, outcome(2))
+    rows = store.read_store(tmp_path).rows
+    assert np.isnan(rows.numbers["crank_work"]).tolist() == [True, False]
+    assert peaks(tmp_path) == {1: 1, 2: 2}
+
+
+def test_small_segments_are_merged_and_nothing_else_changes(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "MOST_AGE", 0)
+    with Writer(tmp_path) as open_writer:
+        for number in range(100):
+            kept = outcome(number % 75, number, detail=f"the {number}th")
+            assert open_writer.add(kept) == [kept.key]
+    assert len(list(tmp_path.glob("rows/*.h5"))) <= writer.FEW_SMALL
+    assert peaks(tmp_path) == {n: n + 75 if n < 25 else n for n in range(75)}
+    found = store.read_store(tmp_path)
+    details = {k: found.outcome(found.position(k)).detail for k in found.keys()}  # noqa: SIM118
+    assert details[key(3)] == "the 78th"
+    assert details[key(74)] == "the 74th"
+
+
+def test_merging_does_not_make_an_old_row_new(tmp_path, monkeypatch):
+    put(tmp_path, outcome(1, 10), shard="a")
+    put(tmp_path, outcome(1, 11))
+    monkeypatch.setattr(writer, "FEW_SMALL", 1)
+    put(tmp_path, outcome(2), shard="a")
+    assert len(list(tmp_path.glob("shards/a/rows/*.h5"))) == 1
+    assert peaks(tmp_path) == {1: 11, 2: 2}
+
+
+def test_a_reader_that_loses_the_race_with_a_merge_reads_again(tmp_path, monkeypatch):
+    put(tmp_path, outcome(1))
+    put(tmp_path, outcome(2))
+    real, gone = segments.read_segment, []
+
+    def merged_meanwhile(path):
+        if not gone:
+            gone.append(path)
+            monkeypatch.setattr(writer, "FEW_SMALL", 1)
+            put(tmp_path, outcome(3))
+        return real(path)
+
+    monkeypatch.setattr(store, "read_segment", merged_meanwhile)
+    assert peaks(tmp_path) == {1: 1, 2: 2, 3: 3}
+    assert not gone[0].exists()
+
+
+def test_twenty_thousand_rows_open_as_a_grid(tmp_path):
+    with Writer(tmp_path) as open_writer:
+        for number in range(20_000):
+            if number != 7:
+                open_writer.add(outcome(number))
+    axes = (
+        StoredAxis("machine.speed_rpm", tuple(range(200)), "rpm"),
+        StoredAxis("machine.rod_mass_kg", tuple(range(100)), "kg"),
+    )
+    plan(tmp_path, *axes, count=20_000)
+    found = store.open_study(tmp_path)
+    expected = np.arange(20_000.0).reshape(200, 100)
+    expected[0, 7] = np.nan
+    np.testing.assert_array_equal(found.peak_acceleration.values, expected)
+    assert found.peak_contact_force_axis.dims == ("speed_rpm", "rod_mass_kg", "joint", "axis")
+    assert found.status.values[0, 6:8].tolist() == ["ok", "missing"]
+    assert len(list(tmp_path.glob("rows/*"))) < 20
+
+
+# ---- shards and the lock ------------------------------------------------------------------------
+
+
+def test_readers_merge_shards(tmp_path):
+    jobs = [simulate(case) for case in short_cases()]
+    for number, (name, job) in enumerate(zip(("", "1-of-2", "2-of-2"), jobs, strict=True)):
+        with Writer(tmp_path, shard=name) as open_writer:
+            series = store.write_series(open_writer.place, job, short_cases()[number].output)
+            attributes = dict(job.attrs)
+            open_writer.add(Outcome("ok", "", np.zeros(1, ROW)[0], attributes, series))
+    found = store.read_store(tmp_path)
+    assert len(found.keys()) == 3
+    for job in jobs:
+        xr.testing.assert_identical(found.job(job.attrs["key"]), job)
+    assert len(list(tmp_path.glob("shards/1-of-2/jobs/*.h5"))) == 1
+    assert verify(tmp_path) == []
+
+
+def short_cases():
+    from compressor.case import Case
+
+    solve = {"duration_rev": 0.1, "settle_rev": 0, "output_step_deg": 1}
+    return [Case.from_values({"load": load, "solve": solve}) for load in ("none", "design")] + [
+        Case.from_values({"load": "typical", "solve": solve})
+    ]
+
+
+@pytest.mark.parametrize("name", ["../up", "a/b", ".hidden", "x" * 65])
+def test_a_shard_stays_in_its_folder(name, tmp_path):
+    with pytest.raises(store.StoreError, match="is no shard's name"):
+        Writer(tmp_path, shard=name)
+
+
+def test_one_writer_at_a_time(tmp_path):
+    with Writer(tmp_path, command="the first"):
+        with pytest.raises(
+            store.StoreError, match=rf"process {os.getpid()} on .*: the first; wait"
+        ):
+            Writer(tmp_path).__enter__()
+        put(tmp_path, outcome(1), shard="a")  # has a lock of its own
+    put(tmp_path, outcome(2))
+    assert peaks(tmp_path) == {1: 1, 2: 2}
+
+
+WAITING = """
+    import sys
+    from compressor.writer import Writer
+    with Writer(sys.argv[1], wait=True):
+        print("has it")
+"""
+
+
+def test_a_second_writer_can_wait(tmp_path):
+    with Writer(tmp_path) as first:
+        call = [sys.executable, "-c", textwrap.dedent(WAITING), str(tmp_path)]
+        second = subprocess.Popen(call, stdout=subprocess.PIPE, text=True)
+        with pytest.raises(subprocess.TimeoutExpired):
+            second.wait(2)
+        first.add(outcome(1))
+    assert second.communicate(timeout=20) == ("has it\n", None)
+
+
+# ---- crashes ------------------------------------------------------------------------------------
+
+DRIVER = """
+    import sys
+    from compressor import writer
+    from test_writer import outcome
+    folder, begin = sys.argv[1], int(sys.argv[2])
+    writer.MOST_AGE, writer.MOST_SMALL = 0.002, 4
+    with writer.Writer(folder) as open_writer:
+        for number in range(begin, begin + 10**6):
+            for key in open_writer.add(outcome(number)):
+                print(int(key, 16), flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_what_was_acknowledged_survives_sigkill(tmp_path):
+    wait, acknowledged = np.random.default_rng(1), set()
+    for attempt in range(10):
+        call = [sys.executable, "-c", textwrap.dedent(DRIVER), str(tmp_path), str(attempt * 10**6)]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        driver = subprocess.Popen(call, stdout=subprocess.PIPE, text=True, env=environment)
+        assert driver.stdout is not None
+        acknowledged.add(int(driver.stdout.readline()))
+        time.sleep(wait.uniform(0, 0.3))
+        driver.send_signal(signal.SIGKILL)
+        rest = driver.communicate()[0].splitlines(keepends=True)
+        acknowledged |= {int(line) for line in rest if line.endswith("\n")}
+        stored = peaks(tmp_path)
+        assert acknowledged <= stored.keys()
+        assert all(value == number for number, value in stored.items())
+        assert verify(tmp_path) == []
+    assert len(acknowledged) > 100
+
+
+def test_a_crash_before_the_row_leaves_the_old_result(tmp_path):
+    case = short_cases()[0]
+    job = simulate(case)
+    with Writer(tmp_path) as open_writer:
+        series = store.write_series(tmp_path, job, case.output)
+        kept = Outcome("ok", "", np.zeros(1, ROW)[0], dict(job.attrs), series)
+        open_writer.add(kept)
+    store.write_series(tmp_path, job.assign_attrs(detail="again"), case.output)  # then: SIGKILL
+    assert len(list(tmp_path.glob("jobs/*.h5"))) == 2
+    xr.testing.assert_identical(store.read_job(tmp_path, case.key), job)
+    with Writer(tmp_path):
+        pass
+    assert len(list(tmp_path.glob("jobs/*.h5"))) == 1
+    xr.testing.assert_identical(store.read_job(tmp_path, case.key), job)
+
+
+def test_a_full_disk_is_an_error_with_a_name_and_rows_wait(tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(28, os.strerror(28))
+
+    put(tmp_path, outcome(1))
+    real = os.fsync
+    with Writer(tmp_path) as open_writer:
+        monkeypatch.setattr(os, "fsync", full)
+        with pytest.raises(store.StoreError, match="No space left on device; free some space"):
+            open_writer.add(outcome(2))
+        monkeypatch.setattr(os, "fsync", real)
+        assert open_writer.flush() == [key(2)]
+    assert peaks(tmp_path) == {1: 1, 2: 2}
+
+
+def test_an_interrupt_keeps_what_was_added(tmp_path):
+    def interrupted():
+        with Writer(tmp_path) as open_writer:
+            open_writer.add(outcome(1))
+            assert open_writer.add(outcome(2)) == []
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert peaks(tmp_path) == {1: 1, 2: 2}
+
+
+# ---- damage -------------------------------------------------------------------------------------
+
+
+def damaged(path, data):
+    path.write_bytes(data)
+    return verify(path.parent.parent)
+
+
+def test_every_flipped_bit_of_a_segment_is_found_and_its_jobs_named(tmp_path):
+    put(tmp_path, *(outcome(number) for number in range(3)))
+    plan(tmp_path, StoredAxis("machine.speed_rpm", (1, 2, 3, 4), "rpm"), count=4)
+    (path,) = tmp_path.glob("rows/*.h5")
+    good = path.read_bytes()
+    places = {*range(0, len(good), 97)}
+    for name in store.read_store(tmp_path).keys():  # noqa: SIM118
+        begin = good.index(name.encode())
+        places |= {*range(begin, begin + 20)}
+    for place in sorted(places):
+        flipped = good[:place] + bytes([good[place] ^ (1 << place % 8)]) + good[place + 1 :]
+        (damage,) = damaged(path, flipped)
+        assert damage.path == path
+        assert damage.keys == (key(0), key(1), key(2))
+    for size in range(0, len(good), 211):
+        (damage,) = damaged(path, good[:size])
+        assert {key(0), key(1), key(2)} <= {*damage.keys}
+    assert damaged(path, good) == []
+
+
+def test_every_flipped_bit_of_a_job_or_study_is_found(tmp_path):
+    case = short_cases()[1]
+    job = simulate(case)
+    with Writer(tmp_path) as open_writer:
+        series = store.write_series(tmp_path, job, case.output)
+        open_writer.add(Outcome("ok", "", np.zeros(1, ROW)[0], dict(job.attrs), series))
+    plan(tmp_path, count=1)
+    for pattern, keys, step in (("jobs/*.h5", (case.key,), 151), ("studies/*.json", (), 3)):
+        (path,) = tmp_path.glob(pattern)
+        good = path.read_bytes()
+        for place in range(0, len(good), step):
+            flipped = good[:place] + bytes([good[place] ^ (1 << place % 8)]) + good[place + 1 :]
+            (damage,) = damaged(path, flipped)
+            assert (damage.path, damage.keys) == (path, keys)
+        for size in range(0, len(good), 11 * step):
+            (damage,) = damaged(path, good[:size])
+            assert (damage.path, damage.keys) == (path, keys)
+        assert damaged(path, good) == []
+
+
+def test_readers_pass_a_damaged_segment_by_and_say_so(tmp_path):
+    put(tmp_path, outcome(0))
+    put(tmp_path, outcome(1))
+    plan(tmp_path, StoredAxis("machine.speed_rpm", (1, 2), "rpm"), count=2)
+    first = sorted(tmp_path.glob("rows/*.h5"))[0]
+    first.write_bytes(first.read_bytes()[:-1])
+    with pytest.warns(UserWarning, match=rf"{first.name}: is damaged.*count as missing") as told:
+        found = store.open_study(tmp_path)
+    assert len(told) == 1
+    assert found.status.values.tolist() == ["missing", "ok"]
+    with Writer(tmp_path):
+        pass
+    assert (tmp_path / "rows" / f"{first.name}.damaged").exists()
+    assert verify(tmp_path) == []
+    assert peaks(tmp_path) == {1: 1}
+
+
+SCHEMA = {
+    "text for numbers": lambda file: (
+        file.__delitem__("steps"),
+        file.__setitem__("steps", ["many"] * 2),
+    ),
+    "other length": lambda file: (
+        file.__delitem__("status"),
+        file.__setitem__("status", np.array([b"ok"] * 3)),
+    ),
+    "no keys": lambda file: file.__delitem__("key"),
+    "link": lambda file: file.__setitem__("x", h5py.ExternalLink("/etc/passwd", "/")),
+}
+
+
+@pytest.mark.parametrize("change", list(SCHEMA))
+def test_a_segment_with_another_schema_is_refused_and_left_alone(change, tmp_path):
+    put(tmp_path, outcome(1), outcome(2))
+    (path,) = tmp_path.glob("rows/*.h5")
+    with h5py.File(path, "a") as file:
+        SCHEMA[change](file)
+    planted = path.with_name(segments.segment_name(1, path.read_bytes()))
+    path.rename(planted)
+    for read in (store.read_store, lambda folder: Writer(folder).__enter__()):
+        with pytest.raises(hdf5.DamagedJob, match="move it away"):
+            read(tmp_path)
+    assert [damage.path for damage in verify(tmp_path)] == [planted]
+
+
+def test_a_row_of_a_pickled_object_cannot_be_stored(tmp_path):
+    bad = dataclasses.replace(outcome(1), attributes={"key": key(1), "case": "{}", "x": object()})
+    with pytest.raises(AttributeError), Writer(tmp_path) as open_writer:
+        open_writer.add(bad)
