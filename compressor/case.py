@@ -288,15 +288,17 @@ class Case:
 
     def values(self) -> dict[str, Any]:
         """The case as plain nested values; `from_values` reads them back to an equal case."""
-        plain = dataclasses.asdict(self)
-        for group in GROUPS:
-            if plain[group] is None:
-                plain[group] = False
-            else:
-                plain[group] = {k: v for k, v in plain[group].items() if v is not None}
-        materials = plain["contact"].get("materials")
-        if materials:
-            plain["contact"]["materials"] = list(materials)
+        plain: dict[str, Any] = {"name": self.name, "load": self.load, "joint": self.joint}
+        for name in GROUPS:
+            group = getattr(self, name)
+            # `vars` has the fields in their order, since a group has nothing but fields
+            plain[name] = (
+                {key: value for key, value in vars(group).items() if value is not None}
+                if group is not None
+                else False
+            )
+        if self.contact.materials:
+            plain["contact"]["materials"] = list(self.contact.materials)
         if self.joint == "none":
             del plain["clearance_mm"]
         if self.solve.rtol is not None:

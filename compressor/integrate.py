@@ -130,25 +130,25 @@ def scales(p: np.record) -> tuple[float, float]:
     The length is the smaller of the clearance and the penetration under the forces at hand, but
     not below a thousandth of the latter; the speed is that length at the contact's frequency.
     """
-    force = p.reciprocating_mass * p.crank_radius * p.omega**2
-    if p.load == Load.DESIGN:
-        force += p.preload + p.spring_stiffness * p.spring_stroke
-    elif p.load == Load.TYPICAL:
-        force += p.discharge_force
-    faulty = p.clearance > 0
-    stiffness = p.stiffness[faulty].max()
-    depth = (force / stiffness) ** (1 / p.exponent)
-    length = max(min(p.clearance[faulty].min(), depth), 1e-3 * depth)
-    mass = min(p.rod_mass, p.reciprocating_mass)
-    frequency = math.sqrt(p.exponent * stiffness * depth ** (p.exponent - 1) / mass)
+    force = p["reciprocating_mass"] * p["crank_radius"] * p["omega"] ** 2
+    if p["load"] == Load.DESIGN:
+        force += p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
+    elif p["load"] == Load.TYPICAL:
+        force += p["discharge_force"]
+    faulty = p["clearance"] > 0
+    stiffness = p["stiffness"][faulty].max()
+    depth = (force / stiffness) ** (1 / p["exponent"])
+    length = max(min(p["clearance"][faulty].min(), depth), 1e-3 * depth)
+    mass = min(p["rod_mass"], p["reciprocating_mass"])
+    frequency = math.sqrt(p["exponent"] * stiffness * depth ** (p["exponent"] - 1) / mass)
     return length, length * frequency
 
 
 def natural_sizes(p: np.record) -> np.ndarray:
     """Size of each number of the motion, shape (2 n,): deviations (m, rad), their rates (per s)."""
     length, speed = scales(p)
-    per_unit = np.ones(FREEDOMS[Scene(int(p.scene))])
-    per_unit[-1] = 1.0 / p.rod_length  # the last freedom is an angle
+    per_unit = np.ones(FREEDOMS[Scene(int(p["scene"]))])
+    per_unit[-1] = 1.0 / p["rod_length"]  # the last freedom is an angle
     return np.concatenate((length * per_unit, speed * per_unit))
 
 

@@ -1,4 +1,7 @@
-"""Case -> the SI record of parameters that compiled functions read."""
+"""Case -> the SI record of parameters that compiled functions read.
+
+Fields are set as items: as attributes each would take some ten times as long, for every job.
+"""
 
 import math
 
@@ -23,15 +26,15 @@ def scene(case: Case) -> Scene:
 def record(case: Case) -> np.record:
     """The record of a case, every number in SI."""
     p = new_record()
-    p.scene, p.load, p.law = scene(case), LOADS[case.load], LAWS[case.contact.law]
+    p["scene"], p["load"], p["law"] = scene(case), LOADS[case.load], LAWS[case.contact.law]
     _machine(case, p)
     _contact(case, p)
     _gas(case, p)
     _spring(case, p)
     if case.load == "design":
-        p.corners = cam_corners(p.crank_radius, p.rod_length, p.spring_stroke)
+        p["corners"] = cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
     elif case.load == "typical":
-        p.corners = typical_corners(case)
+        p["corners"] = typical_corners(case)
     return p
 
 
@@ -57,49 +60,49 @@ def offsets(case: Case) -> np.ndarray:
 
 def _machine(case: Case, p: np.record) -> None:
     machine = case.machine
-    p.omega = case.omega
-    p.crank_radius = to_si(machine.crank_radius_mm, "mm")
-    p.rod_length = to_si(machine.rod_length_mm, "mm")
-    p.rod_mass = machine.rod_mass_kg
-    p.rod_centre = to_si(machine.rod_centre_mm or 0.0, "mm")
-    p.rod_inertia = machine.rod_inertia_kg_m2 or 0.0
-    p.reciprocating_mass = machine.reciprocating_mass_kg
-    p.gravity = machine.gravity_m_per_s2
-    p.pin_radius = to_si(machine.pin_radius_mm, "mm")
+    p["omega"] = case.omega
+    p["crank_radius"] = to_si(machine.crank_radius_mm, "mm")
+    p["rod_length"] = to_si(machine.rod_length_mm, "mm")
+    p["rod_mass"] = machine.rod_mass_kg
+    p["rod_centre"] = to_si(machine.rod_centre_mm or 0.0, "mm")
+    p["rod_inertia"] = machine.rod_inertia_kg_m2 or 0.0
+    p["reciprocating_mass"] = machine.reciprocating_mass_kg
+    p["gravity"] = machine.gravity_m_per_s2
+    p["pin_radius"] = to_si(machine.pin_radius_mm, "mm")
 
 
 def _contact(case: Case, p: np.record) -> None:
     contact, friction = case.contact, case.friction
-    p.exponent = contact.exponent
-    p.damping = to_si(contact.damping_N_s_per_mm, "N s/mm")
-    p.full_damping = to_si(contact.full_damping_mm, "mm")
+    p["exponent"] = contact.exponent
+    p["damping"] = to_si(contact.damping_N_s_per_mm, "N s/mm")
+    p["full_damping"] = to_si(contact.full_damping_mm, "mm")
     for i, joint in enumerate(JOINTS):
-        p.clearance[i] = to_si(getattr(case.clearance_mm, joint), "mm")
+        p["clearance"][i] = to_si(getattr(case.clearance_mm, joint), "mm")
         if contact.materials:
-            bore = p.pin_radius + p.clearance[i]
-            p.stiffness[i] = contact_stiffness(*contact.materials, p.pin_radius, bore)
+            bore = p["pin_radius"] + p["clearance"][i]
+            p["stiffness"][i] = contact_stiffness(*contact.materials, p["pin_radius"], bore)
         else:
-            p.stiffness[i] = (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
+            p["stiffness"][i] = (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
     if friction:
-        p.friction = 1
-        p.static, p.dynamic = friction.static, friction.dynamic
-        p.stiction_velocity = to_si(friction.stiction_velocity_mm_per_s, "mm/s")
-        p.friction_velocity = to_si(friction.friction_velocity_mm_per_s, "mm/s")
+        p["friction"] = 1
+        p["static"], p["dynamic"] = friction.static, friction.dynamic
+        p["stiction_velocity"] = to_si(friction.stiction_velocity_mm_per_s, "mm/s")
+        p["friction_velocity"] = to_si(friction.friction_velocity_mm_per_s, "mm/s")
 
 
 def _gas(case: Case, p: np.record) -> None:
     gas = case.gas
     area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
-    p.suction_force = to_si(gas.suction_MPa, "MPa") * area
-    p.discharge_force = to_si(gas.discharge_MPa, "MPa") * area
-    p.back_force = to_si(gas.back_pressure_MPa, "MPa") * area
-    p.head_clearance = to_si(gas.head_clearance_mm, "mm")
-    p.gas_exponent = gas.exponent
+    p["suction_force"] = to_si(gas.suction_MPa, "MPa") * area
+    p["discharge_force"] = to_si(gas.discharge_MPa, "MPa") * area
+    p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * area
+    p["head_clearance"] = to_si(gas.head_clearance_mm, "mm")
+    p["gas_exponent"] = gas.exponent
 
 
 def _spring(case: Case, p: np.record) -> None:
     spring = case.spring
-    p.spring_stiffness = to_si(spring.stiffness_N_per_mm, "N/mm")
-    p.spring_damping = to_si(spring.damping_N_s_per_mm, "N s/mm")
-    p.preload = spring.preload_N
-    p.spring_stroke = to_si(spring.stroke_mm, "mm")
+    p["spring_stiffness"] = to_si(spring.stiffness_N_per_mm, "N/mm")
+    p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")
+    p["preload"] = spring.preload_N
+    p["spring_stroke"] = to_si(spring.stroke_mm, "mm")

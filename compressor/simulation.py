@@ -105,35 +105,35 @@ def outcome(case: Case, p: np.record, trajectory: Trajectory) -> Outcome:
 
 def metrics(p: np.record, tally: np.record) -> dict[str, Any]:
     """The metrics by name, from what was tallied after settling."""
-    ideal = p.clearance == 0
-    seconds = tally.seconds or math.nan
+    ideal = p["clearance"] == 0
+    seconds = tally["seconds"] or math.nan
     return {
-        "peak_acceleration": tally.peak[0],
-        "rms_acceleration": math.sqrt(tally.square_acceleration / seconds),
-        "rms_acceleration_deviation": math.sqrt(tally.square_deviation / seconds),
-        "peak_contact_force": tally.peak[5:],
-        "peak_contact_force_axis": tally.peak[1:5].reshape(2, 2),
-        "max_penetration": np.where(ideal, 0.0, tally.max_penetration),
-        "contact_loss_fraction": np.where(ideal, 0.0, tally.loss_seconds / seconds),
-        "impact_count": np.where(ideal, 0.0, tally.impacts),
+        "peak_acceleration": tally["peak"][0],
+        "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
+        "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
+        "peak_contact_force": tally["peak"][5:],
+        "peak_contact_force_axis": tally["peak"][1:5].reshape(2, 2),
+        "max_penetration": np.where(ideal, 0.0, tally["max_penetration"]),
+        "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
+        "impact_count": np.where(ideal, 0.0, tally["impacts"]),
     }
 
 
 def energy_residual(tally: np.record) -> float:
     """Worst imbalance relative to the contact's losses, floored at 1e-3 of the kinetic energy."""
-    lost = tally.damping_loss + tally.friction_loss
-    return float(tally.worst_imbalance / max(lost, 1e-3 * tally.peak_kinetic))
+    lost = tally["damping_loss"] + tally["friction_loss"]
+    return float(tally["worst_imbalance"] / max(lost, 1e-3 * tally["peak_kinetic"]))
 
 
 def ledger(trajectory: Trajectory) -> dict[str, float]:
     """Energy flows and counts by name."""
     tally = trajectory.tally
     return {
-        "crank_work": tally.crank_work,
-        "load_work": tally.load_work,
-        "contact_damping_loss": tally.damping_loss,
-        "friction_loss": tally.friction_loss,
-        "energy_residual": energy_residual(tally) if tally.started else math.nan,
+        "crank_work": tally["crank_work"],
+        "load_work": tally["load_work"],
+        "contact_damping_loss": tally["damping_loss"],
+        "friction_loss": tally["friction_loss"],
+        "energy_residual": energy_residual(tally) if tally["started"] else math.nan,
         "steps": trajectory.steps,
         "rejected": trajectory.rejected,
         "evaluations": trajectory.evaluations,

@@ -244,6 +244,29 @@ def test_values_read_back_to_an_equal_case(values):
     assert Case.from_values(plain).key == case.key
 
 
+EVERYTHING = {
+    "joint": "both",
+    "clearance_mm": {"big_end": 0.1, "small_end": 0.2},
+    "friction": False,
+    "contact": {"materials": ["steel", "copper"]},
+    "load": "typical",
+    "solve": {"duration_s": 0.12, "settle_rev": 0, "rtol": 1e-6},
+}
+
+
+@pytest.mark.parametrize(
+    ("values", "key", "physics"),
+    [
+        ({}, "2b525255a703a4ce7c25", "b51063b44b7443eabcd1"),
+        (EVERYTHING, "05dcc40c7ce60f4369be", "45bdc4aa8489c4087e69"),
+    ],
+)
+def test_keys_stay_as_they_are_stored(values, key, physics):
+    """A key changes only with the model's version: stores hold results under it."""
+    case = Case.from_values(values)
+    assert (case.key, case.physics_key) == (key, physics)
+
+
 def test_the_defaults_are_valid():
     wrong = [key for key, row in table().items() if row.check(row.default) and not row.optional]
     assert wrong == []
