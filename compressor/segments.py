@@ -35,6 +35,7 @@ COLUMNS = {
     "end": ("f8", "last time of the series, s"),
     "precision": ("S", "of the series: double or single"),
     "digest": ("S20", "of the file with the series"),
+    "timeout": ("f8", "wall time that a job had which ran out of it, s; 0 for all others"),
 }
 
 
@@ -46,6 +47,7 @@ class Segment:
     columns: dict[str, np.ndarray]  # each of shape (rows,)
     numbers: np.ndarray  # dtype ROW, shape (rows,)
     texts: bytes  # zlib of each row's attributes as JSON, a line a row
+    notes: bytes  # the same of each row's `detail`
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -54,6 +56,11 @@ class Segment:
     def place(self) -> Path:
         """The folder that holds `rows` and `jobs`."""
         return self.path.parent.parent
+
+    @cached_property
+    def details(self) -> list[bytes]:
+        """What is known of each failure, as JSON."""
+        return _unpacked(self.notes)
 
 
 def segment_name(number: int, data: bytes) -> str:
@@ -65,7 +72,7 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
     """A segment of new rows, without a path."""
     outcomes = list(outcomes)
     series = [outcome.series or SeriesFile(0, 0.0, "", "") for outcome in outcomes]
-    texts = {
+    words = {
         "key": [outcome.key for outcome in outcomes],
         "physics_key": [str(outcome.attributes.get("physics_key", "")) for outcome in outcomes],
         "status": [outcome.status for outcome in outcomes],
@@ -73,25 +80,36 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
         "precision": [item.precision for item in series],
         "digest": [item.digest for item in series],
     }
-    columns = {name: _text_column(name, values) for name, values in texts.items()}
+    columns = {name: _text_column(name, values) for name, values in words.items()}
     columns["serial"] = np.full(len(outcomes), serial)
     columns["samples"] = np.array([item.samples for item in series], int)
     columns["end"] = np.array([item.end for item in series], float)
     numbers = np.array([outcome.numbers for outcome in outcomes], ROW)
-    lines = (_line(outcome.attributes) for outcome in outcomes)
-    return Segment(Path(), columns, numbers, _packed(lines))
+    columns["timeout"] = np.array([_timeout(outcome) for outcome in outcomes], float)
+    texts = _packed(_line(outcome.attributes) for outcome in outcomes)
+    return Segment(Path(), columns, numbers, texts, _packed(_line(o.detail) for o in outcomes))
+
+
+def _timeout(outcome: Outcome) -> float:
+    if outcome.reason != "budget_seconds":
+        return 0.0
+    return float(json.loads(outcome.attributes["case"])["solve"]["timeout_s"])
 
 
 def _text_column(name: str, values: Sequence[str]) -> np.ndarray:
     return np.array([storable(value).encode() for value in values], COLUMNS[name][0])
 
 
-def _line(attributes: dict[str, Any]) -> bytes:
-    return json.dumps(attributes, default=lambda array: array.tolist()).encode()
+def _line(value: Any) -> bytes:
+    return json.dumps(value, default=lambda array: array.tolist()).encode()
 
 
 def _packed(lines: Iterable[bytes]) -> bytes:
     return zlib.compress(b"\n".join(lines), level=1)
+
+
+def _unpacked(packed: bytes) -> list[bytes]:
+    return zlib.decompress(packed).split(b"\n")
 
 
 def encode(segment: Segment) -> bytes:
@@ -108,8 +126,10 @@ def encode(segment: Segment) -> bytes:
     for name, (dims, unit, phrase) in NUMBERS.items():
         attrs = {"units": unit, "long_name": phrase}
         variables[name] = (("row", *dims), segment.numbers[name], attrs)
-    data = np.frombuffer(segment.texts, np.uint8)
-    variables["attributes"] = (("byte",), data, {"long_name": "zlib of JSON, a line a row"})
+    for name, packed in (("attributes", segment.texts), ("details", segment.notes)):
+        data = np.frombuffer(packed, np.uint8)
+        attrs = {"long_name": "zlib of JSON, a line a row"}
+        variables[name] = ((f"bytes_of_{name}",), data, attrs)
     variables["key_again"] = (("row",), columns["key"], {"long_name": COLUMNS["key"][1]})
     return image(variables, {"Conventions": "SI units"})
 
@@ -132,14 +152,22 @@ def decode(data: bytes, path: Path) -> Segment:
                 if values.shape != numbers[name].shape or values.dtype.kind != "f":
                     raise ValueError(name)
                 numbers[name] = values
-        return Segment(path, columns, numbers, file["attributes"][()].tobytes())
+        blobs = (file[name][()].tobytes() for name in ("attributes", "details"))
+        return Segment(path, columns, numbers, *blobs)
 
 
 def merge(segments: Sequence[Segment]) -> Segment:
     """One segment with the rows that count of several segments, without a path."""
     rows = Rows.of(segments)
-    lines = (rows.line(position) for position in range(len(rows)))
-    return Segment(Path(), rows.columns, rows.numbers, _packed(lines))
+    chosen = [*zip(rows.source.tolist(), rows.row.tolist(), strict=True)]
+    texts = [_unpacked(segment.texts) for segment in segments]
+    return Segment(
+        Path(),
+        rows.columns,
+        rows.numbers,
+        _packed(texts[source][row] for source, row in chosen),
+        _packed(segments[source].details[row] for source, row in chosen),
+    )
 
 
 def read_segment(path: Path) -> Segment:
@@ -170,7 +198,7 @@ class Cut(DamagedJob):
 @lru_cache(maxsize=4)
 def _lines(segment: Segment) -> list[bytes]:
     """The attributes of each row of a segment, as JSON."""
-    return zlib.decompress(segment.texts).split(b"\n")
+    return _unpacked(segment.texts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,15 +254,16 @@ class Rows:
         names = ("status", "reason", "precision")
         return {name: np.char.decode(self.columns[name], "utf-8", "replace") for name in names}
 
-    def line(self, position: int) -> bytes:
-        """A job's attributes as JSON."""
-        return _lines(self.segments[self.source[position]])[self.row[position]]
+    def detail(self, position: int) -> str:
+        """What is known of a job's failure."""
+        return json.loads(self.segments[self.source[position]].details[self.row[position]])
 
     def attributes(self, position: int) -> dict[str, Any]:
-        """A job's attributes."""
+        """A job's attributes; quick for jobs of the same segment one after the other."""
+        line = _lines(self.segments[self.source[position]])[self.row[position]]
         return {
             name: np.array(value) if isinstance(value, list) else value
-            for name, value in json.loads(self.line(position)).items()
+            for name, value in json.loads(line).items()
         }
 
     def path(self, position: int) -> Path | None:

@@ -10,7 +10,6 @@ appears under its name only when all of it is on disk, and carries a digest of i
 no index: what is stored is read from the rows. `compressor.writer` writes them.
 """
 
-import json
 import os
 import warnings
 from collections.abc import Sequence
@@ -106,16 +105,14 @@ class Stored:
         """How the job at a position of `rows` ended."""
         rows = self.rows
         words = {name: str(values[position]) for name, values in rows.words.items()}
-        attributes = rows.attributes(position) if words["status"] != "ok" else {}
-        timed_out = words["reason"] == "budget_seconds"
         return JobStatus(
             rows.columns["key"][position].decode(),
             words["status"],
             words["reason"],
-            str(attributes.get("detail", "")),
+            rows.detail(position) if words["status"] != "ok" else "",
             int(rows.columns["samples"][position]),
             words["precision"],
-            json.loads(attributes["case"])["solve"]["timeout_s"] if timed_out else 0.0,
+            float(rows.columns["timeout"][position]),
             rows.numbers[position],
         )
 
