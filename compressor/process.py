@@ -39,6 +39,13 @@ def start_method() -> str:
     return "fork" if sys.platform == "linux" and alone else "spawn"
 
 
+def cores() -> int:
+    """How many cores this process may use, by its affinity and its container's quota."""
+    import joblib
+
+    return joblib.cpu_count()
+
+
 def memory_share(count: int) -> int:
     """Bytes for each of `count` workers: three quarters of the machine's, or the container's."""
     most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

@@ -50,6 +50,7 @@ __all__ = [
     "write_study",
 ]
 
+BROKEN = {"internal_error", "worker_died", "out_of_memory"}  # reasons that leave no time series
 ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 
 
@@ -63,7 +64,6 @@ class JobStatus:
     detail: str
     samples: int  # of the time series; 0 where only metrics are kept
     precision: str  # of the time series: double | single
-    timeout: float  # wall time that a job was given which ran out of it, s; 0 for others
     numbers: np.void  # dtype schema.ROW
 
     def serves(self, case: Case) -> bool:
@@ -71,10 +71,10 @@ class JobStatus:
 
         The one place that knows of what a case may ask for without it being in its key.
         """
-        if self.reason == "internal_error":
+        if self.reason == "budget_seconds":
+            return False  # a machine with more time to spare may do it
+        if self.reason in BROKEN:
             return True
-        if self.reason == "budget_seconds" and case.solve.timeout_s > self.timeout:
-            return False
         if case.output.keep == "metrics":
             return True
         return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
@@ -112,7 +112,6 @@ class Stored:
             rows.detail(position) if words["status"] != "ok" else "",
             int(rows.columns["samples"][position]),
             words["precision"],
-            float(rows.columns["timeout"][position]),
             rows.numbers[position],
         )
 

@@ -1,50 +1,36 @@
 """Run the jobs of studies that the store does not hold yet, in worker processes.
 
-Workers get batches of jobs, store the time series that are kept, and send home the outcomes; this
-process alone writes the rows that make them stored (`compressor.writer`). A run that fails, or
-breaks, is a result with a named reason. Only this module imports joblib.
+Workers (`compressor.workers`) store the time series that are kept and send home the outcomes; this
+process alone writes the rows that make them stored (`compressor.writer`). A run that fails, breaks,
+or takes its worker with it, is a result with a named reason.
 """
 
-import contextlib
-import itertools
 import json
 import math
-import os
-import signal
 import threading
 import time
-import traceback
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from multiprocessing import resource_tracker
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
-from joblib.externals.loky.backend import resource_tracker as loky_tracker
-from joblib.externals.loky.process_executor import BrokenProcessPool
 
 import compressor
 from compressor.case import Case
 from compressor.plan import Study
 from compressor.schema import ROW, Outcome
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
+from compressor.workers import Done, Lost, rest, run_batches
 from compressor.writer import Writer
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
-BATCH_SECONDS = 0.2  # of work for a worker at a time
+GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
 PATIENCE = 2.0  # s of compiling before a remark on it
-SIGNAL_DELAY = 0.2  # s; what ended a worker may be a signal that is on its way to us, too
 COMPILING = "compiling the equations (once per machine, under a minute)"
-DIED = "a worker process died: killed from outside, or out of memory (-j 1 needs least)"
-
-
-class WorkerDied(Exception):
-    """A worker process was killed from outside, or crashed."""
 
 
 class End(NamedTuple):
@@ -101,7 +87,7 @@ def sweep(
 ) -> Summary:
     """Run what is missing of some studies and store it in a folder; failed jobs only on request.
 
-    Raises StoreError, and WorkerDied; whatever ends a sweep early, finished jobs are stored and
+    Raises StoreError, and WorkersFailed; whatever ends a sweep early, finished jobs are stored and
     the same call goes on.
     """
     began = time.monotonic()
@@ -135,15 +121,30 @@ def run_missing(
             done += len(acknowledged)
             progress(done, total, "")
 
+    def keep(end: Done | Lost) -> None:
+        outcome = settled(end)
+        ends[outcome.key] = End(outcome.status, outcome.reason, outcome.detail)
+        tell(writer.add(outcome))
+
     progress(done, total, "")
-    warm_up(lambda: progress(done, total, COMPILING))
-    with contextlib.closing(run_jobs(writer.place, missing, workers)) as batches:
-        try:
-            for outcome in itertools.chain.from_iterable(batches):
-                ends[outcome.key] = End(outcome.status, outcome.reason, outcome.detail)
-                tell(writer.add(outcome))
-        finally:
-            tell(writer.flush())
+    warm_up(missing, lambda remark: progress(done, total, remark))
+    running = run_batches(
+        partial(run_job, writer.place),
+        ((case, case, case.solve.timeout_s) for case in missing),
+        workers,
+        total=len(missing),
+        grace=GRACE,
+        pulse=lambda: tell(writer.flush_if_due()),
+    )
+    try:
+        for end in running:
+            keep(end)
+    except BaseException as error:
+        for end in rest(running, error):  # which raises it again
+            keep(end)
+    finally:
+        running.close()
+        tell(writer.flush())
 
 
 def wanted(studies: Sequence[Study]) -> dict[str, Case]:
@@ -187,111 +188,53 @@ def endings(
     return tuple(counts), tuple(failures)
 
 
-def warm_up(remark: Callable[[], None]) -> None:
-    """Compile the equations before the workers start, or each of them would do so."""
-    from compressor.simulation import simulate  # needs numba: only where something is simulated
+def warm_up(cases: Sequence[Case], remark: Callable[[str], None]) -> None:
+    """Load what the cases need, and compile the equations, before any worker has to."""
+    from compressor.simulation import measure  # needs numba: only where something is simulated
 
-    timer = threading.Timer(PATIENCE, remark)
+    timer = threading.Timer(PATIENCE, remark, [COMPILING])
     timer.daemon = True
     timer.start()
+    began = time.monotonic()
     try:
         solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
-        simulate(Case.from_values({"solve": solve}))
-        simulate(Case.from_values({"solve": solve, "joint": "both", "clearance_mm": 0.1}))
+        measure(Case.from_values({"solve": solve}))
+        for method in sorted({"auto"} | {case.solve.method for case in cases}):
+            values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | {"method": method}}
+            measure(Case.from_values(values))
     finally:
         timer.cancel()
+        timer.join()  # workers are forked from one thread
+    seconds = time.monotonic() - began
+    if seconds > PATIENCE:
+        remark(f"compiled in {seconds:.0f} s")
 
 
-class Batches:
-    """Cases in batches of about BATCH_SECONDS, by how long the jobs before them took."""
+def run_job(place: Path, case: Case) -> Outcome | StoreError:
+    """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
 
-    def __init__(self, cases: Sequence[Case], workers: int):
-        self.cases, self.workers = cases, workers
-        self.pace = BATCH_SECONDS  # s a job
-
-    def __iter__(self) -> Iterator[Sequence[Case]]:
-        begin = 0
-        while begin < len(self.cases):
-            fair = math.ceil((len(self.cases) - begin) / (2 * self.workers))
-            end = begin + max(1, min(fair, round(BATCH_SECONDS / self.pace)))
-            yield self.cases[begin:end]
-            begin = end
-
-    def learn(self, jobs: int, seconds: float) -> None:
-        """Take note of how long a batch took."""
-        self.pace += 0.5 * (max(seconds / jobs, 1e-5) - self.pace)
-
-
-def run_jobs(
-    place: Path, cases: Sequence[Case], workers: int
-) -> Generator[list[Outcome], None, None]:
-    """Run cases in worker processes and yield how they ended, in batches as they end.
-
-    Closing the iterator, or an exception in it, kills the workers.
+    A StoreError is returned: it ends the sweep, while an exception is a failure of the job.
     """
-    count = min(workers, len(cases))
-    batches = Batches(cases, count)
-    calls = (delayed(timed_batch)(place, batch, os.getpid()) for batch in batches)
-    with parallel_config(backend="loky", inner_max_num_threads=1):
-        parallel = Parallel(count, return_as="generator_unordered", max_nbytes=None, batch_size=1)
-        with terminal_signals_blocked():
-            results = parallel(calls)
-    try:
-        for outcomes, seconds in results:
-            batches.learn(len(outcomes), seconds)
-            yield outcomes
-    except BrokenProcessPool as error:
-        time.sleep(SIGNAL_DELAY)
-        raise WorkerDied(DIED) from error
-    finally:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # joblib warns of what closing early is meant to do
-            results.close()
-
-
-@contextlib.contextmanager
-def terminal_signals_blocked() -> Iterator[None]:
-    """Processes started here ignore Ctrl-C and a closed terminal: it is ours to end them."""
-    for tracker in (resource_tracker, loky_tracker):
-        tracker.ensure_running()  # each unblocks SIGINT when it starts
-    old = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, old)
-
-
-def timed_batch(place: Path, cases: Sequence[Case], parent: int) -> tuple[list[Outcome], float]:
-    """`run_batch` in a worker, and how long it took in s."""
-    follow(parent)
-    began = time.monotonic()
-    return run_batch(place, cases), time.monotonic() - began
-
-
-def run_batch(place: Path, cases: Sequence[Case]) -> list[Outcome]:
-    """Simulate cases and store their time series in a place; the rows are left to the Writer."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
-        return [run_job(place, case) for case in cases]
-
-
-def run_job(place: Path, case: Case) -> Outcome:
-    """Simulate one case; whatever breaks is a failed job, too."""
     from compressor import simulation  # needs numba: only where something is simulated
 
-    try:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
         if case.output.keep == "metrics":
             return simulation.measure(case)
         found, dataset = simulation.observe(case)
+    try:
         return replace(found, series=write_series(place, dataset, case.output))
-    except StoreError:
-        raise
-    except Exception as error:
-        return broken(case, error)
+    except StoreError as error:
+        return error
 
 
-def broken(case: Case, error: Exception) -> Outcome:
-    """The outcome of a job whose simulation raised an exception, which is a bug of ours."""
+def settled(end: Done | Lost) -> Outcome:
+    """The outcome of a job, also of one that raised an exception or lost its worker."""
+    if isinstance(end, Done):
+        if isinstance(end.result, StoreError):
+            raise end.result
+        return end.result
+    case: Case = end.id
     attributes = {
         "key": case.key,
         "physics_key": case.physics_key,
@@ -299,20 +242,8 @@ def broken(case: Case, error: Exception) -> Outcome:
         "case": json.dumps(case.values(), sort_keys=True),
         "complete": 0,
         "program": f"compsim {compressor.__version__}",
-        "detail": f"{type(error).__name__}: {error}",
-        "traceback": "".join(traceback.format_exception(error)),
+        "detail": end.detail,
     }
-    return Outcome("failed", "internal_error", np.full(1, math.nan, ROW)[0], attributes)
-
-
-@cache
-def follow(parent: int) -> None:
-    """Have this process end when its parent does, even by SIGKILL."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
-    if os.getpid() != parent:
-        threading.Thread(target=watch, daemon=True).start()
+    if end.traceback:
+        attributes["traceback"] = end.traceback
+    return Outcome("failed", end.reason, np.full(1, math.nan, ROW)[0], attributes)

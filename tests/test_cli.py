@@ -268,6 +268,15 @@ def test_a_terminal_gets_one_line_that_is_rewritten(capsys, monkeypatch):
     assert "\n" not in err
 
 
+def test_a_remark_stays_above_the_line_that_is_rewritten(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    screen = cli.Screen(quiet=False)
+    for event in [(0, 11, ""), (0, 11, "compiled in 43 s"), (1, 11, "")]:
+        screen(*event)
+    err = capsys.readouterr().err
+    assert re.search(r"\r0 of 11 jobs, 0 %\r +\rcompiled in 43 s\n\r0 of 11 jobs, 0 %", err)
+
+
 @pytest.mark.parametrize(
     ("seconds", "text"),
     [(0.04, "0.0 s"), (9.9, "9.9 s"), (99, "99 s"), (101, "2 min"), (7200, "2 h 00 min")],

@@ -60,7 +60,7 @@ DOORS = {
     "numba": {"physics._jit"},
     "scipy": {"integrate", "analysis", "plan"},
     "yaml": {"plan", "reading"},
-    "joblib": {"sweep"},
+    "joblib": {"process"},
     "h5py": {"hdf5"},
     "matplotlib": {"figures"},
     "click": set(),

@@ -196,28 +196,29 @@ def test_a_key_cannot_lead_out_of_the_store(key, ideal, tmp_path):
         store.write_series(tmp_path, ideal.assign_attrs(key=key), Output())
 
 
-SERVING = [  # output and timeout of what is stored, reason, output and timeout of the case, serves
-    ("series", "double", 1, "", "metrics", "double", 9, True),
-    ("metrics", "double", 1, "", "series", "double", 1, False),
-    ("series", "single", 1, "", "series", "double", 1, False),
-    ("series", "double", 1, "", "series", "single", 1, True),
-    ("metrics", "double", 1, "budget_seconds", "metrics", "double", 9, False),
-    ("metrics", "double", 9, "budget_seconds", "metrics", "double", 9, True),
-    ("metrics", "double", 1, "internal_error", "series", "double", 9, True),
+SERVING = [  # output of what is stored, its reason, output of the case, serves
+    ("series", "double", "", "metrics", "double", True),
+    ("metrics", "double", "", "series", "double", False),
+    ("series", "single", "", "series", "double", False),
+    ("series", "double", "", "series", "single", True),
+    ("metrics", "double", "budget_steps", "metrics", "double", True),
+    ("metrics", "double", "budget_seconds", "metrics", "double", False),
+    ("metrics", "double", "internal_error", "series", "double", True),
+    ("metrics", "double", "worker_died", "series", "double", True),
+    ("metrics", "double", "out_of_memory", "series", "double", True),
 ]
 
 
 @pytest.mark.parametrize("row", SERVING)
 def test_what_a_stored_job_serves(row, ideal, tmp_path):
-    keeps, precision, timeout, reason, asks, exact, more, serves = row
-    values = {"output": {"keep": keeps, "precision": precision}, "solve": {"timeout_s": timeout}}
-    text = json.dumps(Case.from_values(values).values())
+    keeps, precision, reason, asks, exact, serves = row
+    text = json.dumps(
+        Case.from_values({"output": {"keep": keeps, "precision": precision}}).values()
+    )
     dataset = ideal if keeps == "series" else ideal.drop_dims("time")
     dataset = dataset.assign(status="failed" if reason else "ok", reason=reason)
     keep(tmp_path, dataset.assign_attrs(case=text))
-    case = Case.from_values(
-        {"output": {"keep": asks, "precision": exact}, "solve": {"timeout_s": more}}
-    )
+    case = Case.from_values({"output": {"keep": asks, "precision": exact}})
     assert store.job_status(tmp_path, ideal.attrs["key"]).serves(case) == serves
 
 

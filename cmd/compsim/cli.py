@@ -32,16 +32,20 @@ MOST_FAILURES = 20  # listed one by one
 FORESEEN = {
     "CaseFileError": ("", USAGE),
     "StoreError": ("compsim: ", STORE),
-    "WorkerDied": ("compsim: ", INTERNAL),
+    "WorkersFailed": ("compsim: ", INTERNAL),
 }
 ADVICE = {
     "budget_steps": "raise solve.max_steps",
-    "budget_seconds": "raise solve.timeout_s; the same command then tries again",
+    "budget_seconds": "the same command tries again; raise solve.timeout_s if that is not enough",
     "penetration_implausible": "the contact is too soft for the forces: check contact.stiffness, "
     "masses and speed, and their units",
     "non_finite": "the motion leaves what the model can describe: check the values that are swept "
     "furthest, and gas.head_clearance_mm",
     "step_underflow": "try another solve.method, such as Radau",
+    "worker_died": "a crash, or killed from outside, or for want of memory: use a smaller -j; if "
+    "it stays, a bug of compsim: please report it with the case",
+    "out_of_memory": "use a smaller -j, which gives each worker more memory, a longer "
+    "solve.output_step_deg, or output.keep=metrics",
     "internal_error": "a bug of compsim: please report it, with what Python prints for "
     "compressor.store.read_job(FOLDER, JOB).traceback",
 }
@@ -72,13 +76,13 @@ class Screen:
         text = f"{done} of {total} jobs, {100 * done // total} %{self.time_left()}"
         if self.quiet:
             return
-        if self.live:
-            line = f"{text}; {remark}" if remark else text
-            say(f"\r{line:<{self.width}}", end="")
-            self.width = len(line)
-        elif remark:
+        if remark:
+            self.end()
             say(remark)
-        elif time.monotonic() - self.told > QUIET_SECONDS:
+        if self.live:
+            say(f"\r{text:<{self.width}}", end="")
+            self.width = len(text)
+        elif not remark and time.monotonic() - self.told > QUIET_SECONDS:
             self.told = time.monotonic()
             say(text)
 
@@ -130,7 +134,7 @@ def cli() -> None:
 @click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
 @click.option("-o", "--output", default="results", show_default=True, help="Folder of results.")
 @click.option(
-    "-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
+    "-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
     help="Worker processes.",
 )  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
@@ -142,7 +146,7 @@ def run(
     context: click.Context,
     configs: tuple[str, ...],
     output: str,
-    jobs: int,
+    jobs: int | None,
     overrides: tuple[str, ...],
     retry_failed: bool,
     quiet: bool,
@@ -152,6 +156,9 @@ def run(
     Jobs that are stored already are not run again, so a run that was interrupted goes on where it
     ended. A summary line for each study goes to stdout.
     """
+    from compressor.process import cores, one_thread_each
+
+    one_thread_each()  # before numpy loads
     from compressor.plan import load_studies
 
     studies = load_studies(*configs, overrides=overrides)
@@ -159,7 +166,7 @@ def run(
 
     screen = Screen(quiet)
     try:
-        summary = sweep(studies, output, jobs, screen, context.obj, retry_failed)
+        summary = sweep(studies, output, jobs or cores(), screen, context.obj, retry_failed)
     except BaseException:
         screen.end()
         if screen.total:
