@@ -10,9 +10,10 @@ import itertools
 import math
 import time
 from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
 import numpy as np
-from scipy import integrate as scipy_integrate
 
 from compressor.physics.control import Mode
 from compressor.physics.loads import sample_segments, segments
@@ -27,9 +28,6 @@ COMPILED = {
     "DOPRI5": (Mode.EXPLICIT, Pair.DOPRI5),
     "TSIT5": (Mode.EXPLICIT, Pair.TSIT5),
     "RODAS": (Mode.STIFF, Pair.DOPRI5),
-}
-SCIPY = {
-    name: getattr(scipy_integrate, name) for name in ("LSODA", "Radau", "BDF", "DOP853", "RK45")
 }
 # Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
 # revolution at the small end (LSODA up to 4 times, BDF 2.5, RK45 2), so they get a share of it.
@@ -250,6 +248,14 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
         result.evaluations = right_hand_side.evaluations
 
 
+@cache
+def scipy_method(name: str) -> Any:
+    """SciPy's method of a name, loaded when first used: a third of what a short run would take."""
+    from scipy import integrate as scipy_integrate
+
+    return getattr(scipy_integrate, name)
+
+
 class Segment:
     """One stretch between load corners, stepped by a fresh SciPy solver."""
 
@@ -264,7 +270,7 @@ class Segment:
         request, result = self.request, self.result
         result.stop_time, result.stop_state = self.begin, z[:-FLOWS]
         rtol = max(request.rtol * LOCAL.get(request.method, 1.0), LEAST_RTOL)
-        solver = SCIPY[request.method](
+        solver = scipy_method(request.method)(
             self.right_hand_side,
             self.begin,
             z,

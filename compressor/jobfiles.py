@@ -10,15 +10,18 @@ row is on disk.
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor import hdf5
 from compressor.case import Output
 from compressor.durable import StoreError, publish
 from compressor.hdf5 import REMEDY, DamagedJob, digest, opened
-from compressor.schema import NUMBERS, SeriesFile
+from compressor.schema import NUMBERS, SeriesFile, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 KEY = re.compile(r"[0-9a-f]{20}")
 NAME = re.compile(r"([0-9a-f]{20})-([0-9a-f]{20})\.h5")
@@ -32,15 +35,15 @@ def series_path(place: Path, key: str, checksum: str) -> Path:
     return place / "jobs" / f"{key}-{checksum}.h5"
 
 
-def write_series(place: Path, dataset: xr.Dataset, output: Output) -> SeriesFile:
-    """Store a job's Dataset, as `compressor.simulate` returns it, durably."""
+def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> SeriesFile:
+    """Store a job's Dataset, or what it is made of, durably."""
     series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
     rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
     data = hdf5.image(
         {
             str(name): (
                 tuple(map(str, item.dims)),
-                item.to_numpy().astype("f4") if name in rounded else item.to_numpy(),
+                item.values.astype("f4") if name in rounded else item.values,
                 item.attrs,
             )
             for name, item in dataset.variables.items()
@@ -48,7 +51,7 @@ def write_series(place: Path, dataset: xr.Dataset, output: Output) -> SeriesFile
         {str(name): value for name, value in dataset.attrs.items()},
         series if output.compress else (),
     )
-    checksum, times = digest(data), dataset["time"].values
+    checksum, times = digest(data), dataset.variables["time"].values
     publish(series_path(place, dataset.attrs["key"], checksum), data)
     return SeriesFile(times.size, float(times[-1]), output.precision, checksum)
 
@@ -73,8 +76,10 @@ def _bytes(path: Path) -> bytes:
     return data
 
 
-def read_series(path: Path) -> xr.Dataset:
+def read_series(path: Path) -> "xr.Dataset":
     """A job's Dataset, from a file. Raises DamagedJob."""
+    import xarray as xr
+
     with opened(_bytes(path), path) as file:
         attributes = hdf5.attributes(file)
         if attributes["key"] != path.name[:20]:

@@ -11,7 +11,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +133,8 @@ class Worker:
 def start(context: Any, work: Callable[[Any], Any], rules: Rules) -> Worker:
     """Start a worker; signals should be blocked, or they could end it before it is known."""
     if not rules.forked:
+        from multiprocessing import resource_tracker
+
         resource_tracker.ensure_running()  # which unblocks signals where it starts
     ours, theirs = socket.socketpair()
     ours.setblocking(False)

@@ -5,7 +5,7 @@ so that results are read without loading either.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -88,6 +88,22 @@ class Outcome:
         for name, (dims, unit, phrase) in NUMBERS.items():
             named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
         return named
+
+
+class Variable(NamedTuple):
+    """A variable as xarray has it: names of its dimensions, values, attributes."""
+
+    dims: tuple[str, ...]
+    values: np.ndarray
+    attrs: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Table:
+    """What a Dataset is made of; xarray takes half a second to load, which storing a job spares."""
+
+    variables: dict[str, Variable]
+    attrs: dict[str, Any]
 
 
 def coordinates() -> dict[str, tuple]:

@@ -4,10 +4,9 @@ import json
 import math
 from functools import cache
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 import compressor
 from compressor.case import MODEL_VERSION, Case
@@ -16,7 +15,10 @@ from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS, Scene
 from compressor.record import offsets, record, scene
-from compressor.schema import ROW, Outcome, coordinates
+from compressor.schema import ROW, Outcome, Table, Variable, coordinates
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # name: (column, extra dimensions, unit, long name)
 SERIES = {
@@ -35,25 +37,28 @@ SERIES = {
 }  # fmt: skip
 
 
-def simulate(case: Case) -> xr.Dataset:
+def simulate(case: Case) -> "xr.Dataset":
     """Simulate one case and return its Dataset (DESIGN 4): series, metrics, status.
 
     Dims: time, joint, axis; SI units in the attributes. A run that fails is no exception: its
     `status` is "failed", `reason` says why by a stable name, and its series are nan from where it
     stopped. Metrics are taken over the dense solution after `settle_rev`.
     """
-    return observe(case)[1]
+    import xarray as xr
+
+    table = observe(case)[1]
+    return xr.Dataset(table.variables, attrs=table.attrs)
 
 
-def observe(case: Case) -> tuple[Outcome, xr.Dataset]:
-    """Simulate one case for its `Outcome` and its Dataset (see `simulate`)."""
+def observe(case: Case) -> tuple[Outcome, Table]:
+    """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
     p, trajectory = solve(case)
     found = outcome(case, p, trajectory)
-    variables, coords = found.variables(), coordinates()
+    variables = found.variables() | coordinates()
     if case.output.keep == "series":
         variables |= series(p, trajectory)
-        coords["time"] = ("time", trajectory.times, {"units": "s", "long_name": "time"})
-    return found, xr.Dataset(variables, coords, found.attributes)
+    named = {name: Variable(d, np.asarray(v), attrs) for name, (d, v, attrs) in variables.items()}
+    return found, Table(named, found.attributes)
 
 
 def measure(case: Case) -> Outcome:
@@ -81,7 +86,10 @@ def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
     observe_all(trajectory.times, trajectory.states, trajectory.phases, p, rows)
     rows[np.isnan(trajectory.states).any(axis=1)] = math.nan
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
-    variables: dict[str, tuple] = {"crank_angle": ("time", p.omega * trajectory.times, angle)}
+    variables: dict[str, tuple] = {
+        "time": (("time",), trajectory.times, {"units": "s", "long_name": "time"}),
+        "crank_angle": (("time",), p.omega * trajectory.times, angle),
+    }
     sizes = {"joint": 2, "axis": 2}
     for name, (column, dims, unit, phrase) in SERIES.items():
         shape = tuple(sizes[dim] for dim in dims)

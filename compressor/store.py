@@ -15,18 +15,20 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.case import Case
 from compressor.durable import Folder, StoreError, discard_leftovers, system_error
 from compressor.hdf5 import DamagedJob
 from compressor.jobfiles import KEY, read_series, read_values, write_series
-from compressor.labels import grid, labelled, table_of_jobs
 from compressor.manifest import StoredAxis, StoredStudy, points, read_studies, write_study
 from compressor.schema import Outcome, coordinates
 from compressor.segments import NAME, Cut, Rows, Segment, read_segment
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "DamagedJob",
@@ -121,7 +123,7 @@ class Stored:
         attributes = self.rows.attributes(position)
         return Outcome(words["status"], words["reason"], self.rows.numbers[position], attributes)
 
-    def job(self, key: str) -> xr.Dataset:
+    def job(self, key: str) -> "xr.Dataset":
         """A stored job's Dataset. Raises StoreError where there is none, or a damaged one."""
         if not KEY.fullmatch(key):
             raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
@@ -131,6 +133,8 @@ class Stored:
         path = self.rows.path(position)
         if path is not None:
             return read_series(path)
+        import xarray as xr
+
         found = self.outcome(position)
         return xr.Dataset(found.variables(), coordinates(), found.attributes)
 
@@ -192,7 +196,7 @@ def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
     raise StoreError(folder, "changes faster than it can be read", "try again")
 
 
-def read_job(folder: Folder, key: str) -> xr.Dataset:
+def read_job(folder: Folder, key: str) -> "xr.Dataset":
     """A stored job's Dataset (`Stored.job`); who reads many jobs keeps a `Stored`."""
     return read_store(folder).job(key)
 
@@ -207,7 +211,7 @@ def finished_keys(folder: Folder) -> set[str]:
     return read_store(folder).keys()
 
 
-def open_study(folder: Folder, name: str | None = None) -> xr.Dataset:
+def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
     """A study as one Dataset, labelled by its axes; series are read when they are used.
 
     One study (that of `name`, or the only one) has its axes as dimensions: the last part of each
@@ -219,6 +223,8 @@ def open_study(folder: Folder, name: str | None = None) -> xr.Dataset:
     Series have the dimension `time`. If the jobs have different output grids (a swept speed),
     they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.
     """
+    from compressor.labels import grid, labelled, table_of_jobs  # loads xarray: half a second
+
     folder = os.path.abspath(folder)
     studies = read_studies(folder)
     if name is not None:

@@ -25,7 +25,7 @@ from compressor import open_study
 from compressor.case import Case, Output
 from compressor.jobfiles import read_series, series_path, write_series
 from compressor.manifest import StoredAxis, StoredStudy, encode
-from compressor.simulation import measure, observe
+from compressor.simulation import measure, simulate
 from compressor.store import read_store
 from compressor.verification import verify
 from compressor.writer import Writer
@@ -108,7 +108,7 @@ def rows(folder, jobs):
 
 def series(folder):
     """Size and time of a default job's file in each form of its time series."""
-    _, dataset = observe(Case.from_values(WORN))
+    dataset = simulate(Case.from_values(WORN))
     found = []
     for output in OUTPUTS:
         write, kept = timed(lambda output=output: write_series(folder, dataset, output), 5)
