@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench peers readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -50,6 +50,12 @@ claims: install  ## measure the paper's claims over a range of masses (seconds)
 
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
 	$(BIN)/python tests/measure_store.py tests/results/store.json
+
+peers: install  ## time other tools and ours in turn on one problem (about five minutes)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
+	  || echo "going on without numbalsoda: it needs a Fortran compiler"
+	$(BIN)/python tests/measure_peers.py tests/results/peers.json
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md

@@ -64,11 +64,39 @@ def store_table():
     return "\n".join(lines) + "\n"
 
 
+def of_scenes(rows, key, digits):
+    """One quantity of a tool in the three scenes; a dash where it has none."""
+    numbers = (f"{float(f'{row[key]:.{digits}g}'):g}" if key in row else "–" for row in rows)
+    return " / ".join(numbers)
+
+
+def peers_table():
+    kept_rows = kept("peers.json")["rows"]
+    lines = [
+        "| tool | settings | s | error | ours, s | ours, rtol | times faster | solver alone |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for tool in dict.fromkeys(row["tool"] for row in kept_rows):
+        rows = [row for row in kept_rows if row["tool"] == tool]
+        if not any("seconds" in row for row in rows):
+            lines.append(f"| {tool} | {rows[0]['reason']} | | | | | | |")
+            continue
+        cells = [tool, rows[0]["settings"]]
+        for key, digits in (
+            ("seconds", 2), ("error", 1), ("our_seconds", 2), ("our_rtol", 1),
+            ("ratio", 2), ("kernel_ratio", 2),
+        ):  # fmt: skip
+            cells.append(of_scenes(rows, key, digits))
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
     "claims": claims_table,
     "store": store_table,
+    "peers": peers_table,
 }
 
 

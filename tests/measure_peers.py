@@ -1,0 +1,234 @@
+"""Time other tools and ours in turn on one problem, at equal or better error (make peers).
+
+Writes a small JSON file. All run on one core, in rounds: each tool, then ours at the loosest
+tolerance whose error is no greater than that tool's. A call starts from the problem's numbers and
+ends with the crosshead's acceleration on the output grid of 0.1 ms; ours is the whole
+`simulate(case)`, with all its series, metrics and energy balance, the kernel's own seconds beside
+it. Errors are against the reference of tests/reference.py. What is not installed, or fails, is a
+row with its reason.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+import reference
+from measure_accuracy import provenance
+from peers import multibody, notebook, soda
+from peers.mechanism import DURATION, SCENES, case_values, error, output_grid, params
+
+from compressor.case import Case
+from compressor.simulation import simulate
+
+LADDER = (1e-3, 3e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
+ROUNDS = 5
+LIBRARIES = ("exudyn", "scikit-sundae", "numbalsoda")
+TIGHT = 1e-9  # tolerance of Exudyn's run that verifies ours
+FIRST_CALL = """
+import json, sys, time
+from compressor.case import Case
+from compressor.simulation import simulate
+case = Case.from_values(json.loads(sys.argv[1]))
+began = time.perf_counter()
+simulate(case)
+print(time.perf_counter() - began)
+"""
+
+
+class Peer(NamedTuple):
+    """A tool with its settings; `run(scene)` gives the crosshead's acceleration."""
+
+    tool: str
+    settings: str
+    run: Callable
+
+
+PEERS = (
+    Peer("SciPy LSODA, plain Python", "rtol 1e-5",
+         partial(notebook.acceleration, notebook.by_scipy, rtol=1e-5)),
+    Peer("Exudyn DOPRI5, symbolic functions", "rtol 1e-6",
+         partial(multibody.acceleration, rtol=1e-6)),
+    Peer("Exudyn generalised-alpha", "h = 1e-5 s", partial(multibody.acceleration, step=1e-5)),
+    Peer("CVODE BDF (scikit-sundae), plain Python", "rtol 1e-6",
+         partial(notebook.acceleration, notebook.by_cvode, rtol=1e-6)),
+    Peer("LSODA in C++ (numbalsoda), numba", "rtol 1e-6", partial(soda.acceleration, rtol=1e-6)),
+)  # fmt: skip
+
+
+def timed(call):
+    """What a call returns, and its wall time (s)."""
+    began = time.perf_counter()
+    found = call()
+    return found, time.perf_counter() - began
+
+
+def ours(scene, rtol):
+    """Our run of a scene, the `Case` made anew."""
+    return simulate(Case.from_values(case_values(scene, rtol=rtol)))
+
+
+def loosest(errors, limit):
+    """The loosest tolerance of {rtol: error} whose error is at most `limit`, or None."""
+    enough = [rtol for rtol, found in errors.items() if found <= limit]
+    return max(enough, default=None)
+
+
+def first_call(peer, scene, truth):
+    """(error, seconds) of a peer's first run of a scene, or the reason why there is none."""
+    try:
+        found, seconds = timed(lambda: peer.run(scene))
+    except Exception as fault:  # any failure of a foreign tool is a row
+        return f"{type(fault).__name__}: {fault}"
+    return error(found, truth), seconds
+
+
+@dataclass
+class Contest:
+    """A peer and ours in one scene, and the seconds of each round."""
+
+    peer: Peer
+    scene: str
+    error: float
+    first: float  # seconds of the peer's first call
+    rtol: float | None  # ours
+    theirs: list[float] = field(default_factory=list)
+    whole: list[float] = field(default_factory=list)
+    kernel: list[float] = field(default_factory=list)
+
+    def round(self):
+        self.theirs.append(timed(lambda: self.peer.run(self.scene))[1])
+        if self.rtol is not None:
+            found, seconds = timed(lambda: ours(self.scene, self.rtol))
+            self.whole.append(seconds)
+            self.kernel.append(float(found["seconds"]))
+
+    def row(self, our_errors):
+        """Medians and ratios."""
+        theirs = median(self.theirs)
+        found = {
+            "seconds": rounded(theirs),
+            "setup_seconds": rounded(max(0.0, self.first - theirs)),
+            "error": rounded(self.error),
+        }
+        if self.rtol is None:
+            return found | {"reason": "none of our tolerances is as exact"}
+        whole, kernel = median(self.whole), median(self.kernel)
+        return found | {
+            "our_rtol": self.rtol,
+            "our_error": rounded(our_errors[self.rtol]),
+            "our_seconds": rounded(whole),
+            "our_kernel_seconds": rounded(kernel),
+            "ratio": rounded(theirs / whole),
+            "kernel_ratio": rounded(theirs / kernel),
+        }
+
+
+def rounded(number):
+    """Three digits."""
+    return float(f"{number:.3g}")
+
+
+def compile_seconds():
+    """Our first call in a new process (s): with nothing compiled yet, and with the code on disk."""
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        values = json.dumps(case_values("both", rtol=1e-5))
+        for name in ("nothing_compiled", "code_on_disk"):
+            done = subprocess.run(
+                [sys.executable, "-c", FIRST_CALL, values],
+                env=environment, capture_output=True, text=True, check=True,
+            )  # fmt: skip
+            found[name] = rounded(float(done.stdout))
+    return found
+
+
+def agreement(scene, truth):
+    """How far ours at 1e-11 lies from the reference, and Exudyn at TIGHT from ours."""
+    best = ours(scene, 1e-11)["acceleration"].values
+    found = {"scene": scene, "ours_to_reference": rounded(error(best, truth))}
+    try:
+        tight = multibody.acceleration(scene, rtol=TIGHT)
+    except Exception as fault:
+        return found | {"reason": f"{type(fault).__name__}: {fault}"}
+    return found | {"exudyn_rtol": TIGHT, "exudyn_to_ours": rounded(error(tight, best))}
+
+
+def tightened(scene, truth):
+    """Errors of numbalsoda's LSODA as its tolerance is tightened: it may step over contacts."""
+    found = {"scene": scene}
+    try:
+        runs = {rtol: soda.acceleration(scene, rtol) for rtol in (1e-6, 1e-7, 1e-8)}
+    except Exception as fault:
+        return found | {"reason": f"{type(fault).__name__}: {fault}"}
+    return found | {f"{rtol:g}": rounded(error(a, truth)) for rtol, a in runs.items()}
+
+
+def contests(scene, truth, our_errors):
+    """The scene's contests, and the rows of the peers that cannot take part."""
+    taking_part, rows = [], []
+    for peer in PEERS:
+        tried = first_call(peer, scene, truth)
+        if isinstance(tried, str):
+            print(f"{scene}: {peer.tool}: {tried}", file=sys.stderr)
+            rows.append({"tool": peer.tool, "settings": peer.settings, "scene": scene,
+                         "reason": tried})  # fmt: skip
+            continue
+        rtol = loosest(our_errors, tried[0])
+        taking_part.append(Contest(peer, scene, *tried, rtol))
+    return taking_part, rows
+
+
+def versions():
+    """Versions of the peers that are installed."""
+    found = {}
+    for name in LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def main(target):
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    errors, contestants, rows, checks, tighter = {}, [], [], [], []
+    for scene in SCENES:
+        print(f"{scene}: reference, errors", file=sys.stderr)
+        truth = reference.reference_solution(params(scene), scene, output_grid(DURATION))["a"]
+        checks.append(agreement(scene, truth))
+        tighter.append(tightened(scene, truth))
+        errors[scene] = {
+            rtol: error(ours(scene, rtol)["acceleration"].values, truth) for rtol in LADDER
+        }
+        taking_part, absent = contests(scene, truth, errors[scene])
+        contestants, rows = contestants + taking_part, rows + absent
+    for number in range(ROUNDS):
+        print(f"round {number + 1} of {ROUNDS}", file=sys.stderr)
+        for contest in contestants:
+            contest.round()
+    for contest in contestants:
+        about = {"tool": contest.peer.tool, "settings": contest.peer.settings}
+        rows.append({**about, "scene": contest.scene, **contest.row(errors[contest.scene])})
+    order = [peer.tool for peer in PEERS]
+    rows.sort(key=lambda row: (order.index(row["tool"]), SCENES.index(row["scene"])))
+    kept = provenance("make peers")
+    kept["versions"] |= versions()
+    kept |= {"rounds": ROUNDS, "our_first_call_seconds": compile_seconds()}
+    kept |= {"agreement": checks, "numbalsoda_tightened": tighter, "rows": rows}
+    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,114 @@
+"""The comparison with other tools: they solve our problem, and the contest is fair."""
+
+import importlib
+import json
+
+import measure_peers
+import numpy as np
+import pytest
+import readme_tables
+from measure_peers import Contest, Peer, first_call, loosest
+from peers import mechanism, multibody, notebook, soda
+
+from compressor.case import Case
+from compressor.simulation import simulate
+
+SHORT = 0.03  # s: a quarter of a revolution, with landings and two phases of the load
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """Our acceleration over SHORT in each scene, at a tight tolerance."""
+    runs = {}
+    for scene in mechanism.SCENES:
+        values = mechanism.case_values(scene, SHORT, rtol=1e-10, settle_rev=0)
+        runs[scene] = simulate(Case.from_values(values))["acceleration"].values
+    return runs
+
+
+@pytest.mark.parametrize("scene", mechanism.SCENES)
+def test_plain_scipy_agrees(exact, scene):
+    found = notebook.acceleration(notebook.by_scipy, scene, 1e-9, SHORT)
+    assert mechanism.error(found, exact[scene]) < 2e-5
+
+
+def test_agreement_would_show_a_wrong_lever_arm(exact, monkeypatch):
+    monkeypatch.setattr(mechanism, "BORE", mechanism.PIN)
+    found = notebook.acceleration(notebook.by_scipy, "small_end", 1e-9, SHORT)
+    assert mechanism.error(found, exact["small_end"]) > 1e-3
+
+
+@pytest.mark.parametrize("scene", mechanism.SCENES)
+def test_exudyn_agrees(exact, scene):
+    pytest.importorskip("exudyn")
+    found = multibody.acceleration(scene, rtol=1e-9, duration=SHORT)
+    assert mechanism.error(found, exact[scene]) < 1e-4
+
+
+def test_exudyn_agrees_with_fixed_steps(exact):
+    pytest.importorskip("exudyn")
+    found = multibody.acceleration("both", step=2e-6, duration=SHORT)
+    assert mechanism.error(found, exact["both"]) < 2e-3
+
+
+@pytest.mark.parametrize("scene", mechanism.SCENES)
+def test_cvode_agrees(exact, scene):
+    pytest.importorskip("sksundae")
+    found = notebook.acceleration(notebook.by_cvode, scene, 1e-9, SHORT)
+    assert mechanism.error(found, exact[scene]) < 1e-4
+
+
+@pytest.mark.parametrize("scene", mechanism.SCENES)
+def test_numbalsoda_agrees(exact, scene):
+    pytest.importorskip("numbalsoda")
+    found = soda.acceleration(scene, 1e-9, SHORT)
+    assert mechanism.error(found, exact[scene]) < 1e-4
+
+
+def test_pieces_share_out_the_grid():
+    taken = mechanism.pieces(mechanism.DURATION)
+    samples = np.concatenate([piece[0] for piece in taken])
+    assert samples.tolist() == list(range(4801))
+    for _, times, wanted, _ in taken:
+        assert (np.diff(times) > 0).all()
+        assert wanted.max() < times.size
+
+
+def test_loosest_tolerance_that_is_no_worse():
+    errors = {1e-3: 3e-2, 1e-4: 4e-3, 1e-5: 5e-3, 1e-6: 1e-4}
+    assert loosest(errors, 4e-3) == 1e-4  # equal is enough
+    assert loosest(errors, 3.9e-3) == 1e-6
+    assert loosest(errors, 1e-5) is None
+
+
+def test_a_peer_that_is_missing_or_fails_gives_a_reason():
+    def missing(scene):
+        return importlib.import_module("no_such_solver")
+
+    def failing(scene):
+        raise RuntimeError(f"{scene}: step underflow")
+
+    assert "no_such_solver" in first_call(Peer("a", "", missing), "both", np.ones(3))
+    reason = first_call(Peer("b", "", failing), "both", np.ones(3))
+    assert reason == "RuntimeError: both: step underflow"
+    found = first_call(Peer("c", "", lambda scene: np.full(3, 1.1)), "both", np.ones(3))
+    assert found[0] == pytest.approx(0.1)
+
+
+def test_row_of_a_contest_has_medians_and_ratios():
+    peer = Peer("a", "", None)
+    contest = Contest(peer, "both", 1e-3, 9.0, 1e-4, [4.0, 1.0, 2.0], [0.1, 0.5, 0.2], [0.1] * 3)
+    row = contest.row({1e-4: 5e-4})
+    assert (row["seconds"], row["setup_seconds"], row["our_seconds"]) == (2.0, 7.0, 0.2)
+    assert (row["ratio"], row["kernel_ratio"], row["our_error"]) == (10.0, 20.0, 5e-4)
+
+
+def test_kept_contests_are_at_equal_or_better_error():
+    kept = json.loads((readme_tables.RESULTS / "peers.json").read_text(encoding="utf-8"))
+    tools = {(row["tool"], row["scene"]) for row in kept["rows"]}
+    assert tools == {(p.tool, s) for p in measure_peers.PEERS for s in mechanism.SCENES}
+    for row in kept["rows"]:
+        assert "reason" in row or row["our_error"] <= row["error"]
+    for check in kept["agreement"]:  # wrong lever arms would leave 1e-3 and more
+        assert check["ours_to_reference"] < 1e-6
+        assert "reason" in check or check["exudyn_to_ours"] < 1e-4
