@@ -97,10 +97,13 @@ def test_a_peer_that_is_missing_or_fails_gives_a_reason():
 
 def test_row_of_a_contest_has_medians_and_ratios():
     peer = Peer("a", "", None)
-    contest = Contest(peer, "both", 1e-3, 9.0, 1e-4, [4.0, 1.0, 2.0], [0.1, 0.5, 0.2], [0.1] * 3)
+    contest = Contest(peer, "both", 1e-3, 9.0, 1e-4)
+    contest.theirs = [(4.0, 9.0), (1.0, 2.0), (2.0, 3.0)]
+    contest.ours, contest.kernel = [(0.1, 0.3), (0.5, 0.6), (0.2, 0.2)], [0.1, 0.2, 0.1]
     row = contest.row({1e-4: 5e-4})
     assert (row["seconds"], row["setup_seconds"], row["our_seconds"]) == (2.0, 7.0, 0.2)
-    assert (row["ratio"], row["kernel_ratio"], row["our_error"]) == (10.0, 20.0, 5e-4)
+    assert (row["ratio"], row["wall_ratio"], row["kernel_wall_ratio"]) == (10.0, 10.0, 30.0)
+    assert (row["error"], row["our_error"]) == (1e-3, 5e-4)
 
 
 def test_kept_contests_are_at_equal_or_better_error():
