@@ -66,6 +66,21 @@ def new_tally():
 
 
 @jit
+def vertex(nodes, i, before, here, after):
+    """Top of the parabola through the values at nodes i - 1, i and i + 1, or `here` if none."""
+    left, right = nodes[i - 1] - nodes[i], nodes[i + 1] - nodes[i]
+    slope_left = (before - here) / left
+    slope_right = (after - here) / right
+    curvature = (slope_right - slope_left) / (right - left)
+    if curvature < 0.0:
+        slope = slope_left - curvature * left
+        at = -0.5 * slope / curvature
+        if left < at < right:
+            return here + 0.5 * slope * at
+    return here
+
+
+@jit
 def peak_of(nodes, rows, column, known):
     """The greater of `known` and the largest |value| of a column over a step.
 
@@ -78,16 +93,24 @@ def peak_of(nodes, rows, column, known):
             best = i
     top = abs(rows[best, column])
     i = min(max(best, 1), last - 1)
-    left, mid, right = nodes[i - 1] - nodes[i], abs(rows[i, column]), nodes[i + 1] - nodes[i]
-    slope_left = (abs(rows[i - 1, column]) - mid) / left
-    slope_right = (abs(rows[i + 1, column]) - mid) / right
-    curvature = (slope_right - slope_left) / (right - left)
-    if curvature < 0.0:
-        slope = slope_left - curvature * left
-        at = -0.5 * slope / curvature
-        if left < at < right:
-            top = max(top, mid + 0.5 * slope * at)
-    return max(top, known)
+    before, here, after = rows[i - 1, column], rows[i, column], rows[i + 1, column]
+    return max(top, known, vertex(nodes, i, abs(before), abs(here), abs(after)))
+
+
+@jit
+def deepest_of(nodes, rows, column, known):
+    """The greater of `known` and a column's largest value over a step, as `peak_of` finds it."""
+    last = nodes.size - 1
+    best = 0
+    for i in range(1, last + 1):
+        if rows[i, column] > rows[best, column]:
+            best = i
+    top = rows[best, column]
+    if 2.0 * top < known:
+        return max(top, known)
+    i = min(max(best, 1), last - 1)
+    before, here, after = rows[i - 1, column], rows[i, column], rows[i + 1, column]
+    return max(top, known, vertex(nodes, i, before, here, after))
 
 
 @inlined
@@ -118,7 +141,7 @@ def add_flows(rows, weights, span, flows):
 
 
 @inlined
-def tally_contact(joint, rows, weights, span, measured, tally):
+def tally_contact(joint, span, nodes, weights, rows, measured, tally):
     """Add a step's contact loss, impacts and penetration at one joint."""
     lost = 0.0
     for i in range(rows.shape[0]):
@@ -128,11 +151,10 @@ def tally_contact(joint, rows, weights, span, measured, tally):
         elif measured and not tally.touching[joint]:
             tally.impacts[joint] += 1
         tally.touching[joint] = 0 if apart else 1
-        depth = rows[i, PENETRATION + joint]
-        tally.deepest = max(tally.deepest, depth)
-        if measured:
-            tally.max_penetration[joint] = max(tally.max_penetration[joint], depth)
+        tally.deepest = max(tally.deepest, rows[i, PENETRATION + joint])
     if measured:
+        known = tally.max_penetration[joint]
+        tally.max_penetration[joint] = deepest_of(nodes, rows, PENETRATION + joint, known)
         tally.loss_seconds[joint] += lost * span
 
 
@@ -145,9 +167,9 @@ def tally_step(span, nodes, weights, rows, measured, tally, p):
     always does.
     """
     if p.clearance[0] > 0.0:
-        tally_contact(0, rows, weights, span, measured, tally)
+        tally_contact(0, span, nodes, weights, rows, measured, tally)
     if p.clearance[1] > 0.0:
-        tally_contact(1, rows, weights, span, measured, tally)
+        tally_contact(1, span, nodes, weights, rows, measured, tally)
     if not measured:
         return
     tally.seconds += span
