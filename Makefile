@@ -42,7 +42,7 @@ format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-accuracy: install  ## measure the errors behind the words of `accuracy` (about a minute)
+accuracy: install  ## measure the errors behind accuracy and error bars (about four minutes)
 	$(BIN)/python tests/measure_accuracy.py tests/results/accuracy.json
 
 claims: install  ## measure the paper's claims over a range of masses (seconds)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
+from compressor.accuracy import ACCURACY, Targets, checked_targets, first_rung
 from compressor.conflicts import conflicts
 from compressor.parameter import (
     JOINTS,
@@ -27,9 +28,6 @@ from compressor.parameter import (
 
 MODEL_VERSION = "1"  # of the equations and the meaning of what is stored; part of a job's identity
 
-# Relative tolerance behind each word of `accuracy`, for `method: auto`; chosen from the measured
-# errors in tests/results/accuracy.json (make accuracy).
-ACCURACY = {"draft": 2e-4, "standard": 5e-5, "fine": 2e-7, "reference": 1e-10}
 METHODS = ("auto", "DOPRI5", "TSIT5", "RODAS", "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
@@ -176,12 +174,18 @@ class Solve:
         None, "s", (0, 10), "§3.1", "output step in seconds, in place of output_step_deg",
         above=True, optional=True,
     )  # fmt: skip
-    accuracy: str = choice(
-        "standard", tuple(ACCURACY), "measured", "promised relative error of acceleration"
-    )
+    accuracy: str | tuple[tuple[str, float], ...] = choice(
+        "standard", tuple(ACCURACY), "measured",
+        "promised relative error of acceleration, or the greatest one of each metric named",
+        kind="accuracy",
+    )  # fmt: skip
     rtol: float | None = parameter(
         None, "", (1e-13, 0.1), "ours", "relative tolerance, in place of accuracy", optional=True
     )
+    error_bars: bool = choice(
+        True, (), "ours", "an error beside each metric, by a second, looser run; not part of a "
+        "job's identity", kind="boolean",
+    )  # fmt: skip
     method: str = choice(
         "auto", METHODS, "ours", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
     )
@@ -209,7 +213,7 @@ class Output:
         "ours",
         "of the time series; time and crank angle are double",
     )
-    compress: bool = choice(False, (), "ours", "time series shuffled and gzipped", kind="flag")
+    compress: bool = choice(False, (), "ours", "time series shuffled and gzipped", kind="boolean")
 
 
 GROUPS: dict[str, type] = {
@@ -303,12 +307,27 @@ class Case:
             del plain["clearance_mm"]
         if self.solve.rtol is not None:
             del plain["solve"]["accuracy"]
+        elif self.targets:
+            plain["solve"]["accuracy"] = dict(self.targets)
         return plain
 
     @property
     def rtol(self) -> float:
-        """The relative tolerance asked for, by number or by word."""
-        return ACCURACY[self.solve.accuracy] if self.solve.rtol is None else self.solve.rtol
+        """The relative tolerance asked for, by number or word; with `targets`, the first one."""
+        if self.solve.rtol is not None:
+            return self.solve.rtol
+        accuracy = self.solve.accuracy
+        return ACCURACY[accuracy].rtol if isinstance(accuracy, str) else first_rung(accuracy)
+
+    @property
+    def targets(self) -> Targets:
+        """The greatest relative error of each metric that accuracy is asked for by."""
+        return () if isinstance(self.solve.accuracy, str) else self.solve.accuracy
+
+    @property
+    def wants_bars(self) -> bool:
+        """Whether metrics are to have error bars; accuracy by number cannot do without."""
+        return self.solve.error_bars or bool(self.targets)
 
     @property
     def omega(self) -> float:
@@ -356,7 +375,8 @@ class Case:
         values["model"] = MODEL_VERSION
         values["span"] = [self.duration, self.settle, round(self.steps)]
         if with_solver:
-            values["solver"] = [self.rtol, self.solve.method, self.solve.max_steps]
+            accuracy = dict(self.targets) or self.rtol
+            values["solver"] = [accuracy, self.solve.method, self.solve.max_steps]
         return values
 
 
@@ -408,6 +428,8 @@ def checked(key: str, value: Any, problems: list[Problem]) -> Any:
     row = table()[key]
     if value is None and row.optional:
         return row.default
+    if row.kind == "accuracy" and isinstance(value, Mapping):
+        return checked_targets(key, value, problems)
     message = row.check(value)
     if message:
         problems.append(Problem(key, message))

@@ -335,14 +335,18 @@ class Segment:
         self.right_hand_side.check_budget()
 
 
-def closed_form(p: np.record, times: np.ndarray, settle: float) -> Trajectory:
-    """The ideal scene: nothing is integrated, metrics and energy flows by quadrature."""
+def closed_form(p: np.record, times: np.ndarray, settle: float, pieces: int) -> Trajectory:
+    """The ideal scene: nothing is integrated, metrics and energy flows by quadrature.
+
+    `pieces`: into which each stretch between load corners, or each revolution in it, is cut.
+    """
     edges, phases = segments(p, float(times[-1]))
     result = Trajectory(
         times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally()
     )
     began = time.perf_counter()
-    cuts = np.unique(np.concatenate((edges, [settle], fine_grid(edges))))
+    grid = fine_grid(edges, pieces, 2.0 * math.pi / p.omega)
+    cuts = np.unique(np.concatenate((edges, [settle], grid)))
     owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
     states = np.zeros((NODES.size, 4))
     rows = np.empty((NODES.size, COLUMNS))
@@ -358,6 +362,10 @@ def closed_form(p: np.record, times: np.ndarray, settle: float) -> Trajectory:
     return result
 
 
-def fine_grid(edges: np.ndarray) -> np.ndarray:
+def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
     """Points that cut every segment of the ideal motion into pieces a quadrature resolves."""
-    return np.concatenate([np.linspace(a, b, 33) for a, b in itertools.pairwise(edges)])
+    grids = []
+    for begin, end in itertools.pairwise(edges):
+        count = pieces * math.ceil((end - begin) / turn - 1e-9)
+        grids.append(np.linspace(begin, end, count + 1))
+    return np.concatenate(grids)

@@ -56,7 +56,7 @@ def _coordinate(dims: tuple[str, ...], key: str, values: Sequence[Any], units: s
 
 
 def _word(value: Any) -> str:
-    return ", ".join(value) if isinstance(value, tuple) else str(value).lower()
+    return ", ".join(map(_word, value)) if isinstance(value, tuple) else str(value).lower()
 
 
 def grid(study: StoredStudy) -> Layout:

@@ -118,8 +118,8 @@ def read_study(path: Path) -> StoredStudy:
 
 
 def _frozen(values: Sequence[Any]) -> tuple[Any, ...]:
-    """Values as a case holds them; JSON makes lists of pairs."""
-    return tuple(tuple(value) if isinstance(value, list) else value for value in values)
+    """Values as a case holds them; JSON makes lists of tuples."""
+    return tuple(_frozen(value) if isinstance(value, list) else value for value in values)
 
 
 def _unit(key: str) -> str:

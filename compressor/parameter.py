@@ -83,7 +83,7 @@ class Parameter:
     above: bool  # whether `low` itself is excluded
     source: str
     phrase: str
-    kind: str  # number | integer | choice | flag | text | materials
+    kind: str  # number | integer | boolean | choice | text | materials | accuracy
     choices: tuple[str, ...] = ()
     optional: bool = False
 
@@ -92,8 +92,10 @@ class Parameter:
         """The allowed values, for a table or an error."""
         if self.kind == "choice":
             return " | ".join(self.choices)
-        if self.kind == "flag":
+        if self.kind == "boolean":
             return "true | false"
+        if self.kind == "accuracy":
+            return " | ".join(self.choices) + " | {metric: relative error}"
         if self.kind == "materials":
             return "two of " + ", ".join(self.choices)
         if self.kind == "text":
@@ -103,12 +105,12 @@ class Parameter:
 
     def check(self, value: Any) -> str | None:
         """What is wrong with a scalar value of this parameter, or None."""
-        if self.kind in ("choice", "text"):
+        if self.kind in ("choice", "text", "accuracy"):
             return self._check_text(value)
+        if self.kind == "boolean":
+            return None if isinstance(value, bool) else f"needs true or false, not {shown(value)}"
         if self.kind == "materials":
             return self._check_materials(value)
-        if self.kind == "flag":
-            return None if isinstance(value, bool) else f"needs true or false, not {shown(value)}"
         if isinstance(value, bool) or not isinstance(value, int | float):
             return f"needs a number, not {shown(value)}"
         if not _is_finite(value):
@@ -173,7 +175,7 @@ def parameter_table(rows: Iterable[Parameter]) -> str:
     lines = ["| key | unit | default | range | source | what it is |", "|---|---|---|---|---|---|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)
-        default = str(row.default).lower() if row.kind == "flag" else default.removesuffix(".0")
+        default = shown(row.default) if row.kind == "boolean" else default.removesuffix(".0")
         cells = (f"`{row.key}`", row.unit, default, row.range, row.source, row.phrase)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

@@ -34,6 +34,7 @@ MAX_JOBS = 10_000
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 UNSWEPT = (  # no part of a job's identity
     "name",
+    "solve.error_bars",
     "solve.timeout_s",
     "output.keep",
     "output.precision",
@@ -231,7 +232,7 @@ def _axis_values(key: str, node: Node, problems: list[FileProblem]) -> list[Node
 
 def _axis_kind(key: str, node: Node) -> str:
     if isinstance(node.value, dict):
-        return "mapping"
+        return "value" if key == "solve.accuracy" else "mapping"
     if not isinstance(node.value, list):
         return "value"
     pair = key == "contact.materials" and not any(isinstance(n.value, list) for n in node.value)
@@ -254,10 +255,16 @@ def _checked(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
     """A node with its value as the case holds it; None if that is wrong, which joins `problems`."""
     if node.value is None or key == "friction":  # told when it was read; or false, which is valid
         return node if node.value is False else None
+    if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
+        return None
     found: list[Problem] = []
     row = "clearance_mm.big_end" if key == "clearance_mm" else key
     value = checked(row, node.plain(), found)
-    problems += [FileProblem(node.place, key, problem.message) for problem in found]
+    parts = node.value if isinstance(node.value, dict) else {}
+    for problem in found:
+        part = parts.get(problem.key.removeprefix(f"{row}."))
+        place, about = (part.place, problem.key) if part else (node.place, key)
+        problems.append(FileProblem(place, about, problem.message))
     return None if found else replace(node, value=value)
 
 
@@ -293,7 +300,10 @@ def _nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for key, node in chosen.items():
         group, _, name = key.rpartition(".")
-        (values.setdefault(group, {}) if group else values)[name] = node.value
+        value = node.value
+        if key == "solve.accuracy" and isinstance(value, tuple):
+            value = dict(value)  # as a case file has it
+        (values.setdefault(group, {}) if group else values)[name] = value
     return values
 
 

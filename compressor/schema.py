@@ -1,7 +1,7 @@
-"""What is known of a finished job: names, dimensions, units and phrases of its numbers.
+"""What is known of a finished job, without physics or compiled code.
 
-The one table of results, as `compressor.case` is of parameters. Without physics or compiled code,
-so that results are read without loading either.
+So that results are read without loading either; the numbers' names and units are those of
+`compressor.quantities`.
 """
 
 from dataclasses import dataclass
@@ -10,34 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compressor.parameter import JOINTS
+from compressor.quantities import AXES, ERRORS, LEDGER, METRICS, NUMBERS, SIZES
 
-AXES = ("x", "y")
-SIZES = {"joint": len(JOINTS), "axis": len(AXES)}
+__all__ = ["AXES", "ERRORS", "LEDGER", "METRICS", "NUMBERS", "ROW", "SIZES", "Outcome"]
 
-# name: (dimensions, unit, long name)
-METRICS: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "peak_acceleration": ((), "m/s2", "greatest |acceleration|"),
-    "rms_acceleration": ((), "m/s2", "root mean square of acceleration"),
-    "rms_acceleration_deviation": ((), "m/s2", "rms of acceleration less the ideal machine's"),
-    "peak_contact_force": (("joint",), "N", "greatest joint force on the rod"),
-    "peak_contact_force_axis": (("joint", "axis"), "N", "greatest joint force along an axis"),
-    "max_penetration": (("joint",), "m", "greatest penetration; negative: never touched"),
-    "contact_loss_fraction": (("joint",), "1", "share of time without contact (F_N = 0)"),
-    "impact_count": (("joint",), "1", "times that contact began"),
-}
-# energy flows and how the run went
-LEDGER: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "crank_work": ((), "J", "work put in by the crank over the run"),
-    "load_work": ((), "J", "work put in by the piston force over the run"),
-    "contact_damping_loss": ((), "J", "energy lost to contact damping over the run"),
-    "friction_loss": ((), "J", "energy lost to joint friction over the run"),
-    "energy_residual": ((), "1", "worst energy imbalance relative to the contact's losses"),
-    "steps": ((), "1", "accepted integration steps"),
-    "rejected": ((), "1", "rejected steps; SciPy's methods do not tell"),
-    "evaluations": ((), "1", "evaluations of the right-hand side"),
-    "seconds": ((), "s", "wall time of the solution"),
-}
-NUMBERS = METRICS | LEDGER
 # a job's numbers as one structured scalar: what workers send home and segments hold
 ROW = np.dtype(
     [(name, "f8", tuple(SIZES[dim] for dim in dims)) for name, (dims, _, _) in NUMBERS.items()]
@@ -58,9 +34,9 @@ class SeriesFile:
 class Outcome:
     """How a job ended, without its time series.
 
-    `numbers`: a scalar of dtype ROW, metrics nan unless `status` is "ok"; `reason`: a stable name,
-    empty when ok; `attributes`: those of the job's Dataset, its `key` among them; `series`: where
-    the time series are stored, if they are.
+    `numbers`: a scalar of dtype ROW, metrics nan where the run did not reach its end; `reason`: a
+    stable name, empty when ok; `attributes`: those of the job's Dataset, its `key` among them;
+    `series`: where the time series are stored, if they are.
     """
 
     status: str

@@ -35,7 +35,6 @@ COLUMNS = {
     "end": ("f8", "last time of the series, s"),
     "precision": ("S", "of the series: double or single"),
     "digest": ("S20", "of the file with the series"),
-    "timeout": ("f8", "wall time that a job had which ran out of it, s; 0 for all others"),
 }
 
 
@@ -85,15 +84,8 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
     columns["samples"] = np.array([item.samples for item in series], int)
     columns["end"] = np.array([item.end for item in series], float)
     numbers = np.array([outcome.numbers for outcome in outcomes], ROW)
-    columns["timeout"] = np.array([_timeout(outcome) for outcome in outcomes], float)
     texts = _packed(_line(outcome.attributes) for outcome in outcomes)
     return Segment(Path(), columns, numbers, texts, _packed(_line(o.detail) for o in outcomes))
-
-
-def _timeout(outcome: Outcome) -> float:
-    if outcome.reason != "budget_seconds":
-        return 0.0
-    return float(json.loads(outcome.attributes["case"])["solve"]["timeout_s"])
 
 
 def _text_column(name: str, values: Sequence[str]) -> np.ndarray:

@@ -1,14 +1,18 @@
 """Case -> Dataset: the only place where numbers get names, units and attributes."""
 
+import itertools
 import json
 import math
+from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import compressor
+from compressor.accuracy import TIGHTEST
+from compressor.bars import Metrics, bars, unmet
 from compressor.case import MODEL_VERSION, Case
 from compressor.integrate import Request, Trajectory, closed_form, integrate
 from compressor.physics.motion import start
@@ -36,6 +40,27 @@ SERIES = {
     ),
 }  # fmt: skip
 
+PIECES = 32  # of the ideal scene's quadrature; twice as many a rung
+OUT_OF_BUDGET = ("budget_steps", "budget_seconds", "step_underflow")  # a tighter run may end so
+
+
+@dataclass
+class Solution:
+    """A case's motion and what is told of it.
+
+    `rtol`: the tolerance it was integrated with; `metrics`: by name, empty where the run did not
+    reach its end; `bars`: an error bar of each metric, empty where none was made; `reason` and
+    `detail`: why the job failed, empty when it is ok.
+    """
+
+    p: np.record
+    trajectory: Trajectory
+    rtol: float
+    metrics: Metrics
+    bars: Metrics
+    reason: str
+    detail: str
+
 
 def simulate(case: Case) -> "xr.Dataset":
     """Simulate one case and return its Dataset (DESIGN 4): series, metrics, status.
@@ -52,32 +77,92 @@ def simulate(case: Case) -> "xr.Dataset":
 
 def observe(case: Case) -> tuple[Outcome, Table]:
     """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
-    p, trajectory = solve(case)
-    found = outcome(case, p, trajectory)
-    variables = found.variables() | coordinates()
+    found = solve(case)
+    end = outcome(case, found)
+    variables = end.variables() | coordinates()
     if case.output.keep == "series":
-        variables |= series(p, trajectory)
+        variables |= series(found.p, found.trajectory)
     named = {name: Variable(d, np.asarray(v), attrs) for name, (d, v, attrs) in variables.items()}
-    return found, Table(named, found.attributes)
+    return end, Table(named, end.attributes)
 
 
 def measure(case: Case) -> Outcome:
     """Simulate one case for its `Outcome` alone: what `simulate` gives less the time series."""
-    return outcome(case, *solve(case))
+    return outcome(case, solve(case))
 
 
-def solve(case: Case) -> tuple[np.record, Trajectory]:
-    """A case's record and its motion."""
-    p = record(case)
-    times = case.duration * (np.arange(round(case.steps) + 1) / round(case.steps))
+def solve(case: Case) -> Solution:
+    """A case's motion, with error bars where they are wanted."""
+    if case.targets:
+        return climb(case)
+    found = attempt(case, 0, case.solve.timeout_s)
+    if case.wants_bars and not found.reason:
+        left = case.solve.timeout_s - found.trajectory.seconds
+        found.bars = error_bars(found, attempt(case, -1, left, sampled=False))
+    return found
+
+
+def climb(case: Case) -> Solution:
+    """Ever tighter runs, until the bars of the metrics that accuracy is asked for are met.
+
+    Each run is the looser one of the next, so that bars cost nothing. A ladder that ends before
+    keeps its last whole run, and says how far it came.
+    """
+    left = case.solve.timeout_s
+    best = attempt(case, 0, left)
+    for rung in itertools.count(1):
+        if best.reason:
+            return best
+        left -= best.trajectory.seconds
+        if case.rtol / 10.0**rung < 0.99 * TIGHTEST:
+            return short_of(case, best, "accuracy_not_reached", "no run is tighter")
+        found = attempt(case, rung, left)
+        if found.reason in OUT_OF_BUDGET:
+            reason = found.reason if found.reason == "budget_seconds" else "accuracy_not_reached"
+            return short_of(case, best, reason, f"the next run: {found.detail}")
+        if not found.reason:
+            found.bars = error_bars(found, best)
+            if not unmet(case.targets, found.metrics, found.bars):
+                return found
+        best = found
+    raise AssertionError("the ladder has an end")
+
+
+def short_of(case: Case, best: Solution, reason: str, detail: str) -> Solution:
+    """The best run of a ladder as a failed job that tells how far it came."""
+    best.bars = best.bars or error_bars(best, None)
+    missed = unmet(case.targets, best.metrics, best.bars)
+    best.reason = reason
+    best.detail = "; ".join([*missed, f"at rtol {best.rtol:.2g}", detail])
+    return best
+
+
+def attempt(case: Case, rung: int, timeout: float, sampled: bool = True) -> Solution:
+    """One run of a case, 10^rung times tighter than it asks for, without error bars.
+
+    The ideal scene's quadrature gets twice the pieces a rung. `sampled`: whether on the output
+    grid; steps do not land on it, so that metrics are the same without.
+    """
+    p, rtol = record(case), case.rtol / 10.0**rung
+    samples = round(case.steps) if sampled else 1
+    times = case.duration * (np.arange(samples + 1) / samples)
     if scene(case) == Scene.IDEAL:
-        return p, closed_form(p, times, case.settle)
-    y = np.zeros(2 * FREEDOMS[scene(case)])
-    start(offsets(case), y, p)
-    how = case.solve
-    return p, integrate(
-        Request(p, y, times, case.settle, case.rtol, how.method, how.max_steps, how.timeout_s)
-    )
+        trajectory = closed_form(p, times, case.settle, round(PIECES * 2.0**rung))
+    else:
+        y = np.zeros(2 * FREEDOMS[scene(case)])
+        start(offsets(case), y, p)
+        how = case.solve
+        trajectory = integrate(
+            Request(p, y, times, case.settle, rtol, how.method, how.max_steps, timeout)
+        )
+    found = {} if trajectory.reason else metrics(p, trajectory.tally)
+    return Solution(p, trajectory, rtol, found, {}, trajectory.reason, trajectory.detail)
+
+
+def error_bars(found: Solution, looser: Solution | None) -> Metrics:
+    """The error bar of each metric; unknown where there is no looser run, or it failed."""
+    other = looser.metrics if looser else {}
+    return bars(found.metrics, other, found.rtol, energy_residual(found.trajectory.tally))
 
 
 def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
@@ -99,19 +184,18 @@ def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
     return variables
 
 
-def outcome(case: Case, p: np.record, trajectory: Trajectory) -> Outcome:
-    """What is kept of a trajectory without its series."""
+def outcome(case: Case, found: Solution) -> Outcome:
+    """What is kept of a solution without its series."""
     numbers = np.full(1, math.nan, dtype=ROW)[0]
-    if not trajectory.reason:
-        for name, value in metrics(p, trajectory.tally).items():
-            numbers[name] = value
-    for name, value in ledger(trajectory).items():
+    known = {**found.metrics, **ledger(found.trajectory)}
+    known |= {f"{name}_error": bar for name, bar in found.bars.items()}
+    for name, value in known.items():
         numbers[name] = value
-    status = "failed" if trajectory.reason else "ok"
-    return Outcome(status, trajectory.reason, numbers, attributes(case, trajectory))
+    status = "failed" if found.reason else "ok"
+    return Outcome(status, found.reason, numbers, attributes(case, found))
 
 
-def metrics(p: np.record, tally: np.record) -> dict[str, Any]:
+def metrics(p: np.record, tally: np.record) -> Metrics:
     """The metrics by name, from what was tallied after settling."""
     ideal = p["clearance"] == 0
     seconds = tally["seconds"] or math.nan
@@ -149,8 +233,9 @@ def ledger(trajectory: Trajectory) -> dict[str, float]:
     }
 
 
-def attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
+def attributes(case: Case, found: Solution) -> dict[str, object]:
     """What a reader of the file needs to know of the case and the program."""
+    trajectory = found.trajectory
     attrs: dict[str, object] = {
         "Conventions": "SI units; forces act on the rod; the frame of the README",
         "name": case.name,
@@ -159,14 +244,16 @@ def attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
         "physics_key": case.physics_key,
         "complete": 0 if trajectory.reason else 1,
         "settle": case.settle,
-        "rtol": case.rtol,
+        "rtol": found.rtol,
+        "error_bars": int(case.wants_bars),
         "method": case.solve.method,
         "model_version": MODEL_VERSION,
         "program": f"compsim {compressor.__version__}",
         "libraries": libraries(),
     }
+    if found.reason:
+        attrs["detail"] = found.detail
     if trajectory.reason:
-        attrs["detail"] = trajectory.detail
         attrs["stop_time"] = trajectory.stop_time
         attrs["stop_crank_angle"] = case.omega * trajectory.stop_time
         attrs["stop_state"] = trajectory.stop_state

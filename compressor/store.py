@@ -68,6 +68,11 @@ class JobStatus:
     precision: str  # of the time series: double | single
     numbers: np.void  # dtype schema.ROW
 
+    @property
+    def bars(self) -> bool:
+        """Whether metrics have error bars."""
+        return not np.isnan(self.numbers["peak_acceleration_error"])
+
     def serves(self, case: Case) -> bool:
         """Whether a case needs no new run.
 
@@ -77,6 +82,8 @@ class JobStatus:
             return False  # a machine with more time to spare may do it
         if self.reason in BROKEN:
             return True
+        if case.wants_bars and self.status == "ok" and not self.bars:
+            return False
         if case.output.keep == "metrics":
             return True
         return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
@@ -218,7 +225,7 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
     swept key, such as `clearance_mm`, in the case file's unit; a swept `joint` is called `fault`.
     Several studies have a `job` dimension with coordinates `study`, `fault`, `load` and each
     swept key. `key` names every job (see `read_job`), `status` is ok, failed or missing, and
-    metrics are nan where a job is not ok.
+    metrics are nan where a job did not reach its end.
 
     Series have the dimension `time`. If the jobs have different output grids (a swept speed),
     they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.

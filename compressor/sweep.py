@@ -148,27 +148,45 @@ def run_missing(
 
 
 def wanted(studies: Sequence[Study]) -> dict[str, Case]:
-    """Each job once, by key; where studies share one, the case that asks for most."""
+    """Each job once, by key; where studies share one, a case that serves them all."""
     cases: dict[str, Case] = {}
     for case in (case for study in studies for case in study.cases):
-        cases[case.key] = max(case, cases.get(case.key, case), key=_demand)
+        known = cases.get(case.key)
+        cases[case.key] = case if known is None else serving_both(known, case)
     return cases
 
 
-def _demand(case: Case) -> tuple[bool, bool, float]:
-    output = case.output
-    return output.keep == "series", output.precision == "double", case.solve.timeout_s
+def serving_both(first: Case, second: Case) -> Case:
+    """A case with all that two cases of one key ask for beside it."""
+    keeping = [case.output for case in (first, second) if case.output.keep == "series"]
+    output = first.output
+    if keeping:
+        precision = max("single", *(o.precision for o in keeping), key=("single", "double").index)
+        compress = all(o.compress for o in keeping)
+        output = replace(output, keep="series", precision=precision, compress=compress)
+    solve = replace(
+        first.solve,
+        error_bars=first.solve.error_bars or second.solve.error_bars,
+        timeout_s=max(first.solve.timeout_s, second.solve.timeout_s),
+    )
+    return replace(first, output=output, solve=solve)
 
 
 def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
-    """How the jobs ended that need no new run: stored ones that serve, with intact files."""
+    """How the jobs ended that need no new run: stored ones that serve, with intact files.
+
+    A case whose job is to be run again goes on keeping the time series that its job has.
+    """
     found = {}
     positions = store.rows.find(list(cases)).tolist()
-    for (key, case), position in zip(cases.items(), positions, strict=True):
+    for (key, case), position in zip(list(cases.items()), positions, strict=True):
         if position >= 0:
             end = store.status_at(position)
             if end.serves(case) and store.rows.intact(position):
                 found[key] = End(end.status, end.reason, end.detail)
+            elif end.samples and case.output.keep == "metrics":
+                output = replace(case.output, keep="series", precision=end.precision)
+                cases[key] = replace(case, output=output)
     return found
 
 

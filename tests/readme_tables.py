@@ -17,15 +17,67 @@ def kept(name):
     return json.loads((RESULTS / name).read_text(encoding="utf-8"))
 
 
+def markdown(head, rows):
+    """A table of text."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines).replace(" --- ", "---")
+
+
 def accuracy_table():
-    lines = ["| accuracy | rtol | worst error of acceleration, relative L2 | of its peak |",
-             "|---|---|---|---|"]  # fmt: skip
-    for word, row in kept("accuracy.json")["words"].items():
-        lines.append(
-            f"| {word} | {row['rtol']:g} | {row['acceleration_error']:.1e} "
-            f"| {row['peak_error']:.1e} |"
-        )
-    return "\n".join(lines) + "\n"
+    head = ["accuracy", "rtol", "promise", "worst of nine", "random: median", "90 %", "95 %",
+            "worst", "kept by"]  # fmt: skip
+    rows = [
+        [word, f"{row['rtol']:g}", f"{row['promise']:g}", f"{row['nine']['acceleration']:.1e}"]
+        + [f"{error:.1e}" for error in row["random"]["acceleration"]]
+        + [f"{row['kept']:.1%}"]
+        for word, row in kept("accuracy.json")["words"].items()
+    ]
+    return markdown(head, rows)
+
+
+def trade_table():
+    measured = kept("accuracy.json")["trade"]
+    head = ["rtol", "acceleration: median", "95 %", "peak: median", "95 %",
+            "energy residual / bound"]  # fmt: skip
+    rows = [
+        [f"{row['rtol']:g}"]
+        + [f"{row[what][k]:.1e}" for what in ("acceleration", "peak") for k in (0, 2)]
+        + [f"{row['residual']:.2g}"]
+        for row in measured
+    ]
+    return markdown(head, rows)
+
+
+def bars_table():
+    measured = kept("accuracy.json")["bars"]
+    names = list(next(iter(measured.values())))
+    rows = [
+        [f"`{name}`"]
+        + [
+            f"{row['within']:.1%}" + (f", {row['tightness']:.1f}" if row["tightness"] else "")
+            for row in (metrics[name] for metrics in measured.values())
+        ]
+        for name in names
+    ]
+    shares = []
+    for metrics in measured.values():
+        within = sum(row["within"] * row["of"] for row in metrics.values())
+        shares.append(f"{within / sum(row['of'] for row in metrics.values()):.1%}")
+    rows.append(["all", *shares])
+    return markdown(["error within its bar, bar / error", *measured], rows)
+
+
+def missed_table():
+    head = ["clearance, mm", "joint", "load", "rpm", "rod, kg", "recipr., kg", "acceleration",
+            "peak", "bar of peak", "rms", "without friction"]  # fmt: skip
+    rows = [
+        [f"{row['clearance_mm']:g}", row["joint"], row["load"], f"{row['speed_rpm']:g}",
+         f"{row['rod_mass_kg']:g}", f"{row['reciprocating_mass_kg']:g}"]
+        + [f"{row[key]:.1e}"
+           for key in ("acceleration", "peak", "peak_bar", "rms", "without_friction")]
+        for row in kept("accuracy.json")["missed"]["standard"]
+    ]  # fmt: skip
+    return markdown(head, rows)
 
 
 def claims_table():
@@ -94,6 +146,9 @@ def peers_table():
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
+    "bars": bars_table,
+    "missed": missed_table,
+    "trade": trade_table,
     "claims": claims_table,
     "store": store_table,
     "peers": peers_table,

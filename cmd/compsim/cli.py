@@ -41,6 +41,8 @@ ADVICE = {
     "masses and speed, and their units",
     "non_finite": "the motion leaves what the model can describe: check the values that are swept "
     "furthest, and gas.head_clearance_mm",
+    "accuracy_not_reached": "ask for less in solve.accuracy, or raise solve.max_steps where the "
+    "detail names steps",
     "step_underflow": "try another solve.method, such as Radau",
     "worker_died": "a crash, or killed from outside, or for want of memory: use a smaller -j; if "
     "it stays, a bug of compsim: please report it with the case",

@@ -1,0 +1,291 @@
+"""Accuracy by number, error bars: what they cover, what they say when they cannot, what is kept."""
+
+import numpy as np
+import pytest
+from random_cases import random_cases
+
+from compressor import simulation
+from compressor.accuracy import ACCURACY, TIGHTEST, first_rung
+from compressor.bars import bars, unmet
+from compressor.case import Case
+from compressor.plan import CaseFileError, load_studies
+from compressor.schema import ERRORS, METRICS
+from compressor.simulation import measure, simulate
+from compressor.store import job_status, open_study, read_studies, write_job, write_study
+
+SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
+BOTH = {"joint": "both", "clearance_mm": 0.2}
+EIGHT = random_cases(8)
+
+
+def run(values, **solve):
+    """A run's numbers, at draft unless rtol is given."""
+    short = {key: value for key, value in SHORT.items() if key != "accuracy" or "rtol" not in solve}
+    return measure(Case.from_values({**values, "solve": {**short, **solve}})).numbers
+
+
+def exact(values):
+    return run(values, rtol=1e-11, error_bars=False)
+
+
+def within(found, truth, stretch=1.0):
+    """Whether each number of each metric lies within its bar of the truth, times `stretch`."""
+    return np.concatenate([
+        np.ravel(np.abs(found[name] - truth[name]) <= stretch * found[f"{name}_error"])
+        for name in METRICS
+    ])  # fmt: skip
+
+
+# Error bars
+
+
+@pytest.mark.parametrize("method", ["auto", "LSODA"])
+def test_metrics_are_bit_equal_with_and_without_bars(method):
+    plain, barred = (run(BOTH, error_bars=bars, method=method) for bars in (False, True))
+    for name in METRICS:
+        np.testing.assert_array_equal(plain[name], barred[name])
+        assert np.isnan(plain[f"{name}_error"]).all()
+        assert np.isfinite(barred[f"{name}_error"]).all()
+    assert barred["peak_acceleration_error"] > 0
+
+
+@pytest.fixture(scope="module")
+def eight():
+    """Runs at draft of eight random cases, and the exact ones."""
+    return [(run(values), exact(values)) for values in EIGHT]
+
+
+def test_bars_cover_most_true_errors(eight):
+    covered = np.concatenate([within(*pair) for pair in eight])
+    assert covered.mean() >= 0.9
+    # and no more than needed: the same bars do not cover when they are a hundred times shorter
+    assert np.concatenate([within(*pair, stretch=0.01) for pair in eight]).mean() < 0.7
+
+
+def test_bars_of_the_same_run_twice_would_cover_little(eight):
+    """What would go wrong if the looser run were no looser."""
+    covered = []
+    for found, truth in eight:
+        metrics = {name: found[name] for name in METRICS}
+        same = bars(metrics, metrics, ACCURACY["draft"].rtol, 0.0)
+        wrong = [np.ravel(np.abs(found[n] - truth[n]) > same[n]) for n in METRICS]
+        covered.append(~np.concatenate(wrong))
+    assert np.concatenate(covered).mean() < 0.6
+
+
+def test_the_looser_run_is_ten_times_looser(monkeypatch):
+    asked = []
+    original = simulation.integrate
+    monkeypatch.setattr(
+        simulation, "integrate", lambda request: asked.append(request) or original(request)
+    )
+    run(BOTH, rtol=1e-5)
+    assert [request.rtol for request in asked] == pytest.approx([1e-5, 1e-4])
+    assert asked[1].times.tolist() == [0.0, asked[0].times[-1]]
+
+
+def test_a_looser_run_that_fails_leaves_the_error_unknown(monkeypatch):
+    original = simulation.integrate
+
+    def failing(request):
+        found = original(request)
+        if request.times.size == 2:
+            found.reason, found.detail = "step_underflow", "made to fail"
+        return found
+
+    monkeypatch.setattr(simulation, "integrate", failing)
+    found = measure(Case.from_values({**BOTH, "solve": SHORT}))
+    assert found.status == "ok"
+    for name in ERRORS:
+        assert np.isinf(found.numbers[name]).all()
+
+
+def test_a_failed_run_has_no_bars():
+    found = run(BOTH, max_steps=50)
+    for name in ERRORS:
+        assert np.isnan(found[name]).all()
+
+
+@pytest.mark.parametrize("load", ["design", "typical", "none"])
+def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
+    found = measure(Case.from_values({"load": load, "solve": SHORT}))
+    truth = simulation.attempt(Case.from_values({"load": load, "solve": SHORT}), 3, 60).metrics
+    for name in METRICS:
+        error = np.abs(found.numbers[name] - truth[name])
+        assert (error <= found.numbers[f"{name}_error"]).all(), name
+    assert found.numbers["peak_acceleration_error"] < 1e-5 * found.numbers["peak_acceleration"]
+
+
+def test_a_long_ideal_run_is_cut_by_revolutions():
+    """Without load corners the whole run is one stretch."""
+    solve = {"duration_rev": 200, "settle_rev": 0, "output_step_deg": 10}
+    long = measure(Case.from_values({"load": "none", "solve": solve})).numbers
+    short = measure(Case.from_values({"load": "none", "solve": SHORT | {"settle_rev": 0}})).numbers
+    assert long["rms_acceleration"] == pytest.approx(short["rms_acceleration"], rel=1e-9)
+    assert long["peak_contact_force"] == pytest.approx(short["peak_contact_force"], rel=1e-4)
+
+
+def test_bars_are_no_part_of_a_job_s_identity():
+    keys = {Case.from_values({**BOTH, "solve": {"error_bars": bars}}).key for bars in (True, False)}
+    assert len(keys) == 1
+
+
+def test_a_stored_job_without_bars_does_not_serve_a_case_that_wants_them(tmp_path):
+    solve = SHORT | {"duration_rev": 0.25, "settle_rev": 0}
+    plain, barred, by_number = (
+        Case.from_values({"solve": solve | more, "output": {"keep": "metrics"}})
+        for more in ({"error_bars": False}, {}, {"accuracy": {"rms_acceleration": 0.1}})
+    )
+    write_job(tmp_path, simulate(plain))
+    stored = job_status(tmp_path, plain.key)
+    assert stored.serves(plain)
+    assert not stored.serves(barred)
+    write_job(tmp_path, simulate(barred))
+    stored = job_status(tmp_path, plain.key)
+    assert stored.serves(plain)
+    assert stored.serves(barred)
+    write_job(tmp_path, simulate(by_number))
+    assert job_status(tmp_path, by_number.key).serves(by_number)
+
+
+# Accuracy by number
+
+
+@pytest.mark.parametrize("values", [EIGHT[0], EIGHT[5]])
+def test_a_number_is_reached_truly_and_a_looser_one_costs_less(values):
+    truth = exact(values)
+    steps = []
+    for target in (1e-2, 1e-4, 1e-6):
+        found = measure(
+            Case.from_values(
+                {**values, "solve": SHORT | {"accuracy": {"peak_acceleration": target}}}
+            )
+        )
+        peak, bar = (found.numbers[f"peak_acceleration{end}"] for end in ("", "_error"))
+        assert found.status == "ok"
+        assert bar <= target * peak
+        assert abs(peak / truth["peak_acceleration"] - 1) <= target
+        steps.append(found.numbers["steps"])
+    assert steps == sorted(steps)
+    assert steps[0] < steps[-1]
+
+
+def test_the_rtol_told_is_the_one_that_gives_the_same_metrics():
+    found = measure(
+        Case.from_values({**BOTH, "solve": SHORT | {"accuracy": {"max_penetration": 1e-3}}})
+    )
+    assert found.attributes["rtol"] < first_rung((("max_penetration", 1e-3),))
+    again = run(BOTH, rtol=found.attributes["rtol"])
+    for name in METRICS:
+        assert found.numbers[name].tolist() == again[name].tolist()
+
+
+@pytest.mark.parametrize(
+    ("solve", "reason", "detail"),
+    [
+        ({"accuracy": {"peak_contact_force": 2e-9}}, "accuracy_not_reached", "no run is tighter"),
+        ({"accuracy": {"peak_acceleration": 1e-7}, "max_steps": 12_000},
+         "accuracy_not_reached", "the next run: more than 12000 steps"),
+    ],
+)  # fmt: skip
+def test_accuracy_that_is_not_reached_is_told_and_numbers_are_kept(solve, reason, detail):
+    found = measure(Case.from_values({**BOTH, "solve": SHORT | solve}))
+    (name, target), *_ = solve["accuracy"].items()
+    assert (found.status, found.reason) == ("failed", reason)
+    assert found.attributes["detail"].startswith(f"{name}: its error bar is ")
+    assert found.attributes["detail"].endswith(detail)
+    assert found.attributes["complete"] == 1
+    bar = found.numbers[f"{name}_error"] / found.numbers[name]
+    assert target < bar.max() < np.inf
+    assert found.attributes["rtol"] >= 0.99 * TIGHTEST
+
+
+def test_time_that_runs_out_on_the_ladder_can_be_raised():
+    """The clock's reason, which a longer timeout makes try again (JobStatus.serves)."""
+    case = Case.from_values(
+        {**BOTH, "solve": SHORT | {"accuracy": {"peak_acceleration": 1e-4}, "timeout_s": 1e-9}}
+    )
+    assert measure(case).reason == "budget_seconds"
+
+
+def test_ideal_joints_meet_any_number():
+    solve = SHORT | {"accuracy": {"max_penetration": 1e-6, "impact_count": 1e-6}}
+    found = measure(Case.from_values({"solve": solve}))
+    assert found.status == "ok"
+    assert found.numbers["max_penetration_error"].tolist() == [0, 0]
+    one = measure(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": solve}))
+    assert one.status == "ok"
+
+
+def test_unmet_names_the_worst_joint():
+    found = {"max_penetration": np.array([2.0, 0.0]), "impact_count": np.array([0.0, 0.0])}
+    error = {"max_penetration": np.array([0.1, 0.0]), "impact_count": np.array([0.0, 1.0])}
+    assert unmet((("max_penetration", 0.1),), found, error) == []
+    (said,) = unmet((("max_penetration", 0.01),), found, error)
+    assert said == "max_penetration: its error bar is 0.05 of it, not 0.01"
+    (said,) = unmet((("impact_count", 0.5),), found, error)
+    assert "inf" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "message"),
+    [
+        ("{peak_accelaration: 0.01}", "2:21", "solve.accuracy.peak_accelaration: unknown metric; "
+         "did you mean peak_acceleration?"),
+        ("{loudness: 0.01}", "2:21", "solve.accuracy.loudness: unknown metric; metrics are "
+         "peak_acceleration, "),
+        ("{peak_acceleration: 0.6}", "2:40",
+         "solve.accuracy.peak_acceleration: 0.6 is outside (1e-09, 0.5]"),
+        ("{peak_acceleration: [0.1, 0.2]}", "2:40",
+         "solve.accuracy.peak_acceleration: needs a number, not [0.1, 0.2]"),
+        ("{}", "2:20", "solve.accuracy: needs a metric, such as {peak_acceleration: 0.01}"),
+        ("finest", "2:20", "solve.accuracy: 'finest' is none of draft | standard | fine"),
+        ("[fine, {impact: 0.1}]", "2:28", "solve.accuracy.impact: unknown metric"),
+        ("{peak_acceleration: 0.1}\n  rtol: 1e-5", "3:9", "solve.rtol: stands in place of"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_told_with_their_place(tmp_path, text, place, message):
+    path = tmp_path / "case.yaml"
+    path.write_text(f"solve:\n         accuracy: {text}\n".replace("\n  rtol", "\n         rtol"))
+    with pytest.raises(CaseFileError) as caught:
+        load_studies(path)
+    (problem,) = caught.value.problems
+    assert message in str(problem)
+    assert problem.place.line == int(place.partition(":")[0])
+
+
+def test_accuracy_by_number_is_an_axis_too(tmp_path):
+    path = tmp_path / "trade.yaml"
+    path.write_text(
+        "solve:\n  accuracy:\n    - fine\n    - {peak_acceleration: 0.01}\n"
+        "    - rms_acceleration: 1e-3\n      max_penetration: 0.02\n"
+    )
+    (study,) = load_studies(path)
+    assert [case.targets for case in study.cases] == [
+        (),
+        (("peak_acceleration", 0.01),),
+        (("max_penetration", 0.02), ("rms_acceleration", 1e-3)),
+    ]
+    assert len({case.key for case in study.cases}) == 3
+    for case in study.cases:
+        assert Case.from_values(case.values()) == case
+        write_job(tmp_path, simulate(case))
+    for _ in range(2):  # written once, though JSON knows no tuples
+        write_study(tmp_path, study, "once")
+        (stored,) = read_studies(tmp_path)
+        assert stored.axes[0].values == study.axes[0].values
+    with open_study(tmp_path) as data:
+        assert data.accuracy.values.tolist() == [
+            "fine",
+            "peak_acceleration, 0.01",
+            "max_penetration, 0.02, rms_acceleration, 0.001",
+        ]
+        assert data.peak_acceleration_error.dims == ("accuracy",)
+        assert np.isfinite(data.peak_acceleration_error).all()
+
+
+def test_tiers_promise_more_for_tighter_tolerances():
+    tiers = list(ACCURACY.values())
+    assert [tier.rtol for tier in tiers] == sorted((t.rtol for t in tiers), reverse=True)
+    assert [tier.promise for tier in tiers] == sorted((t.promise for t in tiers), reverse=True)
+    assert first_rung((("peak_acceleration", 0.5),)) > ACCURACY["draft"].rtol
