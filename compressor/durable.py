@@ -48,8 +48,8 @@ def system_error(path: Folder, error: OSError) -> StoreError:
 def publish(path: Path, data: bytes) -> None:
     """Put a whole file under its name, durably, or leave what was there."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+    make_folder(path.parent)
     try:
-        make_folder(path.parent)
         try:
             with open(temporary, "xb") as file:
                 file.write(data)
@@ -66,7 +66,14 @@ def publish(path: Path, data: bytes) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, durably."""
+    """Make a folder and those above it, durably; raises StoreError."""
+    try:
+        _make_folder(folder)
+    except OSError as error:
+        raise system_error(folder, error) from error
+
+
+def _make_folder(folder: Path) -> None:
     if not folder.is_dir():
         make_folder(folder.parent)
         try:

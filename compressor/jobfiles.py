@@ -8,7 +8,7 @@ row is on disk.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,21 +39,32 @@ def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> 
     """Store a job's Dataset, or what it is made of, durably."""
     series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
     rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
-    data = hdf5.image(
-        {
-            str(name): (
-                tuple(map(str, item.dims)),
-                item.values.astype("f4") if name in rounded else item.values,
-                item.attrs,
-            )
-            for name, item in dataset.variables.items()
-        },
-        {str(name): value for name, value in dataset.attrs.items()},
-        series if output.compress else (),
-    )
+    data = image_of(dataset, rounded, series if output.compress else ())
     checksum, times = digest(data), dataset.variables["time"].values
     publish(series_path(place, dataset.attrs["key"], checksum), data)
     return SeriesFile(times.size, float(times[-1]), output.precision, checksum)
+
+
+def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
+    """Store a Dataset that is no job as netCDF-4, durably."""
+    publish(path, image_of(dataset))
+    return path
+
+
+def image_of(
+    dataset: "Table | xr.Dataset", rounded: Collection[str] = (), deflated: Collection[str] = ()
+) -> bytes:
+    """A Dataset as the bytes of a file; `rounded` variables in single precision."""
+    variables = {
+        str(name): (
+            tuple(map(str, item.dims)),
+            item.values.astype("f4") if name in rounded else item.values,
+            item.attrs,
+        )
+        for name, item in dataset.variables.items()
+    }
+    attributes = {str(name): value for name, value in dataset.attrs.items()}
+    return hdf5.image(variables, attributes, deflated)
 
 
 def intact(path: Path) -> bool:

@@ -22,7 +22,7 @@ import numpy as np
 from compressor.case import Case
 from compressor.durable import Folder, StoreError, discard_leftovers, system_error
 from compressor.hdf5 import DamagedJob
-from compressor.jobfiles import KEY, read_series, read_values, write_series
+from compressor.jobfiles import KEY, read_series, read_values, write_dataset, write_series
 from compressor.manifest import StoredAxis, StoredStudy, points, read_studies, write_study
 from compressor.schema import Outcome, coordinates
 from compressor.segments import NAME, Cut, Rows, Segment, read_segment
@@ -48,6 +48,7 @@ __all__ = [
     "read_store",
     "read_studies",
     "read_values",
+    "write_dataset",
     "write_series",
     "write_study",
 ]

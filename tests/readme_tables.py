@@ -143,6 +143,93 @@ def peers_table():
     return "\n".join(lines) + "\n"
 
 
+def cell(value, form="{:.2g}"):
+    """A number of a kept measurement; a dash where there is none."""
+    return "—" if value is None else form.format(value)
+
+
+def change(value):
+    """A relative change in per cent."""
+    return cell(value and 100 * value, "{:+z.1f} %")
+
+
+def milliseconds(seconds):
+    """A time, to three digits below a second."""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 0.9995 else f"{1e3 * seconds:.0f} ms"
+
+
+def spoken(scene):
+    """A label of a case as the README says it."""
+    return scene.replace("_", " ") + " mm"
+
+
+def by_scene(rows, scenes, key, make):
+    """A table row a value of `key`, a column a scene, each cell made from its row."""
+    for value in dict.fromkeys(row[key] for row in rows):
+        found = {row["scene"]: make(row) for row in rows if row[key] == value}
+        yield value, " | ".join(found.get(scene, "—") for scene in scenes)
+
+
+def fastest_table():
+    measured = kept("tradeoff.json")
+    scenes = [row["scene"] for row in measured["paper"]]
+    head = " | ".join(spoken(scene) for scene in scenes)
+    lines = [f"| error of acceleration below | {head} |", "|---" * (len(scenes) + 1) + "|"]
+    rows = sorted(measured["fastest"], key=lambda row: -row["error_below"])
+    for decade, cells in by_scene(
+        rows, scenes, "error_below",
+        lambda row: f"{row['method']}, {milliseconds(row['seconds'])} (rtol {row['rtol']:g})",
+    ):  # fmt: skip
+        lines.append(f"| {decade:.0e} | {cells} |")
+    return "\n".join(lines) + "\n"
+
+
+def paper_table():
+    measured = kept("tradeoff.json")
+    standard = kept("accuracy.json")["words"]["standard"]["rtol"]
+    lines = [
+        "| case | numerics | time | acceleration | its peak | its rms | peak contact force |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in measured["paper"]:
+        ours = next(
+            point for point in measured["points"]
+            if (point["scene"], point["method"], point["rtol"]) == (row["scene"], "auto", standard)
+        )  # fmt: skip
+        for name, found in (("the paper's", row), ("`standard`", ours)):
+            errors = " | ".join(
+                cell(found[f"error_{quantity}"], "{:.1e}")
+                for quantity in
+                ("acceleration", "peak_acceleration", "rms_acceleration", "peak_contact_force")
+            )  # fmt: skip
+            time = milliseconds(found["seconds"])
+            lines.append(f"| {spoken(row['scene'])} | {name} | {time} | {errors} |")
+    return "\n".join(lines) + "\n"
+
+
+def modelling_table():
+    measured = kept("tradeoff.json")
+    scenes = [row["scene"] for row in measured["paper"]]
+    head = " | ".join(spoken(scene) for scene in scenes)
+    lines = [f"| change of the model | {head} |", "|---" * (len(scenes) + 1) + "|"]
+
+    def effect(row):
+        if row["reason"]:
+            return row["reason"]
+        if row["change"].startswith("series"):
+            share = 100 * measured["place_error"][row["scene"]]
+            return f"{change(row['change_acceleration'])} of a (L2), {share:.0f} % of the clearance"
+        ratio = cell(row["time_ratio"], "×{:.2g}")
+        return (
+            f"{change(row['change_peak_acceleration'])}, "
+            f"{change(row['change_peak_contact_force'])}, {ratio}"
+        )
+
+    for name, cells in by_scene(measured["changes"], scenes, "change", effect):
+        lines.append(f"| {name} | {cells} |")
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
@@ -152,6 +239,9 @@ TABLES = {
     "claims": claims_table,
     "store": store_table,
     "peers": peers_table,
+    "fastest": fastest_table,
+    "paper-numerics": paper_table,
+    "modelling": modelling_table,
 }
 
 

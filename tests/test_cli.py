@@ -285,6 +285,111 @@ def test_durations(seconds, text):
     assert cli.duration(seconds) == text
 
 
+# ---- explain and tradeoff -----------------------------------------------------------------------
+
+
+def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
+    case_file(
+        "two.yaml", joint="big_end", clearance_mm=[0.2, 0.3], machine={"gravity_m_per_s2": 1e-4}
+    )
+    assert cli.main(["explain", "two.yaml", "-j", "1"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  scene       clearance at ")
+    for word in ("active", "absent", "scales", "tolerance", "cost", "without"):
+        assert re.search(rf"^  {word} ", out, re.MULTILINE), word
+    assert "2 degrees of freedom, the deviations of x, phi" in out
+    assert "for 2 jobs with 1 worker," in out
+    assert "; less than 2 %: leave it out (machine.gravity_m_per_s2: 0)" in out
+    assert re.search(r"friction: peak acceleration .* needed for peak acceleration", out)
+    assert err.startswith("running the first of 2 jobs of two")
+
+
+def test_explain_as_json(case_file, capsys):
+    case_file("a.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": 5})
+    case_file("b.yaml", load="none")
+    assert cli.main(["explain", "a.yaml", "b.yaml", "--json", "--set", "friction=false"]) == 3
+    broken, calm = json.loads(capsys.readouterr().out)
+    assert (broken["reason"], broken["advice"]) == ("budget_steps", [])
+    assert (calm["study"], calm["unknowns"], calm["reason"]) == ("b", [], "")
+
+
+def test_explain_of_a_failed_job_says_so(case_file, capsys):
+    case_file("a.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": 5})
+    assert cli.main(["explain", "a.yaml"]) == 3
+    assert "the job failed, budget_steps: more than 5 steps" in capsys.readouterr().out
+
+
+def test_explain_of_an_effect_that_failed():
+    from compsim.explain import advised, without_nan
+
+    effect = types.SimpleNamespace(reason="non_finite")
+    assert advised(types.SimpleNamespace(name="load", effect=effect), None).endswith("non_finite")
+    assert without_nan({"a": [float("nan"), 1.0]}) == {"a": [None, 1.0]}
+
+
+def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
+    import xarray as xr
+
+    from compressor import bench
+
+    few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
+    monkeypatch.setattr(bench.work_precision, "__defaults__",
+                        (*few.values(), *bench.work_precision.__defaults__[2:]))  # fmt: skip
+    case_file("a.yaml", joint=["big_end", "both"], clearance_mm=0.2)
+    assert cli.main(["tradeoff", "a.yaml", "-o", "out dir", "--repeats", "1"]) == 0
+    out, err = capsys.readouterr()
+    with xr.open_dataset("out dir/tradeoff.nc", engine="h5netcdf") as study:
+        assert study["scene"].values.tolist() == ["a big_end", "a both"]
+        assert (study["status"] == "ok").all()
+        error = study["error_acceleration"].sel({"scene": "a both", "method": "auto"})
+    with xr.open_dataset("out dir/modelling.nc", engine="h5netcdf") as trade:
+        assert "no friction" in trade["change"]
+    decade = 10.0 ** -(next(k for k in range(1, 9) if error.values[0] > 10.0**-k) - 1)
+    assert re.search(rf"^a both +{decade:.0e}  auto +1e-0[35]", out, re.MULTILINE)
+    assert re.search(r"^a big_end  no friction +[+-]", out, re.MULTILINE)
+    assert "the paper's BDF at 1e-5 takes" in out
+    assert "a both: the series of Eq. 3-4 would misplace the crosshead by 61% of" in out
+    assert Path("out dir/tradeoff.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("out dir/tradeoff.svg").exists()
+    assert "\nout dir/tradeoff.png\n" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["tradeoff", "calm.yaml"], "calm.yaml: calm has no joint with clearance"),
+        (["tradeoff", "--set", "load=none"], "--set changes case files: name one"),
+        (["tradeoff", "calm.yaml", "--repeats", "0"], "0 is not in the range"),
+        (["tradeoff", "calm.yaml", "--budget", "0"], "0.0 is not in the range"),
+        (["explain"], "Missing argument 'CONFIG...'"),
+    ],
+)
+def test_usage_errors_of_studies(arguments, told, case_file, capsys):
+    case_file("calm.yaml")
+    assert cli.main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert told in err
+    assert out == ""
+
+
+def test_tradeoff_finds_a_bad_folder_before_it_measures(case_file, capsys):
+    case_file("a.yaml", joint="both", clearance_mm=0.1)
+    Path("file").touch()
+    assert cli.main(["tradeoff", "a.yaml", "-o", "file/deeper"]) == 5
+    out, err = capsys.readouterr()
+    assert err.startswith("compsim: file: is a file, where a folder is needed")
+    assert out == ""
+
+
+def test_a_reference_that_fails_is_told_in_one_line(case_file, capsys):
+    case_file("a.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": 50})
+    assert cli.main(["tradeoff", "a.yaml", "--quiet"]) == 3
+    err = capsys.readouterr().err
+    assert err.startswith("compsim: a: the reference, DOP853 at 1e-12, ends with budget_steps: ")
+    assert err.count("\n") == 1
+    assert not [*Path("tradeoff").iterdir()]
+
+
 # ---- signals ------------------------------------------------------------------------------------
 
 

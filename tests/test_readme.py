@@ -7,6 +7,7 @@ import sys
 
 import pytest
 import readme_tables
+from measure_tradeoff import fingerprint
 
 import compressor
 
@@ -24,6 +25,21 @@ def test_generated_tables_are_current(name):
     written = readme_tables.block(name).search(README)
     assert written, f"no block for {name}"
     assert written[2] == readme_tables.TABLES[name](), "stale: run make readme"
+
+
+def test_the_trade_was_measured_with_these_numerics():
+    """The work of a few fixed runs: as measured, but for what another machine's rounding does."""
+    kept, now = readme_tables.kept("tradeoff.json")["fingerprint"], fingerprint()
+    assert now["rtol"] == kept["rtol"], "stale: run make tradeoff and make readme"
+    assert now["evaluations"] == pytest.approx(kept["evaluations"], rel=0.01), (
+        "stale: the numerics have changed; run make tradeoff and make readme"
+    )
+
+
+def test_figures_of_the_readme_exist():
+    figures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README)
+    assert figures
+    assert all((readme_tables.ROOT / figure).exists() for figure in figures)
 
 
 @pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:`|^)make ([a-z-]+)", README, re.M))))

@@ -10,7 +10,6 @@ import shlex
 import signal
 import sys
 import tempfile
-import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -19,13 +18,24 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
+from compsim import explain, tradeoff
+from compsim.screen import (
+    DONE,
+    INTERNAL,
+    SOME_FAILED,
+    STORE,
+    USAGE,
+    Screen,
+    duration,
+    plural,
+    say,
+    setting,
+)
 
 if TYPE_CHECKING:
     from compressor.sweep import Failure, Summary
 
-DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
 MOST_FAILURES = 20  # listed one by one
 
 # error -> what stands before its text, and the exit code
@@ -33,6 +43,7 @@ FORESEEN = {
     "CaseFileError": ("", USAGE),
     "StoreError": ("compsim: ", STORE),
     "WorkersFailed": ("compsim: ", INTERNAL),
+    "ReferenceFailed": ("compsim: ", SOME_FAILED),
 }
 ADVICE = {
     "budget_steps": "raise solve.max_steps",
@@ -61,67 +72,6 @@ class Interrupted(BaseException):
         super().__init__(signal.Signals(number).name)
 
 
-class Screen:
-    """Progress on stderr: one line, rewritten, on a terminal; elsewhere a line now and then."""
-
-    def __init__(self, quiet: bool):
-        self.quiet, self.live = quiet, sys.stderr.isatty()
-        self.done = self.total = self.width = 0
-        self.began = self.told = time.monotonic()
-        self.before: int | None = None
-
-    def __call__(self, done: int, total: int, remark: str) -> None:
-        """Take note of a sweep's progress (`compressor.sweep.Progress`)."""
-        self.done, self.total = done, total
-        if self.before in (None, done):
-            self.before, self.began = done, time.monotonic()
-        text = f"{done} of {total} jobs, {100 * done // total} %{self.time_left()}"
-        if self.quiet:
-            return
-        if remark:
-            self.end()
-            say(remark)
-        if self.live:
-            say(f"\r{text:<{self.width}}", end="")
-            self.width = len(text)
-        elif not remark and time.monotonic() - self.told > QUIET_SECONDS:
-            self.told = time.monotonic()
-            say(text)
-
-    def time_left(self) -> str:
-        """A guess from the jobs that this run has done."""
-        here = self.done - (self.before or 0)
-        if not here or self.done == self.total:
-            return ""
-        seconds = (time.monotonic() - self.began) / here * (self.total - self.done)
-        return f", {duration(seconds)} left"
-
-    def end(self) -> None:
-        """Leave the line of progress behind."""
-        if self.width and not self.quiet:
-            say(f"\r{'':<{self.width}}\r", end="")
-            self.width = 0
-
-
-def say(text: str, end: str = "\n") -> None:
-    """Write to stderr; nobody may be there to read it."""
-    with contextlib.suppress(OSError):
-        print(text, end=end, file=sys.stderr, flush=True)
-
-
-def duration(seconds: float) -> str:
-    """Seconds as people say them."""
-    if seconds < 100:
-        return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
-
-
-def plural(jobs: int) -> str:
-    """A number of jobs in words."""
-    return f"{jobs} job" + ("s" if jobs != 1 else "")
-
-
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(compressor.__version__, prog_name="compsim")
 def cli() -> None:
@@ -139,8 +89,7 @@ def cli() -> None:
     "-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
     help="Worker processes.",
 )  # fmt: skip
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
-              help="Set a key in all case files, such as machine.speed_rpm=300.")  # fmt: skip
+@setting
 @click.option("--retry-failed", is_flag=True, help="Run failed jobs again, too.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
@@ -220,6 +169,10 @@ def verify(results: str, as_json: bool) -> int:
         return STORE
     say("no damage")
     return DONE
+
+
+cli.add_command(explain.explain)
+cli.add_command(tradeoff.tradeoff)
 
 
 def report_run(summary: "Summary", folder: str, quiet: bool) -> None:

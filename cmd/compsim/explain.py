@@ -1,0 +1,127 @@
+"""`compsim explain`: what a case asks for, and which of its features it pays for in vain."""
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import click
+
+from compsim.screen import DONE, SOME_FAILED, plural, say, setting
+
+if TYPE_CHECKING:
+    from compressor.explain import Advice, Explanation
+
+INDENT = 12  # columns of a heading
+
+
+@click.command()
+@click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
+@click.option("-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
+              help="Worker processes that the sweep's cost is told for.")  # fmt: skip
+@setting
+@click.option("--json", "as_json", is_flag=True, help="The same as JSON, a list of studies.")
+def explain(configs: tuple[str, ...], jobs: int, overrides: tuple[str, ...], as_json: bool) -> int:
+    """Tell what case files ask for: terms, natural scales, cost, and what is paid for in vain.
+
+    Runs the first job of each case file, and again without each feature that it pays for. Exit
+    code 3 where such a job fails.
+    """
+    from compressor.plan import load_studies
+
+    studies = load_studies(*configs, overrides=overrides)
+    from compressor.explain import explain as explained
+
+    found = []
+    for study in studies:
+        say(f"running the first of {plural(len(study.cases))} of {study.name}, with and without "
+            "each of its features")  # fmt: skip
+        found.append(explained(study, jobs))
+        if not as_json:
+            click.echo("\n".join(lines(found[-1])))
+    if as_json:
+        plain = [without_nan(dataclasses.asdict(one)) for one in found]
+        click.echo(json.dumps(plain, indent=1, ensure_ascii=False))
+    return SOME_FAILED if any(one.reason for one in found) else DONE
+
+
+def without_nan(value):
+    """A value as JSON can hold it: null for nan."""
+    if isinstance(value, dict):
+        return {key: without_nan(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_nan(item) for item in value]
+    return None if value != value else value
+
+
+def heading(word: str, text: str) -> str:
+    """A line under a heading."""
+    return f"  {word:<{INDENT}}{text}"
+
+
+def lines(told: "Explanation") -> Iterator[str]:
+    """An explanation as it is printed."""
+    point = ", ".join(f"{key} = {value}" for key, value in told.point.items())
+    yield f"{told.study}: {plural(told.jobs)}" + (f"; explained: {point}" if point else "")
+    count = len(told.unknowns)
+    names = ", ".join(name.split()[0] for name in told.unknowns)
+    solved = (
+        f"{count} degrees of freedom, the deviations of {names}"
+        if count
+        else "closed form, nothing integrated"
+    )
+    yield heading("scene", f"{told.scene}: {solved}")
+    for number, (term, words) in enumerate(told.active.items()):
+        yield heading("" if number else "active", f"{term}: {words}")
+    if told.absent:
+        yield heading("absent", f"{', '.join(told.absent)}: cost nothing")
+    for number, joint in enumerate(told.scales):
+        name = joint.joint.replace("_", " ")
+        yield heading(
+            "" if number else "scales",
+            f"{name}: {joint.force:.0f} N at most in the ideal machine press "
+            f"{joint.penetration * 1e6:.0f} µm deep; there it rings at {joint.frequency:.0f} Hz "
+            f"({1e3 / joint.frequency:.2f} ms),",
+        )
+        yield heading("", f"and {joint.limited_by} holds explicit steps to about "
+                      f"{joint.step_limit * 1e6:.0f} µs")  # fmt: skip
+    word = told.accuracy or "given"
+    yield heading("tolerance", f"{word}: rtol {told.rtol:g}, {told.method}, "
+                  f"for errors below {percent(told.promise)}")  # fmt: skip
+    if told.reason:
+        yield heading("cost", f"unknown: the job failed, {told.reason}: {told.detail}")
+        return
+    yield from cost_lines(told)
+    for number, advice in enumerate(told.advice):
+        yield heading("" if number else "without", advised(advice, told))
+
+
+def cost_lines(told: "Explanation") -> Iterator[str]:
+    """What a job and the sweep cost."""
+    work = f" ({told.steps} steps, {told.evaluations} evaluations)" if told.steps else ""
+    yield heading("cost", f"{1e3 * told.seconds:.3g} ms a job{work}")
+    if told.jobs > 1:
+        workers = f"{told.workers} worker{'s' if told.workers > 1 else ''}"
+        yield heading("", f"{told.sweep_seconds:.2g} s for {plural(told.jobs)} with {workers}, "
+                      "if all cost the same")  # fmt: skip
+
+
+def advised(advice: "Advice", told: "Explanation") -> str:
+    """What leaving a feature out does, and whether it is worth while."""
+    effect = advice.effect
+    if effect.reason:
+        return f"{advice.name}: the run failed, {effect.reason}"
+    saved = 1 - effect.time_ratio
+    told_time = f"{'saves' if saved >= 0 else 'costs'} {100 * abs(saved):.0f} % of the time"
+    text = (
+        f"{advice.name}: peak acceleration {percent(effect.change_peak_acceleration, '+')}, "
+        f"contact force {percent(effect.change_peak_contact_force, '+')}, {told_time}"
+    )
+    if advice.removable:
+        return f"{text}; less than {percent(told.promise)}: leave it out ({advice.neutral})"
+    return f"{text}; needed for {' and '.join(advice.needed_for)}"
+
+
+def percent(share: float, sign: str = "") -> str:
+    """A share in per cent, to two digits."""
+    return f"{100 * share:{sign}z.2g} %"

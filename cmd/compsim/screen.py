@@ -1,0 +1,77 @@
+"""What the commands share: exit codes, an option, and how they speak on stderr."""
+
+import contextlib
+import sys
+import time
+
+import click
+
+DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
+QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
+
+setting = click.option(
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE",
+    help="Set a key in all case files, such as machine.speed_rpm=300.",
+)  # fmt: skip
+
+
+class Screen:
+    """Progress on stderr: one line, rewritten, on a terminal; elsewhere a line now and then."""
+
+    def __init__(self, quiet: bool, things: str = "jobs", alike: bool = True):
+        self.quiet, self.live = quiet, sys.stderr.isatty()
+        self.things, self.alike = things, alike
+        self.done = self.total = self.width = 0
+        self.began = self.told = time.monotonic()
+        self.before: int | None = None
+
+    def __call__(self, done: int, total: int, remark: str) -> None:
+        """Take note of a sweep's progress (`compressor.sweep.Progress`)."""
+        self.done, self.total = done, total
+        if self.before in (None, done):
+            self.before, self.began = done, time.monotonic()
+        text = f"{done} of {total} {self.things}, {100 * done // total} %{self.time_left()}"
+        if self.quiet:
+            return
+        if remark:
+            self.end()
+            say(remark)
+        if self.live:
+            say(f"\r{text:<{self.width}}", end="")
+            self.width = len(text)
+        elif not remark and time.monotonic() - self.told > QUIET_SECONDS:
+            self.told = time.monotonic()
+            say(text)
+
+    def time_left(self) -> str:
+        """A guess from the jobs that this run has done, where all take about the same time."""
+        here = self.done - (self.before or 0)
+        if not self.alike or not here or self.done == self.total:
+            return ""
+        seconds = (time.monotonic() - self.began) / here * (self.total - self.done)
+        return f", {duration(seconds)} left"
+
+    def end(self) -> None:
+        """Leave the line of progress behind."""
+        if self.width and not self.quiet:
+            say(f"\r{'':<{self.width}}\r", end="")
+            self.width = 0
+
+
+def say(text: str, end: str = "\n") -> None:
+    """Write to stderr; nobody may be there to read it."""
+    with contextlib.suppress(OSError):
+        print(text, end=end, file=sys.stderr, flush=True)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them."""
+    if seconds < 100:
+        return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def plural(jobs: int) -> str:
+    """A number of jobs in words."""
+    return f"{jobs} job" + ("s" if jobs != 1 else "")

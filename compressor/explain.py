@@ -1,0 +1,224 @@
+"""What a case asks for: its terms, its natural scales, its cost, and what it pays for in vain.
+
+A feature is paid for in vain where leaving it out changes peaks by less than the accuracy that the
+case promises: model only what a scene requires.
+"""
+
+import math
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import xarray as xr
+
+from compressor.accuracy import ACCURACY
+from compressor.bench import SLOW, complete, faulty
+from compressor.case import Case
+from compressor.modelling import FEATURES, Effect, Feature, compare
+from compressor.parameter import JOINTS
+from compressor.physics.contact import step
+from compressor.physics.control import BOUNDARY
+from compressor.physics.parameters import FREEDOMS, Scene
+from compressor.plan import Study
+from compressor.record import record, scene
+from compressor.simulation import STATE_NAMES, simulate
+
+SCENES = {
+    Scene.IDEAL: "ideal joints",
+    Scene.BIG_END: "clearance at the big end",
+    Scene.SMALL_END: "clearance at the small end",
+    Scene.BOTH: "clearance at both joints",
+}
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Natural scales of a joint's contact, under the greatest force of the ideal machine (SI)."""
+
+    joint: str
+    force: float  # N
+    penetration: float  # m, at rest under the force
+    frequency: float  # Hz, of the lighter body on the contact's stiffness there
+    step_limit: float  # s, of an explicit method, by the fastest of stiffness, damping, friction
+    limited_by: str
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What leaving one feature out changes.
+
+    `needed_for` names the quantities that change by more than the case promises; `removable`: none.
+    """
+
+    key: str
+    name: str
+    neutral: str
+    effect: Effect
+    needed_for: tuple[str, ...]
+    removable: bool
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """All that is told of one study: of its first job, measured, and of the sweep."""
+
+    study: str
+    path: str
+    jobs: int
+    point: dict[str, Any]  # of the sweep's axes, at the job explained
+    scene: str
+    unknowns: tuple[str, ...]
+    active: dict[str, str]  # term -> in words
+    absent: tuple[str, ...]  # terms left out, at no cost
+    scales: tuple[Scales, ...]
+    accuracy: str  # the word, or "" where rtol is given
+    rtol: float
+    promise: float
+    method: str
+    reason: str  # why the job failed; empty when it did not
+    detail: str
+    seconds: float  # wall time of the job, without storing it
+    steps: int
+    evaluations: int
+    workers: int
+    sweep_seconds: float  # of all jobs, if they cost what this one does
+    advice: tuple[Advice, ...]
+
+
+def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
+    """Explain the first job of a study by running it, and it again without each of its features.
+
+    Times are medians of `repeats`; a job above `bench.SLOW` is timed once.
+    """
+    case = study.cases[0]
+    run, seconds = timed(case, repeats)
+    repeats = repeats if seconds < SLOW else 1
+    ended = complete(run)
+    active, absent = terms(case)
+    freedoms = FREEDOMS[scene(case)]
+    return Explanation(
+        study=study.name,
+        path=study.path,
+        jobs=len(study.cases),
+        point={axis.key: axis.values[0] for axis in study.axes},
+        scene=SCENES[scene(case)],
+        unknowns=STATE_NAMES[2 * freedoms][:freedoms],
+        active=active,
+        absent=absent,
+        scales=tuple(scales(case)),
+        accuracy=asked(case),
+        rtol=case.rtol,
+        promise=promise(case),
+        method=case.solve.method,
+        reason=run["reason"].item(),
+        detail=run.attrs.get("detail", ""),
+        seconds=seconds,
+        steps=int(run["steps"]),
+        evaluations=int(run["evaluations"]),
+        workers=workers,
+        sweep_seconds=seconds * len(study.cases) / min(workers, len(study.cases)),
+        advice=tuple(advise(case, repeats)) if ended else (),
+    )
+
+
+def timed(case: Case, repeats: int) -> tuple[xr.Dataset, float]:
+    """A run of a case and the median of its wall times (s), compiled code being there already."""
+    run = simulate(case)
+    seconds = []
+    for _ in range(repeats if complete(run) and run["seconds"].item() < SLOW else 1):
+        began = time.perf_counter()
+        run = simulate(case)
+        seconds.append(time.perf_counter() - began)
+    return run, statistics.median(seconds)
+
+
+def asked(case: Case) -> str:
+    """Accuracy as the case file asks for it; "" where it gives a tolerance."""
+    if case.targets:
+        return ", ".join(f"{name} to {target:g}" for name, target in case.targets)
+    return "" if case.solve.rtol is not None else str(case.solve.accuracy)
+
+
+def promise(case: Case) -> float:
+    """The relative error that a case may have: asked for by number, or of its word.
+
+    With an rtol in place of a word it is that of the word it is as tight as, and no less than
+    draft's.
+    """
+    if case.targets:
+        return min(target for _, target in case.targets)
+    kept = [tier.promise for tier in ACCURACY.values() if case.rtol <= tier.rtol]
+    return min(kept, default=ACCURACY["draft"].promise)
+
+
+def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
+    """What a case computes, in words by term, and what it leaves out at no cost."""
+    ideal = scene(case) == Scene.IDEAL
+    shown = [feature for feature in FEATURES if not feature.key.startswith("clearance")]
+    used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
+    active = {feature.name: spoken(case, feature) for feature in used}
+    absent = tuple(feature.name for feature in shown if feature not in used)
+    if ideal:
+        return active, (*absent, "clearance", "contact")
+    widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
+              for joint in faulty(case)]  # fmt: skip
+    contact = case.contact
+    active["clearance"] = ", ".join(widths)
+    stiffness = contact.stiffness_N_per_mm15
+    material = f"K = {stiffness:g} N/mm^p" if stiffness else " on ".join(contact.materials or ())
+    active["contact"] = (
+        f"{contact.law}, {material}, p = {contact.exponent:g}, "
+        f"C_max = {contact.damping_N_s_per_mm:g} N s/mm"
+    )
+    return active, absent
+
+
+def spoken(case: Case, feature: Feature) -> str:
+    """The value by which a case pays for a feature."""
+    group, dot, name = feature.key.partition(".")
+    if feature.key == "friction" and case.friction:
+        return f"static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
+    value = getattr(getattr(case, group), name) if dot else getattr(case, group)
+    return f"{feature.key} = {value}"
+
+
+def scales(case: Case) -> Iterator[Scales]:
+    """The natural scales of each joint with clearance."""
+    ideal = simulate(replace(case, joint="none"))
+    p = record(case)
+    mass = min(p.rod_mass, p.reciprocating_mass)
+    for index, joint in enumerate(JOINTS):
+        if p.clearance[index] <= 0:
+            continue
+        force = float(ideal["peak_contact_force"].sel(joint=joint))
+        stiffness = float(p.stiffness[index])
+        depth = (force / stiffness) ** (1 / p.exponent)
+        frequency = math.sqrt(p.exponent * stiffness * depth ** (p.exponent - 1) / mass)
+        rates = {
+            "contact stiffness": frequency,
+            "contact damping": float(step(depth, 0.0, 0.0, p.full_damping, p.damping)) / mass,
+        }
+        if p.friction:  # the smoothed law is steepest where nothing slides
+            rates["friction"] = 1.5 * p.static * force / (p.stiction_velocity * mass)
+        fastest = max(rates, key=lambda name: rates[name])
+        yield Scales(
+            joint, force, depth, frequency / (2 * math.pi), BOUNDARY / rates[fastest], fastest
+        )
+
+
+def advise(case: Case, repeats: int) -> Iterator[Advice]:
+    """What each feature that a case pays for changes, and whether it could be left out."""
+    if scene(case) == Scene.IDEAL:
+        return
+    allowed = promise(case)
+    for feature in FEATURES:
+        if feature.paid(case):
+            effect = compare(case, feature.remove(case), repeats)
+            needed = {
+                "peak acceleration": effect.change_peak_acceleration,
+                "contact force": effect.change_peak_contact_force,
+            }
+            kept = tuple(name for name, change in needed.items() if not abs(change) < allowed)
+            yield Advice(feature.key, feature.name, feature.neutral, effect, kept, not kept)
