@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from conftest import keep
 from random_cases import random_cases
 
 from compressor import simulation
@@ -11,7 +12,7 @@ from compressor.case import Case
 from compressor.plan import CaseFileError, load_studies
 from compressor.schema import ERRORS, METRICS
 from compressor.simulation import measure, simulate
-from compressor.store import job_status, open_study, read_studies, write_job, write_study
+from compressor.store import job_status, open_study, read_studies, write_study
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -136,15 +137,15 @@ def test_a_stored_job_without_bars_does_not_serve_a_case_that_wants_them(tmp_pat
         Case.from_values({"solve": solve | more, "output": {"keep": "metrics"}})
         for more in ({"error_bars": False}, {}, {"accuracy": {"rms_acceleration": 0.1}})
     )
-    write_job(tmp_path, simulate(plain))
+    keep(tmp_path, simulate(plain))
     stored = job_status(tmp_path, plain.key)
     assert stored.serves(plain)
     assert not stored.serves(barred)
-    write_job(tmp_path, simulate(barred))
+    keep(tmp_path, simulate(barred))
     stored = job_status(tmp_path, plain.key)
     assert stored.serves(plain)
     assert stored.serves(barred)
-    write_job(tmp_path, simulate(by_number))
+    keep(tmp_path, simulate(by_number))
     assert job_status(tmp_path, by_number.key).serves(by_number)
 
 
@@ -269,7 +270,7 @@ def test_accuracy_by_number_is_an_axis_too(tmp_path):
     assert len({case.key for case in study.cases}) == 3
     for case in study.cases:
         assert Case.from_values(case.values()) == case
-        write_job(tmp_path, simulate(case))
+        keep(tmp_path, simulate(case))
     for _ in range(2):  # written once, though JSON knows no tuples
         write_study(tmp_path, study, "once")
         (stored,) = read_studies(tmp_path)

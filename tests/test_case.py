@@ -262,7 +262,7 @@ EVERYTHING = {
 @pytest.mark.parametrize(
     ("values", "key", "physics"),
     [
-        ({}, "2b525255a703a4ce7c25", "b51063b44b7443eabcd1"),
+        ({"solve": {"rtol": 5e-5}}, "2b525255a703a4ce7c25", "b51063b44b7443eabcd1"),
         (EVERYTHING, "05dcc40c7ce60f4369be", "45bdc4aa8489c4087e69"),
     ],
 )

@@ -499,7 +499,7 @@ def test_any_override_is_read_or_refused(write, text):
 
 def near(row):
     """Values so near a row's default that they fit those of all other rows."""
-    if row.kind == "flag":
+    if row.kind == "boolean":
         return st.booleans()
     if row.kind == "choice":
         return st.sampled_from(row.choices)
