@@ -37,6 +37,7 @@ BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is gi
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
 NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
 CHUNK = 4096  # attempts of the march between two looks at the clock; about ten milliseconds
+SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 
@@ -185,11 +186,11 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     deadline = time.monotonic() + request.timeout
     mode, pair = COMPILED[request.method]
     walker = new_walker(mode)
-    walker.pair, walker.rtol, walker.settle = pair, request.rtol, request.settle
+    walker.pair, walker.rtol = pair, request.rtol
     length, speed = scales(request.p)
     walker.watch, walker.contact_step = 1, CONTACT_STEP * length / speed
     walker.deepest = IMPLAUSIBLE * request.p.pin_radius
-    edges, phases = cut(edges, phases, request.settle)
+    edges, phases, walker.settle = cut(edges, phases, request.settle)
     size = natural_sizes(request.p)
     work = new_work(size.size)
     while walker.status == Status.RUNNING:
@@ -206,12 +207,15 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     result.stop_time = math.nan
 
 
-def cut(edges: np.ndarray, phases: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Segments that end at a time as well; a step then lies before it or after it."""
+def cut(edges: np.ndarray, phases: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Segments that end at a time as well, and that time: of an edge that lies there already."""
+    near = edges[np.abs(edges - time).argmin()]
+    if abs(near - time) <= SAME_TIME * edges[-1]:
+        return edges, phases, float(near)
     i = int(np.searchsorted(edges, time))
-    if i == 0 or i == edges.size or edges[i] == time:
-        return edges, phases
-    return np.insert(edges, i, time), np.insert(phases, i, phases[i - 1])
+    if i == edges.size:
+        return edges, phases, time
+    return np.insert(edges, i, time), np.insert(phases, i, phases[i - 1]), time
 
 
 def check_march(request: Request, walker: np.record, deepest: float, deadline: float) -> None:

@@ -5,7 +5,7 @@ import pytest
 import reference
 
 from compressor.case import ACCURACY, METHODS, Case
-from compressor.integrate import absolute_tolerances
+from compressor.integrate import absolute_tolerances, cut
 from compressor.physics.parameters import FREEDOMS
 from compressor.record import record, scene
 from compressor.simulation import simulate
@@ -123,3 +123,12 @@ def test_tolerances_scale_with_the_clearance(joint):
     assert small.size == 2 * n + 4
     assert large[: 2 * n] / small[: 2 * n] == pytest.approx(2)
     assert small[0] == pytest.approx(1e-6 * 1e-6)
+
+
+def test_settling_at_a_corner_makes_no_segment_of_rounding():
+    edges, phases = np.array([0.0, 0.1, 0.2, 0.4]), np.array([0, 1, 2])
+    assert cut(edges, phases, 0.1 + 1e-17)[2] == 0.1
+    for time in (0.1, np.nextafter(0.1, 1), 0.0, 0.4, 0.9):
+        assert cut(edges, phases, time)[0] is edges
+    found = cut(edges, phases, 0.3)
+    assert [part.tolist() for part in found[:2]] == [[0, 0.1, 0.2, 0.3, 0.4], [0, 1, 2, 2]]
