@@ -95,7 +95,7 @@ def solve(case: Case) -> Solution:
     """A case's motion, with error bars where they are wanted."""
     if case.targets:
         return climb(case)
-    found = attempt(case, 0, case.solve.timeout_s)
+    found = attempt(case, 0, case.solve.timeout_s, case.output.keep == "series")
     if case.wants_bars and not found.reason:
         left = case.solve.timeout_s - found.trajectory.seconds
         found.bars = error_bars(found, attempt(case, -1, left, sampled=False))
@@ -109,14 +109,15 @@ def climb(case: Case) -> Solution:
     keeps its last whole run, and says how far it came.
     """
     left = case.solve.timeout_s
-    best = attempt(case, 0, left)
+    sampled = case.output.keep == "series"
+    best = attempt(case, 0, left, sampled)
     for rung in itertools.count(1):
         if best.reason:
             return best
         left -= best.trajectory.seconds
         if case.rtol / 10.0**rung < 0.99 * TIGHTEST:
             return short_of(case, best, "accuracy_not_reached", "no run is tighter")
-        found = attempt(case, rung, left)
+        found = attempt(case, rung, left, sampled)
         if found.reason in OUT_OF_BUDGET:
             reason = found.reason if found.reason == "budget_seconds" else "accuracy_not_reached"
             return short_of(case, best, reason, f"the next run: {found.detail}")
@@ -137,7 +138,7 @@ def short_of(case: Case, best: Solution, reason: str, detail: str) -> Solution:
     return best
 
 
-def attempt(case: Case, rung: int, timeout: float, sampled: bool = True) -> Solution:
+def attempt(case: Case, rung: int, timeout: float, sampled: bool) -> Solution:
     """One run of a case, 10^rung times tighter than it asks for, without error bars.
 
     The ideal scene's quadrature gets twice the pieces a rung. `sampled`: whether on the output

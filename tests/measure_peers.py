@@ -76,7 +76,7 @@ def timed(call):
 
 def ours(scene, rtol):
     """Our run of a scene, the `Case` made anew."""
-    return simulate(Case.from_values(case_values(scene, rtol=rtol)))
+    return simulate(Case.from_values(case_values(scene, rtol=rtol, error_bars=False)))
 
 
 def loosest(errors, limit):

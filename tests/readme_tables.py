@@ -230,6 +230,22 @@ def modelling_table():
     return "\n".join(lines) + "\n"
 
 
+def throughput_table():
+    found = kept("throughput.json")
+    start, sweep = found["start"], found["sweep"]
+    lines = ["| warm, whole process | seconds |", "|---|---|"]
+    lines += [f"| {name} | {seconds:.2g} |" for name, seconds in start.items()]
+    lines += [
+        "",
+        f"{sweep['jobs']:,} big-end jobs without time series or error bars on "
+        f"{sweep['workers']} workers: {sweep['wall_s']:.0f} s, {sweep['jobs_per_s']:.0f} jobs a "
+        f"second, {100 * sweep['kernel_share']:.0f} % of the wall time inside the kernel; the "
+        f"kernel by itself would do {sweep['alone_jobs_per_s']:.0f} a second on as many cores. "
+        f"The same command again takes {sweep['again_s']:.1f} s.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
@@ -239,6 +255,7 @@ TABLES = {
     "claims": claims_table,
     "store": store_table,
     "peers": peers_table,
+    "throughput": throughput_table,
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,
