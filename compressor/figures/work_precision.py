@@ -17,7 +17,7 @@ ROOM = 4.0  # times left of the fastest point, for the words
 MID, LIGHT = "#7d7d7d", "#ababab"
 # compiled methods are solid and coloured, SciPy's grey and dashed
 LOOKS: dict[str, tuple[Line, str, str]] = {
-    "auto": (Line(BLUE, "-", 1.7, 3.2), "o", "auto (DOPRI5)"),
+    "auto": (Line(BLUE, "-", 1.7, 3.2), "o", "auto (TSIT5)"),
     "DOPRI5": (Line(RED, "-", 1.3, 3.1), "s", "DOPRI5"),
     "RODAS": (Line(GOLD, "-", 1.6, 3.0), "D", "RODAS"),
     "DOP853": (Line(BLACK, (0, (1, 1.2)), 1.2, 2.5), "^", "SciPy DOP853"),
