@@ -16,19 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from compressor.case import Case, checked, table
-from compressor.conflicts import IN_PLACE_OF
-from compressor.parameter import JOINTS, CaseError, Problem, shown
-from compressor.reading import (
-    FileProblem,
-    Leaves,
-    Node,
-    Place,
-    cut,
-    leaves,
-    read_file,
-    read_text,
-    resolved,
-)
+from compressor.leaves import Leaves, leaves
+from compressor.overrides import overridden, read_overrides
+from compressor.parameter import CaseError, Problem, shown
+from compressor.reading import FileProblem, Node, Place, read_file, resolved
 
 MAX_JOBS = 10_000
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
@@ -96,7 +87,7 @@ def load_studies(*paths: str | os.PathLike[str], overrides: Sequence[str] = ()) 
     Raises CaseFileError with everything that is wrong in all files and overrides.
     """
     problems: list[FileProblem] = []
-    changes = _read_overrides(overrides, problems)
+    changes = read_overrides(overrides, problems)
     drafts = [_draft(os.fsdecode(path), changes, problems) for path in paths]
     _refuse_shared_names(drafts)
     studies = [_study(draft) for draft in drafts]
@@ -104,53 +95,6 @@ def load_studies(*paths: str | os.PathLike[str], overrides: Sequence[str] = ()) 
     if problems:
         raise CaseFileError(problems)
     return studies
-
-
-def _read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[str, Leaves]:
-    """The leaves of each `key=value` of the command line, by its key."""
-    found: dict[str, Leaves] = {}
-    for text in texts:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        place = Place(f"--set {cut(text)}")
-        if not key or not equals:
-            message = "needs the form key=value, such as joint=both"
-            problems.append(FileProblem(place, "", message))
-        elif any(_covers(key, other) or _covers(other, key) for other in found):
-            problems.append(FileProblem(place, key, "is set twice"))
-        elif node := read_text(value, place, problems):
-            group, dot, inner = key.partition(".")
-            node = Node({inner: node}, place, place) if dot else node
-            found[key] = leaves(Node({group: node}, place, place), problems)
-    return found
-
-
-def _overridden(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
-    """A file's leaves with every override in place of the leaves at or under its key."""
-    new = {key: node for change in overrides.values() for key, node in change.values.items()}
-    places = {key: place for change in overrides.values() for key, place in change.places.items()}
-    gone = [*overrides]
-    for one, other in IN_PLACE_OF:
-        gone += [other] * (one in new) + [one] * (other in new)
-    if "joint" in new and new["joint"].value == "none":
-        gone.append("clearance_mm")
-    kept = {
-        key: node
-        for outer, value in file.values.items()
-        for key, node in _opened(outer, value, new).items()
-        if key in new or not any(_covers(other, key) for other in gone)
-    }
-    return Leaves(kept | new, places | file.places)
-
-
-def _opened(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
-    """A value that stands for a whole group, split up if an override sets a part of the group."""
-    if not any(other.startswith(f"{key}.") for other in new):
-        return {key: node}
-    return {f"{key}.{joint}": node for joint in JOINTS} if key == "clearance_mm" else {}
-
-
-def _covers(outer: str, key: str) -> bool:
-    return f"{key}.".startswith(f"{outer}.")
 
 
 def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProblem]) -> _Draft:
@@ -162,7 +106,7 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
     elif root and root.value is not None:
         message = "needs keys at the top, such as `joint: big_end`"
         problems.append(FileProblem(root.place, "", message))
-    found = _overridden(found, changes)
+    found = overridden(found, changes)
     name = _name(path, found, problems) if root else ""
     return _Draft(path, name, found, problems)
 

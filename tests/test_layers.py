@@ -33,6 +33,8 @@ FLOORS = [
     "bars",
     "simulation",
     "reading",
+    "leaves",
+    "overrides",
     "plan",
     "durable",
     "hdf5",
