@@ -21,9 +21,9 @@ from compressor.parameter import JOINTS
 from compressor.physics.contact import step
 from compressor.physics.control import BOUNDARY
 from compressor.physics.parameters import FREEDOMS, Scene
-from compressor.plan import Study
 from compressor.record import record, scene
 from compressor.simulation import STATE_NAMES, simulate
+from compressor.study import Study
 
 SCENES = {
     Scene.IDEAL: "ideal joints",

@@ -71,16 +71,22 @@ def grid(study: StoredStudy) -> Layout:
 
 
 def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
-    """Several studies: one dimension, `job`."""
+    """Several studies, or one that is no grid: one dimension, `job`."""
     units = {"joint": "", "load": ""} | {a.key: a.units for s in studies for a in s.axes}
-    rows = [(study, point) for study in studies for point in points(study.axes)]
+    rows = [(study, point) for study in studies for point in points(study)]
     coordinates = {"study": xr.Variable("job", [study.name for study, _ in rows])}
     for key, name in coordinate_names(list(units)).items():
         missing = np.nan if units[key] else ""
-        values = [point.get(key, _fixed_value(study.fixed, key, missing)) for study, point in rows]
+        values = [_value(study, point, key, missing) for study, point in rows]
         coordinates[name] = _coordinate(("job",), key, values, units[key])
     keys = [key for study in studies for key in study.keys]
     return Layout(("job",), np.array(keys), coordinates)
+
+
+def _value(study: StoredStudy, point: Mapping[str, Any], key: str, missing: Any) -> Any:
+    """The value of a key in one job of a study."""
+    value = point[key] if key in point else _fixed_value(study.fixed, key, missing)
+    return missing if value is None else value
 
 
 def _fixed_value(fixed: Mapping[str, Any], key: str, missing: Any) -> Any:

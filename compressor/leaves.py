@@ -5,16 +5,23 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from compressor.axes import FORMS
 from compressor.case import GROUPS, Case, table
 from compressor.parameter import shown
 from compressor.reading import FileProblem, Node, Place
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
+# keys of a case file that are no part of a case: how values are swept together
+SWEEP = ("sample", "zip", "exclude", "blocks")
+SAMPLE = ("n", "seed")
 
 
 @dataclass(frozen=True)
 class Leaves:
-    """The values of a case file by dotted key, and where each known key and group stands."""
+    """The values of a case file by dotted key, and where each known key and group stands.
+
+    A block has its own place at "".
+    """
 
     values: dict[str, Node]
     places: dict[str, Place]
@@ -25,19 +32,26 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
     found = Leaves({}, {})
     for name, node in _known("", root, problems):
         found.places[name] = node.key_place
-        if name in GROUPS and isinstance(node.value, dict):
+        mapping = isinstance(node.value, dict)
+        if (name in GROUPS or name == "sample") and mapping and not _is_sweep(name, node):
             for inner, item in _known(name, node, problems):
                 found.values[f"{name}.{inner}"] = item
                 found.places[f"{name}.{inner}"] = item.key_place
         elif name == "friction" and node.value is not False:
             message = f"needs false or a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
-        elif name in GROUPS and name not in ("friction", "clearance_mm"):
+        elif (name in GROUPS or name == "sample") and name not in ("friction", "clearance_mm"):
             message = f"needs a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
         else:
             found.values[name] = node
     return found
+
+
+def _is_sweep(name: str, node: Node) -> bool:
+    """Whether a group's mapping sweeps a value that stands for the whole group."""
+    few = name == "clearance_mm" and len(node.value) <= 2
+    return few and any(get_close_matches(word, FORMS, n=1) for word in node.value)
 
 
 def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tuple[str, Node]]:
@@ -52,7 +66,10 @@ def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tupl
 
 
 def _allowed(group: str) -> list[str]:
-    return [item.name for item in dataclasses.fields(GROUPS[group] if group else Case)]
+    if group == "sample":
+        return [*SAMPLE]
+    names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Case)]
+    return names if group else [*names, *SWEEP]
 
 
 def suggestion(name: str, group: str) -> str:

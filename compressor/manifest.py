@@ -6,7 +6,7 @@ import itertools
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -19,7 +19,7 @@ from compressor.hdf5 import digest
 from compressor.parameter import JOINTS
 
 if TYPE_CHECKING:
-    from compressor.plan import Axis, Study
+    from compressor.study import Study
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,10 @@ class StoredAxis:
 
 @dataclass(frozen=True)
 class StoredStudy:
-    """What a store knows of one study; `keys` are its jobs in C order over `axes`."""
+    """What a store knows of one study; `keys` are its jobs, in a grid in C order over `axes`.
+
+    In a study that is no grid every axis is a column: a value for each job, None where it has none.
+    """
 
     name: str
     case_file: str
@@ -43,12 +46,24 @@ class StoredStudy:
     command: str
     versions: dict[str, str]
     written: str  # UTC
+    is_grid: bool = True
+
+    @property
+    def jobs(self) -> int:
+        return len(self.keys)
 
 
-def points(axes: "Sequence[Axis | StoredAxis]") -> Iterator[dict[str, Any]]:
-    """The swept values of each job by dotted key, in C order over the axes."""
-    for values in itertools.product(*(axis.values for axis in axes)):
-        yield {axis.key: value for axis, value in zip(axes, values, strict=True)}
+def points(study: "Study | StoredStudy") -> Iterator[dict[str, Any]]:
+    """The swept values of each job by dotted key, in the order of the jobs."""
+    keys = [axis.key for axis in study.axes]
+    columns = [axis.values for axis in study.axes]
+    rows: Iterable[tuple[Any, ...]]
+    if study.is_grid:
+        rows = itertools.product(*columns)
+    else:
+        rows = (tuple(column[n] for column in columns) for n in range(study.jobs))
+    for values in rows:
+        yield dict(zip(keys, values, strict=True))
 
 
 def write_study(folder: Folder, study: "Study", command: str = "") -> None:
@@ -64,6 +79,7 @@ def write_study(folder: Folder, study: "Study", command: str = "") -> None:
         {"compsim": compressor.__version__, "model": MODEL_VERSION}
         | {name: metadata.version(name) for name in ("numpy", "scipy", "numba", "h5py", "xarray")},
         datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        study.is_grid,
     )
     path = Path(folder) / "studies" / f"{study.name}.json"
     with contextlib.suppress(StoreError, FileNotFoundError):
@@ -76,7 +92,10 @@ def write_study(folder: Folder, study: "Study", command: str = "") -> None:
 
 def encode(study: StoredStudy) -> bytes:
     """The text of a study's file; its last entry is the digest of what stands before it."""
-    text = json.dumps(vars(study) | {"axes": [vars(axis) for axis in study.axes]}, indent=1)
+    plain = vars(study) | {"axes": [vars(axis) for axis in study.axes]}
+    if study.is_grid:  # as in files that are older than other studies
+        del plain["is_grid"]
+    text = json.dumps(plain, indent=1)
     head = text.removesuffix("\n}").encode()
     return head + f',\n "digest": "{digest(head)}"\n}}\n'.encode()
 
@@ -103,7 +122,10 @@ def read_study(path: Path) -> StoredStudy:
         del plain["digest"]
         axes = (StoredAxis(a["key"], _frozen(a["values"]), a["units"]) for a in plain["axes"])
         study = StoredStudy(**plain | {"axes": tuple(axes), "keys": tuple(plain["keys"])})
-        if len(study.keys) != math.prod(len(axis.values) for axis in study.axes):
+        sizes = [len(axis.values) for axis in study.axes]
+        if study.is_grid and study.jobs != math.prod(sizes):
+            raise ValueError
+        if not study.is_grid and {*sizes} - {study.jobs}:
             raise ValueError
         if encode(study) != data:
             raise ValueError

@@ -1,4 +1,4 @@
-"""Values that stand in place of a case file's: `key=value` on the command line."""
+"""Values in place of a case file's: `key=value` on the command line, and blocks of the file."""
 
 from collections.abc import Mapping, Sequence
 
@@ -42,6 +42,13 @@ def overridden(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
         if key in new or not any(_covers(other, key) for other in gone)
     }
     return Leaves(kept | new, places | file.places)
+
+
+def merged(file: Leaves, block: Leaves) -> Leaves:
+    """A file's leaves with every leaf of one of its blocks in place of the file's."""
+    changes = {key: Leaves({key: node}, {}) for key, node in block.values.items()}
+    found = overridden(file, changes)
+    return Leaves(found.values, file.places | block.places)
 
 
 def _opened(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:

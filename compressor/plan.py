@@ -10,27 +10,23 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from compressor.case import Case, checked, table
+from compressor import blocks
+from compressor.axes import counted
+from compressor.case import Case, table
+from compressor.comparisons import NoComparison, Test, comparison
 from compressor.leaves import Leaves, leaves
-from compressor.overrides import overridden, read_overrides
-from compressor.parameter import CaseError, Problem, shown
-from compressor.reading import FileProblem, Node, Place, read_file, resolved
+from compressor.overrides import merged, overridden, read_overrides
+from compressor.parameter import CaseError, Problem
+from compressor.reading import FileProblem, Node, Place, cut, read_file, resolved
+from compressor.study import Axis, Cases, Study, value_of
 
 MAX_JOBS = 10_000
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
-UNSWEPT = (  # no part of a job's identity
-    "name",
-    "solve.error_bars",
-    "solve.timeout_s",
-    "output.keep",
-    "output.precision",
-    "output.compress",
-)
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 
@@ -46,30 +42,13 @@ class CaseFileError(ValueError):
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One swept key of a study, such as `machine.rod_mass_kg`, and its values."""
-
-    key: str
-    values: tuple[Any, ...]
-
-
-@dataclass(frozen=True)
-class Study:
-    """One case file: its cases in C order over the axes, which stand in the file's order."""
-
-    name: str
-    path: str
-    axes: tuple[Axis, ...]
-    cases: tuple[Case, ...]
-
-
-@dataclass(frozen=True)
 class _Draft:
     """A study that is being read; `name` is empty where the file gives no valid one."""
 
     path: str
     name: str
     leaves: Leaves
+    changes: Mapping[str, Leaves]
     problems: list[FileProblem]
 
 
@@ -81,20 +60,39 @@ def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
     return [case for study in load_studies(*paths) for case in study.cases]
 
 
-def load_studies(*paths: str | os.PathLike[str], overrides: Sequence[str] = ()) -> list[Study]:
+def load_studies(
+    *paths: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    max_jobs: int = MAX_JOBS,
+    only: str = "",
+) -> list[Study]:
     """The studies of YAML case files; each override, `key=value`, replaces a value in all of them.
 
-    Raises CaseFileError with everything that is wrong in all files and overrides.
+    A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
+    comparison, selects the jobs to be run. Raises CaseFileError with everything that is wrong in
+    all files, overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
+    test = _read_only(only, problems) if only else None
     drafts = [_draft(os.fsdecode(path), changes, problems) for path in paths]
     _refuse_shared_names(drafts)
-    studies = [_study(draft) for draft in drafts]
+    studies = [_study(draft, max_jobs, test) for draft in drafts]
     problems += [problem for draft in drafts for problem in draft.problems]
+    if not problems and not any(study.selected for study in studies):
+        problems.append(FileProblem(Place(f"--only {cut(only)}"), "", "selects no job"))
     if problems:
         raise CaseFileError(problems)
     return studies
+
+
+def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
+    """The comparison of the command line."""
+    try:
+        return comparison(text)
+    except NoComparison as error:
+        problems.append(FileProblem(Place(f"--only {cut(text)}"), "", str(error)))
+        return None
 
 
 def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProblem]) -> _Draft:
@@ -106,9 +104,11 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
     elif root and root.value is not None:
         message = "needs keys at the top, such as `joint: big_end`"
         problems.append(FileProblem(root.place, "", message))
-    found = overridden(found, changes)
-    name = _name(path, found, problems) if root else ""
-    return _Draft(path, name, found, problems)
+    name = _name(path, overridden(found, changes), problems) if root else ""
+    if "blocks" in changes:
+        found = overridden(found, {"blocks": changes["blocks"]})
+    rest = {key: change for key, change in changes.items() if key != "blocks"}
+    return _Draft(path, name, found, rest, problems)
 
 
 def _name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
@@ -130,137 +130,124 @@ def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
     for draft in drafts:
         other = first.setdefault(draft.name.casefold(), draft)
         if draft.name and other is not draft:
-            given = draft.leaves.values.get("name")
+            given = overridden(draft.leaves, draft.changes).values.get("name")
             place = given.place if given else Place(draft.path, 1, 1)
             message = f"{other.path} and {draft.path} would be stored under one name, {draft.name}"
             draft.problems.append(FileProblem(place, "name", message))
 
 
-def _study(draft: _Draft) -> Study:
+def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
     """The study of a draft; without cases if the draft has problems, to which its own are added."""
-    fixed: dict[str, Node] = {}
-    swept: dict[str, list[Node]] = {}
-    for key, node in draft.leaves.values.items():
-        values = _axis_values(key, node, draft.problems)
-        if values is not None:
-            swept[key] = _checked_axis(key, values, draft.problems)
-        elif good := _checked(key, node, draft.problems):
-            fixed[key] = good
-    _refuse_size(swept, draft)
-    cases = () if draft.problems else tuple(_cases(draft, fixed, swept))
-    axes = (Axis(key, tuple(node.value for node in nodes)) for key, nodes in swept.items())
-    return Study(draft.name, draft.path, tuple(axes), cases)
-
-
-# How an axis is written -> the function that gives its values.
-AXIS_KINDS: dict[str, Callable[[Node], list[Node]]] = {"list": lambda node: node.value}
-
-
-def _axis_values(key: str, node: Node, problems: list[FileProblem]) -> list[Node] | None:
-    """The values that a node sweeps, none if it sweeps in no valid way; None for a single value."""
-    kind = _axis_kind(key, node)
-    if kind == "value":
-        return None
-    if kind not in AXIS_KINDS:
-        message = "needs a value or a list of values, not a mapping"
-    elif key in UNSWEPT:
-        message = "cannot be swept: it does not change what a job computes"
+    drafts = [blocks.draft(leaves, draft.problems) for leaves in _blocks(draft, max_jobs)]
+    if not _bearable(drafts, draft, max_jobs):
+        return Study(draft.name, draft.path, (), ())
+    found = [one.block() for one in drafts]
+    cases = Cases(draft.name, found)
+    if not draft.problems and not draft.changes:
+        _refuse_idle_sample(drafts, draft)
+    is_grid = len(found) == 1 and found[0].is_grid
+    keys = [] if is_grid else blocks.columns(found)
+    table = _checked_cases(draft, cases, keys) if not draft.problems else []
+    if is_grid:
+        axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
-        values = AXIS_KINDS[kind](node)
-        if values:
-            return values
-        message = "is an empty list"
-    problems.append(FileProblem(node.place, key, message))
-    return []
+        found_columns = zip(*table, strict=True)
+        axes = [Axis(key, column) for key, column in zip(keys, found_columns, strict=False)]
+    if draft.problems:
+        cases = Cases(draft.name, ())
+    selected = range(len(cases)) if only is None else cases.where(only)
+    return Study(draft.name, draft.path, tuple(axes), cases, is_grid, selected)
 
 
-def _axis_kind(key: str, node: Node) -> str:
-    if isinstance(node.value, dict):
-        return "value" if key == "solve.accuracy" else "mapping"
-    if not isinstance(node.value, list):
-        return "value"
-    pair = key == "contact.materials" and not any(isinstance(n.value, list) for n in node.value)
-    return "value" if pair else "list"
+def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
+    """The leaves of each block, over those of the file; the file's alone where it has no blocks."""
+    node = draft.leaves.values.get("blocks")
+    own = {key: item for key, item in draft.leaves.values.items() if key != "blocks"}
+    file = Leaves(own, draft.leaves.places)
+    if node is None:
+        yield overridden(file, draft.changes)
+        return
+    items = node.value if isinstance(node.value, list) else []
+    if not items or not all(isinstance(item.value, dict) for item in items):
+        message = "needs a list of mappings, such as [{load: none}, {joint: both}]"
+        draft.problems.append(FileProblem(node.place, "blocks", message))
+    elif len(items) > max_jobs:
+        message = f"{len(items)} blocks are more jobs than {max_jobs}; raise --max-jobs"
+        draft.problems.append(FileProblem(node.place, "blocks", message))
+    else:
+        for item in items:
+            yield overridden(merged(file, _block_leaves(item, draft)), draft.changes)
 
 
-def _checked_axis(key: str, values: list[Node], problems: list[FileProblem]) -> list[Node]:
-    """The valid values of an axis; each of the others, and each repetition, is a problem."""
-    found = [good for value in values if (good := _checked(key, value, problems))]
-    seen: set[Any] = set()
-    for node in found:
-        if node.value in seen:
-            message = f"{shown(node.value)} is in the list twice"
-            problems.append(FileProblem(node.place, key, message))
-        seen.add(node.value)
+def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
+    """A `sample` of which no key is sampled is a mistake."""
+    place = draft.leaves.places.get("sample")
+    if place and not any(one.samples and one.is_sampled for one in drafts):
+        message = "samples nothing: give a key {random: [least, greatest]}, lhs or sobol"
+        draft.problems.append(FileProblem(place, "sample", message))
+
+
+def _block_leaves(item: Node, draft: _Draft) -> Leaves:
+    """What a block says; what only a file can say is a problem."""
+    found = leaves(item, draft.problems)
+    for key in [key for key in found.values if key in ("name", "blocks")]:
+        message = "cannot stand in a block: it belongs to the whole file"
+        draft.problems.append(FileProblem(found.places[key], key, message))
+        del found.values[key]
+    found.places[""] = item.place
     return found
 
 
-def _checked(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
-    """A node with its value as the case holds it; None if that is wrong, which joins `problems`."""
-    if node.value is None or key == "friction":  # told when it was read; or false, which is valid
-        return node if node.value is False else None
-    if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
-        return None
-    found: list[Problem] = []
-    row = "clearance_mm.big_end" if key == "clearance_mm" else key
-    value = checked(row, node.plain(), found)
-    parts = node.value if isinstance(node.value, dict) else {}
-    for problem in found:
-        part = parts.get(problem.key.removeprefix(f"{row}."))
-        place, about = (part.place, problem.key) if part else (node.place, key)
-        problems.append(FileProblem(place, about, problem.message))
-    return None if found else replace(node, value=value)
+def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> bool:
+    """Whether there are few enough jobs to make their values; too many are a problem."""
+    sizes = [one.sizes() for one in drafts]
+    total = sum(math.prod(one.values()) for one in sizes)
+    if total <= max_jobs:
+        return True
+    largest = max(drafts, key=lambda one: math.prod(one.sizes().values()))
+    keys = max(largest.factors, key=lambda keys: largest.size(keys[0]))
+    told = [" x ".join(f"{name} ({counted(n)})" for name, n in one.items()) for one in sizes]
+    message = (
+        f"{counted(total)} jobs are more than {max_jobs}: {cut(' + '.join(told), 300)}; "
+        "ask for fewer, or raise --max-jobs"
+    )
+    place = largest.sweeps[keys[0]].node.place
+    draft.problems.append(FileProblem(place, keys[0], message))
+    return False
 
 
-def _refuse_size(swept: Mapping[str, list[Node]], draft: _Draft) -> None:
-    count = math.prod(len(nodes) for nodes in swept.values())
-    if count > MAX_JOBS:
-        longest = max(swept, key=lambda key: len(swept[key]))
-        sizes = " x ".join(f"{key} ({len(nodes)})" for key, nodes in swept.items())
-        message = f"{count} jobs are more than {MAX_JOBS}: {sizes}"
-        place = draft.leaves.values[longest].place
-        draft.problems.append(FileProblem(place, longest, message))
-
-
-def _cases(draft: _Draft, fixed: dict[str, Node], swept: dict[str, list[Node]]) -> Iterator[Case]:
-    """The case of every combination; those that do not fit together are problems of the draft."""
+def _checked_cases(draft: _Draft, cases: Cases, keys: Sequence[str]) -> list[tuple[Any, ...]]:
+    """Each case's values of some keys; conflicts in any combination are problems of the draft."""
     found: dict[Problem, FileProblem] = {}
-    for nodes in itertools.product(*swept.values()):
-        chosen = fixed | dict(zip(swept, nodes, strict=True))
-        if "joint" in swept and chosen["joint"].value == "none":
-            chosen = {key: n for key, n in chosen.items() if not key.startswith("clearance_mm")}
+    rows = []
+    for block, chosen in cases.combinations():
         try:
-            yield Case.from_values(_nested(chosen) | {"name": draft.name})
+            case = cases.case(chosen)
         except CaseError as error:
             for problem in error.problems:
-                found.setdefault(problem, _located(problem, chosen, draft))
+                found.setdefault(problem, _located(problem, chosen, block, draft.path))
+        else:
+            rows.append(tuple(value_of(case, key) for key in keys))
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         draft.problems.append(FileProblem(Place(draft.path), "", message))
+    return rows
 
 
-def _nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for key, node in chosen.items():
-        group, _, name = key.rpartition(".")
-        value = node.value
-        if key == "solve.accuracy" and isinstance(value, tuple):
-            value = dict(value)  # as a case file has it
-        (values.setdefault(group, {}) if group else values)[name] = value
-    return values
-
-
-def _located(problem: Problem, chosen: Mapping[str, Node], draft: _Draft) -> FileProblem:
-    """A case's problem at the value it is about, or else at the key or group that is nearest."""
+def _located(
+    problem: Problem, chosen: Mapping[str, Node], block: blocks.Block, path: str
+) -> FileProblem:
+    """A case's problem at the value it is about, or at the nearest key, group or block."""
     group = problem.key.partition(".")[0]
     for key in (problem.key, group):
         if key in chosen:
             return FileProblem(chosen[key].place, key, problem.message)
     for key in (problem.key, group):
-        if key in draft.leaves.places:
-            return FileProblem(draft.leaves.places[key], problem.key, problem.message)
-    return FileProblem(Place(draft.path, 1, 1), problem.key, problem.message)
+        if key in block.leaves.places:
+            return FileProblem(block.leaves.places[key], problem.key, problem.message)
+    place = block.leaves.places.get("", Place(path, 1, 1))
+    return FileProblem(place, problem.key, problem.message)
 
 
 def to_yaml(case: Case) -> str:

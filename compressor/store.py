@@ -224,9 +224,10 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
 
     One study (that of `name`, or the only one) has its axes as dimensions: the last part of each
     swept key, such as `clearance_mm`, in the case file's unit; a swept `joint` is called `fault`.
-    Several studies have a `job` dimension with coordinates `study`, `fault`, `load` and each
-    swept key. `key` names every job (see `read_job`), `status` is ok, failed or missing, and
-    metrics are nan where a job did not reach its end.
+    Several studies, and one that is no grid (zip, samples, exclude, blocks), have a `job` dimension
+    with coordinates `study`, `fault`, `load` and each swept key. `key` names every job (see
+    `read_job`), `status` is ok, failed or missing, and metrics are nan where a job did not reach
+    its end.
 
     Series have the dimension `time`. If the jobs have different output grids (a swept speed),
     they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.
@@ -243,7 +244,8 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
     stored = read_store(folder)
     for damage in stored.damaged:
         warnings.warn(f"{damage}: its jobs count as missing", stacklevel=2)
-    layout = grid(studies[0]) if len(studies) == 1 else table_of_jobs(studies)
+    is_grid = len(studies) == 1 and studies[0].is_grid
+    layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
     dataset = labelled(layout, stored.rows, stored.job, stored.values)
     dataset.attrs = {"folder": folder, "studies": [study.name for study in studies]}
     return dataset

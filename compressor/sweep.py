@@ -20,9 +20,9 @@ import numpy as np
 
 import compressor
 from compressor.case import Case
-from compressor.plan import Study
 from compressor.schema import ROW, Outcome
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
+from compressor.study import Study
 from compressor.workers import Done, Lost, rest, run_batches
 from compressor.writer import Writer
 
@@ -54,7 +54,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Count:
-    """How many of a study's jobs ended well."""
+    """How many of a study's selected jobs ended well."""
 
     study: str
     jobs: int
@@ -148,9 +148,9 @@ def run_missing(
 
 
 def wanted(studies: Sequence[Study]) -> dict[str, Case]:
-    """Each job once, by key; where studies share one, a case that serves them all."""
+    """Each selected job once, by key; where studies share one, a case that serves them all."""
     cases: dict[str, Case] = {}
-    for case in (case for study in studies for case in study.cases):
+    for case in (study.cases[number] for study in studies for number in study.selected):
         known = cases.get(case.key)
         cases[case.key] = case if known is None else serving_both(known, case)
     return cases
@@ -193,15 +193,16 @@ def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
 def endings(
     studies: Sequence[Study], ends: dict[str, End]
 ) -> tuple[tuple[Count, ...], tuple[Failure, ...]]:
-    """How each study ended, and every job of it that failed."""
+    """How the selected jobs of each study ended, and every one that failed."""
     counts, failures = [], []
     for study in studies:
+        selected = {*study.selected}
         failed = [
-            Failure(study.name, point, case.key, ends[case.key].reason, ends[case.key].detail)
-            for case, point in zip(study.cases, points(study.axes), strict=True)
-            if ends[case.key].status != "ok"
+            Failure(study.name, point, key, ends[key].reason, ends[key].detail)
+            for number, point in enumerate(points(study))
+            if number in selected and ends[key := study.cases[number].key].status != "ok"
         ]
-        counts.append(Count(study.name, len(study.cases), len(failed)))
+        counts.append(Count(study.name, len(selected), len(failed)))
         failures += failed
     return tuple(counts), tuple(failures)
 

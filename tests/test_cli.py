@@ -60,8 +60,12 @@ def test_help_is_on_stdout(arguments, capsys):
         (["run", "bad.yaml"], "bad.yaml:1:9: joint: 'bigend' is none of"),
         (["run", "good.yaml", "--set", "joint"], "--set joint: needs the form key=value"),
         (["run", "good.yaml", "--set", "jiont=both"], "--set jiont=both: jiont: unknown key"),
+        (["run", "good.yaml", "--only", "load"], "--only load: needs one of == != < <= > >= after"),
+        (["run", "good.yaml", "--only", "load == none"], "--only load == none: selects no job"),
+        (["run", "good.yaml", "--set", "load=[none, design]", "--max-jobs", "1"],
+         "--set load=[none, design]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
     ],
-)
+)  # fmt: skip
 def test_usage_errors(arguments, told, case_file, capsys):
     case_file("good.yaml")
     Path("bad.yaml").write_text("joint:  bigend\nload: none\n")
@@ -132,6 +136,21 @@ def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, capsys):
         (key,) = re.findall(r"^    job ([0-9a-f]{20})$", err, re.MULTILINE)
         assert store.job_status("results", key).reason == "budget_steps"
         assert "--retry-failed runs failed ones again unchanged." in err
+
+
+def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, capsys):
+    case_file("two.yaml", load=["none", "design"])
+    case_file("one.yaml", load="typical")
+    some = ["run", "two.yaml", "one.yaml", "-j", "1", "--only", "load == none"]
+    assert cli.main(some) == 0
+    out, err = capsys.readouterr()
+    assert [line.split()[1:6:2] for line in out.splitlines()] == [["1", "1", "0"], ["0", "0", "0"]]
+    assert err.startswith("--only selects 1 of 3 jobs\n")
+    found = store.open_study("results", "two")
+    assert found.status.values.tolist() == ["ok", "missing"]
+    assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1"]) == 0
+    assert "2 jobs run in" in capsys.readouterr().err
+    assert store.open_study("results").status.values.tolist() == ["ok"] * 3
 
 
 def test_failed_jobs_run_again_on_request(case_file, capsys):

@@ -33,8 +33,13 @@ FLOORS = [
     "bars",
     "simulation",
     "reading",
+    "sampling",
+    "axes",
     "leaves",
     "overrides",
+    "comparisons",
+    "blocks",
+    "study",
     "plan",
     "durable",
     "hdf5",
@@ -67,7 +72,7 @@ FLOORS = [
 ]
 DOORS = {
     "numba": {"physics._jit"},
-    "scipy": {"integrate", "analysis", "plan"},
+    "scipy": {"integrate", "analysis", "sampling"},
     "yaml": {"plan", "reading"},
     "joblib": {"process"},
     "h5py": {"hdf5"},

@@ -382,7 +382,7 @@ def test_a_study_is_stored_and_found(tmp_path):
         ("machine.speed_rpm", (300, 500), "rpm"),
         ("load", ("design", "none"), ""),
     ]
-    assert list(store.points(found.axes))[1] == {"machine.speed_rpm": 300, "load": "none"}
+    assert list(store.points(found))[1] == {"machine.speed_rpm": 300, "load": "none"}
 
 
 def test_storing_a_study_again_leaves_its_file_alone(tmp_path):

@@ -90,6 +90,11 @@ def cli() -> None:
     help="Worker processes.",
 )  # fmt: skip
 @setting
+@click.option("--only", default="", metavar="COMPARISON",
+              help="Run only the jobs for which this holds, such as 'clearance_mm < 0.2'; the "
+              "others stay missing.")  # fmt: skip
+@click.option("--max-jobs", type=click.IntRange(min=1), default=10_000, show_default=True,
+              help="Refuse a case file that asks for more, before it is expanded.")  # fmt: skip
 @click.option("--retry-failed", is_flag=True, help="Run failed jobs again, too.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
@@ -99,6 +104,8 @@ def run(
     output: str,
     jobs: int | None,
     overrides: tuple[str, ...],
+    only: str,
+    max_jobs: int,
     retry_failed: bool,
     quiet: bool,
 ) -> int:
@@ -112,7 +119,10 @@ def run(
     one_thread_each()  # before numpy loads
     from compressor.plan import load_studies
 
-    studies = load_studies(*configs, overrides=overrides)
+    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
+    if only and not quiet:
+        selected = sum(len(study.selected) for study in studies)
+        say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     from compressor.sweep import sweep
 
     screen = Screen(quiet)

@@ -91,7 +91,7 @@ def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, C
         return default_cases()
     cases = {}
     for study in load_studies(*configs, overrides=overrides):
-        for point, case in zip(points(study.axes), study.cases, strict=True):
+        for point, case in zip(points(study), study.cases, strict=True):
             name = " ".join([study.name, *(plain(value) for value in point.values())])
             if scene(case) == Scene.IDEAL:
                 raise click.UsageError(

@@ -1,0 +1,111 @@
+"""Comparisons select jobs: the grammar, against Python's own, and what is refused."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from compressor.case import table
+from compressor.comparisons import MAX_DEPTH, MAX_LENGTH, NoComparison, comparison
+
+JOB = {
+    "clearance_mm": 0.2,
+    "machine.speed_rpm": 500.0,
+    "load": "design",
+    "joint": "big_end",
+    "gas.exponent": None,
+    "solve.error_bars": True,
+}
+NUMBERS = ("clearance_mm", "machine.speed_rpm")
+SIGNS = ("==", "!=", "<", "<=", ">", ">=")
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("clearance_mm == 0.2", True), ("clearance_mm>0.2", False), ("clearance_mm >= 2e-1", True),
+        ("load == design", True), ("load != design", False), ("solve.error_bars == true", True),
+        ("gas.exponent < 2", False), ("gas.exponent >= 2", False), ("gas.exponent != 2", True),
+        ("not gas.exponent < 2", True), ("not not load == design", True),
+        ("load == none or clearance_mm < 1 and joint == both", False),
+        ("(load == none or clearance_mm < 1) and joint == big_end", True),
+        ("load == design or load == none and load == typical", True),
+        ("not load == none and joint == both", False),
+        ("not (load == none and joint == both)", True),
+        ("  machine.speed_rpm  >  +4.0E2  ", True),
+    ],
+)  # fmt: skip
+def test_a_comparison_holds_or_not(text, holds):
+    assert comparison(text)(JOB.get) is holds
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "needs a key, such as clearance_mm (at the end)"),
+        ("clearance_mm", "needs one of == != < <= > >= after clearance_mm (at the end)"),
+        ("clearance_mm = 1", "write == for equal (at character 14, '= 1')"),
+        ("clearance_mm > > 1", "needs a value after > (at character 16, '> 1')"),
+        ("clearance_mm > 0.1 load == none",
+         "needs `and` or `or` before this (at character 20, 'load == none')"),
+        ("clearance_mm > big", "clearance_mm needs a number (at character 16, 'big')"),
+        ("0.1 < clearance_mm", "needs a key, such as clearance_mm (at character 1, "
+         "'0.1 < clearance_mm')"),
+        ("(load == none", "needs a closing parenthesis (at the end)"),
+        ("load == none)", "needs `and` or `or` before this (at character 13, ')')"),
+        ("load < none", "load is a word: compare it by == or != (at character 6, '< none')"),
+        ("load == desing", "load needs design | typical | none (at character 9, 'desing')"),
+        ("speed_rpm > 1", "unknown key 'speed_rpm'; did you mean machine.speed_rpm? "
+         "(at character 1, 'speed_rpm > 1')"),
+        ("contact.materials == steel", "contact.materials cannot be compared (at character 1, "
+         "'contact.materials...')"),
+        ("__import__('os')", "unknown key '__import__' (at character 1, \"__import__('os')\")"),
+        ("load == 'none'", "cannot be read (at character 9, \"'none'\")"),
+        ("load == none and", "needs a key, such as clearance_mm (at the end)"),
+        ("not " * (MAX_DEPTH + 1) + "load == none",
+         "is nested deeper than 50 levels (at character 205, 'load == none')"),
+        (" " * (MAX_LENGTH + 1), "is longer than 1000 characters"),
+    ],
+)  # fmt: skip
+def test_what_is_no_comparison_is_told(text, message):
+    with pytest.raises(NoComparison) as error:
+        comparison(text)
+    assert str(error.value) == message
+
+
+compared = st.builds(
+    "{} {} {}".format, st.sampled_from(NUMBERS), st.sampled_from(SIGNS),
+    st.sampled_from([0.1, 0.2, 500, -3e5]),
+) | st.builds(
+    "{} {} {}".format, st.just("load"), st.sampled_from(["==", "!="]),
+    st.sampled_from(table()["load"].choices),
+)  # fmt: skip
+expressions = st.recursive(
+    compared,
+    lambda inner: (
+        st.builds("{} and {}".format, inner, inner)
+        | st.builds("{} or {}".format, inner, inner)
+        | st.builds("not {}".format, inner)
+        | st.builds("({})".format, inner)
+    ),
+    max_leaves=12,
+)
+WORDS = [*NUMBERS, "load", "joint", "none", "both", "and", "or", "not", "(", ")", "1e5", "-1", "9"]
+
+
+@given(expressions)
+def test_comparisons_mean_what_they_mean_in_python(text):
+    names = {"clearance_mm": 0.2, "speed": 500.0, "load": "design"}
+    names |= {word: word for word in table()["load"].choices}
+    meant = eval(text.replace("machine.speed_rpm", "speed"), {"__builtins__": {}}, names)
+    assert comparison(text)(JOB.get) is meant
+
+
+@given(st.text() | st.lists(st.sampled_from([*WORDS, *SIGNS, "=", "'"])).map(" ".join))
+def test_any_text_is_a_comparison_or_refused(text):
+    try:
+        test = comparison(text)
+    except NoComparison as error:
+        message = str(error)
+    else:
+        message = str(test(JOB.get))
+    assert message.isprintable()

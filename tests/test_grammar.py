@@ -1,0 +1,446 @@
+"""The grammar of sweeps: how values are made, joined and left out, and what is refused."""
+
+import itertools
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+from conftest import keep
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from compressor import store
+from compressor.case import Case
+from compressor.manifest import points
+from compressor.plan import CaseFileError, load_studies
+from compressor.sampling import design
+from compressor.simulation import simulate
+
+ONE = "joint: big_end\n"
+SHORT = "solve: {duration_rev: 0.25, settle_rev: 0, accuracy: draft, output_step_deg: 0.9}\n"
+
+
+@pytest.fixture
+def plan(tmp_path, monkeypatch):
+    """The study of a case file's text."""
+    monkeypatch.chdir(tmp_path)
+
+    def plan(text, **more):
+        (tmp_path / "case.yaml").write_text(text)
+        (study,) = load_studies("case.yaml", **more)
+        return study
+
+    return plan
+
+
+def rows(study):
+    """The swept values of each job, in the order of the axes."""
+    return [tuple(point.values()) for point in points(study)]
+
+
+def refused(plan, text, **more):
+    with pytest.raises(CaseFileError) as caught:
+        plan(text, **more)
+    return str(caught.value).split("\n")
+
+
+# ---- one axis -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("axis", "values"),
+    [
+        ("{linspace: [0.1, 0.3, 5]}", (0.1, 0.15, 0.2, 0.25, 0.3)),
+        ("{linspace: [0.3, 0.1, 3]}", (0.3, 0.2, 0.1)),
+        ("{logspace: [0.001, 10, 5]}", (0.001, 0.01, 0.1, 1.0, 10.0)),
+        ("{range: [0.1, 0.5, 0.1]}", (0.1, 0.2, 0.3, 0.4, 0.5)),
+        ("{range: [0.1, 0.55, 0.1]}", (0.1, 0.2, 0.3, 0.4, 0.5)),
+        ("{range: [0.5, 0.1, -0.2]}", (0.5, 0.3, 0.1)),
+        ("{range: [1, 1, 5]}", (1.0,)),
+    ],
+)
+def test_made_values_are_those_that_one_would_write(plan, axis, values):
+    study = plan(ONE + f"clearance_mm: {axis}\n")
+    assert [(a.key, a.values) for a in study.axes] == [("clearance_mm", values)]
+    assert study.is_grid
+    written = plan(ONE + f"clearance_mm: {list(values)}\n")
+    assert [c.key for c in study.cases] == [c.key for c in written.cases]
+
+
+def test_whole_numbers_stay_whole(plan):
+    assert rows(plan("solve: {max_steps: {range: [10, 30, 10]}}")) == [(10,), (20,), (30,)]
+
+
+@given(st.decimals(-500, 500, places=3), st.decimals("0.001", 5, places=3), st.integers(1, 60))
+def test_a_range_is_that_of_decimal_numbers(first, step, count):
+    from compressor.axes import sweep_of
+    from compressor.reading import Place, read_text
+
+    problems = []
+    last = first + (count - 1) * step
+    text = f"{{range: [{first}, {last}, {step}]}}"
+    sweep = sweep_of(
+        "initial_offset_mm.big_end_x", read_text(text, Place("x", 1, 1), problems), problems
+    )
+    assert problems == []
+    assert [node.value for node in sweep.nodes()] == [float(first + i * step) for i in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("axis", "message"),
+    [
+        ("{linspace: [0.1, 0.3]}", "1:25: rod_mass_kg: linspace needs [first, last, count], finite "
+         "numbers"),
+        ("{linspace: 5}", "1:25: rod_mass_kg: linspace needs [first, last, count], finite numbers"),
+        ("{linspace: [1, x, 3]}", "1:25: rod_mass_kg: linspace needs [first, last, count], finite "
+         "numbers"),
+        ("{linspace: [1, .inf, 3]}", "1:25: rod_mass_kg: linspace needs [first, last, count], "
+         "finite numbers"),
+        ("{linspace: [1, 2, 2.5]}", "1:25: rod_mass_kg: linspace needs a whole count of 2 or more"),
+        ("{linspace: [1, 2, 1]}", "1:25: rod_mass_kg: linspace needs a whole count of 2 or more"),
+        ("{linspace: [1, 1, 2]}", "1:25: rod_mass_kg: linspace needs two different ends"),
+        ("{linspace: [0, 1, 2]}", "1:25: rod_mass_kg: 0 is outside (0, 1e+06] kg"),
+        ("{linspace: [1, 2, 3], log: true}", "1:41: rod_mass_kg: log is true or false, and for "
+         "random lhs sobol alone"),
+        ("{logspace: [-1, 1, 3]}", "1:25: rod_mass_kg: logspace needs ends above 0"),
+        ("{range: [1, 2, 0]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
+        ("{range: [1, 2, -1]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
+        ("{lnspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of values or a mapping "
+         "with one of linspace logspace range random lhs sobol; did you mean linspace?"),
+        ("{range: [1, 2, 1], linspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of "
+         "values or a mapping with one of linspace logspace range random lhs sobol; "
+         "did you mean range?"),
+        ("{random: [2, 1]}", "1:23: rod_mass_kg: random needs [least, greatest]: 2 exceeds 1"),
+        ("{random: [1, 2]}", "1:14: rod_mass_kg: needs a number of samples: add "
+         "`sample: {n: 64, seed: 1}` to the file"),
+    ],
+)  # fmt: skip
+def test_a_wrong_axis_is_told(plan, axis, message):
+    place, text = message.split(" ", 1)
+    line, column, _ = place.split(":")
+    # the key is nested: its value stands at column 25 of `machine: {rod_mass_kg: ...`
+    (found,) = refused(plan, f"machine: {{rod_mass_kg: {axis}}}")
+    assert found.endswith(text)
+    assert found.startswith(f"case.yaml:{line}:{int(column) + 10}: machine.")
+
+
+# ---- too many -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "count"),
+    [
+        ("machine: {speed_rpm: {linspace: [1, 2, 1e15]}}", "1:22: machine.speed_rpm: ", 10**15),
+        ("machine: {speed_rpm: {range: [1, 1e5, 1e-9]}}", "1:22: machine.speed_rpm: ",
+         99_999 * 10**9 + 1),
+        (ONE + "clearance_mm: {logspace: [1, 2, 101]}\nmachine: {speed_rpm: "
+         "{linspace: [1, 2, 100]}}", "2:15: clearance_mm: ", 10_100),
+        (ONE + "clearance_mm: {sobol: [1, 2]}\nsample: {n: 1000000000000}", "2:15: clearance_mm: ",
+         10**12),
+        ("load: [none, design]\nblocks: [{joint: none}, {machine: {speed_rpm: "
+         "{range: [1, 10000, 1]}}}]", "2:47: machine.speed_rpm: ", 20_002),
+    ],
+)  # fmt: skip
+def test_a_bomb_is_counted_not_made(plan, text, where, count):
+    tracemalloc.start()
+    (message,) = refused(plan, text)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert message.startswith(f"case.yaml:{where}{count} jobs are more than 10000: ")
+    assert message.endswith("ask for fewer, or raise --max-jobs")
+    assert peak < 4e6
+
+
+def test_a_count_of_any_size_can_be_told(plan):
+    keys = ("rod_mass_kg", "speed_rpm", "rod_length_mm")
+    text = "machine:\n" + "".join(f"  {key}: {{range: [1, 2, 1e-300]}}\n" for key in keys)
+    (message,) = refused(plan, text)
+    assert "over 10^899 jobs are more than 10000" in message
+
+
+def test_the_most_jobs_are_a_choice(plan):
+    text = ONE + "clearance_mm: [0.1, 0.2, 0.3]\n"
+    assert "3 jobs are more than 2: clearance_mm (3)" in refused(plan, text, max_jobs=2)[0]
+    assert len(plan(text, max_jobs=3).cases) == 3
+
+
+def test_many_blocks_are_refused_too(plan):
+    (message,) = refused(plan, f"blocks: [{', '.join(['{load: none}'] * 11)}]", max_jobs=10)
+    assert message == "case.yaml:1:9: blocks: 11 blocks are more jobs than 10; raise --max-jobs"
+
+
+def test_cases_are_made_when_they_are_asked_for(plan, monkeypatch):
+    study = plan(ONE + "clearance_mm: {linspace: [0.1, 1, 100]}\n")
+    made, real = [], Case.from_values
+    monkeypatch.setattr(Case, "from_values", lambda values: made.append(values) or real(values))
+    assert len(study.cases) == 100
+    assert made == []
+    assert study.cases[-1].clearance_mm.big_end == 1.0
+    assert [case.clearance_mm.big_end for case in study.cases[:2]] == [0.1, 0.109090909090909091]
+    assert len(made) == 3
+
+
+# ---- together -----------------------------------------------------------------------------------
+
+
+def test_zipped_keys_advance_together(plan):
+    study = plan(ONE + "load: [none, design]\nclearance_mm: [0.1, 0.2, 0.1]\n"
+                 "machine: {speed_rpm: {range: [300, 500, 100]}}\n"
+                 "zip: [[machine.speed_rpm, clearance_mm]]\n")  # fmt: skip
+    assert [axis.key for axis in study.axes] == ["load", "clearance_mm", "machine.speed_rpm"]
+    pairs = [(0.1, 300.0), (0.2, 400.0), (0.1, 500.0)]
+    assert rows(study) == [(load, *pair) for load in ("none", "design") for pair in pairs]
+    assert not study.is_grid
+
+
+@pytest.mark.parametrize(
+    ("groups", "message"),
+    [
+        ("[load, joint]", "zip: needs a list of groups of keys, such as "
+         "[[machine.speed_rpm, clearance_mm]]"),
+        ("[[load]]", "zip: needs a list of groups of keys, such as "
+         "[[machine.speed_rpm, clearance_mm]]"),
+        ("[[load, speed]]", "zip: 'speed' is not swept here; did you mean machine.speed_rpm?"),
+        ("[[load, joint]]", "zip: 'joint' is not swept here"),
+        ("[[load, load]]", "zip: load is named twice"),
+        ("[[load, clearance_mm]]", "zip: needs equally many values of each key: load has 2, "
+         "clearance_mm has 3"),
+        ("[[load, gas.exponent], [gas.exponent, load]]", "zip: gas.exponent is named twice"),
+    ],
+)  # fmt: skip
+def test_a_wrong_zip_is_told(plan, groups, message):
+    text = f"zip: {groups}\nload: [none, design]\njoint: both\nclearance_mm: [1, 2, 3]\n"
+    found = refused(plan, text + "gas: {exponent: [1.3, 1.4]}\n")
+    assert {line.split(": ", 1)[1] for line in found} == {message}
+
+
+SAMPLED = """\
+joint: big_end
+clearance_mm: {%s: [0.01, 1], log: true}
+machine: {speed_rpm: {%s: [300, 900]}}
+load: [none, design]
+sample: {n: 8, seed: 5}
+"""
+
+
+@pytest.mark.parametrize("kind", ["random", "lhs", "sobol"])
+def test_a_design_draws_its_keys_together(plan, kind):
+    study = plan(SAMPLED % (kind, kind))
+    drawn = design(kind, 8, 2, 5)
+    found = rows(study)
+    assert len(found) == 16
+    for point, (clearance, speed, _) in zip(drawn, found[::2], strict=True):
+        assert clearance == pytest.approx(0.01 * 100 ** point[0], rel=1e-11)
+        assert speed == pytest.approx(300 + 600 * point[1], rel=1e-11)
+    assert found[::2] == [(c, s, "none") for c, s, _ in found[1::2]]
+    assert rows(plan(SAMPLED % (kind, kind))) == found
+    assert rows(plan(SAMPLED % (kind, kind), overrides=["sample.seed=6"])) != found
+
+
+@pytest.mark.parametrize("kind", ["lhs", "sobol"])
+def test_designs_fill_every_eighth_of_every_key(kind):
+    for column in np.array(design(kind, 8, 3, 1)).T:
+        assert sorted((8 * column).astype(int)) == [*range(8)]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SAMPLED % ("lhs", "random"), "one design draws all sampled keys: lhs or random, not both"),
+        (SAMPLED % ("lhs", "lhs") + "zip: [[clearance_mm, machine.speed_rpm]]",
+         "zip: sampled keys go together by their design already"),
+        ("sample: {n: 3}", "1:1: sample: samples nothing: give a key {random: [least, greatest]}, "
+         "lhs or sobol"),
+        ("sample: 3", "sample: needs a mapping of keys, not 3"),
+        ("sample: {n: 2.5}", "sample.n: needs a whole number from 1"),
+        ("sample: {n: 1, seed: -1}", "sample.seed: needs a whole number from 0"),
+        ("sample: {n: 1, sed: 1}", "sample.sed: unknown key; did you mean sample.seed?"),
+    ],
+)  # fmt: skip
+def test_a_wrong_design_is_told(plan, text, message):
+    assert refused(plan, text)[0].endswith(message)
+
+
+# ---- left out, and put together -----------------------------------------------------------------
+
+
+def test_excluded_combinations_are_no_jobs(plan):
+    text = ONE + "clearance_mm: [0.1, 0.2, 0.3]\nload: [none, design]\n"
+    study = plan(text + "exclude: [clearance_mm > 0.2 and load == none, clearance_mm == 0.1]\n")
+    assert rows(study) == [(0.2, "none"), (0.2, "design"), (0.3, "design")]
+    assert [case.load for case in study.cases] == ["none", "design", "design"]
+
+
+def test_what_does_not_fit_may_be_excluded(plan):
+    text = "machine: {crank_radius_mm: [100, 700], rod_length_mm: [600, 800]}\nload: none\n"
+    assert len(refused(plan, text)) == 1
+    study = plan(text + "exclude: machine.crank_radius_mm == 700 and machine.rod_length_mm < 700\n")
+    assert len(study.cases) == 3
+
+
+@pytest.mark.parametrize(
+    ("exclude", "message"),
+    [
+        ("1", "needs comparisons, such as clearance_mm > 0.2"),
+        ("[load == x]", "load needs design | typical | none (at character 9, 'x')"),
+        ("load != both", "load needs design | typical | none (at character 9, 'both')"),
+        ("clearance_mm > 0", "leaves no job"),
+        (f"[{', '.join(['load == none'] * 101)}]", "has more than 100 comparisons: join by `or`"),
+    ],
+)
+def test_a_wrong_exclusion_is_told(plan, exclude, message):
+    (found,) = refused(plan, ONE + f"clearance_mm: [0.1, 0.2]\nexclude: {exclude}\n")
+    assert found.partition("exclude: ")[2] == message
+
+
+def test_a_comparison_knows_what_is_not_swept(plan):
+    text = ONE + "clearance_mm: {big_end: 0.2}\nload: [none, design]\n"
+    for exclude, left in [
+        ("clearance_mm == 0.2 and load == none", 1),
+        ("clearance_mm.small_end > 0", 2),
+        ("machine.speed_rpm == 500 and load == none", 1),
+        ("solve.rtol > 0", 2),
+    ]:
+        assert len(plan(text + f"exclude: {exclude}\n").cases) == left, exclude
+
+
+def test_blocks_stand_one_after_the_other(plan):
+    study = plan("""\
+load: none
+blocks:
+  - {joint: big_end, clearance_mm: [0.1, 0.2]}
+  - {joint: both, clearance_mm: {big_end: 0.1, small_end: 0.3}, friction: false}
+  - {load: [design, typical]}
+""")
+    assert [axis.key for axis in study.axes] == [
+        "clearance_mm", "load", "joint", "clearance_mm.big_end", "clearance_mm.small_end",
+        "friction",
+    ]  # fmt: skip
+    assert rows(study) == [
+        (0.1, "none", "big_end", 0.1, 0.0, True),
+        (0.2, "none", "big_end", 0.2, 0.0, True),
+        (None, "none", "both", 0.1, 0.3, False),
+        (None, "design", "none", 0.0, 0.0, True),
+        (None, "typical", "none", 0.0, 0.0, True),
+    ]
+    assert [case.friction is None for case in study.cases] == [False, False, True, False, False]
+
+
+def test_a_block_takes_the_place_of_the_files_keys_and_an_override_of_both(plan):
+    text = ONE + "clearance_mm: [0.1, 0.2]\nblocks: [{clearance_mm: 0.3}, {load: none}]\n"
+    assert rows(plan(text)) == [(0.3, "design"), (0.1, "none"), (0.2, "none")]
+    assert rows(plan(text, overrides=["load=typical"])) == [(0.3,), (0.1,), (0.2,)]
+    assert rows(plan(text, overrides=["blocks=[{load: none}]"])) == [(0.1,), (0.2,)]
+    assert rows(plan(text, overrides=["clearance_mm=0.4"])) == [("design",), ("none",)]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "message"),
+    [
+        ("{load: none}", "1:9: blocks: needs a list of mappings, such as "
+         "[{load: none}, {joint: both}]"),
+        ("[]", "1:9: blocks: needs a list of mappings, such as [{load: none}, {joint: both}]"),
+        ("[{name: x}]", "1:11: name: cannot stand in a block: it belongs to the whole file"),
+        ("[{laod: none}]", "1:11: laod: unknown key; did you mean load?"),
+        ("[{load: none}, {joint: both}]", "1:24: clearance_mm.big_end: is needed with joint: both"),
+        ("[{load: none}, {load: [x]}]", "1:32: load: 'x' is none of design | typical | none"),
+    ],
+)  # fmt: skip
+def test_a_wrong_block_is_told(plan, blocks, message):
+    assert refused(plan, f"blocks: {blocks}")[0].startswith(f"case.yaml:{message}")
+
+
+# ---- selected -----------------------------------------------------------------------------------
+
+
+def test_only_some_jobs_are_selected_and_all_are_in_the_study(plan):
+    text = ONE + "clearance_mm: {linspace: [0.1, 0.5, 5]}\nload: [none, design]\n"
+    study = plan(text, only="clearance_mm >= 0.4 and load == none")
+    assert (len(study.cases), [*study.selected]) == (10, [6, 8])
+    assert [*plan(text).selected] == [*range(10)]
+    assert refused(plan, text, only="clearance_mm > 1") == [
+        "--only clearance_mm > 1: selects no job"
+    ]
+    assert refused(plan, "laod: none", only="clearance > 1") == [
+        "--only clearance > 1: unknown key 'clearance'; did you mean clearance_mm? "
+        "(at character 1, 'clearance > 1')",
+        "case.yaml:1:1: laod: unknown key; did you mean load?",
+    ]
+
+
+# ---- stored -------------------------------------------------------------------------------------
+
+
+def test_a_study_that_is_no_grid_has_a_job_dimension(plan, tmp_path):
+    second = "{contact: {materials: [steel, copper]}, machine: {rod_centre_mm: 200}}"
+    study = plan(SHORT + f"blocks:\n  - {{load: [none, design]}}\n  - {second}\n")
+    store.write_study(tmp_path, study, "by hand")
+    keep(tmp_path, *(simulate(case) for case in study.cases[:2]))
+    (stored,) = store.read_studies(tmp_path)
+    assert list(points(stored)) == list(points(study))
+    found = store.open_study(tmp_path, "case")
+    assert found.status.dims == ("job",)
+    assert found.status.values.tolist() == ["ok", "ok", "missing"]
+    assert found["load"].values.tolist() == ["none", "design", "design"]
+    assert found.materials.values.tolist() == ["", "", "steel, copper"]
+    assert found.rod_centre_mm.values.tolist() == [300, 300, 200]
+    assert found.rod_centre_mm.attrs["units"] == "mm"
+    assert found.acceleration.dims == ("job", "time")
+    one = store.read_job(tmp_path, study.cases[1].key)
+    assert found.acceleration.isel(job=1).values.tobytes() == one.acceleration.values.tobytes()
+
+
+def test_only_a_grid_is_stored_as_one(plan, tmp_path):
+    for text, is_grid in [("load: [none, design]\n", True), ("load: [none]\nexclude: []\n", True),
+                          ("load: [none, design]\nexclude: load == none\n", False)]:  # fmt: skip
+        study = plan(text)
+        store.write_study(tmp_path, study)
+        (stored,) = store.read_studies(tmp_path)
+        assert (stored.is_grid, stored.jobs) == (is_grid, len(study.cases))
+        assert ("is_grid" in (tmp_path / "studies/case.json").read_text()) == (not is_grid)
+
+
+PARTS = ["clearance_mm", "load", "{", "}", "[", "]", ": ", ", ", "linspace", "range", "random",
+         "sample", "n", "seed", "zip", "exclude", "blocks", "none", "0.1", "3", "1e9", "-", ">",
+         "\n", "machine", "speed_rpm", "log", "true", "'load == none'", "joint",
+         "big_end"]  # fmt: skip
+FRAGMENTS = [
+    "clearance_mm: {linspace: [0.1, 0.3, 3]}", "clearance_mm: {random: [1, 2]}", "load: [none]",
+    "machine: {speed_rpm: {lhs: [300, 900], log: true}}", "sample: {n: 3}", "sample: {seed: 1}",
+    "zip: [[load, clearance_mm]]", "exclude: load == none", "exclude: [load == none]",
+    "blocks: [{load: none}, {joint: both, sample: {n: 2}}]", "joint: big_end", "zip: {}",
+    "blocks: [1]", "exclude: {load: none}", "sample: {n: [1, 2]}", "zip: [[[load]]]",
+]  # fmt: skip
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=5000)
+@given(
+    st.lists(st.sampled_from(PARTS), max_size=25).map("".join)
+    | st.lists(st.sampled_from(FRAGMENTS), max_size=6, unique=True).map("\n".join)
+)
+def test_any_sweep_is_planned_or_refused(plan, text):
+    try:
+        study = plan(text)
+    except CaseFileError as error:
+        message = str(error)
+    else:
+        message = ""
+        assert len(rows(study)) == len(study.cases) == len([*study.cases]) > 0
+    assert all(line.startswith("case.yaml") for line in message.splitlines())
+
+
+def test_blocks_and_axes_multiply_as_products_do(plan):
+    text = (
+        "blocks:\n- {load: [none, design], machine: {rod_mass_kg: [3, 4, 5]}}\n- {load: typical}\n"
+    )
+    product = itertools.product(("none", "design"), (3.0, 4.0, 5.0))
+    assert rows(plan(text)) == [*product, ("typical", 4.7)]
+
+
+def test_the_largest_sweep_is_planned_soon(plan):
+    start = time.process_time()
+    axes = "rod_mass_kg: {linspace: [1, 5, 100]}, speed_rpm: {range: [1, 100, 1]}"
+    study = plan(f"machine: {{{axes}}}\nexclude: machine.rod_mass_kg > 4.99\n")
+    assert len(study.cases) == 9900
+    assert time.process_time() - start < 30  # under 2 s
