@@ -10,6 +10,7 @@ import readme_tables
 from measure_tradeoff import fingerprint
 
 import compressor
+from compressor.plan import load_studies
 
 README = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
 MAKEFILE = (readme_tables.ROOT / "Makefile").read_text(encoding="utf-8")
@@ -52,13 +53,37 @@ def expanded(place, word):
     return sorted(map(str, place.glob(word))) if "*" in word else [word]
 
 
+def write_case_files(place):
+    """Every YAML block under the name in its first line; how many jobs each says that it has."""
+    jobs = {}
+    for text in blocks("yaml"):
+        name, count = re.match(r"# (\S+\.yaml)(?:: (\d+) jobs)?\n", text).groups()
+        (place / name).write_text(text, encoding="utf-8")
+        jobs[name] = count
+    return jobs
+
+
+def test_case_files_have_the_jobs_that_they_say(tmp_path):
+    jobs = write_case_files(tmp_path)
+    assert [*jobs] == [
+        "bearing-wear.yaml", "grid.yaml", "zipped.yaml", "sampled.yaml", "bounded.yaml",
+        "blocks.yaml",
+    ]  # fmt: skip
+    for name, count in jobs.items():
+        (study,) = load_studies(tmp_path / name)
+        assert len(study.cases) == int(count or 6), name
+    grid, zipped, *_ = (load_studies(tmp_path / f"{n}.yaml")[0] for n in ("grid", "zipped"))
+    assert [axis.values for axis in grid.axes] == [
+        (0.1, 0.2, 0.3), (300.0, 400.0, 500.0), (2.0, 8.0)
+    ]  # fmt: skip
+    assert [axis.values[::2] for axis in zipped.axes[:2]] == [(0.1, 0.2), (400.0, 500.0)]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder as the README's reader would have it: its case file, and our configs."""
     place = tmp_path_factory.mktemp("readme")
-    (text,) = blocks("yaml")
-    name = re.match(r"# (\S+\.yaml)", text)[1]
-    (place / name).write_text(text, encoding="utf-8")
+    write_case_files(place)
     (place / "configs").symlink_to(readme_tables.ROOT / "configs")
     for command in (line for text in blocks("console") for line in text.splitlines()):
         if not command.startswith("compsim "):
