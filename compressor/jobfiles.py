@@ -37,12 +37,17 @@ def series_path(place: Path, key: str, checksum: str) -> Path:
 
 def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> SeriesFile:
     """Store a job's Dataset, or what it is made of, durably."""
-    series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
-    rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
-    data = image_of(dataset, rounded, series if output.compress else ())
+    data = series_image(dataset, output)
     checksum, times = digest(data), dataset.variables["time"].values
     publish(series_path(place, dataset.attrs["key"], checksum), data)
     return SeriesFile(times.size, float(times[-1]), output.precision, checksum)
+
+
+def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:
+    """A job's Dataset as the bytes of its file."""
+    series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
+    rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
+    return image_of(dataset, rounded, series if output.compress else ())
 
 
 def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:

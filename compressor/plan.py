@@ -1,8 +1,9 @@
-"""Case files to jobs: every list is an axis, axes multiply, and all errors are told at once.
+"""Case files to studies: what is swept multiplies, and all errors are told at once.
 
-A file becomes values by dotted key (`compressor.reading`), overrides take their places, and each
-value is checked alone against the table of parameters. Only a file in which every value is good has
-its cases built, which finds the values that do not fit each other.
+A file becomes values by dotted key (`compressor.reading`, `leaves`), blocks and overrides take
+their places, and each value is checked alone against the table of parameters. The jobs are counted
+(`compressor.blocks`) before any is made; every combination is then built once, which finds the
+values that do not fit each other.
 """
 
 import itertools

@@ -11,7 +11,7 @@ import types
 from pathlib import Path
 
 import pytest
-from compsim import cli
+from compsim import cli, plan
 
 from compressor import load_cases, store
 from compressor.analysis import paper_cases
@@ -151,6 +151,44 @@ def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, capsys):
     assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1"]) == 0
     assert "2 jobs run in" in capsys.readouterr().err
     assert store.open_study("results").status.values.tolist() == ["ok"] * 3
+
+
+def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
+    case_file("two.yaml", load=["none", "design"])
+    case_file("many.yaml", joint="big_end", clearance_mm={"linspace": [0.1, 0.4, 4]},
+              blocks=[{}, {"joint": "none", "output": {"keep": "metrics"}}])  # fmt: skip
+    both = ["two.yaml", "many.yaml", "-j", "1"]
+    assert cli.main(["plan", *both, "--json", "--first", "1"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert not Path("results").exists()
+    # the ideal machine with the design load is a job of both studies
+    assert [(s["study"], s["jobs"], s["missing"]) for s in found["studies"]] == [
+        ("two", 2, 2), ("many", 4, 4)
+    ]  # fmt: skip
+    assert (found["jobs"], found["done"], found["missing"], found["workers"]) == (6, 0, 6, 1)
+    (first,) = found["first"]
+    assert (first["study"], first["coordinates"]) == ("two", {"load": "none"})
+    assert found["seconds"] > 0
+
+    assert cli.main(["run", *both]) == 0
+    size = sum(path.stat().st_size for path in Path("results/jobs").iterdir())
+    assert 1 < found["bytes"] / size < 1.02  # rows, too
+    capsys.readouterr()
+    assert cli.main(["plan", "many.yaml", "--set", "load=[design, none]", "-j", "1"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out[0].split() == ["many", "10", "jobs", "6", "done", "4", "missing"]
+    assert out[1].startswith("about ")
+    assert out[2] == "next: many clearance_mm=0.1 load=none joint=big_end"
+    assert cli.main(["plan", "two.yaml"]) == 0
+    assert capsys.readouterr().out.split() == ["two", "2", "jobs", "2", "done", "0", "missing"]
+
+
+@pytest.mark.parametrize(
+    ("count", "text"), [(0, "0 B"), (999, "999 B"), (1000, "1 kB"), (681_000, "681 kB"),
+                        (2_345_678, "2.35 MB"), (12_345_678_901, "12.35 GB")],
+)  # fmt: skip
+def test_sizes(count, text):
+    assert plan.size(count) == text
 
 
 def test_failed_jobs_run_again_on_request(case_file, capsys):

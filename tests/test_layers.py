@@ -58,6 +58,7 @@ FLOORS = [
     "modelling",
     "explain",
     "sweep",
+    "forecast",
     "figures.style",
     "figures.curves",
     "figures.response",

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, tradeoff
+from compsim import explain, plan, tradeoff
 from compsim.screen import (
     DONE,
     INTERNAL,
@@ -27,6 +27,8 @@ from compsim.screen import (
     USAGE,
     Screen,
     duration,
+    limit,
+    only_option,
     plural,
     say,
     setting,
@@ -90,11 +92,8 @@ def cli() -> None:
     help="Worker processes.",
 )  # fmt: skip
 @setting
-@click.option("--only", default="", metavar="COMPARISON",
-              help="Run only the jobs for which this holds, such as 'clearance_mm < 0.2'; the "
-              "others stay missing.")  # fmt: skip
-@click.option("--max-jobs", type=click.IntRange(min=1), default=10_000, show_default=True,
-              help="Refuse a case file that asks for more, before it is expanded.")  # fmt: skip
+@only_option
+@limit
 @click.option("--retry-failed", is_flag=True, help="Run failed jobs again, too.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
@@ -181,6 +180,7 @@ def verify(results: str, as_json: bool) -> int:
     return DONE
 
 
+cli.add_command(plan.plan)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
 

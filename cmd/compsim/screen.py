@@ -1,4 +1,4 @@
-"""What the commands share: exit codes, an option, and how they speak on stderr."""
+"""What the commands share: exit codes, options, and how they speak on stderr."""
 
 import contextlib
 import sys
@@ -12,6 +12,16 @@ QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no termina
 setting = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
     help="Set a key in all case files, such as machine.speed_rpm=300.",
+)  # fmt: skip
+
+only_option = click.option(
+    "--only", default="", metavar="COMPARISON",
+    help="Only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
+    "missing.",
+)  # fmt: skip
+limit = click.option(
+    "--max-jobs", type=click.IntRange(min=1), default=10_000, show_default=True,
+    help="Refuse a case file that asks for more, before it is expanded.",
 )  # fmt: skip
 
 

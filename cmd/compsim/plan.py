@@ -1,0 +1,67 @@
+"""`compsim plan`: what a run would do, without doing it."""
+
+import dataclasses
+import json
+
+import click
+
+from compsim.screen import DONE, duration, limit, only_option, plural, setting
+
+
+@click.command()
+@click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
+@click.option("-o", "--output", default="results", show_default=True, help="Folder of results.")
+@click.option(
+    "-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
+    help="Worker processes that the time is told for.",
+)  # fmt: skip
+@setting
+@only_option
+@limit
+@click.option("--first", type=click.IntRange(min=0), default=5, show_default=True,
+              help="How many of the missing jobs to list.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="The same as JSON.")
+def plan(
+    configs: tuple[str, ...],
+    output: str,
+    jobs: int | None,
+    overrides: tuple[str, ...],
+    only: str,
+    max_jobs: int,
+    first: int,
+    as_json: bool,
+) -> int:
+    """Tell what a run would do: its jobs, those that are stored, time and bytes of the others.
+
+    Times one job of each study and of each set of worn joints; stores nothing.
+    """
+    from compressor.plan import load_studies
+    from compressor.process import cores
+
+    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
+    from compressor.forecast import forecast
+
+    found = forecast(studies, output, jobs or cores(), first)
+    if as_json:
+        click.echo(json.dumps(dataclasses.asdict(found), indent=1))
+        return DONE
+    width = max(len(part.study) for part in found.studies)
+    for part in found.studies:
+        click.echo(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
+                   f"{part.missing:>4} missing")  # fmt: skip
+    if found.missing:
+        workers = f"{found.workers} worker{'s' if found.workers > 1 else ''}"
+        click.echo(f"about {duration(found.seconds)} with {workers}, and {size(found.bytes)}")
+    for job in found.first:
+        point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
+        click.echo(f"next: {job.study}{point}")
+    return DONE
+
+
+def size(count: float) -> str:
+    """Bytes as people say them."""
+    for unit in ("B", "kB", "MB"):
+        if count < 999.5:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.4g} GB"
