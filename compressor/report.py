@@ -58,7 +58,8 @@ LEAD = (
 )
 SWEEP = (
     "A line for each combination of the other axes or, where they are many, a light line for each "
-    "and their median. A cross: a job failed here; a circle: a job was not run."
+    "and their median; a study that is no grid has a point for each job. A cross: a job failed "
+    "here; a circle: a job was not run."
 )
 ASSUMPTIONS = (
     "The masses are ours, since the paper prints none: rod 4.7 kg (a steel bar of 600 × 40 × "

@@ -417,3 +417,21 @@ def test_words_are_ticks():
 def test_axes_over_decades_are_logarithmic(clearances, scale):
     figure = sweep_metric.draw_metrics(study(clearances=clearances), "clearance_mm")
     assert {panel.get_xscale() for panel in figure.axes} == {scale}
+
+
+def test_a_list_of_jobs_is_points_against_each_coordinate():
+    listed = study().stack(job=("clearance_mm", "reciprocating_mass_kg")).reset_index("job")
+    listed = listed.transpose("job", ...).assign_coords(
+        key=("job", [*"abcdef"]), study=("job", ["one"] * 6), fault=("job", ["none", "both"] * 3)
+    )
+    listed["clearance_mm"] = listed.clearance_mm.where(listed.clearance_mm != 0.2)
+    assert {*sweep_metric.swept(listed)} == {"clearance_mm", "reciprocating_mass_kg", "fault"}
+    panel = titled(sweep_metric.draw_metrics(listed, "clearance_mm"))["peak acceleration (m/s²)"]
+    (points,) = panel.lines
+    np.testing.assert_array_equal(
+        points.get_data(), (listed.clearance_mm, listed.peak_acceleration)
+    )
+    assert points.get_linestyle() == "None"
+    panel = sweep_metric.draw_metrics(listed, "fault").axes[0]
+    assert panel.lines[0].get_xdata().tolist() == [0, 1] * 3
+    assert [tick.get_text() for tick in panel.get_xticklabels()] == ["none", "both"]

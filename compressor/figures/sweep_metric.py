@@ -22,6 +22,7 @@ MANY = Line(GREY, "-", 0.8, 2.0)
 MEDIAN = Line(BLUE, "-", 2.0, 2.3)
 LOG_RATIO = 100.0  # an axis that spans more is drawn on a log scale
 ALONE = {"linestyle": "none", "zorder": 4}
+POINTS: dict[str, Any] = {"linestyle": "none", "markersize": 3.5}
 MARKS: dict[str, dict[str, Any]] = {
     "failed": {"marker": "x", "color": RED, "markersize": 7, "markeredgewidth": 1.8} | ALONE,
     "missing": {"marker": "o", "color": "#606060", "markersize": 6, "markerfacecolor": "none"}
@@ -77,8 +78,11 @@ def measures(data: xr.Dataset) -> list[Measure]:
 
 
 def swept(study: xr.Dataset) -> list[str]:
-    """The axes of a study that have more than one value."""
-    return [str(dim) for dim in study["status"].dims if study.sizes[dim] > 1]
+    """The axes of a study that have more than one value; of a list of jobs, the coordinates."""
+    if study["status"].dims != ("job",):
+        return [str(dim) for dim in study["status"].dims if study.sizes[dim] > 1]
+    columns = (str(n) for n, c in study.coords.items() if c.dims == ("job",) and n != "key")
+    return [name for name in columns if len({*study[name].dropna("job").values.tolist()}) > 1]
 
 
 def axis_title(study: xr.Dataset, axis: str) -> str:
@@ -93,8 +97,12 @@ def draw_metrics(study: xr.Dataset, axis: str) -> Figure:
     """Every metric of a study (as `open_study` gives it) against one of its axes.
 
     A few combinations of the other axes are lines with a legend; many are light lines, with their
-    median. A job without result is a mark at the foot of every panel.
+    median. A list of jobs is drawn as points against one of its coordinates. A job without result
+    is a mark at the foot of every panel.
     """
+    listed = axis not in study.dims
+    if listed:
+        study = study.swap_dims(job=axis)
     data = study.drop_vars([n for n in study.variables if {"time", "sample"} & {*study[n].dims}])
     others = [str(dim) for dim in study["status"].dims if dim != axis]
     data = data.transpose(axis, *others, ...)
@@ -106,7 +114,10 @@ def draw_metrics(study: xr.Dataset, axis: str) -> Figure:
         panel.remove()
     for panel, measure in zip(panels, shown, strict=False):
         table = measure.of(data).values.reshape(data.sizes[axis], -1)
-        plot_table(panel, positions(data, axis), table)
+        if listed:
+            panel.plot(positions(data, axis), table[:, 0], marker="o", color=BLUE, **POINTS)
+        else:
+            plot_table(panel, positions(data, axis), table)
         mark_unfinished(panel, data, axis)
         scale_axis(panel, data, axis)
         scale_values(panel, table)
@@ -119,11 +130,12 @@ def draw_metrics(study: xr.Dataset, axis: str) -> Figure:
 
 
 def positions(data: xr.Dataset, axis: str) -> np.ndarray:
-    """Where the values of an axis stand: at their numbers, words one after the other."""
+    """Where the values of an axis stand: at their numbers, different words one after the other."""
     values = data[axis].values
-    return (
-        values.astype(float) if values.dtype.kind in "fiu" else np.arange(values.size, dtype=float)
-    )
+    if values.dtype.kind in "fiu":
+        return values.astype(float)
+    places = {word: float(n) for n, word in enumerate(dict.fromkeys(values))}
+    return np.array([places[word] for word in values])
 
 
 def plot_table(panel: Axes, x: np.ndarray, table: np.ndarray) -> None:
@@ -154,11 +166,12 @@ def scale_axis(panel: Axes, data: xr.Dataset, axis: str) -> None:
     """Words as ticks, and a log scale where numbers span decades."""
     x = positions(data, axis)
     if data[axis].dtype.kind not in "fiu":
-        panel.set_xticks(x, [str(value) for value in data[axis].values])
-        panel.set_xlim(-0.3, x.size - 0.7)
+        words = [str(value) for value in dict.fromkeys(data[axis].values)]
+        panel.set_xticks(range(len(words)), words)
+        panel.set_xlim(-0.3, len(words) - 0.7)
         return
     panel.margins(x=0.06)
-    if x.min() > 0 and x.max() / x.min() >= LOG_RATIO:
+    if np.nanmin(x) > 0 and np.nanmax(x) / np.nanmin(x) >= LOG_RATIO:
         panel.set_xscale("log")
 
 
