@@ -98,7 +98,7 @@ def selected(study: Study) -> Iterator[Next]:
     chosen = {*study.selected}
     for number, point in enumerate(points(study)):
         if number in chosen:
-            yield Next(study.name, point, study.cases[number].key)
+            yield Next(study.name, point, study.keys[number])
 
 
 def cost(cases: Sequence[Case]) -> tuple[float, int]:

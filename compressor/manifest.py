@@ -73,7 +73,7 @@ def write_study(folder: Folder, study: "Study", command: str = "") -> None:
         study.name,
         os.path.abspath(study.path),
         tuple(axes),
-        tuple(case.key for case in study.cases),
+        study.keys,
         study.cases[0].values(),
         command,
         {"compsim": compressor.__version__, "model": MODEL_VERSION}

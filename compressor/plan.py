@@ -148,7 +148,7 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
         _refuse_idle_sample(drafts, draft)
     is_grid = len(found) == 1 and found[0].is_grid
     keys = [] if is_grid else blocks.columns(found)
-    table = _checked_cases(draft, cases, keys) if not draft.problems else []
+    jobs, table = _checked_cases(draft, cases, keys)
     if is_grid:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
@@ -157,7 +157,7 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
     if draft.problems:
         cases = Cases(draft.name, ())
     selected = range(len(cases)) if only is None else cases.where(only)
-    return Study(draft.name, draft.path, tuple(axes), cases, is_grid, selected)
+    return Study(draft.name, draft.path, tuple(axes), cases, tuple(jobs), is_grid, selected)
 
 
 def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
@@ -217,10 +217,15 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
     return False
 
 
-def _checked_cases(draft: _Draft, cases: Cases, keys: Sequence[str]) -> list[tuple[Any, ...]]:
-    """Each case's values of some keys; conflicts in any combination are problems of the draft."""
+def _checked_cases(
+    draft: _Draft, cases: Cases, keys: Sequence[str]
+) -> tuple[list[str], list[tuple[Any, ...]]]:
+    """The job's key of each case, and its values of some keys of the file.
+
+    Conflicts in any combination are problems of the draft.
+    """
     found: dict[Problem, FileProblem] = {}
-    rows = []
+    jobs, rows = [], []
     for block, chosen in cases.combinations():
         try:
             case = cases.case(chosen)
@@ -228,12 +233,13 @@ def _checked_cases(draft: _Draft, cases: Cases, keys: Sequence[str]) -> list[tup
             for problem in error.problems:
                 found.setdefault(problem, _located(problem, chosen, block, draft.path))
         else:
+            jobs.append(case.key)
             rows.append(tuple(value_of(case, key) for key in keys))
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         draft.problems.append(FileProblem(Place(draft.path), "", message))
-    return rows
+    return jobs, rows
 
 
 def _located(

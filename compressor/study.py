@@ -31,12 +31,13 @@ class Study:
     path: str
     axes: tuple[Axis, ...]
     cases: Sequence[Case]
+    keys: tuple[str, ...] = ()  # of the cases
     is_grid: bool = True
     selected: Sequence[int] = ()  # numbers of the jobs to be run now
 
     @property
     def jobs(self) -> int:
-        return len(self.cases)
+        return len(self.keys)
 
 
 class Cases(Sequence[Case]):

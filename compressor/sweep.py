@@ -150,9 +150,10 @@ def run_missing(
 def wanted(studies: Sequence[Study]) -> dict[str, Case]:
     """Each selected job once, by key; where studies share one, a case that serves them all."""
     cases: dict[str, Case] = {}
-    for case in (study.cases[number] for study in studies for number in study.selected):
-        known = cases.get(case.key)
-        cases[case.key] = case if known is None else serving_both(known, case)
+    for study in studies:
+        for number in study.selected:
+            key, case = study.keys[number], study.cases[number]
+            cases[key] = serving_both(cases[key], case) if key in cases else case
     return cases
 
 
@@ -200,7 +201,7 @@ def endings(
         failed = [
             Failure(study.name, point, key, ends[key].reason, ends[key].detail)
             for number, point in enumerate(points(study))
-            if number in selected and ends[key := study.cases[number].key].status != "ok"
+            if number in selected and ends[key := study.keys[number]].status != "ok"
         ]
         counts.append(Count(study.name, len(selected), len(failed)))
         failures += failed
