@@ -20,7 +20,7 @@ from compressor.reading import FileProblem, Node
 from compressor.sampling import KINDS as SAMPLED
 from compressor.sampling import design
 
-MAX_EXCLUSIONS = 100
+MAX_EXCLUSIONS = 20
 MAX_SEED = 2**63
 UNSWEPT = (  # no part of a job's identity
     "name",
@@ -30,6 +30,7 @@ UNSWEPT = (  # no part of a job's identity
     "output.precision",
     "output.compress",
 )
+RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 Row = tuple[Node, ...]
 
 
@@ -97,11 +98,8 @@ class Draft:
         found = Block(self.leaves, self.fixed, factors, range(count), is_grid)
         if not self.exclusions:
             return found
-        kept = [
-            n
-            for n in range(count)
-            if not any(test(reader(found.chosen(n))) for test in self.exclusions)
-        ]
+        readers = ((n, reader(found.chosen(n))) for n in range(count))
+        kept = [n for n, value in readers if not any(test(value) for test in self.exclusions)]
         if count and not kept:
             self.refuse(self.leaves.values["exclude"], "exclude", "leaves no job")
         return replace(found, kept=kept)
@@ -115,8 +113,7 @@ class Draft:
         for number, key in enumerate(keys):
             sweep = self.sweeps[key]
             drawn = sweep.placed([sweep.spread(point[number]) for point in points])
-            found = [check(key, node, self.problems) for node in drawn or sweep.nodes()]
-            columns.append([node for node in found if node])
+            columns.append(self.checked(sweep, drawn or sweep.nodes()))
         if len({len(column) for column in columns}) > 1:
             return []  # a value is wrong
         rows = list(zip(*columns, strict=True))
@@ -129,6 +126,17 @@ class Draft:
                 self.refuse(row[0], " with ".join(keys), f"{told} is {where} twice")
             seen.add(values)
         return rows
+
+    def checked(self, sweep: Sweep, nodes: Sequence[Node]) -> list[Node]:
+        """The valid ones of a key's values; of wrong ones that were made, one is told."""
+        good = []
+        for node in nodes:
+            value = check(sweep.key, node, self.problems)
+            if value:
+                good.append(value)
+            elif sweep.kind != "list":
+                break
+        return good
 
 
 def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
@@ -250,7 +258,6 @@ def _exclusions(found: Draft) -> Iterable[Test]:
 
 def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
     """The function that gives a combination's value of a key, or its default, or None."""
-    pairs = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 
     def value(key: str) -> Any:
         group = key.partition(".")[0]
@@ -259,7 +266,7 @@ def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
         if key == "clearance_mm":
             sizes = {n.value for k, n in chosen.items() if k.startswith("clearance_mm.")}
             return sizes.pop() if len(sizes) == 1 else None
-        if pairs.get(key) in chosen or (key != group and group in chosen):
+        if RIVALS.get(key) in chosen or (key != group and group in chosen):
             return chosen[group].value if group == "clearance_mm" else None
         return table()[key].default
 

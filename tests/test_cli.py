@@ -15,6 +15,7 @@ from compsim import cli, plan
 
 from compressor import load_cases, store
 from compressor.analysis import paper_cases
+from compressor.plan import MAX_JOBS
 from compressor.writer import Writer
 
 CONFIGS = Path(__file__).parent.parent / "configs"
@@ -181,6 +182,13 @@ def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
     assert out[2] == "next: many clearance_mm=0.1 load=none joint=big_end"
     assert cli.main(["plan", "two.yaml"]) == 0
     assert capsys.readouterr().out.split() == ["two", "2", "jobs", "2", "done", "0", "missing"]
+
+
+def test_the_most_jobs_are_those_of_the_library():
+    defaults = [
+        p.default for c in cli.cli.commands.values() for p in c.params if p.name == "max_jobs"
+    ]
+    assert defaults == [MAX_JOBS] * 3
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, plural, say, setting
+from compsim.screen import DONE, SOME_FAILED, limit, plural, say, setting
 
 if TYPE_CHECKING:
     from compressor.explain import Advice, Explanation
@@ -20,8 +20,11 @@ INDENT = 12  # columns of a heading
 @click.option("-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
               help="Worker processes that the sweep's cost is told for.")  # fmt: skip
 @setting
+@limit
 @click.option("--json", "as_json", is_flag=True, help="The same as JSON, a list of studies.")
-def explain(configs: tuple[str, ...], jobs: int, overrides: tuple[str, ...], as_json: bool) -> int:
+def explain(
+    configs: tuple[str, ...], jobs: int, overrides: tuple[str, ...], max_jobs: int, as_json: bool
+) -> int:
     """Tell what case files ask for: terms, natural scales, cost, and what is paid for in vain.
 
     Runs the first job of each case file, and again without each feature that it pays for. Exit
@@ -29,7 +32,7 @@ def explain(configs: tuple[str, ...], jobs: int, overrides: tuple[str, ...], as_
     """
     from compressor.plan import load_studies
 
-    studies = load_studies(*configs, overrides=overrides)
+    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs)
     from compressor.explain import explain as explained
 
     found = []
