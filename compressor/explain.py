@@ -16,6 +16,7 @@ import xarray as xr
 from compressor.accuracy import ACCURACY
 from compressor.bench import SLOW, complete, faulty
 from compressor.case import Case
+from compressor.manifest import given, points
 from compressor.modelling import FEATURES, Effect, Feature, compare
 from compressor.parameter import JOINTS
 from compressor.physics.contact import step
@@ -102,7 +103,7 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
         study=study.name,
         path=study.path,
         jobs=len(study.cases),
-        point={axis.key: axis.values[0] for axis in study.axes},
+        point=given(next(points(study))),
         scene=SCENES[scene(case)],
         unknowns=STATE_NAMES[2 * freedoms][:freedoms],
         active=active,

@@ -11,6 +11,7 @@ from typing import Any
 
 from compressor.case import Case
 from compressor.jobfiles import series_image
+from compressor.manifest import given
 from compressor.process import one_thread_each
 from compressor.store import Folder, points, read_store
 from compressor.study import Study
@@ -98,7 +99,7 @@ def selected(study: Study) -> Iterator[Next]:
     chosen = {*study.selected}
     for number, point in enumerate(points(study)):
         if number in chosen:
-            yield Next(study.name, point, study.keys[number])
+            yield Next(study.name, given(point), study.keys[number])
 
 
 def cost(cases: Sequence[Case]) -> tuple[float, int]:

@@ -66,6 +66,11 @@ def points(study: "Study | StoredStudy") -> Iterator[dict[str, Any]]:
         yield dict(zip(keys, values, strict=True))
 
 
+def given(point: dict[str, Any]) -> dict[str, Any]:
+    """The swept values that a job has, without those of other blocks."""
+    return {key: value for key, value in point.items() if value is not None}
+
+
 def write_study(folder: Folder, study: "Study", command: str = "") -> None:
     """Store which jobs a study has; a study that is stored already is left as it is."""
     axes = [StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes]

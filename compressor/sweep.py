@@ -20,6 +20,7 @@ import numpy as np
 
 import compressor
 from compressor.case import Case
+from compressor.manifest import given
 from compressor.schema import ROW, Outcome
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
 from compressor.study import Study
@@ -199,7 +200,7 @@ def endings(
     for study in studies:
         selected = {*study.selected}
         failed = [
-            Failure(study.name, point, key, ends[key].reason, ends[key].detail)
+            Failure(study.name, given(point), key, ends[key].reason, ends[key].detail)
             for number, point in enumerate(points(study))
             if number in selected and ends[key := study.keys[number]].status != "ok"
         ]
