@@ -5,17 +5,16 @@ taken to cost the same for every revolution and sample.
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from compressor.case import Case
 from compressor.jobfiles import series_image
 from compressor.manifest import given
-from compressor.process import one_thread_each
 from compressor.store import Folder, points, read_store
 from compressor.study import Study
-from compressor.sweep import silent, stored, wanted, warm_up
+from compressor.sweep import stored, wanted, warm_up
 
 ROW_BYTES = 341  # of one job in a file of rows, measured by `make store-bench`
 
@@ -56,11 +55,16 @@ class Forecast:
 
 
 def forecast(
-    studies: Sequence[Study], folder: Folder, workers: int = 2, first: int = 5
+    studies: Sequence[Study],
+    folder: Folder,
+    workers: int,
+    first: int,
+    remark: Callable[[str], None],
 ) -> Forecast:
     """What `sweep` would do with the selected jobs of some studies; nothing is stored.
 
-    Raises StoreError where the folder cannot be read.
+    `remark` is told where compiling takes its time. Raises StoreError where the folder cannot
+    be read.
     """
     cases = wanted(studies)
     ends = stored(read_store(folder), cases)
@@ -69,8 +73,7 @@ def forecast(
     ahead: list[Next] = []
     told: set[str] = set()
     if missing:
-        one_thread_each()
-        warm_up([*missing.values()], lambda remark: silent(0, 0, remark))
+        warm_up([*missing.values()], remark)
     for study in studies:
         jobs = []
         for job in selected(study):

@@ -5,7 +5,7 @@ import json
 
 import click
 
-from compsim.screen import DONE, duration, limit, only_option, plural, setting
+from compsim.screen import DONE, duration, limit, only_option, plural, say, setting
 
 
 @click.command()
@@ -41,7 +41,7 @@ def plan(
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
     from compressor.forecast import forecast
 
-    found = forecast(studies, output, jobs or cores(), first)
+    found = forecast(studies, output, jobs or cores(), first, say)
     if as_json:
         click.echo(json.dumps(dataclasses.asdict(found), indent=1))
         return DONE
