@@ -187,11 +187,10 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     mode, pair = COMPILED[request.method]
     walker = new_walker(mode)
     walker.pair, walker.rtol = pair, request.rtol
-    length, speed = scales(request.p)
-    walker.watch, walker.contact_step = 1, CONTACT_STEP * length / speed
+    size = natural_sizes(request.p)
+    walker.watch, walker.contact_step = 1, CONTACT_STEP * size[0] / size[size.size // 2]
     walker.deepest = IMPLAUSIBLE * request.p.pin_radius
     edges, phases, walker.settle = cut(edges, phases, request.settle)
-    size = natural_sizes(request.p)
     work = new_work(size.size)
     while walker.status == Status.RUNNING:
         left = request.max_steps - walker.steps - walker.rejected
