@@ -312,12 +312,12 @@ def missed(pulses, rtol, method=METHODS["DOPRI5"]):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "rtol"),
-    [*(("DOPRI5", rtol) for rtol in TOLERANCES), ("TSIT5", 1e-5), ("RODAS", 1e-5)],
+    [*(("TSIT5", rtol) for rtol in TOLERANCES), ("DOPRI5", 1e-5), ("RODAS", 1e-5)],
 )
 def test_no_constructed_pulse_is_stepped_over(pulses, method, rtol):
     """An onset is landed on, unless a graze shallower than the tolerance is not there at all."""
     left = missed(pulses, rtol, METHODS[method])
-    assert len(left) <= 0.01 * COUNT
+    assert len(left) <= 0.02 * COUNT
     for pulse in left:
         assert not pulse.clamped
         assert pulse.depth < 10 * rtol * scales(pulse.p)[0]
