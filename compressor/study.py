@@ -3,7 +3,7 @@
 import bisect
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, overload
 
 from compressor import blocks
@@ -38,6 +38,16 @@ class Study:
     @property
     def jobs(self) -> int:
         return len(self.keys)
+
+
+def shard(study: Study, number: int, of: int) -> Study:
+    """A study of which the jobs of one shard are selected, 1 <= number <= of.
+
+    A job's key says which shard it belongs to, so that any number of machines agree without asking
+    each other, and studies that share a job put it in the same one.
+    """
+    mine = [n for n in study.selected if int(study.keys[n], 16) % of == number - 1]
+    return replace(study, selected=mine)
 
 
 class Cases(Sequence[Case]):

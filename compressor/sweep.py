@@ -23,7 +23,7 @@ from compressor.case import Case
 from compressor.manifest import given
 from compressor.schema import ROW, Outcome
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
-from compressor.study import Study
+from compressor.study import Study, shard
 from compressor.workers import Done, Lost, rest, run_batches
 from compressor.writer import Writer
 
@@ -84,19 +84,27 @@ def sweep(
     workers: int = 2,
     progress: Progress = silent,
     command: str = "",
-    retry_failed: bool = False,
+    rerun_failed: bool = False,
+    part: tuple[int, int] | None = None,
+    wait: bool = False,
 ) -> Summary:
     """Run what is missing of some studies and store it in a folder; failed jobs only on request.
+
+    part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
+    wait: until another run that writes there has ended.
 
     Raises StoreError, and WorkersFailed; whatever ends a sweep early, finished jobs are stored and
     the same call goes on.
     """
     began = time.monotonic()
     folder = Path(folder).absolute()
+    name = ""
+    if part is not None:
+        studies, name = [shard(study, *part) for study in studies], f"{part[0]}-of-{part[1]}"
     cases = wanted(studies)
-    with Writer(folder, command=command) as writer:
+    with Writer(folder, name, wait, command) as writer:
         ends = stored(writer.found, cases)
-        if retry_failed:
+        if rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}
         missing = [case for key, case in cases.items() if key not in ends]
         for study in studies:

@@ -136,7 +136,7 @@ def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, capsys):
         assert "budget_steps (1): raise solve.max_steps" in err
         (key,) = re.findall(r"^    job ([0-9a-f]{20})$", err, re.MULTILINE)
         assert store.job_status("results", key).reason == "budget_steps"
-        assert "--retry-failed runs failed ones again unchanged." in err
+        assert "--rerun failed runs failed ones again unchanged." in err
 
 
 def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, capsys):
@@ -207,8 +207,26 @@ def test_failed_jobs_run_again_on_request(case_file, capsys):
     case_file("mix.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": [5, 10**6]})
     assert cli.main(["run", "mix.yaml", "-j", "1"]) == 3
     capsys.readouterr()
-    assert cli.main(["run", "mix.yaml", "-j", "1", "--retry-failed"]) == 3
+    assert cli.main(["run", "mix.yaml", "-j", "1", "--rerun", "failed"]) == 3
     assert "1 job run in" in capsys.readouterr().err
+
+
+def test_shards(case_file, capsys):
+    case_file("two.yaml", load=["none", "design", "typical"])
+    ran = 0
+    for part in ("1/2", "2/2"):
+        assert cli.main(["run", "two.yaml", "-j", "1", "--shard", part, "--wait", "--quiet"]) == 0
+        ran += int(capsys.readouterr().out.split()[1])
+    assert ran == 3
+    assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
+    assert "nothing to do: all 3 jobs" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("part", ["0/2", "3/2", "2", "a/b", "1/-2", ""])
+def test_what_is_no_shard_is_a_usage_error(part, case_file, capsys):
+    case_file("one.yaml")
+    assert cli.main(["run", "one.yaml", "--shard", part]) == 2
+    assert "such as 2/8" in capsys.readouterr().err
 
 
 def test_verify_finds_damage_that_a_run_mends(case_file, capsys):

@@ -132,8 +132,22 @@ def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path):
 def test_failed_jobs_run_again_on_request(studies, tmp_path):
     made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}})
     sweep(made, tmp_path / "out", 1)
-    again = sweep(made, tmp_path / "out", 1, retry_failed=True)
+    again = sweep(made, tmp_path / "out", 1, rerun_failed=True)
     assert (again.done_before, again.run_now, len(again.failed)) == (1, 1, 1)
+
+
+def test_shards_are_one_study_together(studies, tmp_path):
+    axes = {"load": ["none", "design"], "machine": {"rod_mass_kg": [3, 4, 5, 6]}}
+    made = studies(one=axes, same={"load": "none"})
+    parts = [sweep(made, tmp_path / "out", 1, part=(number, 3)) for number in (1, 2, 3)]
+    assert all(part.done_before == 0 for part in parts)
+    assert sum(part.run_now for part in parts) == len(wanted(made)) == 9
+    assert sweep(made, tmp_path / "out", 1).run_now == 0
+    whole = {key for study in made for key in study.keys}
+    assert store.finished_keys(tmp_path / "out") == whole
+    shards = {path.name for path in (tmp_path / "out" / "shards").iterdir()}
+    assert shards == {"1-of-3", "2-of-3", "3-of-3"}
+    assert verify(tmp_path / "out") == []
 
 
 def test_series_that_were_rounded_do_not_serve_for_exact_ones(studies, tmp_path):

@@ -74,6 +74,19 @@ class Interrupted(BaseException):
         super().__init__(signal.Signals(number).name)
 
 
+class Part(click.ParamType):
+    """I/N with 1 <= I <= N."""
+
+    name = "I/N"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+        """(I, N), or a usage error."""
+        number, _, of = str(value).partition("/")
+        if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
+            self.fail(f"{value!r} is no I/N with 1 <= I <= N, such as 2/8", param, ctx)
+        return int(number), int(of)
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(compressor.__version__, prog_name="compsim")
 def cli() -> None:
@@ -94,7 +107,10 @@ def cli() -> None:
 @setting
 @only_option
 @limit
-@click.option("--retry-failed", is_flag=True, help="Run failed jobs again, too.")
+@click.option("--rerun", type=click.Choice(["failed"]), help="Run failed jobs again, too.")
+@click.option("--shard", "part", type=Part(), metavar="I/N",
+              help="Run part I of N: for machines that share the folder.")  # fmt: skip
+@click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
 def run(
@@ -105,7 +121,9 @@ def run(
     overrides: tuple[str, ...],
     only: str,
     max_jobs: int,
-    retry_failed: bool,
+    rerun: str | None,
+    part: tuple[int, int] | None,
+    wait: bool,
     quiet: bool,
 ) -> int:
     """Simulate what case files ask for, and store it.
@@ -126,7 +144,9 @@ def run(
 
     screen = Screen(quiet)
     try:
-        summary = sweep(studies, output, jobs or cores(), screen, context.obj, retry_failed)
+        summary = sweep(
+            studies, output, jobs or cores(), screen, context.obj, rerun == "failed", part, wait
+        )
     except BaseException:
         screen.end()
         if screen.total:
@@ -224,7 +244,7 @@ def report_failures(failures: Sequence["Failure"]) -> None:
     say("what to do:")
     for reason, number in Counter(failure.reason for failure in failures).items():
         say(f"  {reason} ({number}): {ADVICE.get(reason, 'see its detail above')}")
-    say("A changed case file runs as a new job; --retry-failed runs failed ones again unchanged.")
+    say("A changed case file runs as a new job; --rerun failed runs failed ones again unchanged.")
 
 
 @contextlib.contextmanager
