@@ -49,6 +49,7 @@ FLOORS = [
     "labels",
     "store",
     "verification",
+    "inquiry",
     "writer",
     "analysis",
     "worker",

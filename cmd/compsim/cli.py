@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, plan, tradeoff
+from compsim import explain, plan, status, tradeoff
 from compsim.screen import (
+    ADVICE,
     DONE,
     INTERNAL,
     SOME_FAILED,
@@ -46,23 +47,6 @@ FORESEEN = {
     "StoreError": ("compsim: ", STORE),
     "WorkersFailed": ("compsim: ", INTERNAL),
     "ReferenceFailed": ("compsim: ", SOME_FAILED),
-}
-ADVICE = {
-    "budget_steps": "raise solve.max_steps",
-    "budget_seconds": "the same command tries again; raise solve.timeout_s if that is not enough",
-    "penetration_implausible": "the contact is too soft for the forces: check contact.stiffness, "
-    "masses and speed, and their units",
-    "non_finite": "the motion leaves what the model can describe: check the values that are swept "
-    "furthest, and gas.head_clearance_mm",
-    "accuracy_not_reached": "ask for less in solve.accuracy, or raise solve.max_steps where the "
-    "detail names steps",
-    "step_underflow": "try another solve.method, such as Radau",
-    "worker_died": "a crash, or killed from outside, or for want of memory: use a smaller -j; if "
-    "it stays, a bug of compsim: please report it with the case",
-    "out_of_memory": "use a smaller -j, which gives each worker more memory, a longer "
-    "solve.output_step_deg, or output.keep=metrics",
-    "internal_error": "a bug of compsim: please report it, with what Python prints for "
-    "compressor.store.read_job(FOLDER, JOB).traceback",
 }
 
 
@@ -201,6 +185,8 @@ def verify(results: str, as_json: bool) -> int:
 
 
 cli.add_command(plan.plan)
+cli.add_command(status.status)
+cli.add_command(status.show)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
 

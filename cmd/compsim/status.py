@@ -1,0 +1,124 @@
+"""`compsim status` and `compsim show`: what a folder of results holds, and what of one job."""
+
+import dataclasses
+import json
+import math
+import os
+import shlex
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from compsim.screen import ADVICE, DONE, plural, say
+
+if TYPE_CHECKING:
+    from compressor.inquiry import JobReport
+
+results = click.option("-i", "--input", "folder", default="results", show_default=True,
+                       help="Folder of results.")  # fmt: skip
+as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON.")
+
+
+@click.command()
+@results
+@as_json
+def status(folder: str, as_json: bool) -> int:
+    """Tell how many jobs of each stored study are done, failed or missing, and why they failed."""
+    from compressor.inquiry import standings
+
+    found = standings(folder)
+    if as_json:
+        click.echo(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
+        return DONE
+    width = max(len(one.study) for one in found)
+    for one in found:
+        click.echo(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
+                   f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
+        for reason, number in one.reasons.items():
+            click.echo(f"{'':<{width}}  {number:>4} {reason}: {ADVICE.get(reason, 'compsim show')}")
+    unfinished = {shlex.quote(one.case_file) for one in found if one.missing}
+    if unfinished:
+        say(f"next: compsim run {' '.join(sorted(unfinished))} -o {shlex.quote(folder)}")
+    return DONE
+
+
+@click.command()
+@click.argument("job")
+@results
+@as_json
+def show(job: str, folder: str, as_json: bool) -> int:
+    """Tell what is known of a job, named by its key or the beginning of it.
+
+    Which studies it belongs to and where in them, how it ended and why, its numbers with their
+    error bars, in SI, and what it was run with.
+    """
+    from compressor.inquiry import report_job
+
+    found = report_job(folder, job)
+    if as_json:
+        click.echo(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
+        return DONE
+    click.echo(f"job {found.key}: {ending(found)}")
+    for study, point in found.studies.items():
+        values = "".join(f" {key}={value}" for key, value in point.items())
+        click.echo(f"  in {study}{values}")
+    if found.status == "failed":
+        click.echo(f"  what to do: {ADVICE.get(found.reason, 'see why above')}")
+    for line in (*numbers(found), *facts(found)):
+        click.echo(f"  {line}")
+    if found.status == "missing":
+        files = " ".join(map(shlex.quote, found.case_files))
+        say(f"next: compsim run {files} -o {shlex.quote(folder)}")
+    return DONE
+
+
+def ending(found: "JobReport") -> str:
+    """How a job ended, in a line."""
+    if found.status == "missing":
+        return "not run yet"
+    return "ok" if found.status == "ok" else f"failed: {found.reason}: {found.detail}"
+
+
+def numbers(found: "JobReport") -> list[str]:
+    """A job's numbers, a line each, with what is known of their errors."""
+    from compressor.quantities import ERRORS, NUMBERS
+
+    lines = []
+    for name, value in found.numbers.items():
+        if name in ERRORS:
+            continue
+        unit = "" if NUMBERS[name][1] == "1" else NUMBERS[name][1]
+        error = found.numbers.get(f"{name}_error")
+        known = "" if error is None or blank(error) else f" ± {plain(error)}"
+        lines.append(f"{name:<28} {plain(value)}{known} {unit}".rstrip())
+    return lines
+
+
+def facts(found: "JobReport") -> list[str]:
+    """What a job was run with, a line each."""
+    shown = ("method", "rtol", "case", "program", "libraries")
+    lines = [f"{name:<28} {found.attributes[name]}" for name in shown if name in found.attributes]
+    return [*lines, f"{'file':<28} {os.path.relpath(found.file)}"] if found.file else lines
+
+
+def sayable(value: Any) -> Any:
+    """A value as JSON can say it: null for nan, "inf" for an unknown error."""
+    if isinstance(value, dict):
+        return {key: sayable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [*map(sayable, value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value
+
+
+def plain(value: Any) -> str:
+    """A number, or numbers of joints and axes, to six digits."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(plain, value))}]"
+    return f"{value:.6g}"
+
+
+def blank(value: Any) -> bool:
+    """Whether all numbers are nan."""
+    return all(map(blank, value)) if isinstance(value, list) else math.isnan(value)

@@ -1,0 +1,85 @@
+"""What a store says of its studies and jobs: `compsim status` and `compsim show`."""
+
+import json
+
+import pytest
+from compsim import cli
+
+from compressor.inquiry import report_job, standings
+from compressor.plan import load_studies
+from compressor.store import StoreError
+from compressor.sweep import sweep
+
+SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+MIX = {
+    "joint": "both",
+    "clearance_mm": [0.1, 0.2],
+    "solve": SHORT | {"max_steps": [5, 10**6]},
+    "output": {"keep": "metrics"},
+}
+
+
+@pytest.fixture
+def mix(tmp_path, monkeypatch):
+    """A study of four jobs of which two failed, one is ok and one is missing."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mix.yaml").write_text(json.dumps(MIX))
+    only = "clearance_mm < 0.15 or solve.max_steps < 10"
+    (study,) = load_studies(tmp_path / "mix.yaml", only=only)
+    sweep([study], tmp_path / "results", 1)
+    return study
+
+
+def test_status_counts_jobs_and_reasons(mix, capsys):
+    (found,) = standings("results")
+    assert (found.jobs, found.ok, found.failed, found.missing) == (4, 1, 2, 1)
+    assert found.reasons == {"budget_steps": 2}
+    assert cli.main(["status"]) == 0
+    out, err = capsys.readouterr()
+    assert " ".join(out.split("\n")[0].split()) == "mix 4 jobs 1 ok 2 failed 1 missing"
+    assert "2 budget_steps: raise solve.max_steps" in out
+    assert f"next: compsim run {mix.path} -o results\n" == err
+    assert cli.main(["status", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["reasons"] == {"budget_steps": 2}
+
+
+def test_show_tells_how_a_job_ended(mix, capsys):
+    by_end = {report_job("results", key).status: key for key in mix.keys}
+    assert by_end.keys() == {"ok", "failed", "missing"}
+    assert cli.main(["show", by_end["ok"][:12]]) == 0
+    out = capsys.readouterr().out
+    assert f"job {by_end['ok']}: ok" in out
+    assert "in mix clearance_mm=0.1 solve.max_steps=1000000" in out
+    (line,) = (line for line in out.split("\n") if "peak_acceleration " in line)
+    value, error = line.replace("m/s2", "").split("±")
+    report = report_job("results", by_end["ok"])
+    assert float(value.split()[1]) == pytest.approx(report.numbers["peak_acceleration"], rel=1e-5)
+    assert float(error) == pytest.approx(report.numbers["peak_acceleration_error"], rel=1e-5)
+    assert cli.main(["show", by_end["failed"]]) == 0
+    out = capsys.readouterr().out
+    assert "failed: budget_steps: more than 5 steps" in out
+    assert "what to do: raise solve.max_steps" in out
+    assert cli.main(["show", by_end["missing"]]) == 0
+    out, err = capsys.readouterr()
+    assert "not run yet" in out
+    assert err.startswith("next: compsim run ")
+
+
+def test_show_json_is_json(mix, capsys):
+    for key in mix.keys:
+        assert cli.main(["show", key, "--json"]) == 0
+        found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+        assert (found["key"], [*found["studies"]]) == (key, ["mix"])
+
+
+@pytest.mark.parametrize(("beginning", "problem"), [("x", "no job's key"), ("", "4 jobs' keys")])
+def test_a_job_must_be_told_apart(mix, beginning, problem, capsys):
+    with pytest.raises(StoreError, match=problem):
+        report_job("results", beginning)
+    assert cli.main(["show", beginning]) == 5
+    assert problem in capsys.readouterr().err
+
+
+def test_a_folder_without_results_is_an_error(tmp_path, capsys):
+    assert cli.main(["status", "-i", str(tmp_path)]) == 5
+    assert str(tmp_path) in capsys.readouterr().err
