@@ -19,7 +19,7 @@ from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS, Scene
 from compressor.record import offsets, record, scene
-from compressor.schema import ROW, Outcome, Table, Variable, coordinates
+from compressor.schema import ROW, SIZES, Outcome, Table, Variable, coordinates
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -176,9 +176,8 @@ def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
         "time": (("time",), trajectory.times, {"units": "s", "long_name": "time"}),
         "crank_angle": (("time",), p.omega * trajectory.times, angle),
     }
-    sizes = {"joint": 2, "axis": 2}
     for name, (column, dims, unit, phrase) in SERIES.items():
-        shape = tuple(sizes[dim] for dim in dims)
+        shape = tuple(SIZES[dim] for dim in dims)
         block = rows[:, column : column + math.prod(shape)].reshape(-1, *shape)
         attrs = {"units": unit, "long_name": phrase}
         variables[name] = (("time", *dims), np.ascontiguousarray(block), attrs)
@@ -200,12 +199,13 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
     """The metrics by name, from what was tallied after settling."""
     ideal = p["clearance"] == 0
     seconds = tally["seconds"] or math.nan
+    axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
     return {
         "peak_acceleration": tally["peak"][0],
         "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
         "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
-        "peak_contact_force": tally["peak"][5:],
-        "peak_contact_force_axis": tally["peak"][1:5].reshape(2, 2),
+        "peak_contact_force": tally["peak"][sizes:],
+        "peak_contact_force_axis": tally["peak"][axes:sizes].reshape(2, 2),
         "max_penetration": np.where(ideal, 0.0, tally["max_penetration"]),
         "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
         "impact_count": np.where(ideal, 0.0, tally["impacts"]),

@@ -27,9 +27,11 @@ from compsim.screen import (
     STORE,
     USAGE,
     Screen,
+    configs_argument,
     duration,
     limit,
     only_option,
+    output_option,
     plural,
     say,
     setting,
@@ -82,8 +84,8 @@ def cli() -> None:
 
 
 @cli.command()
-@click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
-@click.option("-o", "--output", default="results", show_default=True, help="Folder of results.")
+@configs_argument
+@output_option
 @click.option(
     "-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
     help="Worker processes.",

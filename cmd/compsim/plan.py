@@ -5,12 +5,22 @@ import json
 
 import click
 
-from compsim.screen import DONE, duration, limit, only_option, plural, say, setting
+from compsim.screen import (
+    DONE,
+    configs_argument,
+    duration,
+    limit,
+    only_option,
+    output_option,
+    plural,
+    say,
+    setting,
+)  # fmt: skip
 
 
 @click.command()
-@click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
-@click.option("-o", "--output", default="results", show_default=True, help="Folder of results.")
+@configs_argument
+@output_option
 @click.option(
     "-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
     help="Worker processes that the time is told for.",

@@ -27,6 +27,9 @@ ADVICE = {
     "compressor.store.read_job(FOLDER, JOB).traceback",
 }
 
+configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
+output_option = click.option("-o", "--output", default="results", show_default=True,
+                             help="Folder of results.")  # fmt: skip
 setting = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
     help="Set a key in all case files, such as machine.speed_rpm=300.",

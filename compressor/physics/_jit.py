@@ -62,9 +62,9 @@ if ENABLED:
         return _compiled(function)
 
     def inlined(function: Function) -> Function:
-        """`jit`, written into each caller: for what returns many numbers to a hot loop.
+        """`jit`, written into each caller: for what a hot loop calls with arrays or tuples.
 
-        Measured: a right-hand side takes 60 ns with `evaluate` inlined, 90 ns without.
+        Passing them took, with `borrowed` missing, about half of a step of the march.
         """
         return _compiled(function, inline="always")
 

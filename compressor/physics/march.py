@@ -182,7 +182,7 @@ def may_touch(rows, p):
 
 @inlined
 def onset_ahead(w, h, work, phase, p):
-    """Whether contact begins within the step just taken; it is then to be h again, to there.
+    """Whether contact begins within the step just taken; it is then to be taken again, to there.
 
     Looked for only where the nodes of the step let it be. The step after the landing is kept
     within the pulse that begins, or to the contact's own time scale.
