@@ -8,7 +8,9 @@ import errno
 import os
 import time
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 Folder = str | os.PathLike[str]
 
@@ -47,12 +49,22 @@ def system_error(path: Folder, error: OSError) -> StoreError:
 
 def publish(path: Path, data: bytes) -> None:
     """Put a whole file under its name, durably, or leave what was there."""
+    with publishing(path) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def publishing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write: it has its name, durably, once the block has ended well, or never.
+
+    What stood under the name is left until then. Raises StoreError where the disk refuses.
+    """
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     make_folder(path.parent)
     try:
         try:
             with open(temporary, "xb") as file:
-                file.write(data)
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, path)

@@ -5,6 +5,7 @@ Reads studies and rows only, never a file with time series, so that 100,000 jobs
 
 import os
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,7 +73,7 @@ def report_job(folder: Folder, beginning: str) -> JobReport:
     Raises StoreError where no job's key does, or several do.
     """
     store, studies = read_store(folder), read_studies(folder)
-    key = _whole_key(folder, beginning, store, studies)
+    key = whole_key(folder, beginning, store, studies)
     position = store.position(key)
     owners = {study.name: _point(study, key) for study in studies if key in study.keys}
     case_files = tuple(study.case_file for study in studies if study.name in owners)
@@ -90,7 +91,8 @@ def report_job(folder: Folder, beginning: str) -> JobReport:
     )  # fmt: skip
 
 
-def _whole_key(folder: Folder, beginning: str, store: Stored, studies: list[StoredStudy]) -> str:
+def whole_key(folder: Folder, beginning: str, store: Stored, studies: Sequence[StoredStudy]) -> str:
+    """The one key, of a stored or a planned job, that begins so; StoreError where that is none."""
     known = store.keys().union(*(study.keys for study in studies))
     like = sorted(key for key in known if key.startswith(beginning))
     if len(like) == 1:

@@ -81,7 +81,8 @@ def intact(path: Path) -> bool:
         return False
 
 
-def _bytes(path: Path) -> bytes:
+def read_bytes(path: Path) -> bytes:
+    """The bytes of a job's file, compared with their digest. Raises DamagedJob."""
     named = NAME.fullmatch(path.name)
     try:
         data = path.read_bytes()
@@ -96,7 +97,7 @@ def read_series(path: Path) -> "xr.Dataset":
     """A job's Dataset, from a file. Raises DamagedJob."""
     import xarray as xr
 
-    with opened(_bytes(path), path) as file:
+    with opened(read_bytes(path), path) as file:
         attributes = hdf5.attributes(file)
         if attributes["key"] != path.name[:20]:
             raise ValueError
@@ -111,5 +112,5 @@ def read_series(path: Path) -> "xr.Dataset":
 
 def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Some variables of a job's file by name, without those that it does not have."""
-    with opened(_bytes(path), path) as file:
+    with opened(read_bytes(path), path) as file:
         return {name: file[name][()] for name in names if name in file}

@@ -50,6 +50,7 @@ FLOORS = [
     "store",
     "verification",
     "inquiry",
+    "export",
     "writer",
     "analysis",
     "worker",

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, plan, status, tradeoff
+from compsim import explain, export, plan, status, tradeoff
 from compsim.screen import (
     ADVICE,
     DONE,
@@ -46,6 +46,7 @@ MOST_FAILURES = 20  # listed one by one
 # error -> what stands before its text, and the exit code
 FORESEEN = {
     "CaseFileError": ("", USAGE),
+    "ExportError": ("compsim: ", USAGE),
     "StoreError": ("compsim: ", STORE),
     "WorkersFailed": ("compsim: ", INTERNAL),
     "ReferenceFailed": ("compsim: ", SOME_FAILED),
@@ -189,6 +190,7 @@ def verify(results: str, as_json: bool) -> int:
 cli.add_command(plan.plan)
 cli.add_command(status.status)
 cli.add_command(status.show)
+cli.add_command(export.export)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
 
