@@ -4,7 +4,6 @@ Nothing heavy is imported at the top: `compsim --help` answers at once.
 """
 
 import contextlib
-import json
 import os
 import shlex
 import signal
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, export, plan, status, tradeoff
+from compsim import explain, export, plan, status, tradeoff, verify
 from compsim.screen import (
     ADVICE,
     DONE,
@@ -158,39 +157,11 @@ def report(context: click.Context, results: str, output: str) -> int:
     return DONE
 
 
-@cli.command()
-@click.option("-i", "--input", "results", default="results", show_default=True,
-              help="Folder of results.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="A list of {path, problem, jobs} on stdout.")
-def verify(results: str, as_json: bool) -> int:
-    """Compare every stored file with its checksum; exit code 5 if any is damaged.
-
-    Damaged files are listed with the jobs that are lost with them, which the next run of their
-    case files computes again.
-    """
-    from compressor.verification import verify as compare
-
-    damages = compare(results)
-    if as_json:
-        found = [{"path": str(d.path), "problem": d.problem, "jobs": d.keys} for d in damages]
-        click.echo(json.dumps(found, indent=1))
-    for damage in () if as_json else damages:
-        click.echo(f"{damage.path}: {damage.problem}")
-        for key in damage.keys:
-            click.echo(f"  job {key}")
-    if damages:
-        lost = len({key for damage in damages for key in damage.keys})
-        files = f"{len(damages)} damaged file" + ("s" if len(damages) != 1 else "")
-        say(f"{files}, {plural(lost)} lost; to mend: compsim run CONFIG... with the case files")
-        return STORE
-    say("no damage")
-    return DONE
-
-
 cli.add_command(plan.plan)
 cli.add_command(status.status)
 cli.add_command(status.show)
 cli.add_command(export.export)
+cli.add_command(verify.verify)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
 

@@ -1,10 +1,16 @@
 """What the commands share: exit codes, options, and how they speak on stderr."""
 
 import contextlib
+import shlex
 import sys
 import time
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from compressor.manifest import Again
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
@@ -40,8 +46,9 @@ only_option = click.option(
     help="Only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
     "missing.",
 )  # fmt: skip
+MAX_JOBS = 10_000
 limit = click.option(
-    "--max-jobs", type=click.IntRange(min=1), default=10_000, show_default=True,
+    "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
     help="Refuse a case file that asks for more, before it is expanded.",
 )  # fmt: skip
 
@@ -93,6 +100,21 @@ def say(text: str, end: str = "\n") -> None:
     """Write to stderr; nobody may be there to read it."""
     with contextlib.suppress(OSError):
         print(text, end=end, file=sys.stderr, flush=True)
+
+
+def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
+    """The commands that run the missing jobs of studies, one for those with the same overrides."""
+    found: dict[tuple[str, ...], list[Again]] = {}
+    for study in dict.fromkeys(studies):
+        found.setdefault(study.overrides, []).append(study)
+    commands = []
+    for overrides, group in found.items():
+        words = ["compsim", "run", *(study.case_file for study in group), "-o", folder]
+        words += [word for text in overrides for word in ("--set", text)]
+        jobs = max(study.jobs for study in group)
+        words += ["--max-jobs", str(jobs)] if jobs > MAX_JOBS else []
+        commands.append(shlex.join(words))
+    return commands
 
 
 def duration(seconds: float) -> str:

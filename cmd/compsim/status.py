@@ -4,12 +4,11 @@ import dataclasses
 import json
 import math
 import os
-import shlex
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from compsim.screen import ADVICE, DONE, plural, say
+from compsim.screen import ADVICE, DONE, plural, run_commands, say
 
 if TYPE_CHECKING:
     from compressor.inquiry import JobReport
@@ -36,9 +35,8 @@ def status(folder: str, as_json: bool) -> int:
                    f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
         for reason, number in one.reasons.items():
             click.echo(f"{'':<{width}}  {number:>4} {reason}: {ADVICE.get(reason, 'compsim show')}")
-    unfinished = {shlex.quote(one.case_file) for one in found if one.missing}
-    if unfinished:
-        say(f"next: compsim run {' '.join(sorted(unfinished))} -o {shlex.quote(folder)}")
+    for command in run_commands((one.again for one in found if one.missing), folder):
+        say(f"next: {command}")
     return DONE
 
 
@@ -67,8 +65,8 @@ def show(job: str, folder: str, as_json: bool) -> int:
     for line in (*numbers(found), *facts(found)):
         click.echo(f"  {line}")
     if found.status == "missing":
-        files = " ".join(map(shlex.quote, found.case_files))
-        say(f"next: compsim run {files} -o {shlex.quote(folder)}")
+        for command in run_commands(found.again, folder):
+            say(f"next: {command}")
     return DONE
 
 
