@@ -39,6 +39,7 @@ FLOORS = [
     "overrides",
     "comparisons",
     "blocks",
+    "case_schema",
     "study",
     "plan",
     "durable",

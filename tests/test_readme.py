@@ -1,5 +1,6 @@
 """What the README says is executed or compared."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -10,6 +11,7 @@ import readme_tables
 from measure_tradeoff import fingerprint
 
 import compressor
+from compressor.case_schema import case_schema
 from compressor.plan import load_studies
 
 README = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
@@ -88,12 +90,15 @@ def folder(tmp_path_factory):
     for command in (line for text in blocks("console") for line in text.splitlines()):
         if not command.startswith("compsim "):
             continue
+        command, _, target = command.partition(" > ")
         words = shlex.split(command)
         words = [w for word in words for w in expanded(place, word)]
         more = QUICK if words[1] == "run" else []
         call = [sys.executable, "-m", "compsim", *words[1:], *more]
         done = subprocess.run(call, cwd=place, capture_output=True, text=True)
         assert done.returncode == 0, f"{command}\n{done.stderr}"
+        if target:
+            (place / target).write_text(done.stdout, encoding="utf-8")
     return place
 
 
@@ -102,6 +107,10 @@ def test_console_commands_work(folder):
     assert (folder / "report" / "index.html").exists()
     assert len(list((folder / "results" / "jobs").glob("*.h5"))) == 11
     assert (folder / "wear-report" / "index.html").exists()
+    assert len((folder / "big-end.csv").read_text(encoding="utf-8").splitlines()) == 4
+    assert len(list((folder / "exported").glob("*/*.csv"))) == 11
+    schema = (folder / "compsim.schema.json").read_text(encoding="utf-8")
+    assert json.loads(schema) == case_schema()
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, export, plan, status, tradeoff, verify
+from compsim import explain, export, plan, schema, status, tradeoff, verify
 from compsim.screen import (
     ADVICE,
     DONE,
@@ -162,6 +162,7 @@ cli.add_command(status.status)
 cli.add_command(status.show)
 cli.add_command(export.export)
 cli.add_command(verify.verify)
+cli.add_command(schema.schema)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
 
