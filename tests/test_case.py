@@ -302,3 +302,12 @@ def test_any_number_is_either_refused_or_reads_back(joint, numbers):
     except CaseError:
         return
     assert Case.from_values(case.values()) == case
+
+
+def test_groups_that_are_alike_are_shared_but_not_with_other_types():
+    values = {"machine": {"gravity_m_per_s2": 1}, "solve": {"duration_rev": 2}}
+    one, same = Case.from_values(values), Case.from_values(values)
+    assert one.solve is same.solve
+    with pytest.raises(CaseError, match="needs a number, not true"):
+        Case.from_values({"machine": {"gravity_m_per_s2": True}})
+    assert Case.from_values(values | {"machine": {"gravity_m_per_s2": 1.0}}) == one
