@@ -246,6 +246,18 @@ def throughput_table():
     return "\n".join(lines) + "\n"
 
 
+def scale_table():
+    found = kept("scale.json")
+    lines = ["| whole process | seconds | peak memory, MB |", "|---|---|---|"]
+    lines += [
+        f"| {name} | {one['seconds']:.2g} | {one['peak_MB']} |"
+        for name, one in found["processes"].items()
+    ]
+    sizes = " and ".join(f"{size / 1e6:.0f} MB" for size in found["bytes"].values())
+    lines += ["", f"{found['jobs']:,} jobs; their metrics are {sizes} of CSV and netCDF."]
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
@@ -256,6 +268,7 @@ TABLES = {
     "store": store_table,
     "peers": peers_table,
     "throughput": throughput_table,
+    "scale": scale_table,
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,
