@@ -104,8 +104,8 @@ def _sync_folder(folder: Path) -> None:
 
 
 def discard_leftovers(folder: Folder) -> None:
-    """Remove the temporary files of writers that died long ago."""
-    for path in Path(folder).glob("**/.*.tmp"):
+    """Remove the temporary files of writers that died long ago, from the folders in a folder."""
+    for path in Path(folder).glob("*/.*.tmp"):
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
                 path.unlink()

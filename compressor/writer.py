@@ -12,6 +12,7 @@ import os
 import re
 import socket
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -55,13 +56,16 @@ class Writer:
     def __enter__(self) -> "Writer":
         self.lock = _locked(self.place / LOCK_NAME, self.wait, self.command)
         try:
-            discard_leftovers(self.folder)
+            discard_leftovers(self.place)
             self.found = read_store(self.folder)
             self.number = max(map(_number, self._all_paths()), default=0)
-            if self.found.damaged:
-                self._set_damage_aside()
+            damaged = self._damaged(self.place)
+            if damaged:
+                _set_aside(damaged)
             else:
                 self._discard_unheard_of()
+            if self.place == self.folder:
+                self._mend_idle_shards()
             mine = (s for s in self.found.segments if s.place == self.place)
             self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
         except BaseException:
@@ -137,11 +141,20 @@ class Writer:
     def _all_paths(self) -> list[Path]:
         return [path for place in places(self.folder) for path in segment_paths(place)]
 
-    def _set_damage_aside(self) -> None:
-        """Rename damaged segments, so that nobody reads them again; their jobs count as missing."""
-        for damage in self.found.damaged:
-            with contextlib.suppress(FileNotFoundError):
-                os.rename(damage.path, f"{damage.path}.damaged")
+    def _damaged(self, place: Path) -> list[Path]:
+        """The segments of a place that were damaged when this writer began."""
+        paths = [Path(damage.path) for damage in self.found.damaged]
+        return [path for path in paths if path.parent.parent == place]
+
+    def _mend_idle_shards(self) -> None:
+        """Set damage of shards aside where nobody writes; others do it when they next begin."""
+        for place in places(self.folder)[1:]:
+            damaged = self._damaged(place)
+            if damaged:
+                with contextlib.suppress(StoreError):  # another process writes there
+                    lock = _locked(place / LOCK_NAME, False, self.command)
+                    _set_aside(damaged)
+                    os.close(lock)
 
     def _discard_unheard_of(self) -> None:
         """Remove time series that no row tells of: replaced, or never acknowledged."""
@@ -151,6 +164,13 @@ class Writer:
             name = JOB_NAME.fullmatch(path.name)
             if name and (name[1].encode(), name[2].encode()) not in known:
                 path.unlink()
+
+
+def _set_aside(paths: Iterable[Path]) -> None:
+    """Rename damaged segments, so that nobody reads them again; their jobs count as missing."""
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError):
+            os.rename(path, f"{path}.damaged")
 
 
 def _number(path: Path) -> int:

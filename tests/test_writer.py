@@ -365,6 +365,38 @@ def test_readers_pass_a_damaged_segment_by_and_say_so(tmp_path):
     assert peaks(tmp_path) == {1: 1}
 
 
+def test_a_writer_leaves_damage_to_shards_that_are_at_work(tmp_path):
+    for name in ("1-of-2", "2-of-2"):
+        put(tmp_path, outcome(1), shard=name)
+    paths = sorted(tmp_path.glob("shards/*/rows/*.h5"))
+    with Writer(tmp_path, shard="1-of-2"):
+        for path in paths:
+            path.write_bytes(path.read_bytes()[:-1])
+        put(tmp_path, outcome(2))  # may see to the second shard alone
+        assert [path.exists() for path in paths] == [True, False]
+    with Writer(tmp_path, shard="2-of-2"):
+        pass  # sees to itself alone
+    assert paths[0].exists()
+    put(tmp_path, shard="1-of-2")
+    assert [f"{path}.damaged" for path in paths] == sorted(
+        map(str, tmp_path.glob("shards/*/rows/*.damaged"))
+    )
+    assert peaks(tmp_path) == {2: 2}
+
+
+def test_a_writer_leaves_the_unfinished_files_of_others(tmp_path):
+    put(tmp_path, outcome(1), shard="1-of-2")
+    put(tmp_path, outcome(2))
+    old = [tmp_path / place / "rows" / ".old.tmp" for place in ("", "shards/1-of-2")]
+    for path in old:
+        path.touch()
+        os.utime(path, (0, 0))
+    put(tmp_path)
+    assert [path.exists() for path in old] == [False, True]
+    put(tmp_path, shard="1-of-2")
+    assert not old[1].exists()
+
+
 SCHEMA = {
     "text for numbers": lambda file: (
         file.__delitem__("steps"),
