@@ -37,10 +37,20 @@ def series_path(place: Path, key: str, checksum: str) -> Path:
 
 def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> SeriesFile:
     """Store a job's Dataset, or what it is made of, durably."""
-    data = series_image(dataset, output)
-    checksum, times = digest(data), dataset.variables["time"].values
-    publish(series_path(place, dataset.attrs["key"], checksum), data)
-    return SeriesFile(times.size, float(times[-1]), output.precision, checksum)
+    file, data = series_file(dataset, output)
+    store_series(place, dataset.attrs["key"], file, data)
+    return file
+
+
+def series_file(dataset: "Table | xr.Dataset", output: Output) -> tuple[SeriesFile, bytes]:
+    """The file that a job's Dataset makes, and its bytes."""
+    data, times = series_image(dataset, output), dataset.variables["time"].values
+    return SeriesFile(times.size, float(times[-1]), output.precision, digest(data)), data
+
+
+def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
+    """Put the bytes of a job's file in their place, durably."""
+    publish(series_path(place, key, file.digest), data)
 
 
 def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:

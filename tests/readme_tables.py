@@ -258,6 +258,41 @@ def scale_table():
     return "\n".join(lines) + "\n"
 
 
+MILLION = 10**6
+
+
+def million_table():
+    """What a million jobs take, from the measured costs of one."""
+    sweep, stored = kept("throughput.json")["sweep"], kept("store.json")
+    rows = stored["rows"]
+    core_s = sweep["workers"] / sweep["jobs_per_s"]
+    segments = rows["segments"] * MILLION // rows["jobs"]
+    lines = [
+        "| kept of each job | GB | files | hours on 2 cores | minutes on 8 nodes of 32 cores |",
+        "|---|---|---|---|---|",
+    ]
+    none = {"bytes": 0, "write_ms": 0.0}
+    for series in (None, *stored["series"]):
+        size, wait = (series or none)["bytes"], (series or none)["write_ms"] / 1e3
+        words = "metrics"
+        if series:
+            words = f"series, {series['precision']}" + (", gzip" if series["compress"] else "")
+        total = (size + rows["bytes_a_job"]) * MILLION / 1e9
+        files = segments + (MILLION if series else 0)
+        hours = MILLION * (core_s + wait) / 3600
+        lines.append(
+            f"| {words} | {total:.3g} | {files:,} | {hours / 2:.2g} | {60 * hours / 256:.2g} |"
+        )
+    expanding = sweep["again_s"] * MILLION / sweep["jobs"] / 60
+    lines += [
+        "",
+        f"Behind it: {1e3 * core_s:.1f} ms of a core a job (big end, no error bars), the time to "
+        f"write its file, {rows['bytes_a_job']} bytes a row. Reading a case file of a million jobs "
+        f"and looking up which are stored takes each run some {expanding:.0f} minutes more.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
@@ -269,6 +304,7 @@ TABLES = {
     "peers": peers_table,
     "throughput": throughput_table,
     "scale": scale_table,
+    "million": million_table,
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,

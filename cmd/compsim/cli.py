@@ -37,7 +37,7 @@ from compsim.screen import (
 )
 
 if TYPE_CHECKING:
-    from compressor.sweep import Failure, Summary
+    from compressor.sweep import Backend, Failure, Summary
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_FAILURES = 20  # listed one by one
@@ -46,6 +46,7 @@ MOST_FAILURES = 20  # listed one by one
 FORESEEN = {
     "CaseFileError": ("", USAGE),
     "ExportError": ("compsim: ", USAGE),
+    "ClusterError": ("compsim: ", USAGE),
     "StoreError": ("compsim: ", STORE),
     "WorkersFailed": ("compsim: ", INTERNAL),
     "ReferenceFailed": ("compsim: ", SOME_FAILED),
@@ -96,6 +97,10 @@ def cli() -> None:
 @click.option("--rerun", type=click.Choice(["failed"]), help="Run failed jobs again, too.")
 @click.option("--shard", "part", type=Part(), metavar="I/N",
               help="Run part I of N: for machines that share the folder.")  # fmt: skip
+@click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
+              show_default=True, help="Where jobs run: here, or on a dask cluster.")  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS",
+              help="Of the dask cluster, such as tcp://host:8786.")  # fmt: skip
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
@@ -109,6 +114,8 @@ def run(
     max_jobs: int,
     rerun: str | None,
     part: tuple[int, int] | None,
+    backend: str,
+    scheduler: str | None,
     wait: bool,
     quiet: bool,
 ) -> int:
@@ -117,6 +124,7 @@ def run(
     Jobs that are stored already are not run again, so a run that was interrupted goes on where it
     ended. A summary line for each study goes to stdout.
     """
+    check_backend(backend, scheduler, jobs)
     from compressor.process import cores, one_thread_each
 
     one_thread_each()  # before numpy loads
@@ -130,9 +138,11 @@ def run(
 
     screen = Screen(quiet)
     try:
-        summary = sweep(
-            studies, output, jobs or cores(), screen, context.obj, rerun == "failed", part, wait
-        )
+        with cluster(scheduler) as elsewhere:
+            summary = sweep(
+                studies, output, jobs or cores(), screen, context.obj, rerun == "failed", part,
+                wait, elsewhere,
+            )  # fmt: skip
     except BaseException:
         screen.end()
         if screen.total:
@@ -142,6 +152,28 @@ def run(
     screen.end()
     report_run(summary, output, quiet)
     return SOME_FAILED if summary.failed else DONE
+
+
+def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
+    """Usage errors of options that do not go together."""
+    if backend == "dask" and not scheduler:
+        raise click.UsageError(
+            "--backend dask needs --scheduler ADDRESS, such as tcp://host:8786: "
+            "what `dask scheduler` prints when it starts"
+        )
+    if backend == "dask" and jobs:
+        raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
+    if backend == "local" and scheduler:
+        raise click.UsageError("--scheduler goes with --backend dask")
+
+
+def cluster(scheduler: str | None) -> contextlib.AbstractContextManager["Backend | None"]:
+    """The cluster of a scheduler; none where jobs run here."""
+    if scheduler is None:
+        return contextlib.nullcontext()
+    from compressor.cluster import Cluster
+
+    return Cluster(scheduler)
 
 
 @cli.command()
