@@ -34,7 +34,7 @@ TIMES = ("seconds",)  # what two runs of a job may differ in
 def dask():
     """A cluster of two worker processes on this machine."""
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
         memory_limit=MEMORY,
     ) as made:  # fmt: skip
         made.wait_for_workers(2, timeout=60)
@@ -48,24 +48,26 @@ def client(dask):
         yield made.client
 
 
-@pytest.fixture
-def studies(tmp_path):
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory):
     """One study of many jobs without time series, one of few with."""
+    folder = tmp_path_factory.mktemp("studies")
     solve = {"duration_rev": 2, "accuracy": "draft", "error_bars": False, "output_step_deg": 0.9}
     many = {"joint": "big_end", "output": {"keep": "metrics"}}
     for name, values in {
         "many": many | {"clearance_mm": {"linspace": [0.1, 0.3, 120]}},
         "few": {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 10]}},
     }.items():
-        (tmp_path / f"{name}.yaml").write_text(json.dumps(values | {"solve": solve}))
-    return load_studies(tmp_path / "many.yaml", tmp_path / "few.yaml")
+        (folder / f"{name}.yaml").write_text(json.dumps(values | {"solve": solve}))
+    return load_studies(folder / "many.yaml", folder / "few.yaml")
 
 
-@pytest.fixture
-def locally(studies, tmp_path):
-    """The store of the studies' jobs, run by processes of this machine."""
-    sweep(studies, tmp_path / "local", 1)
-    return store.read_store(tmp_path / "local")
+@pytest.fixture(scope="module")
+def locally(studies, tmp_path_factory):
+    """The store of the studies' jobs, run by a process of this machine."""
+    folder = tmp_path_factory.mktemp("local")
+    sweep(studies, folder, 1)
+    return store.read_store(folder)
 
 
 def assert_same(folder, expected):
@@ -281,7 +283,7 @@ def test_a_scheduler_that_is_not_there_is_an_error(impatient):
 def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path):
     told = []
     with distributed.LocalCluster(
-        n_workers=0, processes=False, dashboard_address=None, silence_logs=50
+        n_workers=0, processes=False, dashboard_address=":0", silence_logs=50
     ) as empty, Cluster(empty.scheduler_address) as backend:  # fmt: skip
 
         def remark(done, total, text):
