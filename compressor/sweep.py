@@ -234,7 +234,8 @@ def serving_both(first: Case, second: Case) -> Case:
 def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
     """How the jobs ended that need no new run: stored ones that serve, with intact files.
 
-    A case whose job is to be run again goes on keeping the time series that its job has.
+    A case whose job is to be run again goes on keeping the time series that its job has, as exact
+    as they are.
     """
     found = {}
     positions = store.rows.find(list(cases)).tolist()
@@ -243,7 +244,7 @@ def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
             end = store.status_at(position)
             if end.serves(case) and store.rows.intact(position):
                 found[key] = End(end.status, end.reason, end.detail)
-            elif end.samples and case.output.keep == "metrics":
+            elif end.samples and (case.output.keep == "metrics" or end.precision == "double"):
                 output = replace(case.output, keep="series", precision=end.precision)
                 cases[key] = replace(case, output=output)
     return found

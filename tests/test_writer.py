@@ -15,7 +15,7 @@ import xarray as xr
 
 from compressor import hdf5, segments, store, writer
 from compressor.manifest import StoredAxis, StoredStudy, encode
-from compressor.schema import NUMBERS, ROW, Outcome
+from compressor.schema import NUMBERS, ROW, Outcome, SeriesFile
 from compressor.simulation import simulate
 from compressor.verification import verify
 from compressor.writer import Writer
@@ -78,6 +78,32 @@ def test_the_last_row_of_a_job_counts(tmp_path):
     put(tmp_path, outcome(1, 11))
     put(tmp_path, outcome(3, 30), outcome(3, 31))
     assert peaks(tmp_path) == {1: 11, 2: 20, 3: 31}
+
+
+def kept_as(precision):
+    series = SeriesFile(5, 1.0, precision, f"{'':d>20}") if precision else None
+    return dataclasses.replace(outcome(1), series=series)
+
+
+@pytest.mark.parametrize(
+    ("better", "worse"),
+    [
+        (outcome(1), outcome(1, reason="worker_died")),
+        (kept_as("single"), outcome(1)),
+        (kept_as("double"), kept_as("single")),
+        (kept_as("single"), outcome(1, reason="worker_died")),
+    ],
+)
+@pytest.mark.parametrize("shard", ["", "a"])
+def test_a_better_row_stays_whoever_writes_last(better, worse, shard, tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "_usable", lambda segment: np.ones(len(segment), bool))
+    put(tmp_path, better)
+    put(tmp_path, worse, shard=shard)
+    rows = store.read_store(tmp_path).rows
+    expected = segments.of_outcomes([better], 1)
+    for name in ("status", "samples", "precision"):
+        assert rows.columns[name].tolist() == expected.columns[name].tolist()
+    assert len(segments.merge(store.read_store(tmp_path).segments)) == 1
 
 
 def test_xarray_reads_a_segment(tmp_path):
