@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput peers tradeoff measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -57,6 +57,9 @@ scale: install  ## measure 100,000 jobs beside their physics: time and memory (t
 throughput: install  ## measure starting up, and 10,000 jobs without time series (two minutes)
 	$(BIN)/python tests/measure_throughput.py tests/results/throughput.json
 
+sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (fifteen minutes)
+	$(BIN)/python tests/measure_sweep.py tests/results/sweep.json
+
 peers: install  ## time other tools and ours in turn on one problem (about five minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
@@ -66,7 +69,7 @@ peers: install  ## time other tools and ours in turn on one problem (about five 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
 	$(BIN)/python tests/measure_tradeoff.py tests/results/tradeoff.json
 
-measurements: accuracy claims tradeoff store-bench scale throughput peers readme  ## all of these (20 minutes)
+measurements: accuracy claims tradeoff store-bench scale throughput sweep-bench peers readme  ## all of these (35 minutes)
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md

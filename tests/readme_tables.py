@@ -293,6 +293,29 @@ def million_table():
     return "\n".join(lines) + "\n"
 
 
+def sweep_table():
+    found = kept("sweep.json")
+    lines = [
+        "| killed after | SIGKILL of | jobs it had told of | jobs stored |",
+        "|---|---|---|---|",
+    ]
+    for kill in found["kills"]:
+        of = "parent and workers" if kill["of"] == "all" else "parent"
+        lines.append(f"| {kill['after_s']:.0f} s | {of} | {kill['told']:,} | {kill['stored']:,} |")
+    peaks = found["peak_MB"]
+    lines += [
+        "",
+        f"{found['jobs']:,} big-end jobs without time series or error bars on {found['workers']} "
+        f"workers: {found['wall_s']:.0f} s undisturbed, {found['jobs_per_s']:.0f} jobs a second; "
+        f"{found['last_run_s']:.0f} s for what was left after the last kill. The resumed store is "
+        f"complete and equals the undisturbed one to the bit, timings apart: "
+        f"{found['bytes'] / found['jobs']:.0f} bytes a job, {found['bytes'] / 1e6:.1f} MB in "
+        f"{found['files']} files; `open_study` takes {found['open_study_s']:.2g} s. Resident "
+        f"memory peaks at {peaks['parent']} MB in the parent, {peaks['worker']} MB in a worker.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
@@ -305,6 +328,7 @@ TABLES = {
     "throughput": throughput_table,
     "scale": scale_table,
     "million": million_table,
+    "sweep": sweep_table,
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,
