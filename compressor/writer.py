@@ -26,6 +26,7 @@ MOST_ROWS = 4096  # in a segment that is written at once; one with fewer is smal
 MOST_AGE = 1.0  # s between two writings, if they are small
 MOST_SMALL = 32  # small segments before they are merged
 FEW_SMALL = 8  # that may stay when the writer ends
+PATIENCE = 1.0  # s for which a lock's holder may leave its file empty
 SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}")
 LOCK_NAME = "writer.lock"
 
@@ -69,7 +70,7 @@ class Writer:
             mine = (s for s in self.found.segments if s.place == self.place)
             self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
         except BaseException:
-            os.close(self.lock)
+            _release(self.lock)
             raise
         return self
 
@@ -85,7 +86,7 @@ class Writer:
                 if not kind and len(self.small) > FEW_SMALL:
                     self._merge_small()
         finally:
-            os.close(self.lock)
+            _release(self.lock)
 
     def add(self, outcome: Outcome) -> list[str]:
         """Take an outcome in, with a file of time series that is stored already."""
@@ -178,6 +179,14 @@ def _number(path: Path) -> int:
     return int(path.name.partition("-")[0])
 
 
+def _holder(descriptor: int) -> str:
+    """Who holds a lock, from its file; who took it just now is about to say so."""
+    deadline = time.monotonic() + PATIENCE
+    while not (text := os.pread(descriptor, 1000, 0)) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return text.decode(errors="replace").strip() or "another process"
+
+
 def _locked(path: Path, wait: bool, command: str) -> int:
     """Take a lock for this process, for as long as the descriptor stays open."""
     make_folder(path.parent)
@@ -186,7 +195,7 @@ def _locked(path: Path, wait: bool, command: str) -> int:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         except BlockingIOError as error:
-            holder = os.read(descriptor, 1000).decode(errors="replace").strip()
+            holder = _holder(descriptor)
             os.close(descriptor)
             remedy = "wait for it to end, or choose another folder"
             raise StoreError(path, f"the store is in use by {holder}", remedy) from error
@@ -197,3 +206,10 @@ def _locked(path: Path, wait: bool, command: str) -> int:
     except OSError as error:
         raise system_error(path, error) from error
     return descriptor
+
+
+def _release(descriptor: int) -> None:
+    """Give a lock back, and take our name off it first: the next holder is not us."""
+    with contextlib.suppress(OSError):
+        os.ftruncate(descriptor, 0)
+    os.close(descriptor)

@@ -1,11 +1,13 @@
 """Rows: what is acknowledged stays, the last one counts, damage is found, one writer at a time."""
 
 import dataclasses
+import fcntl
 import os
 import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 
 import h5py
@@ -228,6 +230,24 @@ def test_one_writer_at_a_time(tmp_path):
         put(tmp_path, outcome(1), shard="a")  # has a lock of its own
     put(tmp_path, outcome(2))
     assert peaks(tmp_path) == {1: 1, 2: 2}
+
+
+def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "PATIENCE", 60.0)
+    with Writer(tmp_path, command="the first"):
+        pass
+    assert (tmp_path / writer.LOCK_NAME).read_text() == ""
+    with open(tmp_path / writer.LOCK_NAME, "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        named = threading.Timer(0.3, lambda: os.write(lock.fileno(), b"the second"))
+        named.start()
+        with pytest.raises(store.StoreError, match="in use by the second; wait"):
+            Writer(tmp_path).__enter__()
+        named.join()
+        monkeypatch.setattr(writer, "PATIENCE", 0.0)
+        lock.truncate(0)
+        with pytest.raises(store.StoreError, match="in use by another process; wait"):
+            Writer(tmp_path).__enter__()
 
 
 WAITING = """

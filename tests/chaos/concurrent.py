@@ -29,6 +29,8 @@ IN_USE = re.compile(
     r"compsim: .*/writer\.lock: the store is in use by process (\d+) on \S+: compsim run .*; "
     r"wait for it to end, or choose another folder\n"
 )
+RUN_NOW = re.compile(r"(\d+) jobs? run in ")
+ONCE = {"the same study", "shards"}  # in which no job need run twice
 DONE, STORE = 0, 5
 LATEST = 0.4  # s after the first start
 REAL = 10  # one trial in so many is of real commands
@@ -135,8 +137,14 @@ def trial(folder, expected, draw, counts, real):
         problems.append("no run was done")
     before = rows(folder / "out")
     for command, code in zip(commands, codes, strict=True):
-        if code == STORE and together(folder, [command], draw, real)[1] != [DONE]:
-            problems.append(f"{command}: not done when it ran again")
+        if code == STORE:
+            again, ended = together(folder, [command], draw, real)
+            runs += again
+            if ended != [DONE]:
+                problems.append(f"{command}: not done when it ran again")
+    jobs = sum(int(number) for run in runs for number in RUN_NOW.findall(run.text()))
+    if name in ONCE and jobs != len(MASSES):
+        problems.append(f"{jobs} jobs ran where there are {len(MASSES)}")
     problems += compared(folder, commands, expected, before)
     counts[name] += 1
     return "; ".join(problems)
