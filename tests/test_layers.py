@@ -10,6 +10,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = [
     "physics._jit",
     "physics.parameters",
+    "physics.materials",
     "physics.kinematics",
     "physics.loads",
     "physics.contact",
@@ -28,6 +29,7 @@ FLOORS = [
     "accuracy",
     "conflicts",
     "case",
+    "scales",
     "record",
     "schema",
     "retrace",
@@ -43,6 +45,7 @@ FLOORS = [
     "comparisons",
     "blocks",
     "study",
+    "domain",
     "plan",
     "durable",
     "hdf5",

@@ -26,6 +26,7 @@ from compsim.screen import (
     STORE,
     USAGE,
     Screen,
+    caution,
     configs_argument,
     duration,
     limit,
@@ -125,6 +126,7 @@ def run(
     if only and not quiet:
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
+    caution(studies)
     from compressor.sweep import sweep
 
     screen = Screen(quiet)

@@ -3,10 +3,16 @@
 import contextlib
 import sys
 import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
+if TYPE_CHECKING:
+    from compressor.study import Study
+
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
+MOST_CAUTIONS = 5  # told of one case file
 QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
 
 configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
@@ -75,6 +81,19 @@ def say(text: str, end: str = "\n") -> None:
     """Write to stderr; nobody may be there to read it."""
     with contextlib.suppress(OSError):
         print(text, end=end, file=sys.stderr, flush=True)
+
+
+def caution(studies: "Sequence[Study]") -> None:
+    """Say once what is odd about case files, in a few lines however many jobs they have."""
+    from compressor.domain import cautions
+
+    for study in studies:
+        found = cautions(study)
+        for one in found[:MOST_CAUTIONS]:
+            share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs looked at)"
+            say(f"{study.path}: warning: {one.key}: {one.message}{share}")
+        if len(found) > MOST_CAUTIONS:
+            say(f"{study.path}: and {len(found) - MOST_CAUTIONS} more warnings")
 
 
 def duration(seconds: float) -> str:
