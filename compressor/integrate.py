@@ -46,6 +46,7 @@ BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is gi
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
 NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
 CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
+PIECES_A_LOOK = 256  # of the ideal scene's quadrature between two looks at the clock
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 KICK = 30.0  # tolerances of speed: what a contact within one step of SciPy's may add unseen
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
@@ -130,7 +131,7 @@ class Derivative:
         if self.evaluations > self.limit:
             raise Stop(Reason.BUDGET_STEPS, f"more than {self.limit} evaluations")
         if time.monotonic() > self.deadline:
-            raise Stop(Reason.BUDGET_SECONDS, f"more than {self.timeout:g} s of wall time")
+            raise Stop(Reason.BUDGET_SECONDS, overdue(self.timeout))
 
 
 def scales(p: np.record) -> tuple[float, float]:
@@ -259,7 +260,12 @@ def check_march(request: Request, walker: np.record, deepest: float, deadline: f
     if walker.steps + walker.rejected >= request.max_steps:
         raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
     if time.monotonic() > deadline:
-        raise Stop(Reason.BUDGET_SECONDS, f"more than {request.timeout:g} s of wall time")
+        raise Stop(Reason.BUDGET_SECONDS, overdue(request.timeout))
+
+
+def overdue(timeout: float) -> str:
+    """What is wrong with a run that takes longer (s)."""
+    return f"more than {timeout:g} s of wall time"
 
 
 def too_deep(deepest: float) -> str:
@@ -386,11 +392,15 @@ class Segment:
         self.right_hand_side.check_budget()
 
 
-def closed_form(p: np.record, times: np.ndarray, settle: float, pieces: int) -> Trajectory:
+def closed_form(
+    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf
+) -> Trajectory:
     """The ideal scene: nothing is integrated, metrics and energy flows by quadrature.
 
-    `pieces`: into which each stretch between load corners, or each revolution in it, is cut.
+    `pieces`: into which each stretch between load corners, or each revolution in it, is cut;
+    `timeout`: wall time (s) that it may take.
     """
+    deadline = time.monotonic() + timeout
     edges, phases = segments(p, float(times[-1]))
     result = Trajectory(
         times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally()
@@ -402,7 +412,13 @@ def closed_form(p: np.record, times: np.ndarray, settle: float, pieces: int) -> 
     states = np.zeros((NODES.size, 4))
     rows = np.empty((NODES.size, COLUMNS))
     flows = np.zeros(FLOWS)
-    for begin, end, phase in zip(cuts[:-1], cuts[1:], phases[owner], strict=True):
+    for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
+        phase = phases[owner[number]]
+        if number % PIECES_A_LOOK == 0 and time.monotonic() > deadline:
+            result.reason = Reason.BUDGET_SECONDS
+            result.detail, result.stop_time = overdue(timeout), float(begin)
+            result.states[times >= begin] = math.nan
+            break
         nodes = begin + (end - begin) * NODES
         observe_all(nodes, states, np.full(NODES.size, phase), p, rows)
         tally_energy(rows[0], flows, result.tally)

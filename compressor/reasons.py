@@ -63,8 +63,8 @@ class Reason(StrEnum):
         "energy_audit_failed",
         "the energy does not balance within what the tolerance allows, in no run of up to a "
         "hundredth of it: metrics cannot be trusted, and none are stored",
-        "give a smaller rtol or another solve.method, and compare; very small stiction velocities "
-        "(friction.stiction_velocity_mm_per_s) are the usual cause",
+        "try solve.method: DOP853, which takes time; very small stiction velocities and friction "
+        "of 0.5 or more at tight tolerances are the usual causes",
     )
     ACCURACY_NOT_REACHED = (
         "accuracy_not_reached",

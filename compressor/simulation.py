@@ -217,7 +217,7 @@ def attempt(case: Case, rung: int, timeout: float, sampled: bool) -> Solution:
     samples = round(case.steps) if sampled else 1
     times = case.duration * (np.arange(samples + 1) / samples)
     if scene(case) == Scene.IDEAL:
-        trajectory = closed_form(p, times, case.settle, round(PIECES * 2.0**rung))
+        trajectory = closed_form(p, times, case.settle, round(PIECES * 2.0**rung), timeout)
     else:
         y = np.zeros(2 * FREEDOMS[scene(case)])
         start(offsets(case), y, p)

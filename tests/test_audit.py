@@ -107,3 +107,26 @@ def test_a_ladder_of_accuracy_keeps_the_audit(unbalance):
 @pytest.mark.parametrize("load", ["design", "typical", "none"])
 def test_the_ideal_machine_balances(load):
     assert simulation.measure(Case.from_values({"load": load})).status == "ok"
+
+
+EXTREMES = {
+    "stiff contact": {"contact": {"stiffness_N_per_mm15": 3.36e8}},
+    "undamped": {"contact": {"damping_N_s_per_mm": 0}},
+    "sticking": {"friction": {"stiction_velocity_mm_per_s": 0.1}},
+    "rough": {"friction": {"static": 0.5, "dynamic": 0.4}},
+    "light rod": {"machine": {"rod_mass_kg": 0.1, "reciprocating_mass_kg": 50}},
+    "slow": {"machine": {"speed_rpm": 50}},
+    "1 nm": {"clearance_mm": 1e-6},
+    "1 mm": {"clearance_mm": 1.0},
+}
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+@pytest.mark.parametrize("extreme", EXTREMES)
+def test_good_runs_of_extremes_pass(extreme, joint):
+    """Within the supported range, at standard; a few only at a tenth of the tolerance."""
+    values = {"joint": joint, "clearance_mm": 0.2, **EXTREMES[extreme]}
+    solve = SHORT | {"error_bars": False}
+    found = simulation.measure(Case.from_values({**values, "solve": solve}))
+    assert (found.status, found.reason) == ("ok", "")
+    assert found.numbers["energy_residual"] <= allowed(4e-6, 0.5)
