@@ -30,7 +30,7 @@ from compressor.physics.parameters import FREEDOMS, Load, Scene
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.tally import add_flows, lobatto, new_tally, tally_energy, tally_step
 from compressor.reasons import Reason
-from compressor.retrace import LAST, History, Standing, retrace
+from compressor.retrace import LAST, History, Snapshot, Standing, retrace
 
 COMPILED = {
     "auto": (Mode.AUTO, Pair.TSIT5),
@@ -210,10 +210,12 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             request.times, result.states, some.tally, attempts,
         )  # fmt: skip
 
-    earlier = before = now.copy()
+    earlier = before = Snapshot.of(now)
+    seen = 0  # attempts at the last snapshot
     while walker.status == Status.RUNNING:
-        if now.attempts - before.attempts >= LAST:
-            earlier, before = before, now.copy()
+        if result.steps + result.rejected >= seen + LAST:
+            earlier, before = before, Snapshot.of(now)
+            seen = result.steps + result.rejected
         advance(now, min(CHUNK, request.max_steps - walker.steps - walker.rejected))
         result.steps, result.rejected = int(walker.steps), int(walker.rejected)
         result.evaluations = int(walker.evaluations)
@@ -223,16 +225,10 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             check_march(request, walker, float(result.tally.deepest), deadline)
         except Stop:
             result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
-            whole = now.attempts - before.attempts >= LAST
+            enough = result.steps + result.rejected >= seen + LAST
+            kept = (before if enough else earlier).standing()
             result.history = retrace(
-                before if whole else earlier,
-                now,
-                advance,
-                request.p,
-                request.rtol,
-                size,
-                edges,
-                phases,
+                kept, now, advance, request.p, request.rtol, size, edges, phases
             )
             raise
 
