@@ -6,8 +6,6 @@ kept and send home the outcomes; this process alone writes the rows that make th
 named reason.
 """
 
-import json
-import math
 import threading
 import time
 import warnings
@@ -17,13 +15,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-
-import compressor
 from compressor.case import Case
 from compressor.jobfiles import series_file
 from compressor.manifest import given
-from compressor.schema import ROW, Outcome
+from compressor.reasons import Reason
+from compressor.schema import Outcome, without_run
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
 from compressor.study import Study, shard
 from compressor.workers import Done, Input, Lost, rest, run_batches
@@ -302,6 +298,8 @@ def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
         if case.output.keep == "metrics":
             return simulation.measure(case)
         found, dataset = simulation.observe(case)
+    if found.reason == Reason.INVALID_INPUT:
+        return found
     if place is None:
         file, data = series_file(dataset, case.output)
         return Carried(replace(found, series=file), data)
@@ -317,16 +315,5 @@ def settled(end: Done | Lost) -> Outcome:
         if isinstance(end.result, StoreError):
             raise end.result
         return end.result
-    case: Case = end.id
-    attributes = {
-        "key": case.key,
-        "physics_key": case.physics_key,
-        "name": case.name,
-        "case": json.dumps(case.values(), sort_keys=True),
-        "complete": 0,
-        "program": f"compsim {compressor.__version__}",
-        "detail": end.detail,
-    }
-    if end.traceback:
-        attributes["traceback"] = end.traceback
-    return Outcome("failed", end.reason, np.full(1, math.nan, ROW)[0], attributes)
+    more = {"traceback": end.traceback} if end.traceback else {}
+    return without_run(end.id, end.reason, end.detail, **more)
