@@ -186,6 +186,10 @@ class Solve:
         True, (), "ours", "an error beside each metric, by a second, looser run; not part of a "
         "job's identity", kind="boolean",
     )  # fmt: skip
+    horizon: bool = choice(
+        False, (), "ours", "how long the motion can be foretold, by a twin at rtol 1e-12; bars "
+        "end there; not part of a job's identity", kind="boolean",
+    )  # fmt: skip
     method: str = choice(
         "auto", METHODS, "ours", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
     )

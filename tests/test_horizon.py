@@ -1,9 +1,12 @@
 """Twins in step: what parts them is the motion, not the steps."""
 
+import json
 import math
 
 import numpy as np
 import pytest
+from compsim import cli
+from conftest import keep
 
 from compressor.case import Case
 from compressor.horizon import CLOSE, FAR, predictability_horizon, time_of_parting
@@ -11,7 +14,11 @@ from compressor.integrate import Request, integrate
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS
+from compressor.quantities import ERRORS, METRICS
 from compressor.record import offsets, record, scene
+from compressor.simulation import measure, simulate
+from compressor.store import read_store
+from compressor.sweep import serving_both
 
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
 CHAOTIC = {
@@ -89,6 +96,82 @@ def test_ideal_joints_never_part():
 
 
 def test_a_run_that_stops_tells_how_far_it_came():
-    stopped = predictability_horizon(case(REGULAR, max_steps=100))
-    assert 0 < stopped < predictability_horizon(case(REGULAR, max_steps=200)) < 1e-3
+    stopped, later = (predictability_horizon(case(REGULAR, max_steps=n)) for n in (100, 1000))
+    assert 0 < stopped < later < case(REGULAR).duration
     assert 0 < predictability_horizon(case(REGULAR), timeout=0.0) < case(REGULAR).duration
+
+
+# Beside a job's other numbers
+
+BRIEF = {"duration_rev": 1.2, "settle_rev": 0.2, "output_step_deg": 0.9}
+
+
+def brief(values, **solve):
+    return Case.from_values({**values, "solve": BRIEF | solve, "output": {"keep": "metrics"}})
+
+
+def test_bars_are_claimed_within_the_horizon_only():
+    plain, asked = (measure(brief(CHAOTIC, horizon=asked)).numbers for asked in (False, True))
+    assert math.isnan(plain["predictability_horizon"])
+    assert asked["predictability_horizon"] == predictability_horizon(brief(CHAOTIC))
+    for name in METRICS:
+        assert np.array_equal(asked[name], plain[name]), name
+        assert np.isfinite(plain[f"{name}_error"]).all()
+        assert np.isposinf(asked[f"{name}_error"]).all()
+
+
+def test_a_motion_that_can_be_foretold_keeps_its_bars():
+    plain, asked = (measure(brief(REGULAR, horizon=asked)).numbers for asked in (False, True))
+    assert asked["predictability_horizon"] == math.inf
+    for name in (*METRICS, *ERRORS):
+        assert np.array_equal(asked[name], plain[name]), name
+
+
+def test_accuracy_by_number_is_not_reached_beyond_the_horizon():
+    """Bars of rms may be short there, but speak for nothing."""
+    accuracy = {"rms_acceleration": 0.4}
+    assert measure(brief(CHAOTIC, accuracy=accuracy)).status == "ok"
+    found = measure(brief(CHAOTIC, accuracy=accuracy, horizon=True))
+    assert (found.status, found.reason) == ("failed", "accuracy_not_reached")
+    assert "beyond the horizon" in found.detail
+    assert found.numbers["predictability_horizon"] < brief(CHAOTIC).duration
+    assert measure(brief(REGULAR, accuracy=accuracy, horizon=True)).status == "ok"
+
+
+def test_a_failed_job_has_no_horizon():
+    found = measure(brief(REGULAR, horizon=True, max_steps=5))
+    assert found.reason == "budget_steps"
+    assert math.isnan(found.numbers["predictability_horizon"])
+
+
+def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
+    plain, asked = (brief(CHAOTIC, horizon=asked) for asked in (False, True))
+    assert plain.key == asked.key
+    assert serving_both(plain, asked).solve.horizon
+    keep(tmp_path, simulate(plain))
+    assert not read_store(tmp_path).status(plain.key).serves(asked)
+    keep(tmp_path, simulate(asked))
+    stored = read_store(tmp_path).status(plain.key)
+    assert stored.serves(asked)
+    assert stored.serves(plain)
+    assert 0 < stored.numbers["predictability_horizon"] < asked.duration
+
+
+def test_show_and_report_tell_of_jobs_beyond_their_horizon(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    solve = {**BRIEF, "horizon": True}
+    both = {**CHAOTIC, "contact": {"damping_N_s_per_mm": [0, 336]}, "solve": solve}
+    (tmp_path / "ring.yaml").write_text(json.dumps({**both, "output": {"keep": "metrics"}}))
+    assert cli.main(["run", "ring.yaml", "-j", "1"]) == 0
+    keys = json.loads((tmp_path / "results/studies/ring.json").read_text())["keys"]
+    told = []
+    for key in keys:
+        capsys.readouterr()
+        assert cli.main(["show", key]) == 0
+        told.append(capsys.readouterr().out)
+    assert "± inf" in told[0]
+    assert "beyond the horizon" in told[0]
+    assert "predictability_horizon       inf s" in told[1]
+    assert "beyond the horizon" not in told[1]
+    assert cli.main(["report"]) == 0
+    assert "Of 1 of the jobs the run is longer" in (tmp_path / "report/index.html").read_text()

@@ -64,7 +64,7 @@ def show(job: str, folder: str, as_json: bool) -> int:
         click.echo(f"  in {study}{values}")
     if found.status == "failed":
         click.echo(f"  what to do: {ADVICE.get(found.reason, 'see why above')}")
-    for line in (*numbers(found), *facts(found)):
+    for line in (*numbers(found), *cautions(found), *facts(found)):
         click.echo(f"  {line}")
     if found.status == "missing":
         files = " ".join(map(shlex.quote, found.case_files))
@@ -81,17 +81,26 @@ def ending(found: "JobReport") -> str:
 
 def numbers(found: "JobReport") -> list[str]:
     """A job's numbers, a line each, with what is known of their errors."""
-    from compressor.quantities import ERRORS, NUMBERS
+    from compressor.quantities import ERRORS, HORIZON, NUMBERS
 
     lines = []
     for name, value in found.numbers.items():
-        if name in ERRORS:
+        if name in ERRORS or (name == HORIZON and blank(value)):
             continue
         unit = "" if NUMBERS[name][1] == "1" else NUMBERS[name][1]
         error = found.numbers.get(f"{name}_error")
         known = "" if error is None or blank(error) else f" ± {plain(error)}"
         lines.append(f"{name:<28} {plain(value)}{known} {unit}".rstrip())
     return lines
+
+
+def cautions(found: "JobReport") -> list[str]:
+    """What is to be said of numbers that no error bar can be claimed of."""
+    from compressor.quantities import HORIZON
+
+    if not math.isfinite(found.numbers.get(HORIZON, math.nan)):
+        return []
+    return ["the metrics go beyond the horizon: statistics may be trusted, single peaks may not"]
 
 
 def facts(found: "JobReport") -> list[str]:
