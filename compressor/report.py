@@ -289,7 +289,7 @@ def failures(stored: Stored, data: xr.Dataset) -> Html:
     failed, missing = np.flatnonzero(status == "failed"), int((status == "missing").sum())
     counts = f"{status.size} jobs: {status.size - len(failed) - missing} ok, {len(failed)} failed"
     body = [element("p", counts + (f", {missing} not run." if missing else "."))]
-    if chaotic := int(np.isfinite(data[HORIZON].values).sum()):
+    if HORIZON in data and (chaotic := int(np.isfinite(data[HORIZON].values).sum())):
         body.append(element("p", BEYOND.format(jobs=chaotic)))
     items = []
     for place in failed[:MOST_DETAILS]:
