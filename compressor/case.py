@@ -122,7 +122,7 @@ class Contact:
 
     law: str = choice("impact", ("impact",), "Eq. 14", "contact law (ADAMS's IMPACT)")
     stiffness_N_per_mm15: float | None = parameter(
-        3.36e5, "N/mm^p", (0, 1e12), "Table 3", "contact stiffness K, in N/mm^exponent",
+        3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True,
     )  # fmt: skip
     materials: tuple[str, str] | None = choice(

@@ -70,6 +70,7 @@ FLOORS = [
     "figures.machine",
     "figures.sweep_metric",
     "figures.work_precision",
+    "figures.ladders",
     "figures",
     "page",
     "report",
