@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -69,7 +69,13 @@ peers: install  ## time other tools and ours in turn on one problem (about five 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
 	$(BIN)/python tests/measure_tradeoff.py tests/results/tradeoff.json
 
-measurements: accuracy claims tradeoff store-bench scale throughput sweep-bench peers readme  ## all of these (35 minutes)
+ladders: install  ## measure error against tolerance, and the limit of no clearance (two minutes)
+	$(BIN)/python tests/measure_ladders.py tests/results/ladders.json
+
+chaotic: install  ## compare two chaotic scenes' statistics by two integrators (a minute)
+	$(BIN)/python tests/measure_chaotic.py tests/results/chaotic.json
+
+measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers readme  ## all of these (40 minutes)
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md

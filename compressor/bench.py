@@ -59,8 +59,10 @@ def default_cases() -> dict[str, Case]:
 
 
 def solved(case: Case, method: str, rtol: float, timeout: float | None = None) -> Case:
-    """A case by another method and tolerance, with its series kept and without error bars."""
-    solve = replace(case.solve, method=method, rtol=rtol, accuracy="standard", error_bars=False)
+    """A case by another method and tolerance: series kept, no error bars, no horizon."""
+    solve = replace(
+        case.solve, method=method, rtol=rtol, accuracy="standard", error_bars=False, horizon=False
+    )
     if timeout is not None:
         solve = replace(solve, timeout_s=timeout)
     return replace(case, solve=solve, output=Output())

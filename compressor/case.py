@@ -122,7 +122,7 @@ class Contact:
 
     law: str = choice("impact", ("impact",), "Eq. 14", "contact law (ADAMS's IMPACT)")
     stiffness_N_per_mm15: float | None = parameter(
-        3.36e5, "N/mm^p", (0, 1e12), "Table 3", "contact stiffness K, in N/mm^exponent",
+        3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True,
     )  # fmt: skip
     materials: tuple[str, str] | None = choice(
@@ -185,6 +185,10 @@ class Solve:
     error_bars: bool = choice(
         True, (), "ours", "an error beside each metric, by a second, looser run; not part of a "
         "job's identity", kind="boolean",
+    )  # fmt: skip
+    horizon: bool = choice(
+        False, (), "ours", "how long the motion can be foretold, by a twin at rtol 1e-12; bars "
+        "end there; not part of a job's identity", kind="boolean",
     )  # fmt: skip
     method: str = choice(
         "auto", METHODS, "ours", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"

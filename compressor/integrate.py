@@ -192,15 +192,21 @@ def integrate(request: Request) -> Trajectory:
     return result
 
 
-def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
-    """Integrate by the compiled loop, in chunks between which budgets are checked."""
-    deadline = time.monotonic() + request.timeout
+def ready_walker(request: Request, size: np.ndarray) -> np.record:
+    """A walker at the start of a run by a compiled method; `size` as of `natural_sizes`."""
     mode, pair = COMPILED[request.method]
     walker = new_walker(mode)
     walker.pair, walker.rtol = pair, request.rtol
-    size = natural_sizes(request.p)
     walker.watch, walker.contact_step = 1, CONTACT_STEP * size[0] / size[size.size // 2]
     walker.deepest = IMPLAUSIBLE * request.p.pin_radius
+    return walker
+
+
+def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
+    """Integrate by the compiled loop, in chunks between which budgets are checked."""
+    deadline = time.monotonic() + request.timeout
+    size = natural_sizes(request.p)
+    walker = ready_walker(request, size)
     edges, phases, walker.settle = cut(edges, phases, request.settle)
     now = Standing(walker, z, new_work(size.size), result.tally)
 

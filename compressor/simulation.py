@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+import time
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -15,12 +16,14 @@ from compressor.accuracy import TIGHTEST
 from compressor.audit import RUNGS, allowed, energy_residual
 from compressor.bars import Metrics, bars, unmet
 from compressor.case import MODEL_VERSION, Case
+from compressor.horizon import predictability_horizon
 from compressor.integrate import Request, Trajectory, closed_form, integrate
 from compressor.parameter import CaseError
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS, Scene
 from compressor.physics.runge_kutta import FLOWS
+from compressor.quantities import HORIZON
 from compressor.reasons import Reason
 from compressor.record import offsets, record, scene
 from compressor.retrace import NONE
@@ -67,7 +70,7 @@ class Solution:
 
     `rtol`: the tolerance it was integrated with; `metrics`: by name, empty where the run did not
     reach its end; `bars`: an error bar of each metric, empty where none was made; `reason` and
-    `detail`: why the job failed, empty when it is ok.
+    `detail`: why the job failed, empty when it is ok; `horizon` (s): nan where none was asked for.
     """
 
     p: np.record
@@ -77,6 +80,7 @@ class Solution:
     bars: Metrics
     reason: str
     detail: str
+    horizon: float = math.nan
 
 
 def simulate(case: Case) -> "xr.Dataset":
@@ -118,9 +122,28 @@ def refused(case: Case) -> Outcome:
 
 
 def solve(case: Case) -> Solution:
-    """A case's motion, with error bars where they are wanted."""
+    """A case's motion, with error bars and the horizon where they are wanted."""
+    began = time.monotonic()
+    found = climb(case) if case.targets else once(case)
+    if case.solve.horizon and not found.reason:
+        left = case.solve.timeout_s - (time.monotonic() - began)
+        found.horizon = predictability_horizon(case, left)
+        if found.horizon < case.duration:
+            beyond_horizon(case, found)
+    return found
+
+
+def beyond_horizon(case: Case, found: Solution) -> None:
+    """Withdraw the error bars of a motion that cannot be foretold to its end."""
+    found.bars = {name: np.full(np.shape(bar), math.inf) for name, bar in found.bars.items()}
     if case.targets:
-        return climb(case)
+        found.reason = Reason.ACCURACY_NOT_REACHED
+        turns = found.horizon / case.turn
+        found.detail = f"no error bar holds beyond the horizon, {turns:.3g} revolutions"
+
+
+def once(case: Case) -> Solution:
+    """A case's motion at its own tolerance, with error bars where they are wanted."""
     found, looser = audited(case, case.output.keep == "series")
     if case.wants_bars and not found.reason:
         left = case.solve.timeout_s - found.trajectory.seconds
@@ -258,6 +281,7 @@ def outcome(case: Case, found: Solution) -> Outcome:
     numbers = np.full(1, math.nan, dtype=ROW)[0]
     known = {**found.metrics, **ledger(found.trajectory)}
     known |= {f"{name}_error": bar for name, bar in found.bars.items()}
+    known[HORIZON] = found.horizon
     for name, value in known.items():
         numbers[name] = value
     status = "failed" if found.reason else "ok"

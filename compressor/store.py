@@ -24,6 +24,7 @@ from compressor.durable import Folder, StoreError, discard_leftovers, system_err
 from compressor.hdf5 import DamagedJob
 from compressor.jobfiles import KEY, read_series, read_values, write_dataset, write_series
 from compressor.manifest import StoredAxis, StoredStudy, points, read_studies, write_study
+from compressor.quantities import HORIZON
 from compressor.reasons import Reason
 from compressor.schema import Outcome, coordinates
 from compressor.segments import NAME, Cut, Rows, Segment, read_segment
@@ -86,6 +87,8 @@ class JobStatus:
         if self.reason in BROKEN:
             return True
         if case.wants_bars and self.status == "ok" and not self.bars:
+            return False
+        if case.solve.horizon and self.status == "ok" and np.isnan(self.numbers[HORIZON]):
             return False
         if case.output.keep == "metrics":
             return True

@@ -317,6 +317,54 @@ def sweep_table():
     return "\n".join(lines) + "\n"
 
 
+def ladders_table():
+    rows = kept("ladders.json")["ladder"]
+    scenes = [*dict.fromkeys(row["scene"] for row in rows)]
+    names = [scene.replace("_", " ") for scene in scenes]
+    head = ["rtol", *(f"{what}, {name}" for what in ("acceleration", "residual") for name in names)]
+    lines = []
+    for rtol in dict.fromkeys(row["rtol"] for row in rows):
+        rung = {row["scene"]: row for row in rows if row["rtol"] == rtol}
+        lines.append([f"{rtol:.0e}"] + [
+            f"{rung[scene][name]:.1e}"
+            for name in ("error_acceleration", "energy_residual") for scene in scenes
+        ])  # fmt: skip
+    return markdown(head, lines)
+
+
+def limit_table():
+    measured = kept("ladders.json")
+    head = ["joint", "slope", "by decade", "deviation / c at 1 mm", "at 1 nm",
+            "energy residual / bound, worst"]  # fmt: skip
+    lines = []
+    for scene, slope in measured["slopes"].items():
+        rows = [row for row in measured["limit"] if row["scene"] == scene]
+        ends = [f"{row['deviation'] / row['clearance']:.3g}" for row in (rows[0], rows[-1])]
+        decades = f"{slope['least']:.3f} to {slope['greatest']:.3f}"
+        worst = f"{max(row['residual'] for row in rows):.2g}"
+        name = scene.replace("_", " ")
+        lines.append([name, f"{slope['fitted']:.3f}", decades, *ends, worst])
+    return markdown(head, lines)
+
+
+def chaotic_table():
+    head = ["scene", "horizon", "acceleration within", "beyond", "statistic", "means",
+            "apart by"]  # fmt: skip
+    lines = []
+    for scene, row in kept("chaotic.json")["scenes"].items():
+        (other,) = row["others"]
+        first = [scene, f"{row['horizon_rev']:.2g} rev", f"{other['within']:.1e}",
+                 f"{other['beyond']:.2g}"]  # fmt: skip
+        for name, apart in other["standard_errors"].items():
+            means = (row["means"][method][name] for method in (row["against"], other["method"]))
+            text = ", ".join(f"{mean:.3g} ± {error:.1g}" for mean, error in means)
+            lines.append([*first, name.replace("_", " "), text, f"{apart:.1f} s.e."])
+            first = [""] * len(first)
+        lines.append([*first, "distribution of peaks", "",
+                      f"{other['peaks_distance']:.2f} (Kolmogorov-Smirnov)"])  # fmt: skip
+    return markdown(head, lines)
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "reasons": reason_table,
@@ -334,6 +382,9 @@ TABLES = {
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,
+    "ladders": ladders_table,
+    "limit": limit_table,
+    "chaotic": chaotic_table,
 }
 
 

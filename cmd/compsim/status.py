@@ -65,7 +65,7 @@ def show(job: str, folder: str, as_json: bool) -> int:
         click.echo(f"  in {study}{values}")
     if found.status == "failed":
         click.echo(f"  what to do: {remedy(found.reason)}")
-    for line in (*stop(found), *numbers(found), *facts(found)):
+    for line in (*stop(found), *numbers(found), *cautions(found), *facts(found)):
         click.echo(f"  {line}")
     if found.status == "missing":
         for command in run_commands(found.again, folder):
@@ -105,17 +105,26 @@ def stop(found: "JobReport") -> list[str]:
 
 def numbers(found: "JobReport") -> list[str]:
     """A job's numbers, a line each, with what is known of their errors."""
-    from compressor.quantities import ERRORS, NUMBERS
+    from compressor.quantities import ERRORS, HORIZON, NUMBERS
 
     lines = []
     for name, value in found.numbers.items():
-        if name in ERRORS:
+        if name in ERRORS or (name == HORIZON and blank(value)):
             continue
         unit = "" if NUMBERS[name][1] == "1" else NUMBERS[name][1]
         error = found.numbers.get(f"{name}_error")
         known = "" if error is None or blank(error) else f" ± {plain(error)}"
         lines.append(f"{name:<28} {plain(value)}{known} {unit}".rstrip())
     return lines
+
+
+def cautions(found: "JobReport") -> list[str]:
+    """What is to be said of numbers that no error bar can be claimed of."""
+    from compressor.quantities import HORIZON
+
+    if not math.isfinite(found.numbers.get(HORIZON, math.nan)):
+        return []
+    return ["the metrics go beyond the horizon: statistics may be trusted, single peaks may not"]
 
 
 def facts(found: "JobReport") -> list[str]:

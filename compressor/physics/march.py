@@ -70,6 +70,7 @@ WALKER = np.dtype(
         ("segment", "i8"),
         ("sample", "i8"),  # next output sample
         ("steps", "i8"),
+        ("taken", "f8"),  # length of the last accepted step
         ("evaluations", "i8"),
         ("rejected", "i8"),
         ("onsets", "i8"),
@@ -296,6 +297,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         reached = end if at_edge else w.t + h
         take_in(w, h, work, phase, p, tally)
         sample_grid(w, reached, h, work, times, states)
+        w.taken = h
         was_stiff = w.stiff
         choose_method(w, h, z, work, size)
         advance(w, z, work, reached, was_stiff, at_edge, phases.size)
