@@ -363,7 +363,8 @@ class Segment:
         phases = np.full(times.size, self.right_hand_side.phase)
         observe_all(times, states, phases, self.request.p, rows)
         self.check_contact(begin, end - begin, rows)
-        tally_step(end - begin, NODES, WEIGHTS, rows, measured, self.result.tally, self.request.p)
+        tally, p = self.result.tally, self.request.p
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, measured, tally, p)
 
     def check_contact(self, begin: float, span: float, rows: np.ndarray) -> None:
         """Raise Stop where a whole contact lies within a step and its impulse is no small error."""
@@ -426,7 +427,7 @@ def closed_form(
         tally_energy(rows[0], flows, result.tally)
         add_flows(rows, WEIGHTS, end - begin, flows)
         tally_energy(rows[-1], flows, result.tally)
-        tally_step(end - begin, NODES, WEIGHTS, rows, begin >= settle, result.tally, p)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, begin >= settle, result.tally, p)
     result.seconds = time.perf_counter() - began
     return result
 

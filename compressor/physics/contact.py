@@ -7,14 +7,13 @@ from compressor.physics._jit import inlined, jit
 
 
 @jit
-def step(x, x0, h0, x1, h1):
-    """ADAMS's STEP: the cubic from h0 at x0 to h1 at x1, constant outside (x0 < x1)."""
-    if x <= x0:
-        return h0
-    if x >= x1:
-        return h1
-    s = (x - x0) / (x1 - x0)
-    return h0 + (h1 - h0) * s * s * (3.0 - 2.0 * s)
+def rise(s):
+    """ADAMS's STEP from 0 at s = 0 to 1 at s = 1: a cubic, constant outside."""
+    if s <= 0.0:
+        return 0.0
+    if s >= 1.0:
+        return 1.0
+    return s * s * (3.0 - 2.0 * s)
 
 
 @jit
@@ -23,8 +22,9 @@ def friction_coefficient(slip, p):
 
     Rises from 0 to `static` over the stiction velocity, falls to `dynamic` at the friction one.
     """
-    size = step(abs(slip), p.stiction_velocity, p.static, p.friction_velocity, p.dynamic)
-    return step(slip, -p.stiction_velocity, -1.0, p.stiction_velocity, 1.0) * size
+    fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
+    size = p.static + (p.dynamic - p.static) * fall
+    return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
 @jit
@@ -45,7 +45,7 @@ def impact(penetration, rate, stiffness, p):
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = stiffness * power(penetration, p.exponent)
-    unclamped = elastic + step(penetration, 0.0, 0.0, p.full_damping, p.damping) * rate
+    unclamped = elastic + p.damping * rise(penetration * p.per_full_damping) * rate
     return max(0.0, unclamped), elastic, unclamped
 
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from compressor.physics._jit import inlined, jit
-from compressor.physics.kinematics import ideal
+from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.march import DONE, RUNNING, attempt, march
 from compressor.physics.motion import turned
 from compressor.physics.observe import (
@@ -52,7 +52,8 @@ def follow(w, fellow, twin, work, atol, size, phase, p):
     """Take the step that a walker took, from fellow.t on, in the twin's motion."""
     if fellow.fresh:
         derivative_with_flows(fellow.t, twin, phase, p, work.k[0])
-    attempt(fellow, w.taken, twin, work, atol, size, phase, p)
+    base = crank_direction(fellow.t, p)
+    attempt(fellow, base, w.taken, twin, work, atol, size, phase, p)
     for i in range(twin.size):
         twin[i] = work.new[i]
         work.k[0, i] = work.k[STAGES - 1, i]
