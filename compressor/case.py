@@ -263,7 +263,17 @@ class Case:
         problems = [*_inertia_problems(case), *conflicts(case, frozenset(_given(values)))]
         if problems:
             raise CaseError(problems)
+        vars(case)["problems"] = ()  # known: see `problems`
         return case
+
+    @cached_property
+    def problems(self) -> tuple[Problem, ...]:
+        """What is wrong with a case that was made without `from_values`, which would raise it."""
+        try:
+            Case.from_values(self.values())
+        except CaseError as error:
+            return tuple(error.problems)
+        return ()
 
     def __post_init__(self) -> None:
         """Fill in the defaults that depend on other values; unused clearances become 0."""

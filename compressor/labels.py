@@ -16,6 +16,7 @@ from xarray.core import indexing
 from compressor.case import table
 from compressor.hdf5 import DamagedJob
 from compressor.manifest import StoredStudy, points
+from compressor.reasons import Reason
 from compressor.schema import NUMBERS, coordinates
 from compressor.segments import Rows
 
@@ -107,7 +108,7 @@ def labelled(
     positions = rows.find(layout.keys)
     variables = _outcomes(layout, rows, positions)
     found = np.unique(positions[positions >= 0])
-    if (rows.words["reason"][found] != "internal_error").any():
+    if (rows.words["reason"][found] != Reason.INTERNAL_ERROR).any():
         variables |= _metrics(layout, rows, positions)
         variables |= {n: xr.Variable(*parts) for n, parts in coordinates().items()}
     whole = found[rows.columns["samples"][found] > 0]

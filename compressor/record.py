@@ -9,8 +9,8 @@ import numpy as np
 
 from compressor.case import Case
 from compressor.parameter import JOINTS, to_si
-from compressor.physics.contact import contact_stiffness
 from compressor.physics.loads import cam_corners, gas_corners, printed_corners
+from compressor.physics.materials import contact_stiffness
 from compressor.physics.parameters import Law, Load, Scene, new_record
 
 LOADS = {"none": Load.NONE, "typical": Load.TYPICAL, "design": Load.DESIGN}

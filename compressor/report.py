@@ -44,6 +44,7 @@ from compressor.page import (
     table,
 )
 from compressor.physics.cam import comparisons
+from compressor.reasons import remedy as remedy_of
 from compressor.record import record
 from compressor.store import DamagedJob, Stored, open_study, read_store
 
@@ -288,9 +289,11 @@ def failures(stored: Stored, data: xr.Dataset) -> Html:
         job = stored.status(str(data["key"].values.flat[place]))
         point = [f"{name} {plain(values[place])}" for name, values in axes(data).items()]
         items.append(f"{', '.join(point)}: {outcome(job.reason, job.detail) if job else 'gone'}")
+    reasons = dict.fromkeys(data["reason"].values.ravel()[failed])
+    advice = listing(f"{reason}: {remedy_of(reason)}" for reason in reasons)
     if len(failed) > MOST_DETAILS:
         items.append(f"and {len(failed) - MOST_DETAILS} more")
-    return joined([*body, listing(items)] if items else body)
+    return joined([*body, listing(items), "What to do:", advice] if items else body)
 
 
 def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:

@@ -24,6 +24,7 @@ from compressor.durable import Folder, StoreError, discard_leftovers, system_err
 from compressor.hdf5 import DamagedJob
 from compressor.jobfiles import KEY, read_series, read_values, write_dataset, write_series
 from compressor.manifest import StoredAxis, StoredStudy, points, read_studies, write_study
+from compressor.reasons import Reason
 from compressor.schema import Outcome, coordinates
 from compressor.segments import NAME, Cut, Rows, Segment, read_segment
 
@@ -53,7 +54,8 @@ __all__ = [
     "write_study",
 ]
 
-BROKEN = {"internal_error", "worker_died", "out_of_memory"}  # reasons that leave no time series
+# reasons that leave no time series
+BROKEN = {Reason.INTERNAL_ERROR, Reason.WORKER_DIED, Reason.OUT_OF_MEMORY, Reason.INVALID_INPUT}
 ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 
 
@@ -79,7 +81,7 @@ class JobStatus:
 
         The one place that knows of what a case may ask for without it being in its key.
         """
-        if self.reason == "budget_seconds":
+        if self.reason == Reason.BUDGET_SECONDS:
             return False  # a machine with more time to spare may do it
         if self.reason in BROKEN:
             return True

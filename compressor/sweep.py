@@ -5,8 +5,6 @@ process alone writes the rows that make them stored (`compressor.writer`). A run
 or takes its worker with it, is a result with a named reason.
 """
 
-import json
-import math
 import threading
 import time
 import warnings
@@ -16,12 +14,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-import compressor
 from compressor.case import Case
 from compressor.manifest import given
-from compressor.schema import ROW, Outcome
+from compressor.reasons import Reason
+from compressor.schema import Outcome, without_run
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
 from compressor.study import Study, shard
 from compressor.workers import Done, Lost, rest, run_batches
@@ -251,6 +247,8 @@ def run_job(place: Path, case: Case) -> Outcome | StoreError:
         if case.output.keep == "metrics":
             return simulation.measure(case)
         found, dataset = simulation.observe(case)
+    if found.reason == Reason.INVALID_INPUT:
+        return found
     try:
         return replace(found, series=write_series(place, dataset, case.output))
     except StoreError as error:
@@ -263,16 +261,5 @@ def settled(end: Done | Lost) -> Outcome:
         if isinstance(end.result, StoreError):
             raise end.result
         return end.result
-    case: Case = end.id
-    attributes = {
-        "key": case.key,
-        "physics_key": case.physics_key,
-        "name": case.name,
-        "case": json.dumps(case.values(), sort_keys=True),
-        "complete": 0,
-        "program": f"compsim {compressor.__version__}",
-        "detail": end.detail,
-    }
-    if end.traceback:
-        attributes["traceback"] = end.traceback
-    return Outcome("failed", end.reason, np.full(1, math.nan, ROW)[0], attributes)
+    more = {"traceback": end.traceback} if end.traceback else {}
+    return without_run(end.id, end.reason, end.detail, **more)

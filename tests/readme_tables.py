@@ -7,6 +7,7 @@ from pathlib import Path
 
 from compressor.case import table
 from compressor.parameter import parameter_table
+from compressor.reasons import reason_table
 
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "tests" / "results"
@@ -248,6 +249,7 @@ def throughput_table():
 
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
+    "reasons": reason_table,
     "accuracy": accuracy_table,
     "bars": bars_table,
     "missed": missed_table,

@@ -9,13 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from compressor.case import Case
-from compressor.physics.contact import (
-    contact_stiffness,
-    friction_coefficient,
-    impact,
-    joint_contact,
-    step,
-)
+from compressor.physics.contact import friction_coefficient, impact, joint_contact, step
+from compressor.physics.materials import contact_stiffness
 from compressor.record import record
 
 K = 3.36e5 * 1000**1.5

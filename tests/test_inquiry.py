@@ -59,6 +59,14 @@ def test_show_tells_how_a_job_ended(mix, capsys):
     out = capsys.readouterr().out
     assert "failed: budget_steps: more than 5 steps" in out
     assert "what to do: raise solve.max_steps" in out
+    lines = [line.split() for line in out.split("\n")]
+    (stopped,) = (words for words in lines if words[:1] == ["stopped"])
+    assert 0 < float(stopped[2]) < 0.03
+    assert float(stopped[4]) == pytest.approx(float(stopped[2]) * 3000, rel=1e-3)
+    assert len([words for words in lines if words[:2] == ["x", "deviation,"]]) in (1, 2)
+    steps = [words for words in lines if words[:1] == ["step"]]
+    assert len(steps) == 5
+    assert "TSIT5" in steps[0]
     assert cli.main(["show", by_end["missing"]]) == 0
     out, err = capsys.readouterr()
     assert "not run yet" in out

@@ -20,13 +20,13 @@ import click
 import compressor
 from compsim import explain, plan, status, tradeoff
 from compsim.screen import (
-    ADVICE,
     DONE,
     INTERNAL,
     SOME_FAILED,
     STORE,
     USAGE,
     Screen,
+    caution,
     configs_argument,
     duration,
     limit,
@@ -126,6 +126,7 @@ def run(
     if only and not quiet:
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
+    caution(studies)
     from compressor.sweep import sweep
 
     screen = Screen(quiet)
@@ -219,6 +220,7 @@ def report_failures(failures: Sequence["Failure"]) -> None:
     if not failures:
         return
     from compressor.reading import printable
+    from compressor.reasons import remedy
 
     say(f"{plural(len({failure.key for failure in failures}))} failed:")
     for failure in failures[:MOST_FAILURES]:
@@ -231,7 +233,7 @@ def report_failures(failures: Sequence["Failure"]) -> None:
         say(f"  and {len(failures) - MOST_FAILURES} more")
     say("what to do:")
     for reason, number in Counter(failure.reason for failure in failures).items():
-        say(f"  {reason} ({number}): {ADVICE.get(reason, 'see its detail above')}")
+        say(f"  {reason} ({number}): {remedy(reason)}")
     say("A changed case file runs as a new job; --rerun failed runs failed ones again unchanged.")
 
 
