@@ -17,6 +17,7 @@ from compressor.bars import Metrics, bars, unmet
 from compressor.case import MODEL_VERSION, Case
 from compressor.integrate import Request, Trajectory, closed_form, integrate
 from compressor.parameter import CaseError
+from compressor.parting import looked_at, looking, parted
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS, Scene
@@ -66,8 +67,9 @@ class Solution:
     """A case's motion and what is told of it.
 
     `rtol`: the tolerance it was integrated with; `metrics`: by name, empty where the run did not
-    reach its end; `bars`: an error bar of each metric, empty where none was made; `reason` and
-    `detail`: why the job failed, empty when it is ok.
+    reach its end; `bars`: an error bar of each metric, empty where none was made; `looks`:
+    eccentricities (m) at a few times, by which runs are compared; `reason` and `detail`: why the
+    job failed, empty when it is ok.
     """
 
     p: np.record
@@ -75,6 +77,7 @@ class Solution:
     rtol: float
     metrics: Metrics
     bars: Metrics
+    looks: np.ndarray
     reason: str
     detail: str
 
@@ -218,21 +221,26 @@ def attempt(case: Case, rung: int, timeout: float, sampled: bool) -> Solution:
     times = case.duration * (np.arange(samples + 1) / samples)
     if scene(case) == Scene.IDEAL:
         trajectory = closed_form(p, times, case.settle, round(PIECES * 2.0**rung), timeout)
+        looks = np.zeros((1, 2, 2))
     else:
         y = np.zeros(2 * FREEDOMS[scene(case)])
         start(offsets(case), y, p)
         how = case.solve
-        trajectory = integrate(
-            Request(p, y, times, case.settle, rtol, how.method, how.max_steps, timeout)
+        run = integrate(
+            Request(p, y, looking(times), case.settle, rtol, how.method, how.max_steps, timeout)
         )
+        trajectory, looks = looked_at(p, run, times)
     found = {} if trajectory.reason else metrics(p, trajectory.tally)
-    return Solution(p, trajectory, rtol, found, {}, trajectory.reason, trajectory.detail)
+    return Solution(p, trajectory, rtol, found, {}, looks, trajectory.reason, trajectory.detail)
 
 
 def error_bars(found: Solution, looser: Solution | None) -> Metrics:
     """The error bar of each metric; unknown where there is no looser run, or it failed."""
-    other = looser.metrics if looser else {}
-    return bars(found.metrics, other, found.rtol, energy_residual(found.trajectory.tally))
+    residual = energy_residual(found.trajectory.tally)
+    if not looser or looser.reason:
+        return bars(found.metrics, {}, found.rtol, residual)
+    apart = parted(found.p, found.looks, looser.looks)
+    return bars(found.metrics, looser.metrics, found.rtol, residual, apart)
 
 
 def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:

@@ -36,6 +36,7 @@ FLOORS = [
     "retrace",
     "integrate",
     "horizon",
+    "parting",
     "bars",
     "audit",
     "simulation",
