@@ -103,6 +103,31 @@ def test_a_looser_run_that_fails_leaves_the_error_unknown(monkeypatch):
         assert np.isinf(found.numbers[name]).all()
 
 
+LOOSE = {
+    "joint": "both", "clearance_mm": {"big_end": 0.023235, "small_end": 0.00067005},
+    "machine": {"speed_rpm": 10636, "rod_mass_kg": 0.021709, "reciprocating_mass_kg": 0.11307,
+                "pin_radius_mm": 11.146},
+    "contact": {"stiffness_N_per_mm15": 527880, "exponent": 1.4911, "damping_N_s_per_mm": 59.029},
+    "friction": {"static": 0.86904, "dynamic": 0.43905, "stiction_velocity_mm_per_s": 0.089756,
+                 "friction_velocity_mm_per_s": 0.89756},
+}  # fmt: skip
+
+
+def test_beyond_loose_tolerances_the_stiff_partner_tells_the_error():
+    """Explicit steps run over friction's fast modes, at ten times this tolerance as well."""
+    solve = {"duration_rev": 0.03125, "settle_rev": 0, "output_step_deg": 0.0625}
+    case, exact = (
+        Case.from_values({**LOOSE, "solve": {**solve, **how}})
+        for how in ({"rtol": 2.5e-4}, {"rtol": 1e-7, "method": "RODAS"})
+    )
+    found, truth = simulation.solve(case), simulation.solve(exact)
+    looser = simulation.error_bars(found, simulation.attempt(case, -1, 60.0, False))
+    name = "rms_acceleration_deviation"
+    error = abs(found.metrics[name] - truth.metrics[name])
+    assert error > 10 * looser[name]
+    assert error <= found.bars[name]
+
+
 def test_bars_do_not_trust_metrics_that_agree_by_chance(eight):
     """Runs whose journals have parted, but whose metrics have not."""
     metrics = {name: eight[0][0][name] for name in METRICS}
