@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench throughput peers tradeoff measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench throughput peers tradeoff stress measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -63,11 +63,14 @@ peers: install  ## time other tools and ours in turn on one problem (about five 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
 	$(BIN)/python tests/measure_tradeoff.py tests/results/tradeoff.json
 
+stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
+	$(BIN)/python tests/measure_stress.py tests/results/stress.json
+
 measurements: accuracy claims tradeoff store-bench throughput peers readme  ## all of these (20 minutes)
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md
 
-clean:  ## remove results, report, tradeoff and caches; .venv stays
-	rm -rf results report tradeoff .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:  ## remove results, report, tradeoff, stress and caches; .venv stays
+	rm -rf results report tradeoff stress .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

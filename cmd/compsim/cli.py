@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, plan, status, tradeoff
+from compsim import explain, plan, status, stress, tradeoff
 from compsim.screen import (
     DONE,
     INTERNAL,
@@ -192,6 +192,7 @@ cli.add_command(status.status)
 cli.add_command(status.show)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
+cli.add_command(stress.stress)
 
 
 def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
