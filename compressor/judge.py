@@ -145,6 +145,7 @@ def settled(
     claim: Case, found: Solution, measured: Compare, result: Finding
 ) -> tuple[str, Excess, Solution | None]:
     """What the judges of a run say together, by how much, and the run of the one that counts."""
+    agreed: list[tuple[Excess, Solution]] = []
     dissent: list[tuple[Excess, Solution]] = []
     statistics = measured is compare_statistics
     for method in judges(found, statistics):
@@ -153,12 +154,14 @@ def settled(
         if other is None:
             continue
         excess = measured(found, other)
-        if excess.ratio <= 1.0:
-            return ("unjudged" if dissent else "ok"), excess, other
-        dissent.append((excess, other))
+        (agreed if excess.ratio <= 1.0 else dissent).append((excess, other))
+        if len(agreed) > min(len(dissent), 1):
+            return ("ok", *agreed[0])
         if len(dissent) == 2:
             break
-    return ("silent_wrong", *dissent[0]) if dissent else ("unjudged", NOTHING, None)
+    if len(dissent) > len(agreed):
+        return ("silent_wrong", *dissent[0])
+    return ("unjudged", *dissent[0]) if dissent else ("unjudged", NOTHING, None)
 
 
 def judges(found: Solution, statistics: bool = False) -> tuple[str, ...]:
@@ -169,9 +172,9 @@ def judges(found: Solution, statistics: bool = False) -> tuple[str, ...]:
     steps = found.trajectory.steps + found.trajectory.rejected
     stiff = found.trajectory.evaluations > STIFF * steps
     if stiff:
-        return ("DOPRI5", "LSODA", "RODAS") if statistics else ("DOPRI5", "LSODA")
+        return ("DOPRI5", "LSODA", "RODAS" if statistics else "Radau")
     names = ("RODAS", "DOPRI5") if tolerance(found.rtol) >= LOOSE else ("DOPRI5", "RODAS")
-    return ("DOP853", *names) if steps <= SHORT else names
+    return ("DOP853", *names) if steps <= SHORT else (*names, "DOP853")
 
 
 def tolerance(rtol: float, share: float = TIGHTER) -> float:

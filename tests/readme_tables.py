@@ -280,8 +280,8 @@ def stress_table():
     text = markdown(["end", "supported range", "whole range"], [*rows, ["ok share", *shares]])
     slow = found["slowest"]
     return text + (
-        f"\n{found['scenes']:,} scenes of seed {found['seed']} took {found['work_s'] / 60:.0f} minutes of "
-        f"one core; {found['silent_wrong']} wrong in silence"
+        f"\n{found['scenes']:,} scenes of seed {found['seed']} took {found['work_s'] / 60:.0f} "
+        f"minutes of one core; {found['silent_wrong']} wrong in silence"
         + (
             f", so that with 95 % confidence at most {found['at_most']:.2%} of such scenes are"
             if not found["silent_wrong"]
