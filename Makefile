@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -75,11 +75,14 @@ ladders: install  ## measure error against tolerance, and the limit of no cleara
 chaotic: install  ## compare two chaotic scenes' statistics by two integrators (a minute)
 	$(BIN)/python tests/measure_chaotic.py tests/results/chaotic.json
 
+stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
+	$(BIN)/python tests/measure_stress.py tests/results/stress.json
+
 measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers readme  ## all of these (40 minutes)
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md
 
-clean:  ## remove results, report, tradeoff and caches; .venv stays
-	rm -rf results report tradeoff .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:  ## remove results, report, tradeoff, stress and caches; .venv stays
+	rm -rf results report tradeoff stress .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

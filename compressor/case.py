@@ -183,7 +183,7 @@ class Solve:
         None, "", (1e-13, 0.1), "ours", "relative tolerance, in place of accuracy", optional=True
     )
     error_bars: bool = choice(
-        True, (), "ours", "an error beside each metric, by a second, looser run; not part of a "
+        True, (), "ours", "an error beside each metric, by a second run; not part of a "
         "job's identity", kind="boolean",
     )  # fmt: skip
     horizon: bool = choice(

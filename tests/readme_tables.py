@@ -365,6 +365,66 @@ def chaotic_table():
     return markdown(head, lines)
 
 
+def unit(name, row):
+    """A drawn parameter with its unit."""
+    what = {"damping": "times the paper's", "rtol": "", "friction": "", "exponent": ""}
+    named = what.get(name, row["unit"])
+    return name.replace("_", " ") + (f", {named}" if named else "")
+
+
+def ranges_table():
+    rows = kept("stress.json")["ranges"]
+    return markdown(
+        ["parameter", "supported", "drawn"],
+        [
+            [unit(name, row)]
+            + ["{:g} … {:g}".format(*row[kind]) for kind in ("supported", "whole")]
+            for name, row in rows.items()
+        ],
+    )
+
+
+def stress_table():
+    found = kept("stress.json")
+    ends = found["ends"]
+    names = sorted(
+        set(ends["supported"]) | set(ends["whole"]), key=lambda name: (name != "ok", name)
+    )
+    if "silent_wrong" not in names:
+        names.insert(1, "silent_wrong")
+    rows = [[f"`{name}`", *(str(ends[kind].get(name, 0)) for kind in ends)] for name in names]
+    totals = {kind: sum(ends[kind].values()) for kind in ends}
+    shares = [f"{ends[kind].get('ok', 0) / totals[kind]:.1%}" for kind in ends]
+    text = markdown(["end", "supported range", "whole range"], [*rows, ["ok share", *shares]])
+    slow = found["slowest"]
+    return text + (
+        f"\n{found['scenes']:,} scenes of seed {found['seed']} took {found['work_s'] / 60:.0f} "
+        f"minutes of one core; {found['silent_wrong']} wrong in silence"
+        + (
+            f", so that with 95 % confidence at most {found['at_most']:.2%} of such scenes are"
+            if not found["silent_wrong"]
+            else ""
+        )
+        + f". Of the ok ones, {found['unforeseeable']} go on beyond their horizon. Slowest ok run: "
+        f"{slow['seconds']:.2g} s (`{slow['command']}`); longest scene with all judges: "
+        f"{found['slowest_judging_s']:.0f} s; peak memory of a worker: "
+        f"{found['peak_memory_MiB']} MiB.\n"
+    )
+
+
+def worst_table():
+    rows = [
+        [f"`{row['command']}`", row["verdict"], row["worst_metric"]]
+        + [cell(row[key]) for key in ("excess", "excess_beyond")]
+        + [cell(row[key], "{:.1e}") for key in ("error", "bar")]
+        + [cell(row["horizon"])]
+        for row in kept("stress.json")["worst"]
+    ]
+    head = ["repeat by", "verdict", "metric", "error over the greatest untold one",
+            "beyond the horizon", "error", "bar", "horizon / span"]  # fmt: skip
+    return markdown(head, rows)
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "reasons": reason_table,
@@ -385,6 +445,9 @@ TABLES = {
     "ladders": ladders_table,
     "limit": limit_table,
     "chaotic": chaotic_table,
+    "ranges": ranges_table,
+    "stress": stress_table,
+    "worst": worst_table,
 }
 
 

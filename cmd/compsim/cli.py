@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, export, plan, schema, status, tradeoff, verify
+from compsim import explain, export, plan, schema, status, stress, tradeoff, verify
 from compsim.screen import (
     DONE,
     INTERNAL,
@@ -198,6 +198,7 @@ cli.add_command(verify.verify)
 cli.add_command(schema.schema)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
+cli.add_command(stress.stress)
 
 
 def report_run(summary: "Summary", folder: str, quiet: bool) -> None:

@@ -1,0 +1,115 @@
+"""`compsim stress`: extreme scenes, each run and judged; what ends how, and what is worst."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from compsim.screen import DONE, SOME_FAILED, Screen, duration, say
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@click.command()
+@click.option("-n", "--scenes", type=click.IntRange(min=1), default=2000, show_default=True,
+              help="How many scenes are drawn.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
+              help="Of the draws.")  # fmt: skip
+@click.option("-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
+              help="Worker processes.")  # fmt: skip
+@click.option("-o", "--output", default="stress", show_default=True,
+              help="Folder of the campaign.")  # fmt: skip
+@click.option("--scene", type=click.IntRange(min=0),
+              help="Repeat this scene of the seed alone, and store nothing.")  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No progress.")
+def stress(
+    scenes: int, seed: int, jobs: int | None, output: str, scene: int | None, quiet: bool
+) -> int:
+    """Test numerical stability at the extremes: draw scenes, run each, and judge what it says.
+
+    Half of the scenes lie in the range that is documented as supported, half go far beyond. A scene
+    ends ok, confirmed by another integrator at a hundredth of its tolerance; failed, with a named
+    reason; silent_wrong, when a number lies ten times farther off than its error bar tells; or
+    unjudged. Writes stress.nc, from which the same command goes on, and the map stress.png and
+    stress.svg; shares and worst cases go to stdout. --scene prints one as a case file, and its end.
+
+    Exit code 3 if any number is wrong in silence, or more than 2 % of the scenes are unjudged.
+    """
+    from compressor.process import cores, one_thread_each
+
+    one_thread_each()  # before numpy loads
+    if scene is not None:
+        click.echo("\n".join(repeated(scene, seed)))
+        return DONE
+    from compressor.durable import make_folder, publish
+    from compressor.figures.outcomes import draw_outcomes
+    from compressor.figures.style import render
+    from compressor.stress import FILE, campaign
+
+    make_folder(Path(output))
+    screen = Screen(quiet, "scenes")
+    try:
+        study = campaign(output, scenes, seed, jobs or cores(), screen)
+    finally:
+        screen.end()
+    drawing = draw_outcomes(study)
+    for kind in ("png", "svg"):
+        publish(Path(output, f"stress.{kind}"), render(drawing, kind))
+    click.echo("\n".join(summary(study)))
+    if not quiet:
+        for name in (FILE, "stress.png"):
+            say(os.path.join(output, name))
+    verdicts = study["verdict"].values.tolist()
+    doubtful = verdicts.count("silent_wrong") or verdicts.count("unjudged") > 0.02 * scenes
+    return SOME_FAILED if doubtful else DONE
+
+
+def repeated(number: int, seed: int) -> Iterator[str]:
+    """A scene as a case file, and below it, as comments, how it ends."""
+    from compressor.extremes import values
+    from compressor.stress import FULL, run_scene
+
+    drawn = values(number, seed)
+    yield from (f"{key}: {json.dumps(value)}" for key, value in drawn.items())
+    for key, value in run_scene((number, seed, FULL)).items():
+        if key not in ("load", "joint") and value != "":
+            yield f"# {key}: {value:.3g}" if isinstance(value, float) else f"# {key}: {value}"
+
+
+def summary(study: "xr.Dataset") -> Iterator[str]:
+    """Shares, the worst scenes with the command that repeats each, and the slowest one."""
+    from compressor.stress import counts, slowest, worst
+
+    for kind, ends in counts(study).items():
+        total = sum(ends.values())
+        named = ", ".join(f"{name} {count}" for name, count in sorted(ends.items()))
+        share = ends.get("ok", 0) / max(total, 1)
+        yield f"{kind} range: {total} scenes, {share:.1%} ok: {named}"
+    yield ""
+    yield f"{'verdict':<13} {'excess':>7} {'beyond':>7} {'error':>8} {'bar':>8}  repeat by"
+    most = worst(study)
+    for place in range(most.sizes["scene"]):
+        row = most.isel(scene=place)
+        far, beyond, error, size = (
+            row[name].item() for name in ("excess", "excess_beyond", "error", "bar")
+        )
+        yield (
+            f"{row['verdict'].item():<13} {far:>7.2g} {beyond:>7.2g} {error:>8.1e} {size:>8.1e}  "
+            f"{command(row, study.attrs['seed'])}"
+        )
+    longest = slowest(study)
+    if longest is not None:
+        yield (
+            f"slowest ok scene: {duration(longest['seconds'].item())}, "
+            f"{command(longest, study.attrs['seed'])}"
+        )
+    yield f"peak memory of a worker: {study['peak_memory'].max().item() / 2**20:.0f} MiB"
+
+
+def command(row: "xr.Dataset", seed: int) -> str:
+    """What repeats a scene."""
+    return f"compsim stress --scene {row['scene'].item()} --seed {seed}"

@@ -1,0 +1,94 @@
+"""Keep what `compsim stress` finds, for the README (make stress, within the hour).
+
+Runs the command and writes a small JSON file and, beside it, the map of outcomes. A campaign that
+was interrupted goes on from its folder.
+"""
+
+import argparse
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from compsim import cli
+from compsim.screen import DONE, SOME_FAILED
+from measure_accuracy import provenance
+
+from compressor.extremes import SPANS
+from compressor.stress import FILE, counts, slowest, worst
+
+WORST = 10
+SHOWN = ("verdict", "reason", "joint", "load", "rtol", "judges", "worst_metric", "horizon",
+         "judged", "excess", "excess_beyond", "error", "bar", "seconds")  # fmt: skip
+
+
+def plain(value):
+    """A number to three digits, None for nan; text as it is."""
+    value = value.item() if isinstance(value, np.generic) else value
+    if not isinstance(value, float):
+        return value
+    return None if value != value else float(f"{value:.3g}")
+
+
+def described(study, scene):
+    """A scene's outcome, and the command that repeats it."""
+    number = int(scene["scene"])
+    return {
+        "command": f"compsim stress --scene {number} --seed {study.attrs['seed']}",
+        **{name: plain(scene[name].values[()]) for name in SHOWN},
+    }
+
+
+def ranges():
+    """The drawn ranges: unit, whole and supported."""
+    return {
+        name: {"unit": unit, "whole": whole, "supported": narrow or whole}
+        for name, (unit, whole, narrow, _) in SPANS.items()
+    }
+
+
+def found(study):
+    """What is kept of a campaign."""
+    most = worst(study, WORST)
+    wrong = int((study["verdict"].values == "silent_wrong").sum())
+    good = study.isel(scene=study["verdict"].values == "ok")
+    return {
+        "scenes": study.sizes["scene"],
+        "seed": int(study.attrs["seed"]),
+        "settings": study.attrs["settings"],
+        "ranges": ranges(),
+        "ends": counts(study),
+        "silent_wrong": wrong,
+        "at_most": plain(3.0 / study.sizes["scene"]),  # 95 % bound where none was found
+        "unforeseeable": int((good["horizon"].values < 1).sum()),
+        "judged_whole": int((good["judged"].values == 1).sum()),
+        "worst": [described(study, most.isel(scene=i)) for i in range(most.sizes["scene"])],
+        "slowest": described(study, slowest(study)),
+        "slowest_judging_s": plain(float(study["judging_seconds"].max())),
+        "peak_memory_MiB": round(float(study["peak_memory"].max()) / 2**20),
+    }
+
+
+def main(target, count, seed, jobs, folder):
+    words = ["stress", "-n", str(count), "--seed", str(seed), "-j", str(jobs), "-o", folder]
+    code = cli.main(words)
+    if code not in (DONE, SOME_FAILED):
+        raise SystemExit(code)
+    study = xr.load_dataset(Path(folder, FILE), engine="h5netcdf").isel(scene=slice(count))
+    seconds = float(study["judging_seconds"].sum())  # of all runs of the command that it took
+    kept = {**provenance("make stress"), "workers": jobs, "work_s": plain(seconds), **found(study)}
+    Path(target).write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    shutil.copyfile(Path(folder, "stress.png"), Path(target).with_suffix(".png"))
+    raise SystemExit(code)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("target", help="file to write")
+    parser.add_argument("-n", "--scenes", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("-j", "--jobs", type=int, default=2, help="worker processes")
+    parser.add_argument("-o", "--output", default="stress", help="folder of the campaign")
+    asked = parser.parse_args()
+    main(asked.target, asked.scenes, asked.seed, asked.jobs, asked.output)
