@@ -9,6 +9,7 @@ from compressor.case import Case
 from compressor.domain import Caution, cautions, remarks
 from compressor.plan import load_studies
 
+STUDIES = load_studies(*sorted((ROOT / "configs").glob("*.yaml")))
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
 
 
@@ -22,7 +23,7 @@ def test_nothing_is_odd_about_the_defaults(load, joint):
     assert odd(load=load, joint=joint, **({} if joint == "none" else {"clearance_mm": 0.1})) == []
 
 
-@pytest.mark.parametrize("study", load_studies(*(ROOT / "configs").glob("*.yaml")), ids=str)
+@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
 def test_nothing_is_odd_about_the_paper_s_cases(study):
     assert cautions(study) == []
 
