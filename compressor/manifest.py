@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import compressor
 from compressor.case import MODEL_VERSION, table
-from compressor.durable import Folder, StoreError, publish, system_error
+from compressor.durable import Folder, StoreError, publish, refusals, system_error
 from compressor.hdf5 import digest
 from compressor.parameter import JOINTS
 
@@ -106,8 +106,9 @@ def encode(study: StoredStudy) -> bytes:
 
 
 def study_paths(folder: Folder) -> list[Path]:
-    """The files of all studies of a store."""
-    return sorted(Path(folder).glob("studies/*.json"))
+    """The files of all studies of a store. Raises StoreError."""
+    with refusals(folder):
+        return sorted(Path(folder).glob("studies/*.json"))
 
 
 def read_studies(folder: Folder) -> list[StoredStudy]:

@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 from types import TracebackType
 
-from compressor.durable import Folder, StoreError, make_folder, publish, system_error
+from compressor.durable import Folder, StoreError, make_folder, publish, refusals, system_error
 from compressor.jobfiles import NAME as JOB_NAME
 from compressor.schema import Outcome
 from compressor.segments import Rows, encode, merge, of_outcomes, read_segment, segment_name
@@ -58,10 +58,11 @@ class Writer:
             discard_leftovers(self.folder)
             self.found = read_store(self.folder)
             self.number = max(map(_number, self._all_paths()), default=0)
-            if self.found.damaged:
-                self._set_damage_aside()
-            else:
-                self._discard_unheard_of()
+            with refusals(self.place):
+                if self.found.damaged:
+                    self._set_damage_aside()
+                else:
+                    self._discard_unheard_of()
             mine = (s for s in self.found.segments if s.place == self.place)
             self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
         except BaseException:
@@ -126,11 +127,12 @@ class Writer:
     def _merge(self, paths: list[Path]) -> None:
         if len(paths) < 2:
             return
-        segment = merge([read_segment(path) for path in paths])
-        merged = self._publish(encode(segment))
-        for path in paths:
-            path.unlink()
-            del self.small[path]
+        with refusals(self.place):
+            segment = merge([read_segment(path) for path in paths])
+            merged = self._publish(encode(segment))
+            for path in paths:
+                path.unlink()
+                del self.small[path]
         if len(segment) < MOST_ROWS:
             self.small[merged] = len(segment)
 

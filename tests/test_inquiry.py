@@ -1,6 +1,7 @@
 """What a store says of its studies and jobs: `compsim status` and `compsim show`."""
 
 import json
+from pathlib import Path
 
 import pytest
 from compsim import cli
@@ -83,3 +84,15 @@ def test_a_job_must_be_told_apart(mix, beginning, problem, capsys):
 def test_a_folder_without_results_is_an_error(tmp_path, capsys):
     assert cli.main(["status", "-i", str(tmp_path)]) == 5
     assert str(tmp_path) in capsys.readouterr().err
+
+
+def test_damage_is_told_where_its_jobs_count_as_missing(mix, capsys):
+    paths = [*Path("results/rows").iterdir()]
+    for path in paths:
+        path.write_bytes(path.read_bytes()[:-1])
+    for command in (["status"], ["show", mix.keys[0]], ["status", "--json"]):
+        assert cli.main(command) == 0
+        out, err = capsys.readouterr()
+        assert "missing" in out
+        assert all(err.count(f"{path.name}: is damaged") == 1 for path in paths)
+        assert "Warning" not in err  # said as other messages are, without a place in the source
