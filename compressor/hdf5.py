@@ -14,7 +14,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5f, h5l, h5o, h5p, h5z
+from h5py import h5d, h5f, h5l, h5o, h5p, h5z
 
 from compressor.durable import Folder, StoreError, system_error
 
@@ -108,8 +108,6 @@ def opened(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.Fil
     """
     try:
         with _image(data) as file:
-            if problem := _odd_attribute(file.id, len(data)):
-                raise DamagedJob(path, f"is refused: {problem}", remedy)
             for name in file:
                 if problem := _objection(file, name, data):
                     raise DamagedJob(path, f"is refused: {name} {problem}", remedy)
@@ -119,20 +117,6 @@ def opened(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.Fil
             raise system_error(path, error) from error
         problem = "is no finished job of compsim: cut short, damaged, or foreign"
         raise DamagedJob(path, problem, remedy) from error
-
-
-def _odd_attribute(owner: Any, size: int) -> str:
-    """What is wrong with an attribute of an object of a file of `size` bytes, or ""."""
-    for number in range(h5a.get_num_attrs(owner)):
-        found = h5a.open(owner, index=number)
-        name, dtype = found.name.decode(errors="replace"), found.dtype
-        if name == "DIMENSION_LIST":
-            continue  # never read: `_dimensions` has the same from the other side
-        if dtype.kind not in "fiuS" and not (name == "REFERENCE_LIST" and dtype.kind == "V"):
-            return f"attribute {name} holds {dtype}, neither numbers nor text of a fixed length"
-        if math.prod(found.shape) * dtype.itemsize > size:
-            return f"attribute {name} claims more data than the file can hold"
-    return ""
 
 
 def _texts_are_there(entry: h5d.DatasetID, data: bytes) -> bool:
@@ -174,8 +158,6 @@ def _objection(file: h5py.File, name: str, data: bytes) -> str:
         return "lies in another file"
     if {how.get_filter(number)[0] for number in range(how.get_nfilters())} - FILTERS:
         return "needs a foreign filter"
-    if problem := _odd_attribute(entry, len(data)):
-        return f"is odd: its {problem}"
     dtype = entry.dtype
     if dtype.kind not in "fiuS" and not h5py.check_string_dtype(dtype):
         return f"holds {dtype}, neither numbers nor text"
@@ -194,8 +176,18 @@ def text(file: h5py.File, name: str) -> str:
 def attributes(stored: Any) -> dict[str, Any]:
     """The attributes that are no business of HDF5's or netCDF's: text and numbers."""
     names = (n for n in stored.attrs if n not in OF_NETCDF and not n.startswith("_"))
-    found = {name: stored.attrs[name] for name in names}
-    return {n: v.decode() if isinstance(v, bytes) else v for n, v in found.items()}
+    return {name: _attribute(stored, name) for name in names}
+
+
+def _attribute(stored: Any, name: str) -> Any:
+    """An attribute. Raises ValueError where HDF5 could read more than its type tells."""
+    found = stored.attrs.get_id(name)
+    plain = found.dtype.kind in "fiuS" or (name == "REFERENCE_LIST" and found.dtype.kind == "V")
+    size = math.prod(found.shape) * found.dtype.itemsize
+    if not plain or size > stored.file.id.get_filesize():
+        raise ValueError(f"{name}: {found.dtype}")
+    value = stored.attrs[name]
+    return value.decode() if isinstance(value, bytes) else value
 
 
 def variables(file: h5py.File) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
@@ -214,9 +206,11 @@ def _dimensions(file: h5py.File) -> dict[str, tuple[str, ...]]:
     """The names of the dimensions of each variable, from the coordinates that tell of them."""
     found = {name: [""] * stored.ndim for name, stored in file.items()}
     for name, stored in file.items():
-        if stored.attrs.get("CLASS") == b"DIMENSION_SCALE":
+        if "CLASS" in stored.attrs and _attribute(stored, "CLASS") == "DIMENSION_SCALE":
             found[name] = [name]
-        for variable, number in stored.attrs.get("REFERENCE_LIST", ()):
+        if "REFERENCE_LIST" not in stored.attrs:
+            continue
+        for variable, number in _attribute(stored, "REFERENCE_LIST"):
             found[file[variable].name.removeprefix("/")][number] = name
     if any("" in names for names in found.values()):
         raise ValueError("a dimension has no name")

@@ -304,6 +304,7 @@ def test_a_text_that_is_not_where_it_says_is_refused(shift, value, ideal, tmp_pa
 SCHEMA = {
     "another's HDF5": lambda file: [file.__delitem__(name) for name in list(file)],
     "another job's": lambda file: file.attrs.__setitem__("key", np.bytes_("0" * 20)),
+    "a text of any length": lambda file: file.attrs.__setitem__("key", file.attrs["key"].decode()),
     "no key": lambda file: file.attrs.__delitem__("key"),
     "no status": lambda file: file.__delitem__("status"),
     "text for numbers": lambda file: (
@@ -417,6 +418,29 @@ def test_storing_a_study_again_leaves_its_file_alone(tmp_path):
 def test_a_damaged_study_is_named_with_a_remedy(text, tmp_path):
     store.write_study(tmp_path, study("one"))
     (tmp_path / "studies/one.json").write_text(text, encoding="latin-1")
+    with pytest.raises(store.StoreError, match=r"one\.json.*delete it and run its case file again"):
+        store.read_studies(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": "../two"}, {"keys": ("../evil",)}, {"fixed": []}, {"command": 5},
+        {"versions": {"compsim": 1}}, {"axes": ({"key": "time", "values": [1.0], "units": ""},)},
+        {"axes": ({"key": "load", "values": ["\x1b[31m"], "units": ""},)},
+        {"axes": ({"key": "load", "values": [{}], "units": ""},)},
+        {"axes": ({"key": "load", "values": ["none"], "units": "\a"},)},
+        {"axes": ({"key": "load", "values": ["none"], "units": ""},) * 2},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_study_that_nobody_wrote_is_refused(change, tmp_path):
+    store.write_study(tmp_path, study("one"))
+    path = tmp_path / "studies/one.json"
+    plain = json.loads(path.read_text()) | change
+    del plain["digest"]
+    head = json.dumps(plain, indent=1).removesuffix("\n}").encode()
+    path.write_bytes(head + f',\n "digest": "{hdf5.digest(head)}"\n}}\n'.encode())
     with pytest.raises(store.StoreError, match=r"one\.json.*delete it and run its case file again"):
         store.read_studies(tmp_path)
 

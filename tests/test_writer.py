@@ -9,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 import time
+import zlib
 from pathlib import Path
 
 import h5py
@@ -378,6 +379,11 @@ SCHEMA = {
         file.__setitem__("status", np.array([b"ok"] * 3)),
     ),
     "no keys": lambda file: file.__delitem__("key"),
+    "keys of another form": lambda file: file["key"].__setitem__(..., b"../../../evil0000000"),
+    "a reason that steers": lambda file: (
+        file.__delitem__("reason"),
+        file.__setitem__("reason", np.array([b"\x1b[31mred"] * 2)),
+    ),
     "link": lambda file: file.__setitem__("x", h5py.ExternalLink("/etc/passwd", "/")),
 }
 
@@ -394,6 +400,26 @@ def test_a_segment_with_another_schema_is_refused_and_left_alone(change, tmp_pat
         with pytest.raises(hdf5.DamagedJob, match="move it away"):
             read(tmp_path)
     assert [damage.path for damage in verify(tmp_path)] == [planted]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b"{", b"[" * 10**5, b"1", b'{"a": [[], {}]}', b"{}\n{}", bytes(2 << 20), None],
+    ids=["broken", "deep", "a number", "ragged", "too many", "too long", "no zlib"],
+)
+def test_lines_that_nobody_wrote_are_refused(line, tmp_path):
+    put(tmp_path, outcome(1, reason="non_finite"), outcome(2, reason="non_finite"))
+    (path,) = tmp_path.glob("rows/*.h5")
+    texts = b"none" if line is None else zlib.compress(b"\n".join([line] * 2))
+    foreign = dataclasses.replace(segments.read_segment(path), texts=texts, notes=texts)
+    data = segments.encode(foreign)
+    path.rename(path.with_name(segments.segment_name(1, data)))
+    (path,) = tmp_path.glob("rows/*.h5")
+    path.write_bytes(data)
+    rows = store.read_store(tmp_path).rows
+    for read in (rows.attributes, rows.detail):
+        with pytest.raises(hdf5.DamagedJob, match=rf"{path.name}: is no file of compsim's"):
+            read(0)
 
 
 def test_a_row_of_a_pickled_object_cannot_be_stored(tmp_path):

@@ -53,19 +53,20 @@ def show(job: str, folder: str, as_json: bool) -> int:
     error bars, in SI, and what it was run with.
     """
     from compressor.inquiry import report_job
+    from compressor.reading import printable
 
     found = report_job(folder, job)
     if as_json:
         click.echo(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
         return DONE
-    click.echo(f"job {found.key}: {ending(found)}")
+    click.echo(f"job {found.key}: {printable(ending(found))}")
     for study, point in found.studies.items():
         values = "".join(f" {key}={value}" for key, value in point.items())
-        click.echo(f"  in {study}{values}")
+        click.echo(f"  in {study}{printable(values)}")
     if found.status == "failed":
         click.echo(f"  what to do: {ADVICE.get(found.reason, 'see why above')}")
     for line in (*numbers(found), *facts(found)):
-        click.echo(f"  {line}")
+        click.echo(f"  {printable(line)}")
     if found.status == "missing":
         files = " ".join(map(shlex.quote, found.case_files))
         say(f"next: compsim run {files} -o {shlex.quote(folder)}")
