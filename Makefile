@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench throughput peers tradeoff measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench throughput peers tradeoff chaos measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,6 +62,9 @@ peers: install  ## time other tools and ours in turn on one problem (about five 
 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
 	$(BIN)/python tests/measure_tradeoff.py tests/results/tradeoff.json
+
+chaos: install  ## inject faults, thousands, and count what did not survive (an hour)
+	$(BIN)/python tests/measure_chaos.py tests/results/chaos.json
 
 measurements: accuracy claims tradeoff store-bench throughput peers readme  ## all of these (20 minutes)
 

@@ -246,6 +246,18 @@ def throughput_table():
     return "\n".join(lines) + "\n"
 
 
+def chaos_table():
+    """What was tried, how often, and what did not survive; 0 of N has its 95 % bound, 3/N."""
+    head = ["what", "trials", "failed", "with 95 % confidence below"]
+    rows = []
+    for found in kept("chaos.json")["campaigns"].values():
+        if "skipped" in found:
+            continue
+        bound = "" if found["failed"] else f"{300 / found['trials']:.2g} %"
+        rows.append([found["what"], f"{found['trials']:,}", str(found["failed"]), bound])
+    return markdown(head, rows)
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "accuracy": accuracy_table,
@@ -256,6 +268,7 @@ TABLES = {
     "store": store_table,
     "peers": peers_table,
     "throughput": throughput_table,
+    "chaos": chaos_table,
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,
