@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -77,6 +77,9 @@ chaotic: install  ## compare two chaotic scenes' statistics by two integrators (
 
 stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
 	$(BIN)/python tests/measure_stress.py tests/results/stress.json
+
+chaos: install  ## inject faults, thousands, and count what did not survive (an hour)
+	$(BIN)/python tests/measure_chaos.py tests/results/chaos.json
 
 measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers readme  ## all of these (40 minutes)
 

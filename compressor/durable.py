@@ -27,6 +27,8 @@ REMEDIES = {
     errno.EPERM: FORBIDDEN,
     errno.EROFS: FORBIDDEN,
     errno.ENOTDIR: ELSEWHERE,
+    errno.ENOLCK: "choose a folder on a file system with locks",
+    errno.EMFILE: "allow more open files (ulimit -n)",
 }
 
 
@@ -41,10 +43,24 @@ class StoreError(Exception):
         return f"{self.path}: {self.problem}; {self.remedy}"
 
 
+class StoreWarning(UserWarning):
+    """What a store lacks that was asked for; who reads it goes on without."""
+
+
 def system_error(path: Folder, error: OSError) -> StoreError:
     """The StoreError that says what the file system refused."""
     remedy = REMEDIES.get(error.errno or 0, "check the disk, then run the same command again")
     return StoreError(path, os.strerror(error.errno) if error.errno else str(error), remedy)
+
+
+@contextlib.contextmanager
+def refusals(path: Folder) -> Iterator[None]:
+    """Turn what the file system refuses, there or at a path that it names, into a StoreError."""
+    try:
+        yield
+    except OSError as error:
+        named = error.filename if isinstance(error.filename, str) else path
+        raise system_error(named, error) from error
 
 
 def publish(path: Path, data: bytes) -> None:
@@ -104,8 +120,13 @@ def _sync_folder(folder: Path) -> None:
 
 
 def discard_leftovers(folder: Folder) -> None:
-    """Remove the temporary files of writers that died long ago, from the folders in a folder."""
-    for path in Path(folder).glob("*/.*.tmp"):
+    """Remove the temporary files of writers that died long ago, from the folders in a folder.
+
+    Raises StoreError.
+    """
+    with refusals(folder):
+        leftovers = [*Path(folder).glob("*/.*.tmp")]
+    for path in leftovers:
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
                 path.unlink()

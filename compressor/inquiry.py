@@ -1,6 +1,7 @@
 """What a store can be asked: how its studies stand, and what is known of one job.
 
 Reads studies and rows only, never a file with time series, so that 100,000 jobs answer at once.
+Jobs whose row is damaged count as missing, with a StoreWarning.
 """
 
 import os
@@ -50,7 +51,7 @@ class JobReport:
 
 def standings(folder: Folder) -> list[Standing]:
     """How each study of a folder stands. Raises StoreError where there is none."""
-    rows = read_store(folder).rows
+    rows = read_store(folder).warned().rows
     found = []
     for study in read_studies(folder):
         positions = rows.find(study.keys)
@@ -73,7 +74,7 @@ def report_job(folder: Folder, beginning: str) -> JobReport:
 
     Raises StoreError where no job's key does, or several do.
     """
-    store, studies = read_store(folder), read_studies(folder)
+    store, studies = read_store(folder).warned(), read_studies(folder)
     key = whole_key(folder, beginning, store, studies)
     position = store.position(key)
     mine = owners(studies, [key])[key]

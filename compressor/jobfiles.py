@@ -7,6 +7,7 @@ is read. A job that is run again gets a new name, so that its old result stays w
 row is on disk.
 """
 
+import errno
 import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 
 from compressor import hdf5
 from compressor.case import Output
-from compressor.durable import StoreError, publish
+from compressor.durable import StoreError, publish, system_error
 from compressor.hdf5 import REMEDY, DamagedJob, digest, opened
 from compressor.schema import NUMBERS, SeriesFile, Table
 
@@ -83,12 +84,17 @@ def image_of(
 
 
 def intact(path: Path) -> bool:
-    """Whether a file's bytes are those that were written."""
+    """Whether a file is there, and its bytes, as far as the disk gives them, as written.
+
+    Raises StoreError where it may not be read.
+    """
     named = NAME.fullmatch(path.name)
     try:
         return named is not None and digest(path.read_bytes()) == named[2]
-    except OSError:
-        return False
+    except OSError as error:
+        if error.errno in (errno.ENOENT, errno.EIO):
+            return False
+        raise system_error(path, error) from error
 
 
 def read_bytes(path: Path) -> bytes:

@@ -3,7 +3,7 @@
 How a job's file is read is handed in by `compressor.store`.
 """
 
-import contextlib
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +14,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from compressor.case import table
+from compressor.durable import StoreWarning
 from compressor.hdf5 import DamagedJob
 from compressor.manifest import StoredStudy, points
 from compressor.schema import NUMBERS, coordinates
@@ -190,8 +191,11 @@ def _series(
 def _first_readable(keys: np.ndarray, job: Callable[[str], xr.Dataset]) -> xr.Dataset:
     """The first of some jobs that is not damaged; who reads the others is told."""
     for key in keys:
-        with contextlib.suppress(DamagedJob):
+        try:
             return job(key.decode())
+        except DamagedJob as error:
+            damage = error
+    warnings.warn(f"{damage}: no time series can be read", StoreWarning, stacklevel=2)
     return xr.Dataset()
 
 

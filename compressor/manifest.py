@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import os
+import re
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +17,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import compressor
 from compressor.case import MODEL_VERSION, table
-from compressor.durable import Folder, StoreError, publish, system_error
+from compressor.durable import Folder, StoreError, publish, refusals, system_error
 from compressor.hdf5 import digest
 from compressor.parameter import JOINTS
 
 if TYPE_CHECKING:
     from compressor.study import Study
+
+
+JOB_KEY = re.compile(r"[0-9a-f]{20}")
 
 
 @dataclass(frozen=True)
@@ -138,8 +142,9 @@ def encode(study: StoredStudy) -> bytes:
 
 
 def study_paths(folder: Folder) -> list[Path]:
-    """The files of all studies of a store."""
-    return sorted(Path(folder).glob("studies/*.json"))
+    """The files of all studies of a store. Raises StoreError."""
+    with refusals(folder):
+        return sorted(Path(folder).glob("studies/*.json"))
 
 
 def read_studies(folder: Folder) -> list[StoredStudy]:
@@ -164,16 +169,41 @@ def read_study(path: Path) -> StoredStudy:
             raise ValueError
         if not study.is_grid and {*sizes} - {study.jobs}:
             raise ValueError
-        if encode(study) != data:
+        if encode(study) != data or not _is_sound(study, path):
             raise ValueError
     except FileNotFoundError:
         raise
     except OSError as error:
         raise system_error(path, error) from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         problem = "is damaged, or of another version of compsim"
         raise StoreError(path, problem, "delete it and run its case file again") from error
     return study
+
+
+def _is_sound(study: StoredStudy, path: Path) -> bool:
+    """Whether a study's entries are of the kinds that we write, and its name that of its file."""
+    swept = {key for name in table() for key in (name, name.rpartition(".")[0])}
+    texts = (study.case_file, study.command, study.written, *study.versions.values())
+    return (
+        study.name == path.stem
+        and not table()["name"].check(study.name)
+        and all(isinstance(text, str) for text in (*texts, *study.versions))
+        and all(JOB_KEY.fullmatch(key) for key in study.keys)
+        and isinstance(study.fixed, dict)
+        and len({axis.key for axis in study.axes} & swept) == len(study.axes)
+        and all(axis.units.isprintable() for axis in study.axes)
+        and all(_is_plain(value) for axis in study.axes for value in axis.values)
+    )
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether a value is one that a case file can sweep: a number, a word, none, or some."""
+    if isinstance(value, tuple):
+        return all(map(_is_plain, value))
+    if isinstance(value, str):
+        return value.isprintable()
+    return value is None or isinstance(value, int | float)
 
 
 def _frozen(values: Sequence[Any]) -> tuple[Any, ...]:

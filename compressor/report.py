@@ -9,6 +9,7 @@ import math
 import re
 import shlex
 import sys
+import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ import xarray as xr
 
 from compressor.analysis import CLEARANCES, FAULTS, SPOKEN, claims, label, paper_cases
 from compressor.case import Case
-from compressor.durable import Folder, publish
+from compressor.durable import Folder, StoreWarning, publish
 from compressor.figures import FIGURES, Drawing
 from compressor.figures.style import render
 from compressor.figures.sweep_metric import MEASURES, Measure, draw_metrics, measures, swept
@@ -105,7 +106,7 @@ def write_report(results: Folder, report: Folder, command: str = "") -> Path:
 
 def compose(results: Folder, command: str) -> tuple[list[Plate], str]:
     """All figures of a report, drawn, and its page."""
-    studies, stored = read_studies(results), read_store(results)
+    studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     plates = draw_paper(paper)
     of_paper = [*paper_sections(paper, plates)]
@@ -137,14 +138,19 @@ def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns
     """The runs with the physics of the paper's cases; of several, the most exact."""
     labels = {case.physics_key: name for name, case in paper_cases().items()}
     found: dict[str, xr.Dataset] = {}
+    damaged = set()
     for key in paper_candidates(stored, studies, labels):
-        with contextlib.suppress(DamagedJob):
+        name = labels[stored.physics_key(key)]
+        try:
             run = stored.job(key)
-            name = labels[run.attrs["physics_key"]]
-            if name not in found or rank(run) > rank(found[name]):
-                found[name] = run
+        except DamagedJob as error:
+            warnings.warn(str(error), StoreWarning, stacklevel=2)
+            damaged.add(name)
+            continue
+        if name not in found or rank(run) > rank(found[name]):
+            found[name] = run
     usable = {name: run for name, run in found.items() if rank(run)[:2] == (True, True)}
-    absent = {n: why_absent(found.get(n)) for n in labels.values() if n not in usable}
+    absent = {n: why_absent(found.get(n), n in damaged) for n in labels.values() if n not in usable}
     return PaperRuns({n: found[n] for n in labels.values() if n in found}, usable, absent)
 
 
@@ -164,10 +170,10 @@ def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
     return str(run["status"].item()) == "ok", "time" in run.dims, -run.attrs.get("rtol", math.inf)
 
 
-def why_absent(run: xr.Dataset | None) -> str:
+def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
     """Why a case of the paper cannot be drawn."""
     if run is None:
-        return "not stored"
+        return "its file is damaged" if damaged else "not stored"
     if str(run["status"].item()) != "ok":
         return f"failed: {run['reason'].item()}"
     return "stored without its time series"

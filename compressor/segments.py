@@ -25,6 +25,15 @@ from compressor.schema import NUMBERS, ROW, Outcome, SeriesFile, coordinates
 NAME = re.compile(r"([0-9]{9})-([0-9a-f]{20})\.h5")
 KEY_BYTES = re.compile(rb"[0-9a-f]{20,}")
 REMEDY = "move it away, then run its studies again"
+WORDS = {  # columns -> what their texts look like
+    "key": re.compile(rb"[0-9a-f]{20}"),
+    "status": re.compile(rb"ok|failed"),
+    "reason": re.compile(rb"[a-z_]*"),
+    "precision": re.compile(rb"(single|double)?"),
+    "digest": re.compile(rb"([0-9a-f]{20})?"),
+}
+FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
+MOST_LINE = 1 << 20  # bytes that are known of one job, on average over a segment
 
 # columns that are no numbers of ROW: (type, phrase)
 COLUMNS = {
@@ -61,7 +70,7 @@ class Segment:
     @cached_property
     def details(self) -> list[bytes]:
         """What is known of each failure, as JSON."""
-        return _unpacked(self.notes)
+        return _unpacked(self.notes, self)
 
 
 def segment_name(number: int, data: bytes) -> str:
@@ -102,8 +111,27 @@ def _packed(lines: Iterable[bytes]) -> bytes:
     return zlib.compress(b"\n".join(lines), level=1)
 
 
-def _unpacked(packed: bytes) -> list[bytes]:
-    return zlib.decompress(packed).split(b"\n")
+def _unpacked(packed: bytes, segment: Segment) -> list[bytes]:
+    """A line for each row of a segment. Raises DamagedJob."""
+    try:
+        inflater = zlib.decompressobj()
+        lines = inflater.decompress(packed, MOST_LINE * (len(segment) + 1)).split(b"\n")
+        if inflater.eof and len(lines) == max(1, len(segment)):
+            return lines
+        raise ValueError(f"{len(lines)} lines")
+    except (zlib.error, ValueError) as error:
+        raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY) from error
+
+
+def _read_line(line: bytes, kind: type, segment: Segment) -> Any:
+    """A line of a segment, of a kind of values. Raises DamagedJob."""
+    try:
+        value = json.loads(line)
+        if isinstance(value, kind):
+            return value
+        raise ValueError(f"no {kind.__name__}")
+    except (ValueError, RecursionError) as error:
+        raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY) from error
 
 
 def encode(segment: Segment) -> bytes:
@@ -139,6 +167,9 @@ def decode(data: bytes, path: Path) -> Segment:
         for name, (kind, _) in COLUMNS.items():
             if columns[name].dtype.kind != kind[0] or columns[name].shape != (rows,):
                 raise ValueError(name)
+        for name, pattern in WORDS.items():
+            if not all(pattern.fullmatch(word) for word in np.unique(columns[name]).tolist()):
+                raise ValueError(name)
         numbers = np.full(rows, np.nan, ROW)
         for name in NUMBERS:
             if name in file:
@@ -154,7 +185,7 @@ def merge(segments: Sequence[Segment]) -> Segment:
     """One segment with the rows that count of several segments, without a path."""
     rows = Rows.of(segments)
     chosen = [*zip(rows.source.tolist(), rows.row.tolist(), strict=True)]
-    texts = [_unpacked(segment.texts) for segment in segments]
+    texts = [_unpacked(segment.texts, segment) for segment in segments]
     return Segment(
         Path(),
         rows.columns,
@@ -192,7 +223,7 @@ class Cut(DamagedJob):
 @lru_cache(maxsize=4)
 def _lines(segment: Segment) -> list[bytes]:
     """The attributes of each row of a segment, as JSON."""
-    return _unpacked(segment.texts)
+    return _unpacked(segment.texts, segment)
 
 
 def worth(columns: dict[str, np.ndarray]) -> np.ndarray:
@@ -256,15 +287,17 @@ class Rows:
 
     def detail(self, position: int) -> str:
         """What is known of a job's failure."""
-        return json.loads(self.segments[self.source[position]].details[self.row[position]])
+        segment = self.segments[self.source[position]]
+        return _read_line(segment.details[self.row[position]], str, segment)
 
     def attributes(self, position: int) -> dict[str, Any]:
         """A job's attributes; quick for jobs of the same segment one after the other."""
-        line = _lines(self.segments[self.source[position]])[self.row[position]]
-        return {
-            name: np.array(value) if isinstance(value, list) else value
-            for name, value in json.loads(line).items()
-        }
+        segment = self.segments[self.source[position]]
+        found = _read_line(_lines(segment)[self.row[position]], dict, segment)
+        try:
+            return {n: np.array(v) if isinstance(v, list) else v for n, v in found.items()}
+        except ValueError as error:
+            raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY) from error
 
     def path(self, position: int) -> Path | None:
         """The file with a job's time series; None where none are kept."""

@@ -20,7 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compressor.case import Case
-from compressor.durable import Folder, StoreError, discard_leftovers, system_error
+from compressor.durable import (
+    Folder,
+    StoreError,
+    StoreWarning,
+    discard_leftovers,
+    system_error,
+)
 from compressor.hdf5 import DamagedJob
 from compressor.jobfiles import KEY, read_series, read_values, write_dataset, write_series
 from compressor.manifest import StoredAxis, StoredStudy, points, read_studies, write_study
@@ -102,6 +108,13 @@ class Stored:
         self.folder, self.segments, self.damaged = folder, segments, damaged
         self.rows = Rows.of(segments, _usable)
 
+    def warned(self) -> "Stored":
+        """The same, after warnings of the damage: its readers go on without some jobs."""
+        for damage in self.damaged:
+            text = f"{damage}: its jobs count as missing"
+            warnings.warn(text, StoreWarning, stacklevel=3)
+        return self
+
     def keys(self) -> set[str]:
         """The keys of all stored jobs, failed ones included."""
         return {key.decode() for key in self.rows.columns["key"]}
@@ -110,6 +123,10 @@ class Stored:
         """Where a job stands in `rows`; None where it is not stored."""
         position = int(self.rows.find([key])[0])
         return position if position >= 0 else None
+
+    def physics_key(self, key: str) -> str:
+        """What a stored job simulates, by its hash."""
+        return bytes(self.rows.columns["physics_key"][self.position(key)]).decode()
 
     def status(self, key: str) -> JobStatus | None:
         """How a stored job ended; None where it is not stored."""
@@ -246,9 +263,7 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
         studies = [study for study in studies if study.name == name]
         if not studies:
             raise StoreError(folder, f"holds no study {name!r}", f"it holds {known}")
-    stored = read_store(folder)
-    for damage in stored.damaged:
-        warnings.warn(f"{damage}: its jobs count as missing", stacklevel=2)
+    stored = read_store(folder).warned()
     is_grid = len(studies) == 1 and studies[0].is_grid
     layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
     dataset = labelled(layout, stored.rows, stored.job, stored.values)

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
-from compressor.durable import Folder, StoreError, make_folder, publish, system_error
+from compressor.durable import Folder, StoreError, make_folder, publish, refusals, system_error
 from compressor.jobfiles import NAME as JOB_NAME
 from compressor.schema import Outcome
 from compressor.segments import Rows, encode, merge, of_outcomes, read_segment, segment_name
@@ -60,13 +60,14 @@ class Writer:
             discard_leftovers(self.place)
             self.found = read_store(self.folder)
             self.number = max(map(_number, self._all_paths()), default=0)
-            damaged = self._damaged(self.place)
-            if damaged:
-                _set_aside(damaged)
-            else:
-                self._discard_unheard_of()
-            if self.place == self.folder:
-                self._mend_idle_shards()
+            with refusals(self.place):
+                damaged = self._damaged(self.place)
+                if damaged:
+                    _set_aside(damaged)
+                else:
+                    self._discard_unheard_of()
+                if self.place == self.folder:
+                    self._mend_idle_shards()
             mine = (s for s in self.found.segments if s.place == self.place)
             self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
         except BaseException:
@@ -131,11 +132,12 @@ class Writer:
     def _merge(self, paths: list[Path]) -> None:
         if len(paths) < 2:
             return
-        segment = merge([read_segment(path) for path in paths])
-        merged = self._publish(encode(segment))
-        for path in paths:
-            path.unlink()
-            del self.small[path]
+        with refusals(self.place):
+            segment = merge([read_segment(path) for path in paths])
+            merged = self._publish(encode(segment))
+            for path in paths:
+                path.unlink()
+                del self.small[path]
         if len(segment) < MOST_ROWS:
             self.small[merged] = len(segment)
 

@@ -425,6 +425,18 @@ def worst_table():
     return markdown(head, rows)
 
 
+def chaos_table():
+    """What was tried, how often, and what did not survive; 0 of N has its 95 % bound, 3/N."""
+    head = ["what", "trials", "failed", "with 95 % confidence below"]
+    rows = []
+    for found in kept("chaos.json")["campaigns"].values():
+        if "skipped" in found:
+            continue
+        bound = "" if found["failed"] else f"{300 / found['trials']:.2g} %"
+        rows.append([found["what"], f"{found['trials']:,}", str(found["failed"]), bound])
+    return markdown(head, rows)
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "reasons": reason_table,
@@ -439,6 +451,7 @@ TABLES = {
     "scale": scale_table,
     "million": million_table,
     "sweep": sweep_table,
+    "chaos": chaos_table,
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,

@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from pathlib import Path
 
 import pytest
 from compsim import cli
@@ -107,3 +108,15 @@ def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys):
     assert next_run.endswith("--max-jobs 20000")
     assert cli.main([*shlex.split(next_run)[1:], "--quiet", "-j", "1"]) == 0
     assert standings("results")[0].missing == 0
+
+
+def test_damage_is_told_where_its_jobs_count_as_missing(mix, capsys):
+    paths = [*Path("results/rows").iterdir()]
+    for path in paths:
+        path.write_bytes(path.read_bytes()[:-1])
+    for command in (["status"], ["show", mix.keys[0]], ["status", "--json"]):
+        assert cli.main(command) == 0
+        out, err = capsys.readouterr()
+        assert "missing" in out or "not run yet" in out
+        assert all(err.count(f"{path.name}: is damaged") == 1 for path in paths)
+        assert "Warning" not in err  # said as other messages are, without a place in the source

@@ -14,6 +14,7 @@ from conftest import CONFIGS, keep, store
 from compressor import page, report
 from compressor.analysis import paper_cases
 from compressor.case import Case
+from compressor.durable import StoreWarning
 from compressor.manifest import encode
 from compressor.plan import load_cases
 from compressor.reasons import Reason
@@ -237,6 +238,16 @@ def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
     assert "design model, no clearance (failed: non_finite)" in found.text
     assert ("failed", "failed: non_finite") in [(k, c[1]) for k, c in found.rows if len(c) > 1]
     assert [p.name for p in (tmp_path / "out").glob("*.png")] == ["figure-03.png"]
+
+
+def test_a_damaged_case_is_told(paper_store, tmp_path):
+    part = part_of(paper_store, tmp_path, "typical")
+    (path,) = (part / "jobs").iterdir()
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.warns(StoreWarning, match=f"{path.name}: is damaged"):
+        paper = find_paper_runs(read_store(part), read_studies(part))
+    assert paper.absent["typical"] == "its file is damaged"
+    assert not paper.stored
 
 
 def test_metrics_without_series_have_tables_but_no_figures(paper_store, tmp_path):

@@ -1,6 +1,7 @@
 """The store: files that others read, that are whole or absent, and studies as labelled data."""
 
 import errno
+import io
 import json
 import os
 import shutil
@@ -16,7 +17,7 @@ from conftest import keep
 
 from compressor import hdf5, labels, store
 from compressor.case import Case, Output, table
-from compressor.jobfiles import series_path
+from compressor.jobfiles import series_image, series_path
 from compressor.plan import load_studies
 from compressor.schema import METRICS
 from compressor.simulation import simulate
@@ -98,7 +99,7 @@ def test_ncdump_reads_a_job_and_a_segment(values, job, tmp_path):
         text = subprocess.run(dump, capture_output=True, text=True, check=True).stdout
         assert "joint = 2 ;" in text
         assert "string joint(joint) ;" in text
-        assert 'string peak_contact_force:units = "N" ;' in text
+        assert '\tpeak_contact_force:units = "N" ;' in text
         assert "double peak_contact_force_axis(joint, axis) ;" in text
         kind = "float" if values else "double"
         assert f"{kind} contact_force(time, joint, axis) ;" in text
@@ -118,7 +119,7 @@ def test_ten_lines_of_h5py_read_a_job(ideal, tmp_path):
         dims = [dim[0].name for dim in force.dims]
         joints = list(file["joint"].asstr())
         peak = force[:, joints.index("small_end"), 0].max()
-        unit = force.attrs["units"]
+        unit = force.attrs["units"].decode()
         status = file["status"].asstr()[()]
     assert dims == ["/time", "/joint", "/axis"]
     assert (unit, status) == ("N", "ok")
@@ -284,9 +285,26 @@ def test_what_a_file_must_not_hold_is_refused(change, ideal, tmp_path):
             read(path)
 
 
+@pytest.mark.parametrize(
+    ("shift", "value"),
+    [(0, 2**31), (0, 6), (4, 8), (12, 99), (-16, 39)],
+    ids=["a length of gigabytes", "another length", "no heap", "no item", "a heap without end"],
+)
+def test_a_text_that_is_not_where_it_says_is_refused(shift, value, ideal, tmp_path):
+    data = bytearray(series_image(ideal, Output()))
+    with h5py.File(io.BytesIO(data)) as file:
+        start = file["joint"].id.get_offset()
+        heap = int.from_bytes(data[start + 4 : start + 12], "little")
+    at = start + shift if shift >= 0 else heap + 24
+    data[at : at + 4] = value.to_bytes(4, "little")
+    with pytest.raises(store.DamagedJob, match="holds texts that are not where it says"):
+        store.read_series(planted(tmp_path, ideal, bytes(data)))
+
+
 SCHEMA = {
     "another's HDF5": lambda file: [file.__delitem__(name) for name in list(file)],
-    "another job's": lambda file: file.attrs.__setitem__("key", "0" * 20),
+    "another job's": lambda file: file.attrs.__setitem__("key", np.bytes_("0" * 20)),
+    "a text of any length": lambda file: file.attrs.__setitem__("key", file.attrs["key"].decode()),
     "no key": lambda file: file.attrs.__delitem__("key"),
     "no status": lambda file: file.__delitem__("status"),
     "text for numbers": lambda file: (
@@ -400,6 +418,29 @@ def test_storing_a_study_again_leaves_its_file_alone(tmp_path):
 def test_a_damaged_study_is_named_with_a_remedy(text, tmp_path):
     store.write_study(tmp_path, study("one"))
     (tmp_path / "studies/one.json").write_text(text, encoding="latin-1")
+    with pytest.raises(store.StoreError, match=r"one\.json.*delete it and run its case file again"):
+        store.read_studies(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": "../two"}, {"keys": ("../evil",)}, {"fixed": []}, {"command": 5},
+        {"versions": {"compsim": 1}}, {"axes": ({"key": "time", "values": [1.0], "units": ""},)},
+        {"axes": ({"key": "load", "values": ["\x1b[31m"], "units": ""},)},
+        {"axes": ({"key": "load", "values": [{}], "units": ""},)},
+        {"axes": ({"key": "load", "values": ["none"], "units": "\a"},)},
+        {"axes": ({"key": "load", "values": ["none"], "units": ""},) * 2},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_study_that_nobody_wrote_is_refused(change, tmp_path):
+    store.write_study(tmp_path, study("one"))
+    path = tmp_path / "studies/one.json"
+    plain = json.loads(path.read_text()) | change
+    del plain["digest"]
+    head = json.dumps(plain, indent=1).removesuffix("\n}").encode()
+    path.write_bytes(head + f',\n "digest": "{hdf5.digest(head)}"\n}}\n'.encode())
     with pytest.raises(store.StoreError, match=r"one\.json.*delete it and run its case file again"):
         store.read_studies(tmp_path)
 

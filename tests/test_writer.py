@@ -1,6 +1,8 @@
 """Rows: what is acknowledged stays, the last one counts, damage is found, one writer at a time."""
 
+import contextlib
 import dataclasses
+import errno
 import fcntl
 import os
 import signal
@@ -9,13 +11,15 @@ import sys
 import textwrap
 import threading
 import time
+import zlib
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
 
-from compressor import hdf5, segments, store, writer
+from compressor import hdf5, jobfiles, segments, store, writer
 from compressor.manifest import StoredAxis, StoredStudy, encode
 from compressor.schema import NUMBERS, ROW, Outcome, SeriesFile
 from compressor.simulation import simulate
@@ -453,6 +457,11 @@ SCHEMA = {
         file.__setitem__("status", np.array([b"ok"] * 3)),
     ),
     "no keys": lambda file: file.__delitem__("key"),
+    "keys of another form": lambda file: file["key"].__setitem__(..., b"../../../evil0000000"),
+    "a reason that steers": lambda file: (
+        file.__delitem__("reason"),
+        file.__setitem__("reason", np.array([b"\x1b[31mred"] * 2)),
+    ),
     "link": lambda file: file.__setitem__("x", h5py.ExternalLink("/etc/passwd", "/")),
 }
 
@@ -471,7 +480,66 @@ def test_a_segment_with_another_schema_is_refused_and_left_alone(change, tmp_pat
     assert [damage.path for damage in verify(tmp_path)] == [planted]
 
 
+@pytest.mark.parametrize(
+    "line",
+    [b"{", b"[" * 10**5, b"1", b'{"a": [[], {}]}', b"{}\n{}", bytes(2 << 20), None],
+    ids=["broken", "deep", "a number", "ragged", "too many", "too long", "no zlib"],
+)
+def test_lines_that_nobody_wrote_are_refused(line, tmp_path):
+    put(tmp_path, outcome(1, reason="non_finite"), outcome(2, reason="non_finite"))
+    (path,) = tmp_path.glob("rows/*.h5")
+    texts = b"none" if line is None else zlib.compress(b"\n".join([line] * 2))
+    foreign = dataclasses.replace(segments.read_segment(path), texts=texts, notes=texts)
+    data = segments.encode(foreign)
+    path.rename(path.with_name(segments.segment_name(1, data)))
+    (path,) = tmp_path.glob("rows/*.h5")
+    path.write_bytes(data)
+    rows = store.read_store(tmp_path).rows
+    for read in (rows.attributes, rows.detail):
+        with pytest.raises(hdf5.DamagedJob, match=rf"{path.name}: is no file of compsim's"):
+            read(0)
+
+
 def test_a_row_of_a_pickled_object_cannot_be_stored(tmp_path):
     bad = dataclasses.replace(outcome(1), attributes={"key": key(1), "case": "{}", "x": object()})
     with pytest.raises(AttributeError), Writer(tmp_path) as open_writer:
         open_writer.add(bad)
+
+
+@pytest.mark.parametrize("name", ["glob", "rename", "unlink", "read_bytes"])
+def test_what_a_disk_refuses_a_writer_has_a_name(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "FEW_SMALL", 0)
+    put(tmp_path, outcome(0))
+    (tmp_path / "jobs").mkdir()
+    (tmp_path / "jobs" / f"{key(1)}-{key(2)}.h5").write_bytes(b"of no row")
+    if name == "rename":
+        (path,) = tmp_path.glob("rows/*.h5")
+        path.write_bytes(b"damaged")
+
+    def refused(*args, **more):
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(args[0]))
+
+    owner = os if name in ("rename", "unlink") else Path
+    if name == "read_bytes":  # of what is merged
+        monkeypatch.setattr(writer, "read_segment", refused)
+    else:
+        monkeypatch.setattr(owner, name, refused)
+    with pytest.raises(store.StoreError, match="Input/output error; check the disk"):
+        put(tmp_path, outcome(1))
+    monkeypatch.undo()
+    put(tmp_path, outcome(1))
+    assert peaks(tmp_path)[1] == 1
+
+
+def test_a_job_that_may_not_be_read_is_not_damaged(tmp_path, monkeypatch):
+    path = tmp_path / f"{key(1)}-{hdf5.digest(b'job')}.h5"
+    path.write_bytes(b"job")
+    assert jobfiles.intact(path)
+    for number, raised in ((errno.EIO, False), (errno.ENOENT, False), (errno.EACCES, True)):
+
+        def refused(self, number=number):
+            raise OSError(number, os.strerror(number), str(self))
+
+        monkeypatch.setattr(Path, "read_bytes", refused)
+        with pytest.raises(store.StoreError) if raised else contextlib.nullcontext():
+            assert not jobfiles.intact(path)

@@ -10,6 +10,7 @@ import signal
 import sys
 import tempfile
 import traceback
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
@@ -262,12 +263,29 @@ def interruptible() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+@contextlib.contextmanager
+def warnings_told() -> Iterator[None]:
+    """Say the store's warnings, each once, as a user reads them; others stay as they are."""
+    show, told = warnings.showwarning, set()
+
+    def say_it(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
+        if category.__name__ != "StoreWarning":  # by name: its module is heavy
+            show(message, category, *where, **more)
+        elif str(message) not in told:
+            told.add(str(message))
+            say(f"compsim: {message}")
+
+    with warnings.catch_warnings():
+        warnings.showwarning = say_it
+        yield
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     command = shlex.join(["compsim", *arguments])
     try:
-        with interruptible():
+        with interruptible(), warnings_told():
             return cli.main(arguments, "compsim", standalone_mode=False, obj=command) or DONE
     except Interrupted as signal_sent:
         say(f"interrupted by {signal_sent}")

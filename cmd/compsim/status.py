@@ -53,20 +53,21 @@ def show(job: str, folder: str, as_json: bool) -> int:
     by which number of it, and its last steps.
     """
     from compressor.inquiry import report_job
+    from compressor.reading import printable
     from compressor.reasons import remedy
 
     found = report_job(folder, job)
     if as_json:
         click.echo(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
         return DONE
-    click.echo(f"job {found.key}: {ending(found)}")
+    click.echo(f"job {found.key}: {printable(ending(found))}")
     for study, point in found.studies.items():
         values = "".join(f" {key}={value}" for key, value in point.items())
-        click.echo(f"  in {study}{values}")
+        click.echo(f"  in {study}{printable(values)}")
     if found.status == "failed":
         click.echo(f"  what to do: {remedy(found.reason)}")
     for line in (*stop(found), *numbers(found), *cautions(found), *facts(found)):
-        click.echo(f"  {line}")
+        click.echo(f"  {printable(line)}")
     if found.status == "missing":
         for command in run_commands(found.again, folder):
             say(f"next: {command}")

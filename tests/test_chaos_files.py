@@ -1,0 +1,75 @@
+"""A sample of the campaigns on files: refused calls, damage, hostile files, power cuts."""
+
+import json
+from pathlib import Path
+
+import measure_chaos
+import pytest
+from chaos import common, faults, hostile
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["faults", "flips", "hostile"])
+def test_nothing_fails_in_a_sample(name):
+    found = measure_chaos.run(name, sample=True)
+    assert found["failures"] == []
+    assert found["failed"] == 0
+    assert found["trials"] == measure_chaos.CAMPAIGNS[name][2]
+
+
+@pytest.mark.slow
+def test_no_acknowledged_result_is_lost_in_a_power_cut():
+    found = measure_chaos.run("power", sample=True)
+    if "skipped" in found:
+        pytest.skip(found["skipped"])
+    assert found["failures"] == []
+    assert found["counts"]["acknowledged results"] > 0
+    # without fsync results are lost: the campaign would notice
+    assert found["counts"]["of these lost, no fsync"] == found["counts"]["controls, no fsync"] > 0
+
+
+def test_a_crash_a_hang_and_an_exception_are_told_apart():
+    assert common.forked(lambda: 1 + 1)[:2] == (2, "")
+    assert "ZeroDivisionError" in common.forked(lambda: 1 // 0).death
+    assert common.forked(lambda: __import__("os").abort()).death == "SIGABRT"
+    assert common.forked(lambda: __import__("time").sleep(60), 0.2).death == "hangs: 0 s"
+
+
+def test_only_the_call_that_is_meant_is_refused(tmp_path):
+    """In files, by descriptors, and not outside the folder."""
+    (tmp_path / "in").mkdir()
+    seen = faults.Faults(tmp_path / "in", "write", 2, 28)
+    with seen.injected():
+        (tmp_path / "out").write_text("not ours")
+        (tmp_path / "in" / "a").write_bytes(b"first")
+        with pytest.raises(OSError, match="No space left"):
+            (tmp_path / "in" / "b").write_bytes(b"second")
+    (tmp_path / "in" / "c").write_bytes(b"third")
+    assert (tmp_path / "in" / "b").read_bytes() == b"sec"  # torn
+    assert dict(zip(faults.NAMES, seen.counts, strict=True))["write"] == 2
+
+
+def test_hostile_screens_are_seen():
+    assert hostile.problem_of(common.Said(0, "\x1b[31m", ""), "", (0,))
+    assert hostile.problem_of(common.Said(1, "", "Traceback"), "", (0, 1))
+    assert hostile.problem_of(None, "SIGSEGV", (0,)) == "SIGSEGV"
+    assert not hostile.problem_of(common.Said(0, "all is well\n", ""), "", (0,))
+
+
+def test_a_partial_driver_keeps_the_other_campaigns(tmp_path, monkeypatch):
+    target = tmp_path / "chaos.json"
+    target.write_text('{"campaigns": {"power": {"trials": 7}, "flips": {"trials": 1}}}')
+    found = {"what": "w", "trials": 2, "failed": 1, "counts": {}, "seconds": 0.1, "failures": ["x"]}
+    monkeypatch.setattr(measure_chaos, "run", lambda name, sample: found)
+    assert measure_chaos.main(target, ["flips"], False) == 1
+    kept = json.loads(target.read_text())["campaigns"]
+    assert kept["power"] == {"trials": 7}
+    assert (kept["flips"]["trials"], kept["flips"]["failures"]) == (2, ["x"])
+    assert list(kept) == ["power", "flips"]
+
+
+def test_every_campaign_of_the_file_is_a_full_one():
+    kept = json.loads((Path(__file__).parent / "results" / "chaos.json").read_text("utf-8"))
+    for name, found in kept["campaigns"].items():
+        assert not found["sample"], name
+        assert found["trials"] > 0, name
