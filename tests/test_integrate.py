@@ -47,6 +47,7 @@ def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance)
     assert peaks[0] == pytest.approx(peaks[1], rel=5e-3)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("load", ["typical", "none"])
 def test_other_loads_against_the_reference(load):
     params = reference.paper_params(load, "both", 2e-4)
@@ -57,6 +58,7 @@ def test_other_loads_against_the_reference(load):
     assert apart(found["acceleration"].values, truth["a"]) <= ACCURACY["fine"].promise
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "auto"])
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_energy_residual_of_every_method(method, joint):
@@ -65,6 +67,7 @@ def test_energy_residual_of_every_method(method, joint):
     assert 0 < float(found["energy_residual"]) <= residual_bound(found, revolutions=1)
 
 
+@pytest.mark.compiled
 def test_the_audit_sees_a_lost_flow(monkeypatch):
     """Without the damping loss in the ledger the energy no longer balances."""
     from compressor import integrate
@@ -102,6 +105,7 @@ def test_scaled_limit_of_vanishing_clearance():
     assert np.abs(slopes - 1).max() <= 0.1
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_output_grid_does_not_touch_the_motion(joint):
     coarse, fine = (

@@ -19,11 +19,15 @@ from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.motion import evaluate, start
 from compressor.physics.observe import COLUMNS, Column, derivative_with_flows, observe_all
 from compressor.physics.onset import (
+    EDGE,
+    LOOKS,
     NEVER,
+    SAMPLES,
     crossing,
     first_onset,
     joint_onset,
     nearness_at,
+    place,
     touching_between,
 )
 from compressor.physics.parameters import FREEDOMS, SMALL_END
@@ -122,6 +126,20 @@ def test_a_maximum_is_searched_for_contact(height):
         assert found == pytest.approx(0.37, abs=WIDTH)
     else:
         assert found == NEVER
+
+
+def test_a_journal_that_rests_at_the_edge_does_not_touch():
+    """F_N = 0 at a penetration of 0."""
+    dense, p, y = small_end_only([CLEARANCE]), parameters(), np.zeros(4)
+    assert nearness_at(SMALL_END, 0.5, 0.0, H, dense, 0, p, y) == 0.0
+    assert joint_onset(SMALL_END, 0.0, H, dense, 0, p, y) == (NEVER, NEVER)
+    assert touching_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, p, y) == NEVER
+
+
+def test_looks_stand_evenly_and_beside_both_ends():
+    looks = [place(i) for i in range(LOOKS + 1)]
+    inner = [i / SAMPLES for i in range(1, SAMPLES)]
+    assert looks == pytest.approx([0.0, EDGE, *inner, 1.0 - EDGE, 1.0], abs=1e-15)
 
 
 FIRST = {

@@ -1,0 +1,6 @@
+"""Drawn mutants that change nothing, by identity, with the reason: never a place for escapes.
+
+`measure_mutants` tries each of them all the same, and stops where a test catches one.
+"""
+
+EQUIVALENT: dict[str, str] = {}
