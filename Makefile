@@ -66,7 +66,7 @@ tradeoff: install  ## measure speed against accuracy, and what the model's featu
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(BIN)/python tests/measure_mutants.py tests/results/mutants.json
 
-measurements: accuracy claims tradeoff store-bench throughput peers readme  ## all of these (20 minutes)
+measurements: accuracy claims tradeoff mutants store-bench throughput peers readme  ## all of these (45 minutes)
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md

@@ -82,6 +82,21 @@ def test_the_audit_sees_a_lost_flow(monkeypatch):
     assert float(found["energy_residual"]) > 100 * residual_bound(found, revolutions=1)
 
 
+def test_methods_agree_beyond_a_corner():
+    """With a follower that dwells for 1 mm only, so that the first corner comes after 6 degrees."""
+    values = {"joint": "big_end", "clearance_mm": 0.2, "spring": {"stroke_mm": 1}}
+    solve = {"duration_rev": 0.03, "settle_rev": 0, "rtol": 1e-6, "error_bars": False}
+    one, other = (
+        simulate(Case.from_values({**values, "solve": {**solve, "method": name}}))
+        for name in ("TSIT5", "DOP853")
+    )
+    for name in ("acceleration", "piston_force", "penetration"):
+        assert apart(one[name].values, other[name].values) < 1e-4
+    for name in ("peak_acceleration", "rms_acceleration_deviation", "max_penetration",
+                 "crank_work", "contact_damping_loss"):  # fmt: skip
+        assert one[name].values == pytest.approx(other[name].values, rel=1e-4, abs=1e-12)
+
+
 def deviation(clearance_mm):
     """Greatest |x - x_ideal| (m) with the contact scaled along (DESIGN 2.6)."""
     size = clearance_mm / 0.2

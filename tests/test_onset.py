@@ -174,6 +174,17 @@ def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     assert (nearness(contact, p.stiffness[1], p) > 0) == (normal > 0)
 
 
+@pytest.mark.parametrize("exponent", [1.5, 2.0])
+def test_a_clamped_force_counts_as_a_length(exponent):
+    """As the penetration of full damping, when it pulls as much as the spring would push there."""
+    p = parameters()
+    p.exponent = exponent
+    pull = p.stiffness[1] * p.full_damping**exponent
+    for share in (1.0, 0.01):
+        contact = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 1e-6, -1.0, 0.0, 0.0, -share * pull)
+        assert nearness(contact, p.stiffness[1], p) == pytest.approx(-share * p.full_damping)
+
+
 # ---- constructed re-engagements: a free flight drawn backwards from its contact
 
 
