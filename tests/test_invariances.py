@@ -1,7 +1,8 @@
 """Invariances of the whole program over random scenes, each with its bound and why that is it.
 
 The compiled march is driven by a record (SI) and a `Request`, as `simulate` drives it. Scenes are
-drawn from a range in which friction's stiffness does not decide (`scenes`).
+drawn from a range in which friction's stiffness does not decide (`scenes`). Whatever has no switch
+but a number (gravity, back pressure, the spring's damping) is off at its neutral value already.
 """
 
 import json

@@ -26,7 +26,7 @@ def request(rtol, duration=None, **values):
     y = np.zeros(2 * FREEDOMS[scene(case)])
     start(offsets(case), y, p)
     times = (duration or case.duration) * np.arange(1201) / 1200
-    return Request(p, y, times, 0.0, rtol, max_steps=20_000)
+    return Request(p, y, times, 0.0, rtol, max_steps=10_000)
 
 
 def accelerations(found, p):
