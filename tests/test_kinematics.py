@@ -63,6 +63,18 @@ def test_sine_and_cosine_of_a_small_angle_are_exact():
             assert abs(found - e) <= np.spacing(abs(e))
 
 
+def test_the_series_of_a_small_angle_lacks_no_term():
+    """Just below 0.01 rad, where a last term would be missed most: by more than its last digit."""
+    biases = np.zeros(2)
+    angles = np.linspace(0.0099, 0.00999, 200)
+    with mpmath.workdps(30):
+        for angle in angles:
+            exact = mpmath.sin(mpmath.mpf(float(angle))), mpmath.cos(mpmath.mpf(float(angle)))
+            for k, (found, e) in enumerate(zip(small_angle(angle), exact, strict=True)):
+                biases[k] += float((mpmath.mpf(found) - e) / np.spacing(float(e)))
+    assert biases / angles.size == pytest.approx(0, abs=0.25)
+
+
 def test_the_motion_a_span_later_is_that_of_the_later_time():
     p = record(Case())
     for t, span in ((0.0, 0.0), (0.013, 1e-5), (0.05, 1e-4), (0.11, 0.07)):
