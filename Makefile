@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench throughput peers tradeoff mutants measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic mutants measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -51,8 +51,14 @@ claims: install  ## measure the paper's claims over a range of masses (seconds)
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
 	$(BIN)/python tests/measure_store.py tests/results/store.json
 
+scale: install  ## measure 100,000 jobs beside their physics: time and memory (two minutes)
+	$(BIN)/python tests/measure_scale.py tests/results/scale.json
+
 throughput: install  ## measure starting up, and 10,000 jobs without time series (two minutes)
 	$(BIN)/python tests/measure_throughput.py tests/results/throughput.json
+
+sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (fifteen minutes)
+	$(BIN)/python tests/measure_sweep.py tests/results/sweep.json
 
 peers: install  ## time other tools and ours in turn on one problem (about five minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
@@ -63,10 +69,16 @@ peers: install  ## time other tools and ours in turn on one problem (about five 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
 	$(BIN)/python tests/measure_tradeoff.py tests/results/tradeoff.json
 
+ladders: install  ## measure error against tolerance, and the limit of no clearance (two minutes)
+	$(BIN)/python tests/measure_ladders.py tests/results/ladders.json
+
+chaotic: install  ## compare two chaotic scenes' statistics by two integrators (a minute)
+	$(BIN)/python tests/measure_chaotic.py tests/results/chaotic.json
+
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(BIN)/python tests/measure_mutants.py tests/results/mutants.json
 
-measurements: accuracy claims tradeoff mutants store-bench throughput peers readme  ## all of these (45 minutes)
+measurements: accuracy claims tradeoff ladders chaotic mutants store-bench scale throughput sweep-bench peers readme  ## all of these (65 minutes)
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md

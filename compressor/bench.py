@@ -20,6 +20,7 @@ from compressor.case import Case, Output
 from compressor.integrate import LOCAL
 from compressor.parameter import JOINTS
 from compressor.physics.parameters import Scene
+from compressor.reasons import Reason
 from compressor.record import scene
 from compressor.simulation import simulate
 
@@ -58,8 +59,10 @@ def default_cases() -> dict[str, Case]:
 
 
 def solved(case: Case, method: str, rtol: float, timeout: float | None = None) -> Case:
-    """A case by another method and tolerance, with its series kept and without error bars."""
-    solve = replace(case.solve, method=method, rtol=rtol, accuracy="standard", error_bars=False)
+    """A case by another method and tolerance: series kept, no error bars, no horizon."""
+    solve = replace(
+        case.solve, method=method, rtol=rtol, accuracy="standard", error_bars=False, horizon=False
+    )
     if timeout is not None:
         solve = replace(solve, timeout_s=timeout)
     return replace(case, solve=solve, output=Output())
@@ -236,7 +239,7 @@ def measure(study: xr.Dataset, point: Point, case: Case, truth: Mapping, budget:
     method = str(study["method"].values[point[1]])
     seconds = study["seconds"].values
     earlier = point[:2]
-    out_of_time = study["reason"].values[earlier][: point[2]] == "budget_seconds"
+    out_of_time = study["reason"].values[earlier][: point[2]] == Reason.BUDGET_SECONDS
     if out_of_time.any() or seconds[point] > SLOW:
         return
     rtol = float(study["tolerance"].values[point[2]])

@@ -25,6 +25,7 @@ MAX_SEED = 2**63
 UNSWEPT = (  # no part of a job's identity
     "name",
     "solve.error_bars",
+    "solve.horizon",
     "solve.timeout_s",
     "output.keep",
     "output.precision",

@@ -9,9 +9,9 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
 from compressor.accuracy import ACCURACY, Targets, checked_targets, first_rung
@@ -122,7 +122,7 @@ class Contact:
 
     law: str = choice("impact", ("impact",), "Eq. 14", "contact law (ADAMS's IMPACT)")
     stiffness_N_per_mm15: float | None = parameter(
-        3.36e5, "N/mm^p", (0, 1e12), "Table 3", "contact stiffness K, in N/mm^exponent",
+        3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True,
     )  # fmt: skip
     materials: tuple[str, str] | None = choice(
@@ -185,6 +185,10 @@ class Solve:
     error_bars: bool = choice(
         True, (), "ours", "an error beside each metric, by a second, looser run; not part of a "
         "job's identity", kind="boolean",
+    )  # fmt: skip
+    horizon: bool = choice(
+        False, (), "ours", "how long the motion can be foretold, by a twin at rtol 1e-12; bars "
+        "end there; not part of a job's identity", kind="boolean",
     )  # fmt: skip
     method: str = choice(
         "auto", METHODS, "ours", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
@@ -263,25 +267,37 @@ class Case:
         problems = [*_inertia_problems(case), *conflicts(case, frozenset(_given(values)))]
         if problems:
             raise CaseError(problems)
+        vars(case)["problems"] = ()  # known: see `problems`
         return case
+
+    @cached_property
+    def problems(self) -> tuple[Problem, ...]:
+        """What is wrong with a case that was made without `from_values`, which would raise it."""
+        try:
+            Case.from_values(self.values())
+        except CaseError as error:
+            return tuple(error.problems)
+        return ()
 
     def __post_init__(self) -> None:
         """Fill in the defaults that depend on other values; unused clearances become 0."""
         machine, solve, contact = self.machine, self.solve, self.contact
-        if machine.rod_centre_mm is None:
-            machine = replace(machine, rod_centre_mm=machine.rod_length_mm / 2)
-        if machine.rod_inertia_kg_m2 is None:
-            inertia = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2 / 12
-            machine = replace(machine, rod_inertia_kg_m2=inertia)
+        if machine.rod_centre_mm is None or machine.rod_inertia_kg_m2 is None:
+            given = (machine.rod_centre_mm, machine.rod_inertia_kg_m2)
+            length, mass = machine.rod_length_mm, machine.rod_mass_kg
+            usual = (length / 2, mass * (length / 1000) ** 2 / 12)
+            centre, inertia = (u if g is None else g for g, u in zip(given, usual, strict=True))
+            machine = replace(machine, rod_centre_mm=centre, rod_inertia_kg_m2=inertia)
         if solve.duration_s is not None:
             solve = replace(solve, duration_rev=None)
         if solve.output_step_s is not None:
             solve = replace(solve, output_step_deg=None)
         if contact.materials is not None:
             contact = replace(contact, stiffness_N_per_mm15=None)
-        unused = {joint: 0.0 for joint in JOINTS if self.joint not in (joint, "both")}
         resolved = {"machine": machine, "solve": solve, "contact": contact}
-        resolved["clearance_mm"] = replace(self.clearance_mm, **unused)
+        if self.joint != "both":
+            unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
+            resolved["clearance_mm"] = replace(self.clearance_mm, **unused)
         for name, value in resolved.items():
             object.__setattr__(self, name, value)
 
@@ -411,16 +427,34 @@ def _part(key: str, value: Any, problems: list[Problem]) -> Any:
         if not isinstance(value, Mapping):
             problems.append(Problem(key, f"needs a mapping of keys, not {shown(value)}"))
             return None
-        known = {item.name for item in dataclasses.fields(GROUPS[key])}
-        for name in value:
-            if name not in known:
-                problems.append(Problem(f"{key}.{name}", "unknown key"))
-        good = {n: checked(f"{key}.{n}", v, problems) for n, v in value.items() if n in known}
-        return GROUPS[key](**good)
+        try:
+            found, wrong = _group(key, tuple((n, v, type(v)) for n, v in value.items()))
+        except TypeError:  # a list or a mapping is in it
+            found, wrong = _checked_group(key, value.items())
+        problems += wrong
+        return found
     if key not in table():
         problems.append(Problem(key, "unknown key"))
         return None
     return checked(key, value, problems)
+
+
+@lru_cache(maxsize=256)
+def _group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[Any, list[Problem]]:
+    """A group from its values, and what is wrong; jobs of a sweep share those they have alike.
+
+    Types are part of the values, since 1, 1.0 and true are equal.
+    """
+    return _checked_group(key, [(name, value) for name, value, _ in items])
+
+
+def _checked_group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Problem]]:
+    problems: list[Problem] = []
+    known = {item.name for item in dataclasses.fields(GROUPS[key])}
+    values = dict(items)
+    problems += [Problem(f"{key}.{name}", "unknown key") for name in values if name not in known]
+    good = {n: checked(f"{key}.{n}", v, problems) for n, v in values.items() if n in known}
+    return GROUPS[key](**good), problems
 
 
 def checked(key: str, value: Any, problems: list[Problem]) -> Any:

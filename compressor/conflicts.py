@@ -1,9 +1,10 @@
 """What does not fit together in a case whose values are each in range."""
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from compressor.parameter import JOINTS, Problem
+from compressor.parameter import IMPLAUSIBLE, JOINTS, Problem
 
 if TYPE_CHECKING:
     from compressor.case import Case
@@ -34,11 +35,12 @@ def conflicts(case: "Case", given: frozenset[str]) -> Iterator[Problem]:
 
 
 def _geometry_conflicts(case: "Case") -> Iterator[Problem]:
-    machine = case.machine
-    if machine.crank_radius_mm >= machine.rod_length_mm:
+    machine, play = case.machine, _play(case)
+    if machine.crank_radius_mm + play >= machine.rod_length_mm:
+        loose = f" and {play:g} mm of clearance" if play else ""
         yield Problem(
             "machine.crank_radius_mm",
-            f"the crank, {machine.crank_radius_mm:g} mm, must be shorter than the rod, "
+            f"the crank, {machine.crank_radius_mm:g} mm{loose}, must be shorter than the rod, "
             f"{machine.rod_length_mm:g} mm, or the mechanism locks",
         )
     if (machine.rod_centre_mm or 0) > machine.rod_length_mm:
@@ -54,6 +56,13 @@ def _clearance_conflicts(case: "Case", given: frozenset[str]) -> Iterator[Proble
             yield Problem(key, f"is needed with joint: {case.joint}")
         if clearance > pin:
             yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm")
+        shift = math.hypot(*(getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy"))
+        if 0 < clearance < shift - IMPLAUSIBLE * pin:
+            yield Problem(
+                f"initial_offset_mm.{joint}_x",
+                f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
+                f"more than a tenth of the pin radius; lower it, or raise {key}",
+            )
     if case.joint == "none" and any(key.startswith("clearance_mm") for key in given):
         yield Problem("clearance_mm", "has no joint to be at; set joint, or leave it out")
 
@@ -73,6 +82,13 @@ def _load_conflicts(case: "Case") -> Iterator[Problem]:
         )
     if case.load != "typical":
         return
+    play = _play(case)
+    if gas.head_clearance_mm <= play:
+        yield Problem(
+            "gas.head_clearance_mm",
+            f"{gas.head_clearance_mm:g} mm does not exceed the clearances, {play:g} mm in all: the "
+            "piston would reach the cylinder head, where the gas force has no bound",
+        )
     if gas.discharge_MPa <= gas.suction_MPa:
         yield Problem("gas.discharge_MPa", "must exceed suction_MPa")
     elif gas.switching == "exact":
@@ -90,6 +106,11 @@ def _load_conflicts(case: "Case") -> Iterator[Problem]:
             "the printed corners hold for the paper's geometry and pressures only; "
             "set switching: exact",
         )
+
+
+def _play(case: "Case") -> float:
+    """How much farther than ideal joints those with clearance let the crosshead go (mm)."""
+    return case.clearance_mm.big_end + case.clearance_mm.small_end
 
 
 def _gas_geometry(case: "Case") -> tuple[float, ...]:

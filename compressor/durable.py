@@ -8,7 +8,9 @@ import errno
 import os
 import time
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 Folder = str | os.PathLike[str]
 
@@ -47,12 +49,22 @@ def system_error(path: Folder, error: OSError) -> StoreError:
 
 def publish(path: Path, data: bytes) -> None:
     """Put a whole file under its name, durably, or leave what was there."""
+    with publishing(path) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def publishing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write: it has its name, durably, once the block has ended well, or never.
+
+    What stood under the name is left until then. Raises StoreError where the disk refuses.
+    """
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     make_folder(path.parent)
     try:
         try:
             with open(temporary, "xb") as file:
-                file.write(data)
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, path)
@@ -92,8 +104,8 @@ def _sync_folder(folder: Path) -> None:
 
 
 def discard_leftovers(folder: Folder) -> None:
-    """Remove the temporary files of writers that died long ago."""
-    for path in Path(folder).glob("**/.*.tmp"):
+    """Remove the temporary files of writers that died long ago, from the folders in a folder."""
+    for path in Path(folder).glob("*/.*.tmp"):
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
                 path.unlink()

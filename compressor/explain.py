@@ -4,7 +4,6 @@ A feature is paid for in vain where leaving it out changes peaks by less than th
 case promises: model only what a scene requires.
 """
 
-import math
 import statistics
 import time
 from collections.abc import Iterator
@@ -18,11 +17,9 @@ from compressor.bench import SLOW, complete, faulty
 from compressor.case import Case
 from compressor.manifest import given, points
 from compressor.modelling import FEATURES, Effect, Feature, compare
-from compressor.parameter import JOINTS
-from compressor.physics.contact import step
-from compressor.physics.control import BOUNDARY
 from compressor.physics.parameters import FREEDOMS, Scene
-from compressor.record import record, scene
+from compressor.record import scene
+from compressor.scales import JointScales, expected_seconds, expected_steps, joint_scales
 from compressor.simulation import STATE_NAMES, simulate
 from compressor.study import Study
 
@@ -32,18 +29,6 @@ SCENES = {
     Scene.SMALL_END: "clearance at the small end",
     Scene.BOTH: "clearance at both joints",
 }
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Natural scales of a joint's contact, under the greatest force of the ideal machine (SI)."""
-
-    joint: str
-    force: float  # N
-    penetration: float  # m, at rest under the force
-    frequency: float  # Hz, of the lighter body on the contact's stiffness there
-    step_limit: float  # s, of an explicit method, by the fastest of stiffness, damping, friction
-    limited_by: str
 
 
 @dataclass(frozen=True)
@@ -73,7 +58,9 @@ class Explanation:
     unknowns: tuple[str, ...]
     active: dict[str, str]  # term -> in words
     absent: tuple[str, ...]  # terms left out, at no cost
-    scales: tuple[Scales, ...]
+    scales: tuple[JointScales, ...]
+    expected_steps: float  # by the scales alone, before the run
+    expected_seconds: float
     accuracy: str  # the word, or "" where rtol is given
     rtol: float
     promise: float
@@ -99,6 +86,8 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
     ended = complete(run)
     active, absent = terms(case)
     freedoms = FREEDOMS[scene(case)]
+    found = tuple(scales(case))
+    steps = expected_steps(case, found)
     return Explanation(
         study=study.name,
         path=study.path,
@@ -108,7 +97,9 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
         unknowns=STATE_NAMES[2 * freedoms][:freedoms],
         active=active,
         absent=absent,
-        scales=tuple(scales(case)),
+        scales=found,
+        expected_steps=steps,
+        expected_seconds=expected_seconds(case, steps),
         accuracy=asked(case),
         rtol=case.rtol,
         promise=promise(case),
@@ -185,28 +176,11 @@ def spoken(case: Case, feature: Feature) -> str:
     return f"{feature.key} = {value}"
 
 
-def scales(case: Case) -> Iterator[Scales]:
-    """The natural scales of each joint with clearance."""
+def scales(case: Case) -> Iterator[JointScales]:
+    """The natural scales of each joint with clearance, under its greatest force when ideal."""
     ideal = simulate(replace(case, joint="none"))
-    p = record(case)
-    mass = min(p.rod_mass, p.reciprocating_mass)
-    for index, joint in enumerate(JOINTS):
-        if p.clearance[index] <= 0:
-            continue
-        force = float(ideal["peak_contact_force"].sel(joint=joint))
-        stiffness = float(p.stiffness[index])
-        depth = (force / stiffness) ** (1 / p.exponent)
-        frequency = math.sqrt(p.exponent * stiffness * depth ** (p.exponent - 1) / mass)
-        rates = {
-            "contact stiffness": frequency,
-            "contact damping": float(step(depth, 0.0, 0.0, p.full_damping, p.damping)) / mass,
-        }
-        if p.friction:  # the smoothed law is steepest where nothing slides
-            rates["friction"] = 1.5 * p.static * force / (p.stiction_velocity * mass)
-        fastest = max(rates, key=lambda name: rates[name])
-        yield Scales(
-            joint, force, depth, frequency / (2 * math.pi), BOUNDARY / rates[fastest], fastest
-        )
+    for joint in faulty(case):
+        yield joint_scales(case, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
 
 
 def advise(case: Case, repeats: int) -> Iterator[Advice]:

@@ -5,13 +5,14 @@ Reads studies and rows only, never a file with time series, so that 100,000 jobs
 
 import os
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from compressor.durable import Folder, StoreError
-from compressor.manifest import StoredStudy, given, points, read_studies
+from compressor.manifest import Again, StoredStudy, owners, read_studies
 from compressor.schema import NUMBERS
 from compressor.store import Stored, read_store
 
@@ -29,6 +30,7 @@ class Standing:
     failed: int
     missing: int
     reasons: dict[str, int]
+    again: Again
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class JobReport:
     detail: str
     file: str  # with its time series; "" where none are kept
     studies: dict[str, dict[str, Any]]  # name -> swept values
-    case_files: tuple[str, ...]
+    again: tuple[Again, ...]  # of the studies
     numbers: dict[str, Any]  # SI; a joint's or an axis's in lists
     attributes: dict[str, Any]
 
@@ -60,7 +62,7 @@ def standings(folder: Folder) -> list[Standing]:
         found.append(
             Standing(
                 study.name, study.case_file, study.jobs, ok, failed, missing,
-                dict(reasons.most_common()),
+                dict(reasons.most_common()), study.again,
             )
         )  # fmt: skip
     return found
@@ -72,25 +74,26 @@ def report_job(folder: Folder, beginning: str) -> JobReport:
     Raises StoreError where no job's key does, or several do.
     """
     store, studies = read_store(folder), read_studies(folder)
-    key = _whole_key(folder, beginning, store, studies)
+    key = whole_key(folder, beginning, store, studies)
     position = store.position(key)
-    owners = {study.name: _point(study, key) for study in studies if key in study.keys}
-    case_files = tuple(study.case_file for study in studies if study.name in owners)
+    mine = owners(studies, [key])[key]
+    again = tuple(study.again for study in studies if study.name in mine)
     if position is None:
-        return JobReport(key, "missing", "", "", "", owners, case_files, {}, {})
+        return JobReport(key, "missing", "", "", "", mine, again, {}, {})
     end, path = store.status_at(position), store.rows.path(position)
     numbers = {name: np.asarray(end.numbers[name]).tolist() for name in NUMBERS}
     attributes = {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in store.rows.attributes(position).items()
     }
+    file = "" if path is None else os.fspath(path)
     return JobReport(
-        key, end.status, end.reason, end.detail, "" if path is None else os.fspath(path), owners,
-        case_files, numbers, attributes,
-    )  # fmt: skip
+        key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes
+    )
 
 
-def _whole_key(folder: Folder, beginning: str, store: Stored, studies: list[StoredStudy]) -> str:
+def whole_key(folder: Folder, beginning: str, store: Stored, studies: Sequence[StoredStudy]) -> str:
+    """The one key, of a stored or a planned job, that begins so; StoreError where that is none."""
     known = store.keys().union(*(study.keys for study in studies))
     like = sorted(key for key in known if key.startswith(beginning))
     if len(like) == 1:
@@ -101,8 +104,3 @@ def _whole_key(folder: Folder, beginning: str, store: Stored, studies: list[Stor
     some = ", ".join(like[:MOST_LIKE]) + (", …" if len(like) > MOST_LIKE else "")
     problem = f"{len(like)} jobs' keys begin with {beginning!r}: {some}"
     raise StoreError(folder, problem, "give more of the key")
-
-
-def _point(study: StoredStudy, key: str) -> dict[str, Any]:
-    """The swept values of a study's job."""
-    return next(given(p) for p, k in zip(points(study), study.keys, strict=True) if k == key)

@@ -15,13 +15,22 @@ from typing import Any
 
 import numpy as np
 
+from compressor.parameter import IMPLAUSIBLE
 from compressor.physics.control import Mode
 from compressor.physics.loads import sample_segments, segments
 from compressor.physics.march import Status, march, new_walker, new_work
-from compressor.physics.observe import COLUMNS, derivative_with_flows, observe, observe_all
+from compressor.physics.observe import (
+    COLUMNS,
+    NORMAL,
+    derivative_with_flows,
+    observe,
+    observe_all,
+)
 from compressor.physics.parameters import FREEDOMS, Load, Scene
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.tally import add_flows, lobatto, new_tally, tally_energy, tally_step
+from compressor.reasons import Reason
+from compressor.retrace import LAST, History, Snapshot, Standing, retrace
 
 COMPILED = {
     "auto": (Mode.AUTO, Pair.TSIT5),
@@ -36,10 +45,11 @@ LEAST_RTOL = 2.3e-14  # SciPy's own floor
 BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
 NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
-CHUNK = 4096  # attempts of the march between two looks at the clock; about ten milliseconds
+CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
+PIECES_A_LOOK = 256  # of the ideal scene's quadrature between two looks at the clock
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
+KICK = 30.0  # tolerances of speed: what a contact within one step of SciPy's may add unseen
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
-IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 
 
 @dataclass
@@ -72,6 +82,7 @@ class Trajectory:
     detail: str = ""
     stop_time: float = math.nan
     stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
+    history: History = field(default_factory=History)  # the last steps before a stop
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0
@@ -110,7 +121,7 @@ class Derivative:
         else:
             self.bad += 1
             if self.bad >= BAD_EVALUATIONS:
-                raise Stop("non_finite", "the right-hand side stays non-finite")
+                raise Stop(Reason.NON_FINITE, "the right-hand side stays non-finite")
         if self.evaluations % 256 == 0:
             self.check_budget()
         return out
@@ -118,9 +129,9 @@ class Derivative:
     def check_budget(self) -> None:
         """Raise Stop when evaluations or wall time have run out."""
         if self.evaluations > self.limit:
-            raise Stop("budget_steps", f"more than {self.limit} evaluations")
+            raise Stop(Reason.BUDGET_STEPS, f"more than {self.limit} evaluations")
         if time.monotonic() > self.deadline:
-            raise Stop("budget_seconds", f"more than {self.timeout:g} s of wall time")
+            raise Stop(Reason.BUDGET_SECONDS, overdue(self.timeout))
 
 
 def scales(p: np.record) -> tuple[float, float]:
@@ -181,29 +192,51 @@ def integrate(request: Request) -> Trajectory:
     return result
 
 
-def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
-    """Integrate by the compiled loop, in chunks between which budgets are checked."""
-    deadline = time.monotonic() + request.timeout
+def ready_walker(request: Request, size: np.ndarray) -> np.record:
+    """A walker at the start of a run by a compiled method; `size` as of `natural_sizes`."""
     mode, pair = COMPILED[request.method]
     walker = new_walker(mode)
     walker.pair, walker.rtol = pair, request.rtol
-    size = natural_sizes(request.p)
     walker.watch, walker.contact_step = 1, CONTACT_STEP * size[0] / size[size.size // 2]
     walker.deepest = IMPLAUSIBLE * request.p.pin_radius
+    return walker
+
+
+def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
+    """Integrate by the compiled loop, in chunks between which budgets are checked."""
+    deadline = time.monotonic() + request.timeout
+    size = natural_sizes(request.p)
+    walker = ready_walker(request, size)
     edges, phases, walker.settle = cut(edges, phases, request.settle)
-    work = new_work(size.size)
-    while walker.status == Status.RUNNING:
-        left = request.max_steps - walker.steps - walker.rejected
+    now = Standing(walker, z, new_work(size.size), result.tally)
+
+    def advance(some: Standing, attempts: int) -> None:
         march(
-            walker, request.p, z, work, request.rtol * size, size, edges, phases, request.times,
-            result.states, result.tally, min(CHUNK, left),
+            some.walker, request.p, some.z, some.work, request.rtol * size, size, edges, phases,
+            request.times, result.states, some.tally, attempts,
         )  # fmt: skip
+
+    earlier = before = Snapshot.of(now)
+    seen = 0  # attempts at the last snapshot
+    while walker.status == Status.RUNNING:
+        if result.steps + result.rejected >= seen + LAST:
+            earlier, before = before, Snapshot.of(now)
+            seen = result.steps + result.rejected
+        advance(now, min(CHUNK, request.max_steps - walker.steps - walker.rejected))
         result.steps, result.rejected = int(walker.steps), int(walker.rejected)
         result.evaluations = int(walker.evaluations)
-        if walker.status != Status.DONE:
-            result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
+        if walker.status == Status.DONE:
+            return
+        try:
             check_march(request, walker, float(result.tally.deepest), deadline)
-    result.stop_time = math.nan
+        except Stop:
+            result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
+            enough = result.steps + result.rejected >= seen + LAST
+            kept = (before if enough else earlier).standing()
+            result.history = retrace(
+                kept, now, advance, request.p, request.rtol, size, edges, phases
+            )
+            raise
 
 
 def cut(edges: np.ndarray, phases: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -221,15 +254,20 @@ def check_march(request: Request, walker: np.record, deepest: float, deadline: f
     """Raise Stop where a march has stopped, or may go no further."""
     status = Status(int(walker.status))
     if status == Status.PENETRATION_IMPLAUSIBLE:
-        raise Stop("penetration_implausible", too_deep(deepest))
+        raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest))
     if status == Status.NON_FINITE:
-        raise Stop("non_finite", "the state or its rates are no longer finite")
+        raise Stop(Reason.NON_FINITE, "the state or its rates are no longer finite")
     if status == Status.STEP_UNDERFLOW:
-        raise Stop("step_underflow", f"the step has shrunk to {walker.h:.3g} s")
+        raise Stop(Reason.STEP_UNDERFLOW, f"the step has shrunk to {walker.h:.3g} s")
     if walker.steps + walker.rejected >= request.max_steps:
-        raise Stop("budget_steps", f"more than {request.max_steps} steps")
+        raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
     if time.monotonic() > deadline:
-        raise Stop("budget_seconds", f"more than {request.timeout:g} s of wall time")
+        raise Stop(Reason.BUDGET_SECONDS, overdue(request.timeout))
+
+
+def overdue(timeout: float) -> str:
+    """What is wrong with a run that takes longer (s)."""
+    return f"more than {timeout:g} s of wall time"
 
 
 def too_deep(deepest: float) -> str:
@@ -282,17 +320,20 @@ class Segment:
             atol=absolute_tolerances(request.p, rtol),
         )
         while solver.status == "running":
+            if result.steps >= request.max_steps:
+                raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
             message = solver.step()
             if solver.status == "failed":
-                raise Stop("step_underflow", str(message))
+                raise Stop(Reason.STEP_UNDERFLOW, str(message))
             if not np.isfinite(solver.y).all():
-                raise Stop("non_finite", "the state is no longer finite")
+                result.history.dominant = int(np.flatnonzero(~np.isfinite(solver.y))[0])
+                raise Stop(Reason.NON_FINITE, "the state is no longer finite")
             result.steps += 1
             self.take(solver)
             self.audit(solver)
             result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
-            if result.steps > request.max_steps:
-                raise Stop("budget_steps", f"more than {request.max_steps} steps")
+            taken = solver.t - solver.t_old
+            result.history.add(solver.t_old, taken, math.nan, f"{request.method} taken")
             self.check()
         if self.end == request.times[-1]:
             result.stop_time = math.nan
@@ -321,7 +362,23 @@ class Segment:
         rows = np.empty((times.size, COLUMNS))
         phases = np.full(times.size, self.right_hand_side.phase)
         observe_all(times, states, phases, self.request.p, rows)
-        tally_step(end - begin, NODES, WEIGHTS, rows, measured, self.result.tally, self.request.p)
+        self.check_contact(begin, end - begin, rows)
+        tally, p = self.result.tally, self.request.p
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, measured, tally, p)
+
+    def check_contact(self, begin: float, span: float, rows: np.ndarray) -> None:
+        """Raise Stop where a whole contact lies within a step and its impulse is no small error."""
+        normal = rows[:, NORMAL : NORMAL + 2]
+        whole = (normal[1:-1] > 0).any(axis=0) & (normal[0] <= 0) & (normal[-1] <= 0)
+        if not whole.any():
+            return
+        p, force = self.request.p, normal.max()
+        kick = span * (WEIGHTS @ normal[:, whole]).max() / min(p.rod_mass, p.reciprocating_mass)
+        if kick > KICK * self.request.rtol * scales(p)[1]:
+            detail = (
+                f"a contact of {force:.2g} N within one step of {span:.2g} s from {begin:.6g} s"
+            )
+            raise Stop(Reason.CONTACT_UNDERRESOLVED, detail)
 
     def audit(self, solver) -> None:
         """Compare the energy at the step's end with the flows up to there."""
@@ -334,15 +391,19 @@ class Segment:
         """Raise Stop when a journal sinks in implausibly deep."""
         deepest, limit = self.result.tally.deepest, IMPLAUSIBLE * self.request.p.pin_radius
         if not deepest <= limit:
-            raise Stop("penetration_implausible", too_deep(deepest))
+            raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest))
         self.right_hand_side.check_budget()
 
 
-def closed_form(p: np.record, times: np.ndarray, settle: float, pieces: int) -> Trajectory:
+def closed_form(
+    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf
+) -> Trajectory:
     """The ideal scene: nothing is integrated, metrics and energy flows by quadrature.
 
-    `pieces`: into which each stretch between load corners, or each revolution in it, is cut.
+    `pieces`: into which each stretch between load corners, or each revolution in it, is cut;
+    `timeout`: wall time (s) that it may take.
     """
+    deadline = time.monotonic() + timeout
     edges, phases = segments(p, float(times[-1]))
     result = Trajectory(
         times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally()
@@ -354,13 +415,19 @@ def closed_form(p: np.record, times: np.ndarray, settle: float, pieces: int) -> 
     states = np.zeros((NODES.size, 4))
     rows = np.empty((NODES.size, COLUMNS))
     flows = np.zeros(FLOWS)
-    for begin, end, phase in zip(cuts[:-1], cuts[1:], phases[owner], strict=True):
+    for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
+        phase = phases[owner[number]]
+        if number % PIECES_A_LOOK == 0 and time.monotonic() > deadline:
+            result.reason = Reason.BUDGET_SECONDS
+            result.detail, result.stop_time = overdue(timeout), float(begin)
+            result.states[times >= begin] = math.nan
+            break
         nodes = begin + (end - begin) * NODES
         observe_all(nodes, states, np.full(NODES.size, phase), p, rows)
         tally_energy(rows[0], flows, result.tally)
         add_flows(rows, WEIGHTS, end - begin, flows)
         tally_energy(rows[-1], flows, result.tally)
-        tally_step(end - begin, NODES, WEIGHTS, rows, begin >= settle, result.tally, p)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, begin >= settle, result.tally, p)
     result.seconds = time.perf_counter() - began
     return result
 

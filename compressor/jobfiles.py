@@ -37,10 +37,20 @@ def series_path(place: Path, key: str, checksum: str) -> Path:
 
 def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> SeriesFile:
     """Store a job's Dataset, or what it is made of, durably."""
-    data = series_image(dataset, output)
-    checksum, times = digest(data), dataset.variables["time"].values
-    publish(series_path(place, dataset.attrs["key"], checksum), data)
-    return SeriesFile(times.size, float(times[-1]), output.precision, checksum)
+    file, data = series_file(dataset, output)
+    store_series(place, dataset.attrs["key"], file, data)
+    return file
+
+
+def series_file(dataset: "Table | xr.Dataset", output: Output) -> tuple[SeriesFile, bytes]:
+    """The file that a job's Dataset makes, and its bytes."""
+    data, times = series_image(dataset, output), dataset.variables["time"].values
+    return SeriesFile(times.size, float(times[-1]), output.precision, digest(data)), data
+
+
+def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
+    """Put the bytes of a job's file in their place, durably."""
+    publish(series_path(place, key, file.digest), data)
 
 
 def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:
@@ -81,7 +91,8 @@ def intact(path: Path) -> bool:
         return False
 
 
-def _bytes(path: Path) -> bytes:
+def read_bytes(path: Path) -> bytes:
+    """The bytes of a job's file, compared with their digest. Raises DamagedJob."""
     named = NAME.fullmatch(path.name)
     try:
         data = path.read_bytes()
@@ -96,7 +107,7 @@ def read_series(path: Path) -> "xr.Dataset":
     """A job's Dataset, from a file. Raises DamagedJob."""
     import xarray as xr
 
-    with opened(_bytes(path), path) as file:
+    with opened(read_bytes(path), path) as file:
         attributes = hdf5.attributes(file)
         if attributes["key"] != path.name[:20]:
             raise ValueError
@@ -111,5 +122,5 @@ def read_series(path: Path) -> "xr.Dataset":
 
 def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Some variables of a job's file by name, without those that it does not have."""
-    with opened(_bytes(path), path) as file:
+    with opened(read_bytes(path), path) as file:
         return {name: file[name][()] for name in names if name in file}

@@ -100,19 +100,32 @@ def _fixed_value(fixed: Mapping[str, Any], key: str, missing: Any) -> Any:
     return missing if isinstance(value, Mapping) else value
 
 
+def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
+    """The Dataset of a layout from the rows of a store, without time series."""
+    positions = rows.find(layout.keys)
+    variables = _outcomes(layout, rows, positions)
+    found = positions[positions >= 0]
+    if (rows.words["reason"][found] != "internal_error").any():
+        variables |= _metrics(layout, rows, positions)
+        variables |= {n: xr.Variable(*parts) for n, parts in coordinates().items()}
+    return _with_coordinates(variables, layout)
+
+
 def labelled(
     layout: Layout, rows: Rows, job: Callable[[str], xr.Dataset], values: Values
 ) -> xr.Dataset:
     """The Dataset of a layout, from the rows of a store and its jobs with time series."""
+    dataset = outcomes(layout, rows)
     positions = rows.find(layout.keys)
-    variables = _outcomes(layout, rows, positions)
     found = np.unique(positions[positions >= 0])
-    if (rows.words["reason"][found] != "internal_error").any():
-        variables |= _metrics(layout, rows, positions)
-        variables |= {n: xr.Variable(*parts) for n, parts in coordinates().items()}
     whole = found[rows.columns["samples"][found] > 0]
-    if whole.size:
-        variables |= _series(layout, rows, positions, whole, job, values)
+    if not whole.size:
+        return dataset
+    series = _series(layout, rows, positions, whole, job, values)
+    return _with_coordinates(dict(dataset.variables) | series, layout)
+
+
+def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
     names = ["key", "study", "joint", "axis", "time", *layout.coordinates]
     dataset = xr.Dataset(variables | layout.coordinates)
     return dataset.set_coords([name for name in names if name in dataset])

@@ -1,16 +1,18 @@
 """The studies of a store: one JSON file each, with its axes and the keys of its jobs in C order."""
 
+import argparse
 import contextlib
 import datetime
 import itertools
 import json
 import math
 import os
+import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import compressor
 from compressor.case import MODEL_VERSION, table
@@ -52,6 +54,23 @@ class StoredStudy:
     def jobs(self) -> int:
         return len(self.keys)
 
+    @property
+    def again(self) -> "Again":
+        """What a run of the same jobs needs."""
+        options = argparse.ArgumentParser(allow_abbrev=False, add_help=False)
+        options.add_argument("--set", action="append", default=[])
+        options.add_argument("--max-jobs", default="0")
+        given, _ = options.parse_known_args(shlex.split(self.command))
+        return Again(self.case_file, tuple(given.set), max(self.jobs, int(given.max_jobs)))
+
+
+class Again(NamedTuple):
+    """A case file, what was set in it on the command line, and the jobs that it counts, or more."""
+
+    case_file: str
+    overrides: tuple[str, ...]
+    jobs: int
+
 
 def points(study: "Study | StoredStudy") -> Iterator[dict[str, Any]]:
     """The swept values of each job by dotted key, in the order of the jobs."""
@@ -69,6 +88,19 @@ def points(study: "Study | StoredStudy") -> Iterator[dict[str, Any]]:
 def given(point: dict[str, Any]) -> dict[str, Any]:
     """The swept values that a job has, without those of other blocks."""
     return {key: value for key, value in point.items() if value is not None}
+
+
+def owners(
+    studies: "Iterable[StoredStudy]", keys: Iterable[str]
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """The studies that each of some jobs belongs to, by name, with its swept values there."""
+    found: dict[str, dict[str, dict[str, Any]]] = {key: {} for key in keys}
+    for study in studies:
+        if not found.keys().isdisjoint(study.keys):
+            for key, point in zip(study.keys, points(study), strict=True):
+                if key in found:
+                    found[key].setdefault(study.name, given(point))
+    return found
 
 
 def write_study(folder: Folder, study: "Study", command: str = "") -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 JOINTS = ("big_end", "small_end")
+IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 # case-file unit -> (SI unit, numerator, denominator): SI value = value * numerator / denominator

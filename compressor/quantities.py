@@ -20,11 +20,13 @@ METRICS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "contact_loss_fraction": (("joint",), "1", "share of time without contact (F_N = 0)"),
     "impact_count": (("joint",), "1", "times that contact began"),
 }
-# how far a metric may be from the exact one: inf where that is unknown, nan where no bar was made
+# how far a metric may be from the exact one: inf where that is unknown, as beyond the horizon, nan
+# where no bar was made
 ERRORS = {
     f"{name}_error": (dims, unit, f"error bar of {name}")
     for name, (dims, unit, _) in METRICS.items()
 }
+HORIZON = "predictability_horizon"
 # energy flows and how the run went
 LEDGER: dict[str, tuple[tuple[str, ...], str, str]] = {
     "crank_work": ((), "J", "work put in by the crank over the run"),
@@ -36,5 +38,6 @@ LEDGER: dict[str, tuple[tuple[str, ...], str, str]] = {
     "rejected": ((), "1", "rejected steps; SciPy's methods do not tell"),
     "evaluations": ((), "1", "evaluations of the right-hand side"),
     "seconds": ((), "s", "wall time of the solution, without that of its error bars"),
+    HORIZON: ((), "s", "time up to which close twins stay together; inf: to the end"),
 }
 NUMBERS = METRICS | ERRORS | LEDGER

@@ -9,9 +9,9 @@ import numpy as np
 
 from compressor.case import Case
 from compressor.parameter import JOINTS, to_si
-from compressor.physics.contact import contact_stiffness
 from compressor.physics.loads import cam_corners, gas_corners, printed_corners
-from compressor.physics.parameters import Law, Load, Scene, new_record
+from compressor.physics.materials import contact_stiffness
+from compressor.physics.parameters import Law, Load, Scene, derive, new_record
 
 LOADS = {"none": Load.NONE, "typical": Load.TYPICAL, "design": Load.DESIGN}
 LAWS = {"impact": Law.IMPACT}
@@ -35,6 +35,7 @@ def record(case: Case) -> np.record:
         p["corners"] = cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
     elif case.load == "typical":
         p["corners"] = typical_corners(case)
+    derive(p)
     return p
 
 

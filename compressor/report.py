@@ -44,6 +44,8 @@ from compressor.page import (
     table,
 )
 from compressor.physics.cam import comparisons
+from compressor.quantities import HORIZON
+from compressor.reasons import remedy as remedy_of
 from compressor.record import record
 from compressor.store import DamagedJob, Stored, open_study, read_store
 
@@ -69,6 +71,11 @@ ASSUMPTIONS = (
     "The cam of the design load is a reconstruction: as printed it does not close (Figure 4).",
     "Claim (1) holds by construction: with ideal joints and a prescribed crank, no load can "
     "change the motion.",
+)
+
+BEYOND = (
+    "Of {jobs} of the jobs the run is longer than their predictability_horizon: single peaks may "
+    "differ between two correct solutions, no error bar is claimed, and statistics alone hold."
 )
 
 
@@ -283,14 +290,18 @@ def failures(stored: Stored, data: xr.Dataset) -> Html:
     failed, missing = np.flatnonzero(status == "failed"), int((status == "missing").sum())
     counts = f"{status.size} jobs: {status.size - len(failed) - missing} ok, {len(failed)} failed"
     body = [element("p", counts + (f", {missing} not run." if missing else "."))]
+    if HORIZON in data and (chaotic := int(np.isfinite(data[HORIZON].values).sum())):
+        body.append(element("p", BEYOND.format(jobs=chaotic)))
     items = []
     for place in failed[:MOST_DETAILS]:
         job = stored.status(str(data["key"].values.flat[place]))
         point = [f"{name} {plain(values[place])}" for name, values in axes(data).items()]
         items.append(f"{', '.join(point)}: {outcome(job.reason, job.detail) if job else 'gone'}")
+    reasons = dict.fromkeys(data["reason"].values.ravel()[failed])
+    advice = listing(f"{reason}: {remedy_of(reason)}" for reason in reasons)
     if len(failed) > MOST_DETAILS:
         items.append(f"and {len(failed) - MOST_DETAILS} more")
-    return joined([*body, listing(items)] if items else body)
+    return joined([*body, listing(items), "What to do:", advice] if items else body)
 
 
 def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:

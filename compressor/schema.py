@@ -4,13 +4,20 @@ So that results are read without loading either; the numbers' names and units ar
 `compressor.quantities`.
 """
 
+import contextlib
+import json
+import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+import compressor
 from compressor.parameter import JOINTS
 from compressor.quantities import AXES, ERRORS, LEDGER, METRICS, NUMBERS, SIZES
+
+if TYPE_CHECKING:
+    from compressor.case import Case
 
 __all__ = ["AXES", "ERRORS", "LEDGER", "METRICS", "NUMBERS", "ROW", "SIZES", "Outcome"]
 
@@ -64,6 +71,20 @@ class Outcome:
         for name, (dims, unit, phrase) in NUMBERS.items():
             named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
         return named
+
+
+def without_run(case: "Case", reason: str, detail: str, **more: Any) -> Outcome:
+    """The outcome of a case of which no run can tell; `more`: attributes.
+
+    The keys of a case with values that none can be made of, such as a speed of 0, are "".
+    """
+    attributes: dict[str, Any] = {"key": "", "physics_key": "", "name": case.name}
+    attributes["case"] = json.dumps(case.values(), sort_keys=True)
+    with contextlib.suppress(ArithmeticError, TypeError, ValueError):
+        attributes |= {"key": case.key, "physics_key": case.physics_key}
+    program = f"compsim {compressor.__version__}"
+    attributes |= {"complete": 0, "program": program, "detail": detail} | more
+    return Outcome("failed", str(reason), np.full(1, math.nan, ROW)[0], attributes)
 
 
 class Variable(NamedTuple):

@@ -2,7 +2,9 @@
 
 A segment is written once, as `<folder>/rows/<number>-<digest>.h5`, netCDF-4 like a job's file. The
 digest of its bytes is in its name, and compared whenever it is read. Of several rows of one job
-the one with the greatest `serial` counts: the number of the segment that it was first written to.
+the one that is worth most counts (`worth`): runs that write at the same time, each its own shard,
+take nothing from each other. Among equals it is the one with the greatest `serial`: the number of
+the segment that it was first written to.
 """
 
 import json
@@ -30,7 +32,7 @@ COLUMNS = {
     "physics_key": ("S20", "hash of what a job simulates, not how"),
     "status": ("S", "ok or failed"),
     "reason": ("S", "why a run failed, by a stable name"),
-    "serial": ("i8", "order of writing; of several rows of a job the greatest counts"),
+    "serial": ("i8", "order of writing; of a job's equally good rows the greatest counts"),
     "samples": ("i8", "length of the time series; 0: none is kept"),
     "end": ("f8", "last time of the series, s"),
     "precision": ("S", "of the series: double or single"),
@@ -193,6 +195,12 @@ def _lines(segment: Segment) -> list[bytes]:
     return _unpacked(segment.texts)
 
 
+def worth(columns: dict[str, np.ndarray]) -> np.ndarray:
+    """How much rows of one job tell: failed 0, ok 1, with time series 2, in double precision 3."""
+    series = columns["samples"] > 0
+    return (columns["status"] == b"ok") * (1 + series * (1 + (columns["precision"] == b"double")))
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """The rows that count of many segments, one a job, in the order of their keys."""
@@ -216,7 +224,7 @@ class Rows:
             )
             for name, (kind, _) in COLUMNS.items()
         }
-        order = np.lexsort((columns["serial"], columns["key"]))
+        order = np.lexsort((columns["serial"], worth(columns), columns["key"]))
         keys = columns["key"][order]
         chosen = order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]
         parts = [s.numbers[mask] for s, mask in zip(segments, masks, strict=True)]

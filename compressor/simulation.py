@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+import time
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -12,14 +13,29 @@ import numpy as np
 
 import compressor
 from compressor.accuracy import TIGHTEST
+from compressor.audit import RUNGS, allowed, energy_residual
 from compressor.bars import Metrics, bars, unmet
 from compressor.case import MODEL_VERSION, Case
+from compressor.horizon import predictability_horizon
 from compressor.integrate import Request, Trajectory, closed_form, integrate
+from compressor.parameter import CaseError
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS, Scene
+from compressor.physics.runge_kutta import FLOWS
+from compressor.quantities import HORIZON
+from compressor.reasons import Reason
 from compressor.record import offsets, record, scene
-from compressor.schema import ROW, SIZES, Outcome, Table, Variable, coordinates
+from compressor.retrace import NONE
+from compressor.schema import (
+    ROW,
+    SIZES,
+    Outcome,
+    Table,
+    Variable,
+    coordinates,
+    without_run,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +57,11 @@ SERIES = {
 }  # fmt: skip
 
 PIECES = 32  # of the ideal scene's quadrature; twice as many a rung
-OUT_OF_BUDGET = ("budget_steps", "budget_seconds", "step_underflow")  # a tighter run may end so
+OUT_OF_BUDGET = (
+    Reason.BUDGET_STEPS,
+    Reason.BUDGET_SECONDS,
+    Reason.STEP_UNDERFLOW,
+)  # a tighter run may end so
 
 
 @dataclass
@@ -50,7 +70,7 @@ class Solution:
 
     `rtol`: the tolerance it was integrated with; `metrics`: by name, empty where the run did not
     reach its end; `bars`: an error bar of each metric, empty where none was made; `reason` and
-    `detail`: why the job failed, empty when it is ok.
+    `detail`: why the job failed, empty when it is ok; `horizon` (s): nan where none was asked for.
     """
 
     p: np.record
@@ -60,6 +80,7 @@ class Solution:
     bars: Metrics
     reason: str
     detail: str
+    horizon: float = math.nan
 
 
 def simulate(case: Case) -> "xr.Dataset":
@@ -77,29 +98,94 @@ def simulate(case: Case) -> "xr.Dataset":
 
 def observe(case: Case) -> tuple[Outcome, Table]:
     """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
-    found = solve(case)
-    end = outcome(case, found)
-    variables = end.variables() | coordinates()
-    if case.output.keep == "series":
-        variables |= series(found.p, found.trajectory)
+    more: dict[str, tuple] = {}
+    if case.problems:
+        end = refused(case)
+    else:
+        found = solve(case)
+        end = outcome(case, found)
+        if case.output.keep == "series":
+            more = series(found.p, found.trajectory)
+    variables = end.variables() | coordinates() | more
     named = {name: Variable(d, np.asarray(v), attrs) for name, (d, v, attrs) in variables.items()}
     return end, Table(named, end.attributes)
 
 
 def measure(case: Case) -> Outcome:
     """Simulate one case for its `Outcome` alone: what `simulate` gives less the time series."""
-    return outcome(case, solve(case))
+    return refused(case) if case.problems else outcome(case, solve(case))
+
+
+def refused(case: Case) -> Outcome:
+    """The outcome of a case that no case file could ask for."""
+    return without_run(case, Reason.INVALID_INPUT, str(CaseError([*case.problems])))
 
 
 def solve(case: Case) -> Solution:
-    """A case's motion, with error bars where they are wanted."""
+    """A case's motion, with error bars and the horizon where they are wanted."""
+    began = time.monotonic()
+    found = climb(case) if case.targets else once(case)
+    if case.solve.horizon and not found.reason:
+        left = case.solve.timeout_s - (time.monotonic() - began)
+        found.horizon = predictability_horizon(case, left)
+        if found.horizon < case.duration:
+            beyond_horizon(case, found)
+    return found
+
+
+def beyond_horizon(case: Case, found: Solution) -> None:
+    """Withdraw the error bars of a motion that cannot be foretold to its end."""
+    found.bars = {name: np.full(np.shape(bar), math.inf) for name, bar in found.bars.items()}
     if case.targets:
-        return climb(case)
-    found = attempt(case, 0, case.solve.timeout_s, case.output.keep == "series")
+        found.reason = Reason.ACCURACY_NOT_REACHED
+        turns = found.horizon / case.turn
+        found.detail = f"no error bar holds beyond the horizon, {turns:.3g} revolutions"
+
+
+def once(case: Case) -> Solution:
+    """A case's motion at its own tolerance, with error bars where they are wanted."""
+    found, looser = audited(case, case.output.keep == "series")
     if case.wants_bars and not found.reason:
         left = case.solve.timeout_s - found.trajectory.seconds
-        found.bars = error_bars(found, attempt(case, -1, left, sampled=False))
+        found.bars = error_bars(found, looser or attempt(case, -1, left, sampled=False))
     return found
+
+
+def audited(case: Case, sampled: bool) -> tuple[Solution, Solution | None]:
+    """A run whose energy balances: at the case's tolerance, or up to RUNGS times ten tighter.
+
+    Also the run before it, ten times looser, if there was one. Where no run passes the audit, the
+    last whole one is a failed job.
+    """
+    left = case.solve.timeout_s
+    best: Solution | None = None
+    for rung in range(RUNGS + 1):
+        found = attempt(case, rung, left, sampled)
+        if best and found.reason in OUT_OF_BUDGET:
+            return unbalanced(case, best, found.reason, f"the next run: {found.detail}"), None
+        if found.reason or balanced(case, found):
+            return found, best
+        left -= found.trajectory.seconds
+        best = found
+        if found.rtol < 9.9 * TIGHTEST:
+            break
+    return unbalanced(case, found, "", f"at rtol {found.rtol:.2g}"), None
+
+
+def balanced(case: Case, found: Solution) -> bool:
+    """Whether the energy of a whole run balances as well as the case asks for."""
+    return energy_residual(found.trajectory.tally) <= allowed(case.rtol, case.duration / case.turn)
+
+
+def unbalanced(case: Case, best: Solution, reason: str, detail: str) -> Solution:
+    """A whole run as a failed job: its series and energies are kept, its metrics are not."""
+    residual = energy_residual(best.trajectory.tally)
+    most = allowed(case.rtol, case.duration / case.turn)
+    best.metrics, best.bars = {}, {}
+    timed_out = reason == Reason.BUDGET_SECONDS
+    best.reason = reason if timed_out else Reason.ENERGY_AUDIT_FAILED
+    best.detail = f"energy residual {residual:.2g}, more than {most:.2g}; {detail}"
+    return best
 
 
 def climb(case: Case) -> Solution:
@@ -116,14 +202,18 @@ def climb(case: Case) -> Solution:
             return best
         left -= best.trajectory.seconds
         if case.rtol / 10.0**rung < 0.99 * TIGHTEST:
-            return short_of(case, best, "accuracy_not_reached", "no run is tighter")
+            return short_of(case, best, Reason.ACCURACY_NOT_REACHED, "no run is tighter")
         found = attempt(case, rung, left, sampled)
         if found.reason in OUT_OF_BUDGET:
-            reason = found.reason if found.reason == "budget_seconds" else "accuracy_not_reached"
+            reason = (
+                found.reason
+                if found.reason == Reason.BUDGET_SECONDS
+                else Reason.ACCURACY_NOT_REACHED
+            )
             return short_of(case, best, reason, f"the next run: {found.detail}")
         if not found.reason:
             found.bars = error_bars(found, best)
-            if not unmet(case.targets, found.metrics, found.bars):
+            if not unmet(case.targets, found.metrics, found.bars) and balanced(case, found):
                 return found
         best = found
     raise AssertionError("the ladder has an end")
@@ -131,6 +221,8 @@ def climb(case: Case) -> Solution:
 
 def short_of(case: Case, best: Solution, reason: str, detail: str) -> Solution:
     """The best run of a ladder as a failed job that tells how far it came."""
+    if not balanced(case, best):
+        return unbalanced(case, best, reason, detail)
     best.bars = best.bars or error_bars(best, None)
     missed = unmet(case.targets, best.metrics, best.bars)
     best.reason = reason
@@ -148,7 +240,7 @@ def attempt(case: Case, rung: int, timeout: float, sampled: bool) -> Solution:
     samples = round(case.steps) if sampled else 1
     times = case.duration * (np.arange(samples + 1) / samples)
     if scene(case) == Scene.IDEAL:
-        trajectory = closed_form(p, times, case.settle, round(PIECES * 2.0**rung))
+        trajectory = closed_form(p, times, case.settle, round(PIECES * 2.0**rung), timeout)
     else:
         y = np.zeros(2 * FREEDOMS[scene(case)])
         start(offsets(case), y, p)
@@ -189,10 +281,11 @@ def outcome(case: Case, found: Solution) -> Outcome:
     numbers = np.full(1, math.nan, dtype=ROW)[0]
     known = {**found.metrics, **ledger(found.trajectory)}
     known |= {f"{name}_error": bar for name, bar in found.bars.items()}
+    known[HORIZON] = found.horizon
     for name, value in known.items():
         numbers[name] = value
     status = "failed" if found.reason else "ok"
-    return Outcome(status, found.reason, numbers, attributes(case, found))
+    return Outcome(status, str(found.reason), numbers, attributes(case, found))
 
 
 def metrics(p: np.record, tally: np.record) -> Metrics:
@@ -210,12 +303,6 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
         "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
         "impact_count": np.where(ideal, 0.0, tally["impacts"]),
     }
-
-
-def energy_residual(tally: np.record) -> float:
-    """Worst imbalance relative to the contact's losses, floored at 1e-3 of the kinetic energy."""
-    lost = tally["damping_loss"] + tally["friction_loss"]
-    return float(tally["worst_imbalance"] / max(lost, 1e-3 * tally["peak_kinetic"]))
 
 
 def ledger(trajectory: Trajectory) -> dict[str, float]:
@@ -255,11 +342,25 @@ def attributes(case: Case, found: Solution) -> dict[str, object]:
     if found.reason:
         attrs["detail"] = found.detail
     if trajectory.reason:
-        attrs["stop_time"] = trajectory.stop_time
-        attrs["stop_crank_angle"] = case.omega * trajectory.stop_time
-        attrs["stop_state"] = trajectory.stop_state
-        attrs["stop_state_names"] = ", ".join(STATE_NAMES[trajectory.stop_state.size])
+        attrs |= stop_attributes(case, trajectory)
     return attrs
+
+
+def stop_attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
+    """Where a run stopped, in which state, and how its last steps went."""
+    history, names = trajectory.history, STATE_NAMES[trajectory.stop_state.size]
+    flows = ("energy flow, J",) * FLOWS
+    return {
+        "stop_time": trajectory.stop_time,
+        "stop_crank_angle": case.omega * trajectory.stop_time,
+        "stop_state": trajectory.stop_state,
+        "stop_state_names": "; ".join(names),
+        "stop_dominant": "" if history.dominant == NONE else (names + flows)[history.dominant],
+        "stop_history_time": np.array(history.times),
+        "stop_history_step": np.array(history.steps),
+        "stop_history_error": np.array(history.errors),
+        "stop_history_words": "; ".join(history.words),
+    }
 
 
 @cache

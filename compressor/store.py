@@ -24,6 +24,8 @@ from compressor.durable import Folder, StoreError, discard_leftovers, system_err
 from compressor.hdf5 import DamagedJob
 from compressor.jobfiles import KEY, read_series, read_values, write_dataset, write_series
 from compressor.manifest import StoredAxis, StoredStudy, points, read_studies, write_study
+from compressor.quantities import HORIZON
+from compressor.reasons import Reason
 from compressor.schema import Outcome, coordinates
 from compressor.segments import NAME, Cut, Rows, Segment, read_segment
 
@@ -53,7 +55,8 @@ __all__ = [
     "write_study",
 ]
 
-BROKEN = {"internal_error", "worker_died", "out_of_memory"}  # reasons that leave no time series
+# reasons that leave no time series
+BROKEN = {Reason.INTERNAL_ERROR, Reason.WORKER_DIED, Reason.OUT_OF_MEMORY, Reason.INVALID_INPUT}
 ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 
 
@@ -79,11 +82,13 @@ class JobStatus:
 
         The one place that knows of what a case may ask for without it being in its key.
         """
-        if self.reason == "budget_seconds":
+        if self.reason == Reason.BUDGET_SECONDS:
             return False  # a machine with more time to spare may do it
         if self.reason in BROKEN:
             return True
         if case.wants_bars and self.status == "ok" and not self.bars:
+            return False
+        if case.solve.horizon and self.status == "ok" and np.isnan(self.numbers[HORIZON]):
             return False
         if case.output.keep == "metrics":
             return True

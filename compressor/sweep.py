@@ -1,30 +1,28 @@
 """Run the jobs of studies that the store does not hold yet, in worker processes.
 
-Workers (`compressor.workers`) store the time series that are kept and send home the outcomes; this
-process alone writes the rows that make them stored (`compressor.writer`). A run that fails, breaks,
-or takes its worker with it, is a result with a named reason.
+Workers (`compressor.workers`, or those of a `compressor.cluster`) store the time series that are
+kept and send home the outcomes; this process alone writes the rows that make them stored
+(`compressor.writer`). A run that fails, breaks, or takes its worker with it, is a result with a
+named reason.
 """
 
-import json
-import math
 import threading
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-
-import compressor
 from compressor.case import Case
+from compressor.jobfiles import series_file
 from compressor.manifest import given
-from compressor.schema import ROW, Outcome
+from compressor.reasons import Reason
+from compressor.schema import Outcome, without_run
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
 from compressor.study import Study, shard
-from compressor.workers import Done, Lost, rest, run_batches
+from compressor.workers import Done, Input, Lost, rest, run_batches
 from compressor.writer import Writer
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
@@ -32,6 +30,29 @@ Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark o
 GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
 PATIENCE = 2.0  # s of compiling before a remark on it
 COMPILING = "compiling the equations (once per machine, under a minute)"
+
+
+class Backend(Protocol):
+    """Where jobs run: runs cases whose time series belong in a place, yields how each one ended.
+
+    `remark` is told what takes its time, `pulse` called several times a second. An exception that
+    is thrown in ends the jobs, and is raised again after the results that had arrived.
+    """
+
+    def __call__(
+        self,
+        place: Path,
+        cases: Sequence[Case],
+        remark: Callable[[str], None],
+        pulse: Callable[[], object],
+    ) -> Generator[Done | Lost, None, None]: ...
+
+
+class Carried(NamedTuple):
+    """An outcome, and the bytes of the file with its time series, which is still to be stored."""
+
+    outcome: Outcome
+    data: bytes
 
 
 class End(NamedTuple):
@@ -87,9 +108,11 @@ def sweep(
     rerun_failed: bool = False,
     part: tuple[int, int] | None = None,
     wait: bool = False,
+    backend: Backend | None = None,
 ) -> Summary:
     """Run what is missing of some studies and store it in a folder; failed jobs only on request.
 
+    backend: by default, `workers` processes of this machine;
     part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
     wait: until another run that writes there has ended.
 
@@ -112,14 +135,18 @@ def sweep(
         if missing:
             for damage in writer.found.damaged:
                 progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
-            run_missing(writer, missing, workers, ends, progress)
+            run_missing(writer, missing, backend or local(workers), ends, progress)
     counts, failed = endings(studies, ends)
     seconds = time.monotonic() - began
     return Summary(len(cases), len(cases) - len(missing), len(missing), counts, failed, seconds)
 
 
 def run_missing(
-    writer: Writer, missing: Sequence[Case], workers: int, ends: dict[str, End], progress: Progress
+    writer: Writer,
+    missing: Sequence[Case],
+    backend: Backend,
+    ends: dict[str, End],
+    progress: Progress,
 ) -> None:
     """Run and store cases; `ends` gains how each ended, `progress` is told of what is on disk."""
     done, total = len(ends), len(ends) + len(missing)
@@ -136,14 +163,11 @@ def run_missing(
         tell(writer.add(outcome))
 
     progress(done, total, "")
-    warm_up(missing, lambda remark: progress(done, total, remark))
-    running = run_batches(
-        partial(run_job, writer.place),
-        ((case, case, case.solve.timeout_s) for case in missing),
-        workers,
-        total=len(missing),
-        grace=GRACE,
-        pulse=lambda: tell(writer.flush_if_due()),
+    running = backend(
+        writer.place,
+        missing,
+        lambda remark: progress(done, total, remark),
+        lambda: tell(writer.flush_if_due()),
     )
     try:
         for end in running:
@@ -154,6 +178,27 @@ def run_missing(
     finally:
         running.close()
         tell(writer.flush())
+
+
+def local(workers: int) -> Backend:
+    """Worker processes of this machine."""
+
+    def run(
+        place: Path,
+        cases: Sequence[Case],
+        remark: Callable[[str], None],
+        pulse: Callable[[], object],
+    ) -> Generator[Done | Lost, None, None]:
+        warm_up(cases, remark)
+        work, jobs = partial(run_job, place), as_jobs(cases)
+        return run_batches(work, jobs, workers, total=len(cases), grace=GRACE, pulse=pulse)
+
+    return run
+
+
+def as_jobs(cases: Sequence[Case]) -> Iterator[Input]:
+    """Cases as workers take them."""
+    return ((case, case, case.solve.timeout_s) for case in cases)
 
 
 def wanted(studies: Sequence[Study]) -> dict[str, Case]:
@@ -177,6 +222,7 @@ def serving_both(first: Case, second: Case) -> Case:
     solve = replace(
         first.solve,
         error_bars=first.solve.error_bars or second.solve.error_bars,
+        horizon=first.solve.horizon or second.solve.horizon,
         timeout_s=max(first.solve.timeout_s, second.solve.timeout_s),
     )
     return replace(first, output=output, solve=solve)
@@ -185,7 +231,8 @@ def serving_both(first: Case, second: Case) -> Case:
 def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
     """How the jobs ended that need no new run: stored ones that serve, with intact files.
 
-    A case whose job is to be run again goes on keeping the time series that its job has.
+    A case whose job is to be run again goes on keeping the time series that its job has, as exact
+    as they are.
     """
     found = {}
     positions = store.rows.find(list(cases)).tolist()
@@ -194,7 +241,7 @@ def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
             end = store.status_at(position)
             if end.serves(case) and store.rows.intact(position):
                 found[key] = End(end.status, end.reason, end.detail)
-            elif end.samples and case.output.keep == "metrics":
+            elif end.samples and (case.output.keep == "metrics" or end.precision == "double"):
                 output = replace(case.output, keep="series", precision=end.precision)
                 cases[key] = replace(case, output=output)
     return found
@@ -239,10 +286,11 @@ def warm_up(cases: Sequence[Case], remark: Callable[[str], None]) -> None:
         remark(f"compiled in {seconds:.0f} s")
 
 
-def run_job(place: Path, case: Case) -> Outcome | StoreError:
+def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
     """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
 
-    A StoreError is returned: it ends the sweep, while an exception is a failure of the job.
+    Without a place, what is to be stored comes back. A StoreError is returned: it ends the sweep,
+    while an exception is a failure of the job.
     """
     from compressor import simulation  # needs numba: only where something is simulated
 
@@ -251,6 +299,11 @@ def run_job(place: Path, case: Case) -> Outcome | StoreError:
         if case.output.keep == "metrics":
             return simulation.measure(case)
         found, dataset = simulation.observe(case)
+    if found.reason == Reason.INVALID_INPUT:
+        return found
+    if place is None:
+        file, data = series_file(dataset, case.output)
+        return Carried(replace(found, series=file), data)
     try:
         return replace(found, series=write_series(place, dataset, case.output))
     except StoreError as error:
@@ -263,16 +316,5 @@ def settled(end: Done | Lost) -> Outcome:
         if isinstance(end.result, StoreError):
             raise end.result
         return end.result
-    case: Case = end.id
-    attributes = {
-        "key": case.key,
-        "physics_key": case.physics_key,
-        "name": case.name,
-        "case": json.dumps(case.values(), sort_keys=True),
-        "complete": 0,
-        "program": f"compsim {compressor.__version__}",
-        "detail": end.detail,
-    }
-    if end.traceback:
-        attributes["traceback"] = end.traceback
-    return Outcome("failed", end.reason, np.full(1, math.nan, ROW)[0], attributes)
+    more = {"traceback": end.traceback} if end.traceback else {}
+    return without_run(end.id, end.reason, end.detail, **more)

@@ -19,6 +19,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
+from compressor.reasons import Reason
+
 POSITION, SINCE = 0, 1  # the shared numbers: job of the batch that began last, since when (s)
 NONE_YET = -1.0  # in place of a position
 NOT_RUNNING = 0.0  # in place of a time: between two jobs
@@ -155,7 +157,7 @@ def do_batch(
         now = time.monotonic()
         answers.append(Answer(position, now - start, len(result), *failure))
         results.append(result)
-        if failure and failure[0] == "out_of_memory":
+        if failure and failure[0] == Reason.OUT_OF_MEMORY:
             tell(channel, answers, results, True)
             return False
         if now - told > REPORT_SECONDS:
@@ -170,9 +172,9 @@ def perform(work: Callable[[Any], Any], payload: bytes) -> tuple[Any, ...]:
     try:
         return (pickle.dumps(work(pickle.loads(payload)), pickle.HIGHEST_PROTOCOL),)
     except MemoryError:
-        return b"", "out_of_memory"
+        return b"", Reason.OUT_OF_MEMORY
     except BaseException as error:  # work may even call sys.exit
-        return b"", "internal_error", *described(error)
+        return b"", Reason.INTERNAL_ERROR, *described(error)
 
 
 def described(error: BaseException) -> tuple[str, str]:

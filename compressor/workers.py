@@ -28,6 +28,7 @@ from compressor.process import (
     start,
     start_method,
 )
+from compressor.reasons import Reason
 from compressor.worker import NONE_YET, NOT_RUNNING, POSITION, SINCE, Answer, Rules, described
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
@@ -58,8 +59,8 @@ class Done:
 class Lost:
     """A job that has no result.
 
-    `reason`: `worker_died`, `out_of_memory`, `budget_seconds`, or `internal_error`, with a
-    traceback, where the work raised an exception.
+    `reason`: WORKER_DIED, OUT_OF_MEMORY, BUDGET_SECONDS, or INTERNAL_ERROR, with a traceback,
+    where the work raised an exception.
     """
 
     id: Any
@@ -173,7 +174,7 @@ class Crew:
             try:
                 return Job(name, pickle.dumps(payload, pickle.HIGHEST_PROTOCOL), timeout)
             except Exception as error:
-                self.ready.append(Lost(name, "internal_error", *described(error)))
+                self.ready.append(Lost(name, Reason.INTERNAL_ERROR, *described(error)))
         return None
 
     def finish(self, job: Job, answer: Answer, result: bytes) -> None:
@@ -182,7 +183,7 @@ class Crew:
         known = min(self.weight, MEMORY)
         self.mean = (known * self.mean + answer.seconds) / (known + 1)
         self.weight = known + 1
-        if answer.reason == "out_of_memory":
+        if answer.reason == Reason.OUT_OF_MEMORY:
             most = f"{self.rules.memory / 1e9:.3g} GB"
             self.suspect(job, answer.reason, f"needs more than the {most} that a worker may add")
         elif answer.reason:
@@ -191,7 +192,7 @@ class Crew:
             try:
                 self.ready.append(Done(job.id, pickle.loads(result), answer.seconds))
             except Exception as error:
-                self.ready.append(Lost(job.id, "internal_error", *described(error)))
+                self.ready.append(Lost(job.id, Reason.INTERNAL_ERROR, *described(error)))
 
     def suspect(self, job: Job, reason: str, detail: str) -> None:
         """Try a job once more, alone; a second time it is lost."""
@@ -286,12 +287,12 @@ class Crew:
         elif job is None:
             return
         elif worker.killed == math.inf:
-            self.suspect(job, "worker_died", how)
+            self.suspect(job, Reason.WORKER_DIED, how)
         elif since != NOT_RUNNING and worker.killed - since > job.timeout:
             detail = f"more than {job.timeout:g} s of wall time; its worker was killed"
-            self.ready.append(Lost(job.id, "budget_seconds", detail))
+            self.ready.append(Lost(job.id, Reason.BUDGET_SECONDS, detail))
         else:
-            self.suspect(job, "worker_died", "its worker stood still and was killed")
+            self.suspect(job, Reason.WORKER_DIED, "its worker stood still and was killed")
 
     def dismiss(self, workers: list[Worker]) -> None:
         """Kill workers, wait for their ends, and take in what they had sent."""

@@ -12,6 +12,7 @@ import os
 import re
 import socket
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -25,6 +26,7 @@ MOST_ROWS = 4096  # in a segment that is written at once; one with fewer is smal
 MOST_AGE = 1.0  # s between two writings, if they are small
 MOST_SMALL = 32  # small segments before they are merged
 FEW_SMALL = 8  # that may stay when the writer ends
+PATIENCE = 1.0  # s for which a lock's holder may leave its file empty
 SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}")
 LOCK_NAME = "writer.lock"
 
@@ -55,17 +57,20 @@ class Writer:
     def __enter__(self) -> "Writer":
         self.lock = _locked(self.place / LOCK_NAME, self.wait, self.command)
         try:
-            discard_leftovers(self.folder)
+            discard_leftovers(self.place)
             self.found = read_store(self.folder)
             self.number = max(map(_number, self._all_paths()), default=0)
-            if self.found.damaged:
-                self._set_damage_aside()
+            damaged = self._damaged(self.place)
+            if damaged:
+                _set_aside(damaged)
             else:
                 self._discard_unheard_of()
+            if self.place == self.folder:
+                self._mend_idle_shards()
             mine = (s for s in self.found.segments if s.place == self.place)
             self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
         except BaseException:
-            os.close(self.lock)
+            _release(self.lock)
             raise
         return self
 
@@ -81,7 +86,7 @@ class Writer:
                 if not kind and len(self.small) > FEW_SMALL:
                     self._merge_small()
         finally:
-            os.close(self.lock)
+            _release(self.lock)
 
     def add(self, outcome: Outcome) -> list[str]:
         """Take an outcome in, with a file of time series that is stored already."""
@@ -137,11 +142,20 @@ class Writer:
     def _all_paths(self) -> list[Path]:
         return [path for place in places(self.folder) for path in segment_paths(place)]
 
-    def _set_damage_aside(self) -> None:
-        """Rename damaged segments, so that nobody reads them again; their jobs count as missing."""
-        for damage in self.found.damaged:
-            with contextlib.suppress(FileNotFoundError):
-                os.rename(damage.path, f"{damage.path}.damaged")
+    def _damaged(self, place: Path) -> list[Path]:
+        """The segments of a place that were damaged when this writer began."""
+        paths = [Path(damage.path) for damage in self.found.damaged]
+        return [path for path in paths if path.parent.parent == place]
+
+    def _mend_idle_shards(self) -> None:
+        """Set damage of shards aside where nobody writes; others do it when they next begin."""
+        for place in places(self.folder)[1:]:
+            damaged = self._damaged(place)
+            if damaged:
+                with contextlib.suppress(StoreError):  # another process writes there
+                    lock = _locked(place / LOCK_NAME, False, self.command)
+                    _set_aside(damaged)
+                    os.close(lock)
 
     def _discard_unheard_of(self) -> None:
         """Remove time series that no row tells of: replaced, or never acknowledged."""
@@ -153,9 +167,24 @@ class Writer:
                 path.unlink()
 
 
+def _set_aside(paths: Iterable[Path]) -> None:
+    """Rename damaged segments, so that nobody reads them again; their jobs count as missing."""
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError):
+            os.rename(path, f"{path}.damaged")
+
+
 def _number(path: Path) -> int:
     """The number of a segment, from its name."""
     return int(path.name.partition("-")[0])
+
+
+def _holder(descriptor: int) -> str:
+    """Who holds a lock, from its file; who took it just now is about to say so."""
+    deadline = time.monotonic() + PATIENCE
+    while not (text := os.pread(descriptor, 1000, 0)) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return text.decode(errors="replace").strip() or "another process"
 
 
 def _locked(path: Path, wait: bool, command: str) -> int:
@@ -166,7 +195,7 @@ def _locked(path: Path, wait: bool, command: str) -> int:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         except BlockingIOError as error:
-            holder = os.read(descriptor, 1000).decode(errors="replace").strip()
+            holder = _holder(descriptor)
             os.close(descriptor)
             remedy = "wait for it to end, or choose another folder"
             raise StoreError(path, f"the store is in use by {holder}", remedy) from error
@@ -177,3 +206,10 @@ def _locked(path: Path, wait: bool, command: str) -> int:
     except OSError as error:
         raise system_error(path, error) from error
     return descriptor
+
+
+def _release(descriptor: int) -> None:
+    """Give a lock back, and take our name off it first: the next holder is not us."""
+    with contextlib.suppress(OSError):
+        os.ftruncate(descriptor, 0)
+    os.close(descriptor)

@@ -4,6 +4,7 @@ import fcntl
 import os
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
@@ -14,6 +15,9 @@ from compressor.schema import NUMBERS, ROW, Outcome
 from compressor.simulation import simulate
 from compressor.store import finished_keys, read_store, write_series, write_study
 from compressor.writer import Writer
+
+hypothesis.settings.register_profile("untimed", deadline=None)  # other work shares the machine
+hypothesis.settings.load_profile("untimed")
 
 CONFIGS = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))
 

@@ -8,6 +8,7 @@ cases in one process and is doubled for two cores.
 """
 
 import json
+import math
 import statistics
 import subprocess
 import sys
@@ -58,7 +59,7 @@ def starting():
 
 def many(jobs):
     """A study of big-end jobs without time series, as a case file."""
-    side = round(jobs**0.5)
+    side = next(n for n in range(math.isqrt(jobs), 0, -1) if jobs % n == 0)
     return json.dumps(
         {
             "name": "many",

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from compressor.case import table
 from compressor.parameter import parameter_table
+from compressor.reasons import reason_table
 
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "tests" / "results"
@@ -246,8 +247,127 @@ def throughput_table():
     return "\n".join(lines) + "\n"
 
 
+def scale_table():
+    found = kept("scale.json")
+    lines = ["| whole process | seconds | peak memory, MB |", "|---|---|---|"]
+    lines += [
+        f"| {name} | {one['seconds']:.2g} | {one['peak_MB']} |"
+        for name, one in found["processes"].items()
+    ]
+    sizes = " and ".join(f"{size / 1e6:.0f} MB" for size in found["bytes"].values())
+    lines += ["", f"{found['jobs']:,} jobs; their metrics are {sizes} of CSV and netCDF."]
+    return "\n".join(lines) + "\n"
+
+
+MILLION = 10**6
+
+
+def million_table():
+    """What a million jobs take, from the measured costs of one."""
+    sweep, stored = kept("throughput.json")["sweep"], kept("store.json")
+    rows = stored["rows"]
+    core_s = sweep["workers"] / sweep["jobs_per_s"]
+    segments = rows["segments"] * MILLION // rows["jobs"]
+    lines = [
+        "| kept of each job | GB | files | hours on 2 cores | minutes on 8 nodes of 32 cores |",
+        "|---|---|---|---|---|",
+    ]
+    none = {"bytes": 0, "write_ms": 0.0}
+    for series in (None, *stored["series"]):
+        size, wait = (series or none)["bytes"], (series or none)["write_ms"] / 1e3
+        words = "metrics"
+        if series:
+            words = f"series, {series['precision']}" + (", gzip" if series["compress"] else "")
+        total = (size + rows["bytes_a_job"]) * MILLION / 1e9
+        files = segments + (MILLION if series else 0)
+        hours = MILLION * (core_s + wait) / 3600
+        lines.append(
+            f"| {words} | {total:.3g} | {files:,} | {hours / 2:.2g} | {60 * hours / 256:.2g} |"
+        )
+    expanding = sweep["again_s"] * MILLION / sweep["jobs"] / 60
+    lines += [
+        "",
+        f"Behind it: {1e3 * core_s:.1f} ms of a core a job (big end, no error bars), the time to "
+        f"write its file, {rows['bytes_a_job']} bytes a row. Reading a case file of a million jobs "
+        f"and looking up which are stored takes each run some {expanding:.0f} minutes more.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def sweep_table():
+    found = kept("sweep.json")
+    lines = [
+        "| killed after | SIGKILL of | jobs it had told of | jobs stored |",
+        "|---|---|---|---|",
+    ]
+    for kill in found["kills"]:
+        of = "parent and workers" if kill["of"] == "all" else "parent"
+        lines.append(f"| {kill['after_s']:.0f} s | {of} | {kill['told']:,} | {kill['stored']:,} |")
+    peaks = found["peak_MB"]
+    lines += [
+        "",
+        f"{found['jobs']:,} big-end jobs without time series or error bars on {found['workers']} "
+        f"workers: {found['wall_s']:.0f} s undisturbed, {found['jobs_per_s']:.0f} jobs a second; "
+        f"{found['last_run_s']:.0f} s for what was left after the last kill. The resumed store is "
+        f"complete and equals the undisturbed one to the bit, timings apart: "
+        f"{found['bytes'] / found['jobs']:.0f} bytes a job, {found['bytes'] / 1e6:.1f} MB in "
+        f"{found['files']} files; `open_study` takes {found['open_study_s']:.2g} s. Resident "
+        f"memory peaks at {peaks['parent']} MB in the parent, {peaks['worker']} MB in a worker.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def ladders_table():
+    rows = kept("ladders.json")["ladder"]
+    scenes = [*dict.fromkeys(row["scene"] for row in rows)]
+    names = [scene.replace("_", " ") for scene in scenes]
+    head = ["rtol", *(f"{what}, {name}" for what in ("acceleration", "residual") for name in names)]
+    lines = []
+    for rtol in dict.fromkeys(row["rtol"] for row in rows):
+        rung = {row["scene"]: row for row in rows if row["rtol"] == rtol}
+        lines.append([f"{rtol:.0e}"] + [
+            f"{rung[scene][name]:.1e}"
+            for name in ("error_acceleration", "energy_residual") for scene in scenes
+        ])  # fmt: skip
+    return markdown(head, lines)
+
+
+def limit_table():
+    measured = kept("ladders.json")
+    head = ["joint", "slope", "by decade", "deviation / c at 1 mm", "at 1 nm",
+            "energy residual / bound, worst"]  # fmt: skip
+    lines = []
+    for scene, slope in measured["slopes"].items():
+        rows = [row for row in measured["limit"] if row["scene"] == scene]
+        ends = [f"{row['deviation'] / row['clearance']:.3g}" for row in (rows[0], rows[-1])]
+        decades = f"{slope['least']:.3f} to {slope['greatest']:.3f}"
+        worst = f"{max(row['residual'] for row in rows):.2g}"
+        name = scene.replace("_", " ")
+        lines.append([name, f"{slope['fitted']:.3f}", decades, *ends, worst])
+    return markdown(head, lines)
+
+
+def chaotic_table():
+    head = ["scene", "horizon", "acceleration within", "beyond", "statistic", "means",
+            "apart by"]  # fmt: skip
+    lines = []
+    for scene, row in kept("chaotic.json")["scenes"].items():
+        (other,) = row["others"]
+        first = [scene, f"{row['horizon_rev']:.2g} rev", f"{other['within']:.1e}",
+                 f"{other['beyond']:.2g}"]  # fmt: skip
+        for name, apart in other["standard_errors"].items():
+            means = (row["means"][method][name] for method in (row["against"], other["method"]))
+            text = ", ".join(f"{mean:.3g} ± {error:.1g}" for mean, error in means)
+            lines.append([*first, name.replace("_", " "), text, f"{apart:.1f} s.e."])
+            first = [""] * len(first)
+        lines.append([*first, "distribution of peaks", "",
+                      f"{other['peaks_distance']:.2f} (Kolmogorov-Smirnov)"])  # fmt: skip
+    return markdown(head, lines)
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
+    "reasons": reason_table,
     "accuracy": accuracy_table,
     "bars": bars_table,
     "missed": missed_table,
@@ -256,9 +376,15 @@ TABLES = {
     "store": store_table,
     "peers": peers_table,
     "throughput": throughput_table,
+    "scale": scale_table,
+    "million": million_table,
+    "sweep": sweep_table,
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,
+    "ladders": ladders_table,
+    "limit": limit_table,
+    "chaotic": chaotic_table,
 }
 
 

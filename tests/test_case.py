@@ -126,6 +126,13 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
     ("values", "key", "message"),
     [
         ({"machine": {"crank_radius_mm": 600}}, "machine.crank_radius_mm", "shorter than the rod"),
+        ({"joint": "both", "clearance_mm": 5, "machine": {"rod_length_mm": 129}},
+         "machine.crank_radius_mm", "120 mm and 10 mm of clearance, must be shorter than the rod"),
+        ({**BIG_END, "initial_offset_mm": {"big_end_x": 0.9, "big_end_y": 0.9}},
+         "initial_offset_mm.big_end_x", "by 1.27279 mm, 1.17 mm into its bearing"),
+        ({"load": "typical", "joint": "both", "clearance_mm": 0.3,
+          "gas": {"head_clearance_mm": 0.6, **EXACT_GAS}},
+         "gas.head_clearance_mm", "0.6 mm does not exceed the clearances, 0.6 mm in all"),
         ({"machine": {"rod_centre_mm": 601}}, "machine.rod_centre_mm", "beyond"),
         ({"machine": {"rod_mass_kg": 1e6, "rod_length_mm": 1e6}},
          "machine.rod_inertia_kg_m2", "m L^2 / 12 of the rod: 8.33333e+10 is outside"),
@@ -172,6 +179,8 @@ def test_values_that_do_not_fit_each_other(values, key, message):
         {"load": "typical", "gas": {"piston_radius_mm": 60, "back_pressure_MPa": 0.1}},
         {"friction": False},
         {"joint": "both", "clearance_mm": 0},
+        {**BIG_END, "initial_offset_mm": {"big_end_x": 1.09, "small_end_x": 5}},
+        {"joint": "both", "clearance_mm": 0.3, "gas": {"head_clearance_mm": 0.6}},
     ],
 )
 def test_values_that_fit(values):
@@ -302,3 +311,12 @@ def test_any_number_is_either_refused_or_reads_back(joint, numbers):
     except CaseError:
         return
     assert Case.from_values(case.values()) == case
+
+
+def test_groups_that_are_alike_are_shared_but_not_with_other_types():
+    values = {"machine": {"gravity_m_per_s2": 1}, "solve": {"duration_rev": 2}}
+    one, same = Case.from_values(values), Case.from_values(values)
+    assert one.solve is same.solve
+    with pytest.raises(CaseError, match="needs a number, not true"):
+        Case.from_values({"machine": {"gravity_m_per_s2": True}})
+    assert Case.from_values(values | {"machine": {"gravity_m_per_s2": 1.0}}) == one

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -242,11 +243,28 @@ def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
     assert cli.main(["verify"]) == 5
     out, err = capsys.readouterr()
     key = file.name[:20]
-    assert out == f"{file}: is damaged\n  job {key}\n"
-    assert err.startswith("1 damaged file, 1 job lost; to mend: compsim run CONFIG...")
+    (load,) = (case.load for case in load_cases("two.yaml") if case.key == key)
+    assert out == f"{file}: is damaged\n  job {key}\n    in two load={load}\n"
+    mend = f"compsim run {os.path.abspath('two.yaml')} -o results"
+    assert err == f"1 damaged file, 1 job lost\nto mend: {mend}\n"
     assert cli.main(["verify", "--json"]) == 5
     out, _ = capsys.readouterr()
-    assert json.loads(out) == [{"path": str(file), "problem": "is damaged", "jobs": [key]}]
+    (found,) = json.loads(out)
+    assert (found["path"], found["problem"], found["jobs"]) == (str(file), "is damaged", [key])
+    assert found["studies"] == {key: {"two": {"load": load}}}
+    assert cli.main([*shlex.split(mend)[1:], "-j", "1", "--quiet"]) == 0
+    assert cli.main(["verify"]) == 0
+
+
+def test_verify_tells_how_a_damaged_study_is_mended(case_file, capsys):
+    case_file("two.yaml", load=["none", "design"])
+    assert cli.main(["run", "two.yaml", "-j", "1", "--quiet"]) == 0
+    Path("results/studies/two.json").write_text("{}")
+    capsys.readouterr()
+    assert cli.main(["verify"]) == 5
+    assert "two.json: is damaged, or of another version of compsim; run its case file again" in (
+        capsys.readouterr().out
+    )
     assert cli.main(["run", "two.yaml", "-j", "1", "--quiet"]) == 0
     assert cli.main(["verify"]) == 0
 

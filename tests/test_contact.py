@@ -9,13 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from compressor.case import Case
-from compressor.physics.contact import (
-    contact_stiffness,
-    friction_coefficient,
-    impact,
-    joint_contact,
-    step,
-)
+from compressor.physics.contact import friction_coefficient, impact, joint_contact, rise
+from compressor.physics.materials import contact_stiffness
 from compressor.record import record
 
 K = 3.36e5 * 1000**1.5
@@ -26,21 +21,19 @@ def law(**values):
     return record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **values}))
 
 
-@given(finite, finite, st.floats(1e-6, 1e3), finite, finite)
-def test_step_stays_between_its_ends(x, x0, width, h0, h1):
-    value = step(x, x0, h0, x0 + width, h1)
-    assert min(h0, h1) <= value <= max(h0, h1)
+@given(finite)
+def test_rise_stays_between_its_ends(s):
+    assert 0.0 <= rise(s) <= 1.0
 
 
-@given(st.floats(0, 1), finite, finite)
-def test_step_is_symmetric_about_its_middle(s, h0, h1):
-    one, other = step(s, 0.0, h0, 1.0, h1), step(1.0 - s, 0.0, h0, 1.0, h1)
-    assert one + other == pytest.approx(h0 + h1, abs=1e-9)
+@given(st.floats(0, 1))
+def test_rise_is_symmetric_about_its_middle(s):
+    assert rise(s) + rise(1.0 - s) == pytest.approx(1.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("x", "h"), [(-1, 2), (0, 2), (0.25, 2.46875), (0.5, 3.5), (1, 5), (9, 5)])
-def test_step_values(x, h):
-    assert step(x, 0.0, 2.0, 1.0, 5.0) == pytest.approx(h)
+@pytest.mark.parametrize(("s", "h"), [(-1, 0), (0, 0), (0.25, 0.15625), (0.5, 0.5), (1, 1), (9, 1)])
+def test_rise_values(s, h):
+    assert rise(s) == pytest.approx(h)
 
 
 @given(st.floats(-10, 10))

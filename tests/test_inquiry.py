@@ -1,6 +1,7 @@
 """What a store says of its studies and jobs: `compsim status` and `compsim show`."""
 
 import json
+import shlex
 
 import pytest
 from compsim import cli
@@ -59,6 +60,14 @@ def test_show_tells_how_a_job_ended(mix, capsys):
     out = capsys.readouterr().out
     assert "failed: budget_steps: more than 5 steps" in out
     assert "what to do: raise solve.max_steps" in out
+    lines = [line.split() for line in out.split("\n")]
+    (stopped,) = (words for words in lines if words[:1] == ["stopped"])
+    assert 0 < float(stopped[2]) < 0.03
+    assert float(stopped[4]) == pytest.approx(float(stopped[2]) * 3000, rel=1e-3)
+    assert len([words for words in lines if words[:2] == ["x", "deviation,"]]) in (1, 2)
+    steps = [words for words in lines if words[:1] == ["step"]]
+    assert len(steps) == 5
+    assert "TSIT5" in steps[0]
     assert cli.main(["show", by_end["missing"]]) == 0
     out, err = capsys.readouterr()
     assert "not run yet" in out
@@ -83,3 +92,18 @@ def test_a_job_must_be_told_apart(mix, beginning, problem, capsys):
 def test_a_folder_without_results_is_an_error(tmp_path, capsys):
     assert cli.main(["status", "-i", str(tmp_path)]) == 5
     assert str(tmp_path) in capsys.readouterr().err
+
+
+def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys):
+    """What was set on the command line is part of them, and so is a raised limit."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "one case.yaml").write_text(json.dumps({"name": "one", "solve": SHORT}))
+    setting = ["--set", "joint=big_end", "--set=clearance_mm=[0.1, 0.2]"]
+    command = ["run", "one case.yaml", "-j", "1", "--quiet", *setting, "--max-jobs", "20000"]
+    assert cli.main([*command, "--only", "clearance_mm < 0.15"]) == 0
+    capsys.readouterr()
+    assert cli.main(["status"]) == 0
+    next_run = capsys.readouterr().err.removeprefix("next: ").strip()
+    assert next_run.endswith("--max-jobs 20000")
+    assert cli.main([*shlex.split(next_run)[1:], "--quiet", "-j", "1"]) == 0
+    assert standings("results")[0].missing == 0

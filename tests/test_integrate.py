@@ -1,14 +1,16 @@
 """Integration against an independent reference, a second method, energy and limits."""
 
+import time
+
 import numpy as np
 import pytest
 import reference
 
 from compressor.case import ACCURACY, METHODS, Case
-from compressor.integrate import absolute_tolerances, cut
+from compressor.integrate import CHUNK, COMPILED, absolute_tolerances, cut
 from compressor.physics.parameters import FREEDOMS
 from compressor.record import record, scene
-from compressor.simulation import simulate
+from compressor.simulation import measure, simulate
 
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
 
@@ -147,7 +149,55 @@ def test_tolerances_scale_with_the_clearance(joint):
 def test_settling_at_a_corner_makes_no_segment_of_rounding():
     edges, phases = np.array([0.0, 0.1, 0.2, 0.4]), np.array([0, 1, 2])
     assert cut(edges, phases, 0.1 + 1e-17)[2] == 0.1
-    for time in (0.1, np.nextafter(0.1, 1), 0.0, 0.4, 0.9):
-        assert cut(edges, phases, time)[0] is edges
+    for at in (0.1, np.nextafter(0.1, 1), 0.0, 0.4, 0.9):
+        assert cut(edges, phases, at)[0] is edges
     found = cut(edges, phases, 0.3)
     assert [part.tolist() for part in found[:2]] == [[0, 0.1, 0.2, 0.3, 0.4], [0, 1, 2, 2]]
+
+
+class Clock:
+    """A clock that moves on by a second whenever it is read."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        self.now += 1.0
+        return self.now
+
+
+EXTREMES = {
+    "stiff contact": {"contact": {"stiffness_N_per_mm15": 3.36e11}},
+    "sticking": {"friction": {"stiction_velocity_mm_per_s": 1e-3}},
+    "fast": {"machine": {"speed_rpm": 2e4}, "contact": {"stiffness_N_per_mm15": 3.36e9}},
+    "light": {"machine": {"rod_mass_kg": 1e-3, "reciprocating_mass_kg": 1e-3}},
+}
+LOOKS = 6  # at the clock, a second each, the first before anything is done
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "RODAS", "LSODA", "Radau", "DOP853"])
+@pytest.mark.parametrize("extreme", EXTREMES)
+def test_the_clock_is_looked_at_however_hard_the_case(extreme, method, monkeypatch):
+    """Every method stops at the first look past its time, with little done between two looks."""
+    monkeypatch.setattr(time, "monotonic", Clock())
+    solve = {"rtol": 1e-9, "method": method, "timeout_s": LOOKS - 0.5, "error_bars": False,
+             "duration_rev": 40, "settle_rev": 0, "output_step_deg": 3.6}  # fmt: skip
+    values = {"joint": "both", "clearance_mm": 0.2, "output": {"keep": "metrics"}}
+    found = measure(Case.from_values({**values, **EXTREMES[extreme], "solve": solve}))
+    assert found.reason == "budget_seconds"
+    between = CHUNK if method in COMPILED else 256
+    done = found.numbers["steps"] + found.numbers["rejected"]
+    assert 0 < done <= LOOKS * between
+    assert found.numbers["evaluations"] <= LOOKS * between * (26 if method in COMPILED else 1)
+
+
+def test_the_ideal_machine_keeps_its_time_too(monkeypatch):
+    monkeypatch.setattr(time, "monotonic", Clock())
+    solve = {"duration_rev": 200, "settle_rev": 0, "timeout_s": 2.5, "output_step_deg": 3.6}
+    found = simulate(Case.from_values({"solve": solve}))
+    assert found["reason"].item() == "budget_seconds"
+    stop = found.attrs["stop_time"]
+    assert 0 < stop < 24
+    assert (
+        np.isfinite(found["acceleration"].values).tolist() == (found["time"] < stop).values.tolist()
+    )

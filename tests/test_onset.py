@@ -13,7 +13,7 @@ from compressor.integrate import COMPILED as METHODS
 from compressor.integrate import CONTACT_STEP, natural_sizes, scales
 from compressor.physics._jit import ENABLED
 from compressor.physics.contact import Contact, impact, nearness
-from compressor.physics.kinematics import ideal
+from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
 from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.motion import evaluate, start
@@ -225,7 +225,7 @@ def flown(t, y, time, phase, p):
     for i in range(count):
         new = np.zeros(z.size)
         derivative_with_flows(t + i * h, z, phase, p, k[0])
-        take_step(Pair.DOPRI5, t + i * h, h, z, k, phase, p, new, row)
+        take_step(Pair.DOPRI5, crank_direction(t + i * h, p), h, z, k, phase, p, new, row)
         z = new
     return z[: y.size]
 

@@ -1,5 +1,6 @@
 """What the README says is executed or compared."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -10,7 +11,9 @@ import readme_tables
 from measure_tradeoff import fingerprint
 
 import compressor
-from compressor.plan import load_studies
+from compressor.axes import FORMS
+from compressor.case_schema import case_schema
+from compressor.plan import MAX_JOBS, load_studies
 
 README = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
 MAKEFILE = (readme_tables.ROOT / "Makefile").read_text(encoding="utf-8")
@@ -66,8 +69,8 @@ def write_case_files(place):
 def test_case_files_have_the_jobs_that_they_say(tmp_path):
     jobs = write_case_files(tmp_path)
     assert [*jobs] == [
-        "bearing-wear.yaml", "grid.yaml", "zipped.yaml", "sampled.yaml", "bounded.yaml",
-        "blocks.yaml",
+        "bearing-wear.yaml", "grid.yaml", "zipped.yaml", "random.yaml", "latin.yaml",
+        "sampled.yaml", "bounded.yaml", "blocks.yaml",
     ]  # fmt: skip
     for name, count in jobs.items():
         (study,) = load_studies(tmp_path / name)
@@ -77,6 +80,36 @@ def test_case_files_have_the_jobs_that_they_say(tmp_path):
         (0.1, 0.2, 0.3), (300.0, 400.0, 500.0), (2.0, 8.0)
     ]  # fmt: skip
     assert [axis.values[::2] for axis in zipped.axes[:2]] == [(0.1, 0.2), (400.0, 500.0)]
+    random, latin = (load_studies(tmp_path / f"{n}.yaml")[0] for n in ("random", "latin"))
+    assert 5 <= sum(size < 0.1 for size in random.axes[0].values) <= 15
+    assert sorted((value - 300) // 60 for value in latin.axes[1].values) == [*range(10)]
+
+
+PLANS = re.findall(r"^compsim (plan .*?)  +# (\d+) jobs", README, re.MULTILINE)
+
+
+@pytest.mark.parametrize(("command", "jobs"), PLANS)
+def test_plans_have_the_jobs_that_they_say(command, jobs, tmp_path, monkeypatch):
+    write_case_files(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    _, path, *words = shlex.split(command)
+    given = dict(zip(words[::2], words[1::2], strict=True))
+    (study,) = load_studies(
+        path,
+        overrides=[given["--set"]] if "--set" in given else [],
+        only=given.get("--only", ""),
+        max_jobs=int(given.get("--max-jobs", MAX_JOBS)),
+    )
+    assert len(study.selected) == int(jobs)
+
+
+def test_every_feature_of_the_grammar_has_an_example():
+    files = "".join(blocks("yaml"))
+    features = [*FORMS, "zip", "exclude", "blocks", "sample", "log"]
+    assert [word for word in features if not re.search(rf"\b{word}:", files)] == []
+    assert {word for command, _ in PLANS for word in command.split()} > {
+        "--set", "--only", "--max-jobs"
+    }  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -88,12 +121,15 @@ def folder(tmp_path_factory):
     for command in (line for text in blocks("console") for line in text.splitlines()):
         if not command.startswith("compsim "):
             continue
-        words = shlex.split(command)
+        command, _, target = command.partition(" > ")
+        words = shlex.split(command, comments=True)
         words = [w for word in words for w in expanded(place, word)]
         more = QUICK if words[1] == "run" else []
         call = [sys.executable, "-m", "compsim", *words[1:], *more]
         done = subprocess.run(call, cwd=place, capture_output=True, text=True)
         assert done.returncode == 0, f"{command}\n{done.stderr}"
+        if target:
+            (place / target).write_text(done.stdout, encoding="utf-8")
     return place
 
 
@@ -102,6 +138,10 @@ def test_console_commands_work(folder):
     assert (folder / "report" / "index.html").exists()
     assert len(list((folder / "results" / "jobs").glob("*.h5"))) == 11
     assert (folder / "wear-report" / "index.html").exists()
+    assert len((folder / "big-end.csv").read_text(encoding="utf-8").splitlines()) == 4
+    assert len(list((folder / "exported").glob("*/*.csv"))) == 11
+    schema = (folder / "compsim.schema.json").read_text(encoding="utf-8")
+    assert json.loads(schema) == case_schema()
 
 
 @pytest.mark.slow

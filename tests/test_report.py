@@ -16,6 +16,7 @@ from compressor.analysis import paper_cases
 from compressor.case import Case
 from compressor.manifest import encode
 from compressor.plan import load_cases
+from compressor.reasons import Reason
 from compressor.report import find_paper_runs, paper_candidates, write_report
 from compressor.store import StoreError, finished_keys, read_job, read_store, read_studies
 
@@ -342,6 +343,7 @@ def test_a_study_whose_jobs_all_broke_has_a_page(own, tmp_path):
     write_report(own, tmp_path / "out")
     found = read(tmp_path / "out")
     assert found.text.count("internal_error: ValueError: a bug") == 4
+    assert found.text.count(f"internal_error: {Reason.INTERNAL_ERROR.remedy}") == 1
     assert not found.sources
 
 

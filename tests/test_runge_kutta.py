@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from compressor.case import Case
+from compressor.physics.kinematics import crank_direction
 from compressor.physics.observe import COLUMNS, derivative_with_flows
 from compressor.physics.runge_kutta import (
     FLOWS,
@@ -15,6 +16,7 @@ from compressor.physics.runge_kutta import (
     Pair,
     extend,
     interpolate,
+    midway,
     take_step,
 )
 from compressor.record import record
@@ -33,7 +35,7 @@ def flow(pair, steps, k=None):
     h = SPAN / steps
     for i in range(steps):
         derivative_with_flows(BEGIN + i * h, z, 3, FLIGHT, k[0])
-        take_step(pair, BEGIN + i * h, h, z, k, 3, FLIGHT, new, ROW)
+        take_step(pair, crank_direction(BEGIN + i * h, FLIGHT), h, z, k, 3, FLIGHT, new, ROW)
         z[:] = new
     return z
 
@@ -60,6 +62,16 @@ def test_dense_output_ends_at_the_step(pair):
 
 
 @pytest.mark.parametrize("pair", Pair)
+def test_the_middle_of_a_step_is_the_interpolants(pair):
+    k = np.sin(np.arange(7.0 * 12)).reshape(STAGES, 12)
+    z, dense, y, middle = np.arange(12.0), np.zeros((5, 8)), np.zeros(8), np.zeros(8)
+    extend(pair, 0.3, z, k, dense)
+    interpolate(0.5, dense, y)
+    midway(pair, 0.3, z, k, middle)
+    assert middle == pytest.approx(y, rel=1e-13)
+
+
+@pytest.mark.parametrize("pair", Pair)
 def test_order_of_convergence(pair):
     exact = flow(pair, 512)
     errors = [np.abs(flow(pair, n) - exact)[:8].max() for n in (6, 12, 24)]
@@ -75,14 +87,14 @@ def test_order_of_dense_output(pair):
         z[4:8] = 0.1, -0.2, 0.3, 0.5
         k, new, y = np.zeros((STAGES, z.size)), np.zeros(z.size), np.zeros(8)
         derivative_with_flows(BEGIN, z, 3, FLIGHT, k[0])
-        take_step(pair, BEGIN, h, z, k, 3, FLIGHT, new, ROW)
+        take_step(pair, crank_direction(BEGIN, FLIGHT), h, z, k, 3, FLIGHT, new, ROW)
         dense = np.zeros((5, 8))
         extend(pair, h, z, k, dense)
         interpolate(0.4, dense, y)
         exact = np.zeros(z.size)
         inner = np.zeros_like(k)
         derivative_with_flows(BEGIN, z, 3, FLIGHT, inner[0])
-        take_step(pair, BEGIN, 0.4 * h, z, inner, 3, FLIGHT, exact, ROW)
+        take_step(pair, crank_direction(BEGIN, FLIGHT), 0.4 * h, z, inner, 3, FLIGHT, exact, ROW)
         errors.append(np.abs(y - exact[:8]).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders == pytest.approx(5, abs=0.35)  # the local error of an extension of order 4

@@ -2,11 +2,12 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.case import Case, Machine, Output, PerJoint, Solve
 from compressor.schema import NUMBERS
 from compressor.simulation import SERIES, measure, simulate
 
@@ -106,7 +107,7 @@ def test_zero_clearance_is_the_ideal_joint():
         (
             {  # at the second top dead centre the piston is flung past the cylinder head
                 "load": "typical",
-                "gas": {"head_clearance_mm": 0.01, "switching": "exact"},
+                "gas": {"head_clearance_mm": 0.601, "switching": "exact"},
                 "solve": {"duration_rev": 1.25},
             },
             "non_finite",
@@ -129,3 +130,30 @@ def test_a_run_that_cannot_go_on_says_why(values, reason, method):
     assert kept[0]
     assert not kept[-1]
     assert (np.diff(kept.astype(int)) <= 0).all()  # nothing after the stop
+
+
+@pytest.mark.parametrize(
+    ("case", "told"),
+    [
+        (Case(machine=Machine(rod_mass_kg=-1.0)), "machine.rod_mass_kg: -1 is outside (0, 1e+06]"),
+        (Case(machine=Machine(speed_rpm=0.0)), "machine.speed_rpm: 0 is outside"),
+        (Case(machine=Machine(rod_length_mm=math.nan)), "machine.rod_length_mm: must be finite"),
+        (Case(joint="big_end", clearance_mm=PerJoint(11.0)), "exceeds the pin radius, 10 mm"),
+        (replace(Case.from_values({}), solve=Solve(settle_rev=9.0)), "leave nothing of a run"),
+    ],
+)
+def test_a_case_made_in_python_is_checked_before_it_runs(case, told):
+    for found in (simulate(case), simulate(replace(case, output=Output("metrics")))):
+        assert (str(found.status.values), str(found.reason.values)) == ("failed", "invalid_input")
+        assert told in found.attrs["detail"]
+        assert found.attrs["complete"] == 0
+        assert np.isnan(found.peak_acceleration)
+    assert measure(case).reason == "invalid_input"
+
+
+def test_a_case_made_in_python_of_good_values_runs():
+    made = Case(joint="big_end", clearance_mm=PerJoint(0.2), solve=Solve(**SHORT))
+    assert made.problems == ()
+    assert measure(made).numbers["peak_acceleration"] == run(
+        joint="big_end", clearance_mm=0.2
+    ).peak_acceleration  # fmt: skip

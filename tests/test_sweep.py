@@ -9,6 +9,7 @@ import pytest
 
 import compressor.simulation
 import compressor.sweep
+import compressor.writer
 from compressor import store
 from compressor.case import Case
 from compressor.plan import load_studies
@@ -159,6 +160,36 @@ def test_series_that_were_rounded_do_not_serve_for_exact_ones(studies, tmp_path)
     exact = store.read_job(tmp_path / "out", single[0].cases[0].key)
     assert exact.acceleration.dtype == "f8"
     assert len(list(tmp_path.glob("out/jobs/*"))) == 1
+
+
+def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path):
+    sweep(studies(one={}), tmp_path / "out", 1)
+    for rough in ({"keep": "metrics"}, {"precision": "single"}):
+        (path,) = tmp_path.glob("out/jobs/*")
+        path.write_bytes(b"")
+        made = studies(one={"output": rough})
+        assert sweep(made, tmp_path / "out", 1).run_now == 1
+        assert sweep(made, tmp_path / "out", 1).run_now == 0
+        job = store.read_job(tmp_path / "out", made[0].cases[0].key)
+        assert job.acceleration.dtype == "f8"
+        assert verify(tmp_path / "out") == []
+
+
+def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypatch):
+    """A shard keeps the time series of a job that another run, which ends later, runs without."""
+    monkeypatch.setattr(compressor.writer, "MOST_AGE", 0)
+    shared = studies(all={"machine": {"rod_mass_kg": 6}})
+    masses = {"machine": {"rod_mass_kg": [3, 4, 5, 6]}}
+    fewer = studies(few={**masses, "output": {"keep": "metrics"}})
+    inside = []
+
+    def meanwhile(done, total, remark):
+        if not inside:
+            inside.append(sweep(shared, tmp_path / "out", 1, part=(1, 1)))
+
+    sweep(fewer, tmp_path / "out", 1, meanwhile)
+    assert inside[0].run_now == 1
+    assert sweep(shared, tmp_path / "out", 1).run_now == 0
 
 
 def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):

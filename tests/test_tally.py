@@ -30,19 +30,19 @@ def test_lobatto_is_exact_for_polynomials(n):
 def test_peak_between_nodes_is_found(middle):
     rows = np.zeros((NODES.size, COLUMNS))
     rows[:, 2] = -7.0 + 3 * (NODES - middle) ** 2
-    assert peak_of(NODES, rows, 2, 0.0) == pytest.approx(7.0, rel=1e-12)
-    assert peak_of(NODES, rows, 2, 6.9) == pytest.approx(7.0, rel=1e-12)
-    assert peak_of(NODES, rows, 2, 50.0) == 50.0
+    assert peak_of(NODES, rows, 1, 2, 0.0) == pytest.approx(7.0, rel=1e-12)
+    assert peak_of(NODES, rows, 1, 2, 6.9) == pytest.approx(7.0, rel=1e-12)
+    assert peak_of(NODES, rows, 1, 2, 50.0) == 50.0
 
 
 @pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
 def test_depth_between_nodes_is_found(middle):
     rows = np.zeros((NODES.size, COLUMNS))
     rows[:, 2] = 1e-5 - 2e-4 * (NODES - middle) ** 2  # a gap at both ends, larger than the depth
-    assert deepest_of(NODES, rows, 2, -np.inf) == pytest.approx(1e-5, rel=1e-12)
-    assert deepest_of(NODES, rows, 2, 9.9e-6) == pytest.approx(1e-5, rel=1e-12)
-    assert deepest_of(NODES, rows, 2, 5e-5) == 5e-5
-    assert deepest_of(NODES, rows - 1.0, 2, -np.inf) == pytest.approx(1e-5 - 1, rel=1e-12)
+    assert deepest_of(NODES, rows, 1, 2, -np.inf) == pytest.approx(1e-5, rel=1e-12)
+    assert deepest_of(NODES, rows, 1, 2, 9.9e-6) == pytest.approx(1e-5, rel=1e-12)
+    assert deepest_of(NODES, rows, 1, 2, 5e-5) == 5e-5
+    assert deepest_of(NODES, rows - 1.0, 1, 2, -np.inf) == pytest.approx(1e-5 - 1, rel=1e-12)
 
 
 def test_tally_of_a_known_step():
@@ -52,12 +52,24 @@ def test_tally_of_a_known_step():
     rows[:, Column.NORMAL] = np.where(NODES > 0.5, 10.0, 0.0)
     rows[:, Column.PENETRATION] = NODES - 0.5
     tally = new_tally()
-    tally_step(1e-4, NODES, WEIGHTS, rows, True, tally, p)
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, True, tally, p)
     assert tally.seconds == pytest.approx(1e-4)
     assert tally.square_acceleration == pytest.approx(9e-4)
     assert tally.impacts.tolist() == [1, 0]
     assert tally.max_penetration[0] == pytest.approx(0.5)
     assert tally.loss_seconds[0] == pytest.approx(1e-4 * WEIGHTS[NODES <= 0.5].sum())
+
+
+def test_every_other_node_of_a_step_will_do():
+    p = record(Case.from_values({"joint": "both", "clearance_mm": 0.2}))
+    rows = np.sin(np.arange(NODES.size * COLUMNS)).reshape(NODES.size, COLUMNS)
+    weights = np.zeros(NODES.size)
+    weights[::2] = np.linspace(1, 2, 5)
+    whole, sparse = new_tally(), new_tally()
+    tally_step(1e-4, NODES[::2].copy(), weights[::2].copy(), rows[::2].copy(), 1, True, whole, p)
+    rows[1::2] = np.nan
+    tally_step(1e-4, NODES, weights, rows, 2, True, sparse, p)
+    assert sparse == whole
 
 
 def test_energy_ledger_of_a_known_step():

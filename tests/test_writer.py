@@ -1,11 +1,13 @@
 """Rows: what is acknowledged stays, the last one counts, damage is found, one writer at a time."""
 
 import dataclasses
+import fcntl
 import os
 import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 
 import h5py
@@ -15,7 +17,7 @@ import xarray as xr
 
 from compressor import hdf5, segments, store, writer
 from compressor.manifest import StoredAxis, StoredStudy, encode
-from compressor.schema import NUMBERS, ROW, Outcome
+from compressor.schema import NUMBERS, ROW, Outcome, SeriesFile
 from compressor.simulation import simulate
 from compressor.verification import verify
 from compressor.writer import Writer
@@ -78,6 +80,32 @@ def test_the_last_row_of_a_job_counts(tmp_path):
     put(tmp_path, outcome(1, 11))
     put(tmp_path, outcome(3, 30), outcome(3, 31))
     assert peaks(tmp_path) == {1: 11, 2: 20, 3: 31}
+
+
+def kept_as(precision):
+    series = SeriesFile(5, 1.0, precision, f"{'':d>20}") if precision else None
+    return dataclasses.replace(outcome(1), series=series)
+
+
+@pytest.mark.parametrize(
+    ("better", "worse"),
+    [
+        (outcome(1), outcome(1, reason="worker_died")),
+        (kept_as("single"), outcome(1)),
+        (kept_as("double"), kept_as("single")),
+        (kept_as("single"), outcome(1, reason="worker_died")),
+    ],
+)
+@pytest.mark.parametrize("shard", ["", "a"])
+def test_a_better_row_stays_whoever_writes_last(better, worse, shard, tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "_usable", lambda segment: np.ones(len(segment), bool))
+    put(tmp_path, better)
+    put(tmp_path, worse, shard=shard)
+    rows = store.read_store(tmp_path).rows
+    expected = segments.of_outcomes([better], 1)
+    for name in ("status", "samples", "precision"):
+        assert rows.columns[name].tolist() == expected.columns[name].tolist()
+    assert len(segments.merge(store.read_store(tmp_path).segments)) == 1
 
 
 def test_xarray_reads_a_segment(tmp_path):
@@ -202,6 +230,24 @@ def test_one_writer_at_a_time(tmp_path):
         put(tmp_path, outcome(1), shard="a")  # has a lock of its own
     put(tmp_path, outcome(2))
     assert peaks(tmp_path) == {1: 1, 2: 2}
+
+
+def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "PATIENCE", 60.0)
+    with Writer(tmp_path, command="the first"):
+        pass
+    assert (tmp_path / writer.LOCK_NAME).read_text() == ""
+    with open(tmp_path / writer.LOCK_NAME, "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        named = threading.Timer(0.3, lambda: os.write(lock.fileno(), b"the second"))
+        named.start()
+        with pytest.raises(store.StoreError, match="in use by the second; wait"):
+            Writer(tmp_path).__enter__()
+        named.join()
+        monkeypatch.setattr(writer, "PATIENCE", 0.0)
+        lock.truncate(0)
+        with pytest.raises(store.StoreError, match="in use by another process; wait"):
+            Writer(tmp_path).__enter__()
 
 
 WAITING = """
@@ -363,6 +409,38 @@ def test_readers_pass_a_damaged_segment_by_and_say_so(tmp_path):
     assert (tmp_path / "rows" / f"{first.name}.damaged").exists()
     assert verify(tmp_path) == []
     assert peaks(tmp_path) == {1: 1}
+
+
+def test_a_writer_leaves_damage_to_shards_that_are_at_work(tmp_path):
+    for name in ("1-of-2", "2-of-2"):
+        put(tmp_path, outcome(1), shard=name)
+    paths = sorted(tmp_path.glob("shards/*/rows/*.h5"))
+    with Writer(tmp_path, shard="1-of-2"):
+        for path in paths:
+            path.write_bytes(path.read_bytes()[:-1])
+        put(tmp_path, outcome(2))  # may see to the second shard alone
+        assert [path.exists() for path in paths] == [True, False]
+    with Writer(tmp_path, shard="2-of-2"):
+        pass  # sees to itself alone
+    assert paths[0].exists()
+    put(tmp_path, shard="1-of-2")
+    assert [f"{path}.damaged" for path in paths] == sorted(
+        map(str, tmp_path.glob("shards/*/rows/*.damaged"))
+    )
+    assert peaks(tmp_path) == {2: 2}
+
+
+def test_a_writer_leaves_the_unfinished_files_of_others(tmp_path):
+    put(tmp_path, outcome(1), shard="1-of-2")
+    put(tmp_path, outcome(2))
+    old = [tmp_path / place / "rows" / ".old.tmp" for place in ("", "shards/1-of-2")]
+    for path in old:
+        path.touch()
+        os.utime(path, (0, 0))
+    put(tmp_path)
+    assert [path.exists() for path in old] == [False, True]
+    put(tmp_path, shard="1-of-2")
+    assert not old[1].exists()
 
 
 SCHEMA = {

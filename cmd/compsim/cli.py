@@ -4,7 +4,6 @@ Nothing heavy is imported at the top: `compsim --help` answers at once.
 """
 
 import contextlib
-import json
 import os
 import shlex
 import signal
@@ -18,15 +17,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import compressor
-from compsim import explain, plan, status, tradeoff
+from compsim import explain, export, plan, schema, status, tradeoff, verify
 from compsim.screen import (
-    ADVICE,
     DONE,
     INTERNAL,
     SOME_FAILED,
     STORE,
     USAGE,
     Screen,
+    caution,
     configs_argument,
     duration,
     limit,
@@ -38,7 +37,7 @@ from compsim.screen import (
 )
 
 if TYPE_CHECKING:
-    from compressor.sweep import Failure, Summary
+    from compressor.sweep import Backend, Failure, Summary
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_FAILURES = 20  # listed one by one
@@ -46,6 +45,8 @@ MOST_FAILURES = 20  # listed one by one
 # error -> what stands before its text, and the exit code
 FORESEEN = {
     "CaseFileError": ("", USAGE),
+    "ExportError": ("compsim: ", USAGE),
+    "ClusterError": ("compsim: ", USAGE),
     "StoreError": ("compsim: ", STORE),
     "WorkersFailed": ("compsim: ", INTERNAL),
     "ReferenceFailed": ("compsim: ", SOME_FAILED),
@@ -96,6 +97,10 @@ def cli() -> None:
 @click.option("--rerun", type=click.Choice(["failed"]), help="Run failed jobs again, too.")
 @click.option("--shard", "part", type=Part(), metavar="I/N",
               help="Run part I of N: for machines that share the folder.")  # fmt: skip
+@click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
+              show_default=True, help="Where jobs run: here, or on a dask cluster.")  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS",
+              help="Of the dask cluster, such as tcp://host:8786.")  # fmt: skip
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
@@ -109,6 +114,8 @@ def run(
     max_jobs: int,
     rerun: str | None,
     part: tuple[int, int] | None,
+    backend: str,
+    scheduler: str | None,
     wait: bool,
     quiet: bool,
 ) -> int:
@@ -117,6 +124,7 @@ def run(
     Jobs that are stored already are not run again, so a run that was interrupted goes on where it
     ended. A summary line for each study goes to stdout.
     """
+    check_backend(backend, scheduler, jobs)
     from compressor.process import cores, one_thread_each
 
     one_thread_each()  # before numpy loads
@@ -126,13 +134,16 @@ def run(
     if only and not quiet:
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
+    caution(studies)
     from compressor.sweep import sweep
 
     screen = Screen(quiet)
     try:
-        summary = sweep(
-            studies, output, jobs or cores(), screen, context.obj, rerun == "failed", part, wait
-        )
+        with cluster(scheduler) as elsewhere:
+            summary = sweep(
+                studies, output, jobs or cores(), screen, context.obj, rerun == "failed", part,
+                wait, elsewhere,
+            )  # fmt: skip
     except BaseException:
         screen.end()
         if screen.total:
@@ -142,6 +153,28 @@ def run(
     screen.end()
     report_run(summary, output, quiet)
     return SOME_FAILED if summary.failed else DONE
+
+
+def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
+    """Usage errors of options that do not go together."""
+    if backend == "dask" and not scheduler:
+        raise click.UsageError(
+            "--backend dask needs --scheduler ADDRESS, such as tcp://host:8786: "
+            "what `dask scheduler` prints when it starts"
+        )
+    if backend == "dask" and jobs:
+        raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
+    if backend == "local" and scheduler:
+        raise click.UsageError("--scheduler goes with --backend dask")
+
+
+def cluster(scheduler: str | None) -> contextlib.AbstractContextManager["Backend | None"]:
+    """The cluster of a scheduler; none where jobs run here."""
+    if scheduler is None:
+        return contextlib.nullcontext()
+    from compressor.cluster import Cluster
+
+    return Cluster(scheduler)
 
 
 @cli.command()
@@ -157,38 +190,12 @@ def report(context: click.Context, results: str, output: str) -> int:
     return DONE
 
 
-@cli.command()
-@click.option("-i", "--input", "results", default="results", show_default=True,
-              help="Folder of results.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="A list of {path, problem, jobs} on stdout.")
-def verify(results: str, as_json: bool) -> int:
-    """Compare every stored file with its checksum; exit code 5 if any is damaged.
-
-    Damaged files are listed with the jobs that are lost with them, which the next run of their
-    case files computes again.
-    """
-    from compressor.verification import verify as compare
-
-    damages = compare(results)
-    if as_json:
-        found = [{"path": str(d.path), "problem": d.problem, "jobs": d.keys} for d in damages]
-        click.echo(json.dumps(found, indent=1))
-    for damage in () if as_json else damages:
-        click.echo(f"{damage.path}: {damage.problem}")
-        for key in damage.keys:
-            click.echo(f"  job {key}")
-    if damages:
-        lost = len({key for damage in damages for key in damage.keys})
-        files = f"{len(damages)} damaged file" + ("s" if len(damages) != 1 else "")
-        say(f"{files}, {plural(lost)} lost; to mend: compsim run CONFIG... with the case files")
-        return STORE
-    say("no damage")
-    return DONE
-
-
 cli.add_command(plan.plan)
 cli.add_command(status.status)
 cli.add_command(status.show)
+cli.add_command(export.export)
+cli.add_command(verify.verify)
+cli.add_command(schema.schema)
 cli.add_command(explain.explain)
 cli.add_command(tradeoff.tradeoff)
 
@@ -219,6 +226,7 @@ def report_failures(failures: Sequence["Failure"]) -> None:
     if not failures:
         return
     from compressor.reading import printable
+    from compressor.reasons import remedy
 
     say(f"{plural(len({failure.key for failure in failures}))} failed:")
     for failure in failures[:MOST_FAILURES]:
@@ -231,7 +239,7 @@ def report_failures(failures: Sequence["Failure"]) -> None:
         say(f"  and {len(failures) - MOST_FAILURES} more")
     say("what to do:")
     for reason, number in Counter(failure.reason for failure in failures).items():
-        say(f"  {reason} ({number}): {ADVICE.get(reason, 'see its detail above')}")
+        say(f"  {reason} ({number}): {remedy(reason)}")
     say("A changed case file runs as a new job; --rerun failed runs failed ones again unchanged.")
 
 

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, limit, plural, say, setting
+from compsim.screen import DONE, SOME_FAILED, caution, limit, plural, say, setting
 
 if TYPE_CHECKING:
     from compressor.explain import Advice, Explanation
+    from compressor.scales import JointScales
 
 INDENT = 12  # columns of a heading
 
@@ -33,6 +34,7 @@ def explain(
     from compressor.plan import load_studies
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs)
+    caution(studies)
     from compressor.explain import explain as explained
 
     found = []
@@ -78,16 +80,8 @@ def lines(told: "Explanation") -> Iterator[str]:
         yield heading("" if number else "active", f"{term}: {words}")
     if told.absent:
         yield heading("absent", f"{', '.join(told.absent)}: cost nothing")
-    for number, joint in enumerate(told.scales):
-        name = joint.joint.replace("_", " ")
-        yield heading(
-            "" if number else "scales",
-            f"{name}: {joint.force:.0f} N at most in the ideal machine press "
-            f"{joint.penetration * 1e6:.0f} µm deep; there it rings at {joint.frequency:.0f} Hz "
-            f"({1e3 / joint.frequency:.2f} ms),",
-        )
-        yield heading("", f"and {joint.limited_by} holds explicit steps to about "
-                      f"{joint.step_limit * 1e6:.0f} µs")  # fmt: skip
+    for number, text in enumerate(text for joint in told.scales for text in scale_lines(joint)):
+        yield heading("" if number else "scales", text)
     word = told.accuracy or "given"
     yield heading("tolerance", f"{word}: rtol {told.rtol:g}, {told.method}, "
                   f"for errors below {percent(told.promise)}")  # fmt: skip
@@ -99,10 +93,31 @@ def lines(told: "Explanation") -> Iterator[str]:
         yield heading("" if number else "without", advised(advice, told))
 
 
+def scale_lines(joint: "JointScales") -> Iterator[str]:
+    """The natural scales of a joint."""
+    name = joint.joint.replace("_", " ")
+    yield (
+        f"{name}: {joint.force:.0f} N at most in the ideal machine press "
+        f"{joint.penetration * 1e6:.0f} µm deep; there it rings at {joint.frequency:.0f} Hz "
+        f"({1e3 / joint.frequency:.2f} ms),"
+    )
+    yield (
+        f"an undamped fall through the clearance ends at {joint.impact_speed:.2g} m/s, "
+        f"{joint.impact_penetration * 1e6:.0f} µm deep, in {joint.contact_time * 1e3:.2g} ms;"
+    )
+    yield (
+        f"{joint.limited_by} holds explicit steps to about {joint.explicit_step * 1e6:.3g} µs, "
+        f"the ringing implicit ones to {joint.implicit_step * 1e6:.3g} µs"
+    )
+
+
 def cost_lines(told: "Explanation") -> Iterator[str]:
     """What a job and the sweep cost."""
     work = f" ({told.steps} steps, {told.evaluations} evaluations)" if told.steps else ""
     yield heading("cost", f"{1e3 * told.seconds:.3g} ms a job{work}")
+    if told.expected_steps:
+        yield heading("", f"by the scales alone about {told.expected_steps:.1g} steps, "
+                      f"{1e3 * told.expected_seconds:.1g} ms")  # fmt: skip
     if told.jobs > 1:
         workers = f"{told.workers} worker{'s' if told.workers > 1 else ''}"
         yield heading("", f"{told.sweep_seconds:.2g} s for {plural(told.jobs)} with {workers}, "

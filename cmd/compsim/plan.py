@@ -7,6 +7,7 @@ import click
 
 from compsim.screen import (
     DONE,
+    caution,
     configs_argument,
     duration,
     limit,
@@ -49,6 +50,7 @@ def plan(
     from compressor.process import cores
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
+    caution(studies)
     from compressor.forecast import forecast
 
     found = forecast(studies, output, jobs or cores(), first, say)

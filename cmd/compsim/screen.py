@@ -1,31 +1,21 @@
 """What the commands share: exit codes, options, and how they speak on stderr."""
 
 import contextlib
+import shlex
 import sys
 import time
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import click
 
-DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
-QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
+if TYPE_CHECKING:
+    from compressor.manifest import Again
+    from compressor.study import Study
 
-ADVICE = {
-    "budget_steps": "raise solve.max_steps",
-    "budget_seconds": "the same command tries again; raise solve.timeout_s if that is not enough",
-    "penetration_implausible": "the contact is too soft for the forces: check contact.stiffness, "
-    "masses and speed, and their units",
-    "non_finite": "the motion leaves what the model can describe: check the values that are swept "
-    "furthest, and gas.head_clearance_mm",
-    "accuracy_not_reached": "ask for less in solve.accuracy, or raise solve.max_steps where the "
-    "detail names steps",
-    "step_underflow": "try another solve.method, such as Radau",
-    "worker_died": "a crash, or killed from outside, or for want of memory: use a smaller -j; if "
-    "it stays, a bug of compsim: please report it with the case",
-    "out_of_memory": "use a smaller -j, which gives each worker more memory, a longer "
-    "solve.output_step_deg, or output.keep=metrics",
-    "internal_error": "a bug of compsim: please report it, with what Python prints for "
-    "compressor.store.read_job(FOLDER, JOB).traceback",
-}
+DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
+MOST_CAUTIONS = 5  # told of one case file
+QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
 
 configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
 output_option = click.option("-o", "--output", default="results", show_default=True,
@@ -40,8 +30,9 @@ only_option = click.option(
     help="Only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
     "missing.",
 )  # fmt: skip
+MAX_JOBS = 10_000
 limit = click.option(
-    "--max-jobs", type=click.IntRange(min=1), default=10_000, show_default=True,
+    "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
     help="Refuse a case file that asks for more, before it is expanded.",
 )  # fmt: skip
 
@@ -93,6 +84,34 @@ def say(text: str, end: str = "\n") -> None:
     """Write to stderr; nobody may be there to read it."""
     with contextlib.suppress(OSError):
         print(text, end=end, file=sys.stderr, flush=True)
+
+
+def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
+    """The commands that run the missing jobs of studies, one for those with the same overrides."""
+    found: dict[tuple[str, ...], list[Again]] = {}
+    for study in dict.fromkeys(studies):
+        found.setdefault(study.overrides, []).append(study)
+    commands = []
+    for overrides, group in found.items():
+        words = ["compsim", "run", *(study.case_file for study in group), "-o", folder]
+        words += [word for text in overrides for word in ("--set", text)]
+        jobs = max(study.jobs for study in group)
+        words += ["--max-jobs", str(jobs)] if jobs > MAX_JOBS else []
+        commands.append(shlex.join(words))
+    return commands
+
+
+def caution(studies: "Sequence[Study]") -> None:
+    """Say once what is odd about case files, in a few lines however many jobs they have."""
+    from compressor.domain import cautions
+
+    for study in studies:
+        found = cautions(study)
+        for one in found[:MOST_CAUTIONS]:
+            share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs looked at)"
+            say(f"{study.path}: warning: {one.key}: {one.message}{share}")
+        if len(found) > MOST_CAUTIONS:
+            say(f"{study.path}: and {len(found) - MOST_CAUTIONS} more warnings")
 
 
 def duration(seconds: float) -> str:

@@ -4,12 +4,11 @@ import dataclasses
 import json
 import math
 import os
-import shlex
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from compsim.screen import ADVICE, DONE, plural, say
+from compsim.screen import DONE, plural, run_commands, say
 
 if TYPE_CHECKING:
     from compressor.inquiry import JobReport
@@ -25,6 +24,7 @@ as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON
 def status(folder: str, as_json: bool) -> int:
     """Tell how many jobs of each stored study are done, failed or missing, and why they failed."""
     from compressor.inquiry import standings
+    from compressor.reasons import remedy
 
     found = standings(folder)
     if as_json:
@@ -35,10 +35,9 @@ def status(folder: str, as_json: bool) -> int:
         click.echo(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
                    f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
         for reason, number in one.reasons.items():
-            click.echo(f"{'':<{width}}  {number:>4} {reason}: {ADVICE.get(reason, 'compsim show')}")
-    unfinished = {shlex.quote(one.case_file) for one in found if one.missing}
-    if unfinished:
-        say(f"next: compsim run {' '.join(sorted(unfinished))} -o {shlex.quote(folder)}")
+            click.echo(f"{'':<{width}}  {number:>4} {reason}: {remedy(reason)}")
+    for command in run_commands((one.again for one in found if one.missing), folder):
+        say(f"next: {command}")
     return DONE
 
 
@@ -50,9 +49,11 @@ def show(job: str, folder: str, as_json: bool) -> int:
     """Tell what is known of a job, named by its key or the beginning of it.
 
     Which studies it belongs to and where in them, how it ended and why, its numbers with their
-    error bars, in SI, and what it was run with.
+    error bars, in SI, and what it was run with. Of one that stopped, where, in which state, driven
+    by which number of it, and its last steps.
     """
     from compressor.inquiry import report_job
+    from compressor.reasons import remedy
 
     found = report_job(folder, job)
     if as_json:
@@ -63,12 +64,12 @@ def show(job: str, folder: str, as_json: bool) -> int:
         values = "".join(f" {key}={value}" for key, value in point.items())
         click.echo(f"  in {study}{values}")
     if found.status == "failed":
-        click.echo(f"  what to do: {ADVICE.get(found.reason, 'see why above')}")
-    for line in (*numbers(found), *facts(found)):
+        click.echo(f"  what to do: {remedy(found.reason)}")
+    for line in (*stop(found), *numbers(found), *cautions(found), *facts(found)):
         click.echo(f"  {line}")
     if found.status == "missing":
-        files = " ".join(map(shlex.quote, found.case_files))
-        say(f"next: compsim run {files} -o {shlex.quote(folder)}")
+        for command in run_commands(found.again, folder):
+            say(f"next: {command}")
     return DONE
 
 
@@ -79,19 +80,51 @@ def ending(found: "JobReport") -> str:
     return "ok" if found.status == "ok" else f"failed: {found.reason}: {found.detail}"
 
 
+def stop(found: "JobReport") -> list[str]:
+    """Where a job's run stopped, and how its last steps went, a line each; none that ended."""
+    told = found.attributes
+    if "stop_history_words" not in told:
+        return []
+    angle = math.degrees(told["stop_crank_angle"]) % 360
+    lines = [f"{'stopped':<28} at {told['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"]
+    if told["stop_dominant"]:
+        lines.append(f"{'driven by':<28} {told['stop_dominant']}")
+    names = told["stop_state_names"].split("; ")
+    for name, value in zip(names, told["stop_state"], strict=False):
+        lines.append(f"{name:<28} {value:.6g}")
+    steps = zip(
+        *(told[f"stop_history_{name}"] for name in ("time", "step", "error")),
+        told["stop_history_words"].split("; "),
+        strict=False,
+    )
+    for time, step, error, words in steps:
+        known = "" if math.isnan(error) else f", error {error:.3g} of the tolerance"
+        lines.append(f"{'step':<28} {time:.12g} s + {step:.4g} s, {words}{known}")
+    return lines
+
+
 def numbers(found: "JobReport") -> list[str]:
     """A job's numbers, a line each, with what is known of their errors."""
-    from compressor.quantities import ERRORS, NUMBERS
+    from compressor.quantities import ERRORS, HORIZON, NUMBERS
 
     lines = []
     for name, value in found.numbers.items():
-        if name in ERRORS:
+        if name in ERRORS or (name == HORIZON and blank(value)):
             continue
         unit = "" if NUMBERS[name][1] == "1" else NUMBERS[name][1]
         error = found.numbers.get(f"{name}_error")
         known = "" if error is None or blank(error) else f" ± {plain(error)}"
         lines.append(f"{name:<28} {plain(value)}{known} {unit}".rstrip())
     return lines
+
+
+def cautions(found: "JobReport") -> list[str]:
+    """What is to be said of numbers that no error bar can be claimed of."""
+    from compressor.quantities import HORIZON
+
+    if not math.isfinite(found.numbers.get(HORIZON, math.nan)):
+        return []
+    return ["the metrics go beyond the horizon: statistics may be trusted, single peaks may not"]
 
 
 def facts(found: "JobReport") -> list[str]:

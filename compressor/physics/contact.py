@@ -5,19 +5,15 @@ from typing import NamedTuple
 
 from compressor.physics._jit import inlined, jit
 
-# Table 2 of the paper: density (kg/m^3), Young's modulus (Pa), Poisson's ratio
-MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326)}
-
 
 @jit
-def step(x, x0, h0, x1, h1):
-    """ADAMS's STEP: the cubic from h0 at x0 to h1 at x1, constant outside (x0 < x1)."""
-    if x <= x0:
-        return h0
-    if x >= x1:
-        return h1
-    s = (x - x0) / (x1 - x0)
-    return h0 + (h1 - h0) * s * s * (3.0 - 2.0 * s)
+def rise(s):
+    """ADAMS's STEP from 0 at s = 0 to 1 at s = 1: a cubic, constant outside."""
+    if s <= 0.0:
+        return 0.0
+    if s >= 1.0:
+        return 1.0
+    return s * s * (3.0 - 2.0 * s)
 
 
 @jit
@@ -26,8 +22,9 @@ def friction_coefficient(slip, p):
 
     Rises from 0 to `static` over the stiction velocity, falls to `dynamic` at the friction one.
     """
-    size = step(abs(slip), p.stiction_velocity, p.static, p.friction_velocity, p.dynamic)
-    return step(slip, -p.stiction_velocity, -1.0, p.stiction_velocity, 1.0) * size
+    fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
+    size = p.static + (p.dynamic - p.static) * fall
+    return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
 @jit
@@ -48,7 +45,7 @@ def impact(penetration, rate, stiffness, p):
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = stiffness * power(penetration, p.exponent)
-    unclamped = elastic + step(penetration, 0.0, 0.0, p.full_damping, p.damping) * rate
+    unclamped = elastic + p.damping * rise(penetration * p.per_full_damping) * rate
     return max(0.0, unclamped), elastic, unclamped
 
 
@@ -108,17 +105,3 @@ def nearness(contact, stiffness, p):
         return contact.penetration
     full = p.full_damping
     return contact.unclamped * full / (stiffness * power(full, p.exponent))
-
-
-def contact_stiffness(first, second, journal_radius, bearing_radius):
-    """Eq. 15's stiffness K (N/m^1.5) of two materials by name and two radii (m).
-
-    Raises KeyError for a material that is not in Table 2. Steel on steel with radii 10 and 9.9 mm
-    gives Table 3's 3.36e5 N/mm^1.5.
-    """
-    compliance = 0.0
-    for name in (first, second):
-        _, modulus, poisson = MATERIALS[name]
-        compliance += (1.0 - poisson**2) / (math.pi * modulus)
-    radius = journal_radius * bearing_radius / (journal_radius + bearing_radius)
-    return 4.0 / (3.0 * math.pi * compliance) * math.sqrt(radius)

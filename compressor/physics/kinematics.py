@@ -38,7 +38,7 @@ def ideal(t, p):
 @inlined
 def ideal_at(cos_theta, sin_theta, p):
     """Ideal `Motion` at a crank angle given by its cosine and sine."""
-    ratio = p.crank_radius / p.rod_length
+    ratio = p.crank_ratio
     sin_phi = ratio * sin_theta
     cos_phi = math.sqrt((1.0 - sin_phi) * (1.0 + sin_phi))
     per_cos = 1.0 / cos_phi
@@ -64,6 +64,13 @@ def small_angle(angle):
         )
         cosine = 1.0 - square * 0.5 * (1.0 - square * TWELFTH * (1.0 - square * THIRTIETH))
     return sine, cosine
+
+
+@inlined
+def crank_direction(t, p):
+    """Cosine and sine of the crank angle at time t (s)."""
+    theta = p.omega * t
+    return math.cos(theta), math.sin(theta)
 
 
 @inlined

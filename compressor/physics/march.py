@@ -22,8 +22,15 @@ from compressor.physics.control import (
     first_step,
     refuse,
 )
-from compressor.physics.kinematics import ideal, ideal_after
-from compressor.physics.observe import COLUMNS, NEARNESS, derivative_with_flows, gauge
+from compressor.physics.kinematics import crank_direction, ideal, ideal_after
+from compressor.physics.observe import (
+    ACCELERATION,
+    COLUMNS,
+    NEARNESS,
+    derivative_with_flows,
+    gauge,
+    glance,
+)
 from compressor.physics.onset import first_onset
 from compressor.physics.runge_kutta import (
     FLOWS,
@@ -31,6 +38,7 @@ from compressor.physics.runge_kutta import (
     error_norm,
     extend,
     interpolate,
+    midway,
     take_step,
 )
 from compressor.physics.tally import lobatto, tally_energy, tally_step
@@ -38,6 +46,10 @@ from compressor.physics.tally import lobatto, tally_energy, tally_step
 LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NODES, WEIGHTS = lobatto(5)
+MIDDLE = NODES.size // 2
+COARSE_WEIGHTS = np.zeros(NODES.size)
+COARSE_WEIGHTS[::MIDDLE] = lobatto(3)[1]
+INWARD = np.array([2, 1, 3])  # nodes between a step's ends, the middle first
 
 rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
 rosenbrock_extend = rosenbrock.extend
@@ -65,11 +77,13 @@ WALKER = np.dtype(
         ("error", "f8"),  # of the last accepted step: logarithm of its norm
         ("fresh", "i8"),  # whether dz/dt at t is still to be evaluated
         ("observed", "i8"),  # whether work.row holds what is observed at t, in this phase
+        ("laid", "i8"),  # whether work.dense holds the step's interpolant
         ("landing", "f8"),  # length of the step that ends on the onset ahead, or 0
         ("landed", "i8"),  # whether the last step ended on an onset
         ("segment", "i8"),
         ("sample", "i8"),  # next output sample
         ("steps", "i8"),
+        ("taken", "f8"),  # length of the last accepted step
         ("evaluations", "i8"),
         ("rejected", "i8"),
         ("onsets", "i8"),
@@ -125,7 +139,7 @@ def new_work(n):
 
 
 @inlined
-def attempt(w, h, z, work, atol, size, phase, p):
+def attempt(w, base, h, z, work, atol, size, phase, p):
     """Take a step of length h by the walker's present method; returns its error norm."""
     if w.stiff:
         u = work.k[1:]
@@ -135,31 +149,67 @@ def attempt(w, h, z, work, atol, size, phase, p):
         ):
             return math.inf
         return rosenbrock_error(z, work.new, u, w.rtol, atol)
-    take_step(w.pair, w.t, h, z, work.k, phase, p, work.new, work.rows[NODES.size - 1])
+    take_step(w.pair, base, h, z, work.k, phase, p, work.new, work.rows[NODES.size - 1])
     w.evaluations += STAGES - 1
     return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
 
 
 @inlined
-def look_at_step(w, h, z, work, phase, p):
-    """Lay the step's interpolant through and gauge it at its nodes; an explicit step's end is."""
+def may_change(rows, p):
+    """Whether contact may begin or end within a step, by the nearness at its ends and middle.
+
+    Twice their range is allowed for beyond them.
+    """
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            begin, middle = rows[0, NEARNESS + joint], rows[MIDDLE, NEARNESS + joint]
+            end = rows[rows.shape[0] - 1, NEARNESS + joint]
+            low, high = min(begin, middle, end), max(begin, middle, end)
+            beyond = 2.0 * (high - low)
+            if low - beyond <= 0.0 < high + beyond:
+                return True
+    return False
+
+
+@jit
+def lay(w, h, z, work):
+    """Lay the interpolant through an explicit step, unless it has been."""
+    if not w.laid:
+        extend(w.pair, h, z, work.k, work.dense)
+        w.laid = 1
+
+
+@inlined
+def look_at_step(w, base, h, z, work, phase, p):
+    """Observe the step's interpolant at its nodes; returns every which one.
+
+    An explicit step is looked at in its middle and at its ends, where its last stage has gauged
+    it already; also between them if contact may change. The interpolant is laid if that needs it.
+    """
     last = NODES.size - 1
     n = work.y.size
     if w.stiff:
         rosenbrock_extend(z, work.new, work.k[1:], work.dense)
         gauge(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
-    else:
-        extend(w.pair, h, z, work.k, work.dense)
+    w.laid = w.stiff
     if w.observed:  # the last step's end is this step's begin
-        for j in range(COLUMNS):
+        for j in range(ACCELERATION, COLUMNS):
             work.rows[0, j] = work.row[j]
     else:
-        interpolate(0.0, work.dense, work.y)
-        gauge(ideal(w.t, p), work.y, phase, p, work.rows[0])
-    base = (math.cos(p.omega * w.t), math.sin(p.omega * w.t))
-    for i in range(1, last):
-        interpolate(NODES[i], work.dense, work.y)
-        gauge(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
+        glance(ideal(w.t, p), z[:n], phase, p, work.rows[0])
+    every = 1 if w.stiff else MIDDLE
+    for i in INWARD:
+        if w.laid:
+            interpolate(NODES[i], work.dense, work.y)
+        elif i == MIDDLE:
+            midway(w.pair, h, z, work.k, work.y)
+        else:
+            break
+        glance(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
+        if i == MIDDLE and not w.stiff and may_change(work.rows, p):
+            every = 1
+            lay(w, h, z, work)
+    return every
 
 
 @inlined
@@ -181,14 +231,14 @@ def may_touch(rows, p):
 
 
 @inlined
-def onset_ahead(w, h, work, phase, p):
+def onset_ahead(w, h, every, work, phase, p):
     """Whether contact begins within the step just taken; it is then to be taken again, to there.
 
     Looked for only where the nodes of the step let it be. The step after the landing is kept
     within the pulse that begins, or to the contact's own time scale.
     """
     found = False
-    if w.watch and may_touch(work.rows, p):
+    if w.watch and every == 1 and may_touch(work.rows, p):
         begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
         if begin < 1.0 and not (w.landed and begin < LANDED):
             found = True
@@ -200,24 +250,26 @@ def onset_ahead(w, h, work, phase, p):
 
 
 @inlined
-def sample_grid(w, t_end, h, work, times, states):
+def sample_grid(w, t_end, h, z, work, times, states):
     """Fill the output samples up to t_end from the step's interpolant."""
     while w.sample < times.size and times[w.sample] <= t_end:
+        lay(w, h, z, work)
         s = (times[w.sample] - w.t) / h
         interpolate(min(1.0, max(0.0, s)), work.dense, states[w.sample])
         w.sample += 1
 
 
 @inlined
-def take_in(w, h, work, phase, p, tally):
+def take_in(w, h, every, work, phase, p, tally):
     """Tally an accepted step that has been looked at, and audit its energy."""
     last = NODES.size - 1
-    for j in range(COLUMNS):
+    for j in range(ACCELERATION, COLUMNS):
         work.row[j] = work.rows[last, j]
     w.observed = 1
     n = work.y.size
     tally_energy(work.row, work.new[n:], tally)
-    tally_step(h, NODES, WEIGHTS, work.rows, w.t >= w.settle, tally, p)
+    weights = WEIGHTS if every == 1 else COARSE_WEIGHTS
+    tally_step(h, NODES, weights, work.rows, every, w.t >= w.settle, tally, p)
 
 
 @jit
@@ -276,7 +328,8 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         landing = w.landing > 0.0
         if landing:
             h = w.landing
-        error = attempt(w, h, z, work, atol, size, phase, p)
+        base = crank_direction(w.t, p)
+        error = attempt(w, base, h, z, work, atol, size, phase, p)
         if not landing:
             if not error <= 1.0:
                 refuse(w, h, error)
@@ -285,17 +338,18 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
                 continue
             longer = controlled(w, h, error)
             w.h = max(w.h, longer) if h < w.h else longer
-        look_at_step(w, h, z, work, phase, p)
+        every = look_at_step(w, base, h, z, work, phase, p)
         if landing:
             w.landing = 0.0
             w.landed = 1
             w.onsets += 1
-        elif onset_ahead(w, h, work, phase, p):
+        elif onset_ahead(w, h, every, work, phase, p):
             continue
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h
-        take_in(w, h, work, phase, p, tally)
-        sample_grid(w, reached, h, work, times, states)
+        take_in(w, h, every, work, phase, p, tally)
+        sample_grid(w, reached, h, z, work, times, states)
+        w.taken = h
         was_stiff = w.stiff
         choose_method(w, h, z, work, size)
         advance(w, z, work, reached, was_stiff, at_edge, phases.size)

@@ -107,7 +107,7 @@ def solve_small_end(motion, turn, load, contact, p):
     """Accelerations (x, phi) of the rod hung on the crankpin and struck at the small end."""
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
-    a = (-load - contact.fx) / p.reciprocating_mass
+    a = (-load - contact.fx) * p.per_reciprocating_mass
     moment = -p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
     pin = p.crank_radius * p.omega * p.omega  # the crankpin's centripetal acceleration
     carried = pin * (sin_phi * motion.cos_theta + cos_phi * motion.sin_theta)
@@ -121,14 +121,14 @@ def solve_both(motion, turn, load, big, small, p):
     """Accelerations (x, X, Y, phi) of a rod between two clearance joints."""
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
-    a = (-load - small.fx) / p.reciprocating_mass
-    per_mass = 1.0 / p.rod_mass
+    a = (-load - small.fx) * p.per_reciprocating_mass
+    per_mass = p.per_rod_mass
     centre_x = (big.fx + small.fx) * per_mass
     centre_y = (big.fy + small.fy) * per_mass - p.gravity
     moment = p.rod_centre * (cos_phi * big.fy + sin_phi * big.fx)
     moment -= (p.rod_length - p.rod_centre) * (cos_phi * small.fy + sin_phi * small.fx)
     moment -= big.moment + small.moment
-    return a, centre_x, centre_y, moment / p.rod_inertia
+    return a, centre_x, centre_y, moment * p.per_rod_inertia
 
 
 @inlined

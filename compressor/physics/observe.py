@@ -77,8 +77,8 @@ def eccentricity_row(y, turn, p, row):
 
 
 @inlined
-def centre_motion(now, y, p):
-    """Rod centre's velocity, acceleration (x, y each) and height (m): vx, vy, ax, ay, height."""
+def centre_velocity(now, y, p):
+    """Rod centre's velocity (m/s), x and y, and its height (m)."""
     motion = now.motion
     sin_phi = motion.sin_phi + now.turn.ds
     cos_phi = motion.cos_phi + now.turn.dc
@@ -86,36 +86,48 @@ def centre_motion(now, y, p):
     crank = p.crank_radius * p.omega
     if p.scene == BIG_END:
         b = p.rod_length - p.rod_centre
-        vx = motion.v + y[2] + b * sin_phi * rate
-        vy = b * cos_phi * rate
-        ax = now.a + b * (cos_phi * rate * rate + sin_phi * now.spin_up)
-        ay = b * (cos_phi * now.spin_up - sin_phi * rate * rate)
-        return vx, vy, ax, ay, b * sin_phi
+        return motion.v + y[2] + b * sin_phi * rate, b * cos_phi * rate, b * sin_phi
     c = p.rod_centre
     height = p.crank_radius * motion.sin_theta - c * motion.sin_phi
     if p.scene == BOTH:
         vx = -crank * motion.sin_theta - c * motion.sin_phi * motion.rate + y[5]
         vy = crank * motion.cos_theta - c * motion.cos_phi * motion.rate + y[6]
-        return vx, vy, now.centre_x, now.centre_y, height + y[2]
+        return vx, vy, height + y[2]
     vx = -crank * motion.sin_theta - c * sin_phi * rate
     vy = crank * motion.cos_theta - c * cos_phi * rate
-    ax = -crank * p.omega * motion.cos_theta - c * (cos_phi * rate * rate + sin_phi * now.spin_up)
-    ay = -crank * p.omega * motion.sin_theta + c * (sin_phi * rate * rate - cos_phi * now.spin_up)
-    return vx, vy, ax, ay, height - c * now.turn.ds
+    return vx, vy, height - c * now.turn.ds
 
 
 @inlined
-def joint_forces(now, centre, p):
+def centre_acceleration(now, y, p):
+    """Rod centre's acceleration (m/s^2), x and y, of a rod that hangs on an ideal joint."""
+    motion = now.motion
+    sin_phi = motion.sin_phi + now.turn.ds
+    cos_phi = motion.cos_phi + now.turn.dc
+    rate = motion.rate + y[y.size - 1]
+    if p.scene == BIG_END:
+        b = p.rod_length - p.rod_centre
+        ax = now.a + b * (cos_phi * rate * rate + sin_phi * now.spin_up)
+        return ax, b * (cos_phi * now.spin_up - sin_phi * rate * rate)
+    c = p.rod_centre
+    pin = p.crank_radius * p.omega * p.omega
+    ax = -pin * motion.cos_theta - c * (cos_phi * rate * rate + sin_phi * now.spin_up)
+    return ax, c * (sin_phi * rate * rate - cos_phi * now.spin_up) - pin * motion.sin_theta
+
+
+@inlined
+def joint_forces(now, y, p):
     """Forces on the rod at both joints: the contact's, or by inverse dynamics at an ideal joint.
 
     Newton-Euler of the rod with the crosshead's x balance; returns (big x, big y, small x, small
     y) in N.
     """
     big, small = now.big, now.small
-    across = p.rod_mass * centre[2]
-    up = p.rod_mass * (centre[3] + p.gravity)
     if p.scene == BOTH:
         return big.fx, big.fy, small.fx, small.fy
+    ax, ay = centre_acceleration(now, y, p)
+    across = p.rod_mass * ax
+    up = p.rod_mass * (ay + p.gravity)
     if p.scene == SMALL_END:
         return across - small.fx, up - small.fy, small.fx, small.fy
     small_x = -now.load - p.reciprocating_mass * now.a
@@ -156,20 +168,21 @@ def write_powers(now, y, forces, p, out):
 
 
 @jit
-def write_energies(now, y, centre, p, row):
+def write_energies(now, y, p, row):
     """Write kinetic and potential energy (J) into the row."""
     v = now.motion.v + y[y.size // 2]
     rate = now.motion.rate + y[y.size - 1]
     kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
-    kinetic += p.rod_mass * (centre[0] * centre[0] + centre[1] * centre[1])
+    vx, vy, height = centre_velocity(now, y, p)
+    kinetic += p.rod_mass * (vx * vx + vy * vy)
     row[KINETIC] = 0.5 * kinetic
     potential = elastic_energy(now.big, p) + elastic_energy(now.small, p)
-    row[POTENTIAL] = potential + p.rod_mass * p.gravity * centre[4]
+    row[POTENTIAL] = potential + p.rod_mass * p.gravity * height
 
 
 @inlined
-def write_gauged(now, y, centre, forces, p, row):
-    """Write the columns from ACCELERATION on into the row."""
+def write_glanced(now, forces, p, row):
+    """Write the columns from ACCELERATION to NEARNESS into the row."""
     row[ACCELERATION] = now.a
     for i in range(4):
         row[FORCE + i] = forces[i]
@@ -180,8 +193,14 @@ def write_gauged(now, y, centre, forces, p, row):
     row[NORMAL], row[NORMAL + 1] = now.big.normal, now.small.normal
     row[NEARNESS] = nearness(now.big, p.stiffness[0], p)
     row[NEARNESS + 1] = nearness(now.small, p.stiffness[1], p)
+
+
+@inlined
+def write_gauged(now, y, forces, p, row):
+    """Write the columns from ACCELERATION on into the row."""
+    write_glanced(now, forces, p, row)
     write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
-    write_energies(now, y, centre, p, row)
+    write_energies(now, y, p, row)
 
 
 @jit
@@ -198,16 +217,21 @@ def observe(t, y, phase, p, row):
     row[ROD_ANGLE] = math.atan2(motion.sin_phi + turn.ds, motion.cos_phi + turn.dc)
     row[PISTON_FORCE] = now.load
     eccentricity_row(y, turn, p, row)
-    centre = centre_motion(now, y, p)
-    write_gauged(now, y, centre, joint_forces(now, centre, p), p, row)
+    write_gauged(now, y, joint_forces(now, y, p), p, row)
+
+
+@inlined
+def glance(motion, y, phase, p, row):
+    """The columns from ACCELERATION to NEARNESS: what a step is tallied by between its ends."""
+    now = evaluate(motion, y, phase, p)
+    write_glanced(now, joint_forces(now, y, p), p, row)
 
 
 @inlined
 def gauge(motion, y, phase, p, row):
-    """`observe` without the columns before ACCELERATION: what a step is judged and tallied by."""
+    """The columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     now = evaluate(motion, y, phase, p)
-    centre = centre_motion(now, y, p)
-    write_gauged(now, y, centre, joint_forces(now, centre, p), p, row)
+    write_gauged(now, y, joint_forces(now, y, p), p, row)
 
 
 @jit
@@ -229,9 +253,8 @@ def write_flowing_derivative(motion, z, phase, p, out):
     n = z.size - 4
     y = z[:n]
     now = evaluate(motion, y, phase, p)
-    centre = centre_motion(now, y, p)
     write_derivative(now, y, p, out[:n])
-    write_powers(now, y, joint_forces(now, centre, p), p, out[n:])
+    write_powers(now, y, joint_forces(now, y, p), p, out[n:])
 
 
 @inlined
@@ -240,8 +263,7 @@ def derivative_and_gauge(motion, z, phase, p, out, row):
     n = z.size - 4
     y = z[:n]
     now = evaluate(motion, y, phase, p)
-    centre = centre_motion(now, y, p)
     write_derivative(now, y, p, out[:n])
-    write_gauged(now, y, centre, joint_forces(now, centre, p), p, row)
+    write_gauged(now, y, joint_forces(now, y, p), p, row)
     for i in range(4):
         out[n + i] = row[CRANK_POWER + i]

@@ -76,6 +76,14 @@ RECORD = np.dtype(
         ("spring_damping", "f8"),  # N s/m
         ("preload", "f8"),  # N
         ("spring_stroke", "f8"),  # piston travel of each dwell of the follower, m
+        # what `derive` makes of these: a division takes as long as ten products
+        ("crank_ratio", "f8"),  # R / L
+        ("per_rod_mass", "f8"),  # 1/kg
+        ("per_rod_inertia", "f8"),  # 1/(kg m^2)
+        ("per_reciprocating_mass", "f8"),  # 1/kg
+        ("per_full_damping", "f8"),  # 1 / d_max, 1/m
+        ("per_stiction", "f8"),  # of friction's first rise, from -v_s to v_s, s/m
+        ("per_transition", "f8"),  # of its fall, from v_s to v_d, s/m
     ],
     align=True,
 )
@@ -84,3 +92,13 @@ RECORD = np.dtype(
 def new_record() -> np.record:
     """A record of zeros, to be filled field by field."""
     return np.zeros(1, dtype=RECORD).view(np.recarray)[0]
+
+
+def derive(p: np.record) -> None:
+    """Fill the fields of a record that follow from its others."""
+    p["crank_ratio"] = p["crank_radius"] / p["rod_length"]
+    for name in ("rod_mass", "rod_inertia", "reciprocating_mass", "full_damping"):
+        p[f"per_{name}"] = 1.0 / p[name]
+    if p["friction"]:
+        p["per_stiction"] = 1.0 / (2.0 * p["stiction_velocity"])
+        p["per_transition"] = 1.0 / (p["friction_velocity"] - p["stiction_velocity"])

@@ -66,9 +66,11 @@ def new_tally():
 
 
 @jit
-def vertex(nodes, i, before, here, after):
-    """Top of the parabola through the values at nodes i - 1, i and i + 1, or `here` if none."""
-    left, right = nodes[i - 1] - nodes[i], nodes[i + 1] - nodes[i]
+def vertex(left, right, before, here, after):
+    """Top of the parabola through three values, or the middle one if it has none between them.
+
+    left, right: places of the outer values from the middle one's.
+    """
     slope_left = (before - here) / left
     slope_right = (after - here) / right
     curvature = (slope_right - slope_left) / (right - left)
@@ -81,36 +83,38 @@ def vertex(nodes, i, before, here, after):
 
 
 @jit
-def peak_of(nodes, rows, column, known):
+def peak_of(nodes, rows, every, column, known):
     """The greater of `known` and the largest |value| of a column over a step.
 
-    The step's nodes count, and the parabola through the best.
+    The step's nodes count, `every` first, second, ... of them, and the parabola through the best.
     """
     last = nodes.size - 1
     best = 0
-    for i in range(1, last + 1):
+    for i in range(every, last + 1, every):
         if abs(rows[i, column]) > abs(rows[best, column]):
             best = i
     top = abs(rows[best, column])
-    i = min(max(best, 1), last - 1)
-    before, here, after = rows[i - 1, column], rows[i, column], rows[i + 1, column]
-    return max(top, known, vertex(nodes, i, abs(before), abs(here), abs(after)))
+    i = min(max(best, every), last - every)
+    before, here, after = rows[i - every, column], rows[i, column], rows[i + every, column]
+    left, right = nodes[i - every] - nodes[i], nodes[i + every] - nodes[i]
+    return max(top, known, vertex(left, right, abs(before), abs(here), abs(after)))
 
 
 @jit
-def deepest_of(nodes, rows, column, known):
+def deepest_of(nodes, rows, every, column, known):
     """The greater of `known` and a column's largest value over a step, as `peak_of` finds it."""
     last = nodes.size - 1
     best = 0
-    for i in range(1, last + 1):
+    for i in range(every, last + 1, every):
         if rows[i, column] > rows[best, column]:
             best = i
     top = rows[best, column]
     if 2.0 * top < known:
         return max(top, known)
-    i = min(max(best, 1), last - 1)
-    before, here, after = rows[i - 1, column], rows[i, column], rows[i + 1, column]
-    return max(top, known, vertex(nodes, i, before, here, after))
+    i = min(max(best, every), last - every)
+    before, here, after = rows[i - every, column], rows[i, column], rows[i + every, column]
+    left, right = nodes[i - every] - nodes[i], nodes[i + every] - nodes[i]
+    return max(top, known, vertex(left, right, before, here, after))
 
 
 @inlined
@@ -141,10 +145,10 @@ def add_flows(rows, weights, span, flows):
 
 
 @inlined
-def tally_contact(joint, span, nodes, weights, rows, measured, tally):
+def tally_contact(joint, span, nodes, weights, rows, every, measured, tally):
     """Add a step's contact loss, impacts and penetration at one joint."""
     lost = 0.0
-    for i in range(rows.shape[0]):
+    for i in range(0, nodes.size, every):
         apart = rows[i, NORMAL + joint] <= 0.0
         if apart:
             lost += weights[i]
@@ -154,34 +158,35 @@ def tally_contact(joint, span, nodes, weights, rows, measured, tally):
         tally.deepest = max(tally.deepest, rows[i, PENETRATION + joint])
     if measured:
         known = tally.max_penetration[joint]
-        tally.max_penetration[joint] = deepest_of(nodes, rows, PENETRATION + joint, known)
+        column = PENETRATION + joint
+        tally.max_penetration[joint] = deepest_of(nodes, rows, every, column, known)
         tally.loss_seconds[joint] += lost * span
 
 
 @inlined
-def tally_step(span, nodes, weights, rows, measured, tally, p):
+def tally_step(span, nodes, weights, rows, every, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
 
-    nodes, weights: (m,) of the Lobatto quadrature; rows: (m, COLUMNS), observed at the nodes;
-    measured: whether the metrics count (after settling); the depth of contact over the whole run
-    always does.
+    nodes, weights: (m,), both ends of the step and between them; rows: (m, COLUMNS), observed at
+    the nodes; every: 1, or 2 where only the first, third, ... row is filled, with `weights` zero
+    at the others; measured: whether the metrics count (after settling); the depth of contact over
+    the whole run always does.
     """
     if p.clearance[0] > 0.0:
-        tally_contact(0, span, nodes, weights, rows, measured, tally)
+        tally_contact(0, span, nodes, weights, rows, every, measured, tally)
     if p.clearance[1] > 0.0:
-        tally_contact(1, span, nodes, weights, rows, measured, tally)
+        tally_contact(1, span, nodes, weights, rows, every, measured, tally)
     if not measured:
         return
     tally.seconds += span
-    for i in range(nodes.size):
+    for k in range(PEAKED):
+        tally.top[k] = 0.0
+    for i in range(0, nodes.size, every):
         weight = span * weights[i]
         tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
         tally.square_deviation += weight * rows[i, DEVIATION] ** 2
-    for k in range(PEAKED):
-        tally.top[k] = 0.0
-    for i in range(nodes.size):
         for k in range(PEAKED):
             tally.top[k] = max(tally.top[k], abs(rows[i, ACCELERATION + k]))
     for k in range(PEAKED):
         if 2.0 * tally.top[k] >= tally.peak[k]:  # a parabola rises to less than twice its nodes
-            tally.peak[k] = peak_of(nodes, rows, ACCELERATION + k, tally.peak[k])
+            tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k])

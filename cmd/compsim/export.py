@@ -1,0 +1,80 @@
+"""`compsim export`: results as netCDF or CSV, for other programs."""
+
+import dataclasses
+import itertools
+import json
+import os
+from typing import TYPE_CHECKING
+
+import click
+
+from compsim.plan import size
+from compsim.screen import DONE, STORE, Screen, plural, say
+from compsim.status import results
+
+if TYPE_CHECKING:
+    from compressor.export import Exported
+
+
+@click.command()
+@click.argument("names", nargs=-1, metavar="[STUDY|JOB]...")
+@results
+@click.option("-o", "--output", required=True, metavar="FILE|FOLDER",
+              help="A file, .nc or .csv, or a folder for a file each.")  # fmt: skip
+@click.option("--format", "form", type=click.Choice(["netcdf", "csv"]),
+              help="Of the files in a folder; netcdf by default.")  # fmt: skip
+@click.option("--series", is_flag=True, help="Also the time series of each job of the studies.")
+@click.option("--force", is_flag=True, help="Replace files that exist.")
+@click.option("--json", "as_json", is_flag=True, help="A list of the files as JSON.")
+@click.option("--quiet", is_flag=True, help="No progress; damage is still told.")
+def export(
+    names: tuple[str, ...],
+    folder: str,
+    output: str,
+    form: str | None,
+    series: bool,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Write results as netCDF or CSV: a study's metrics, or the time series of a job.
+
+    A STUDY becomes one table of its jobs, failed and missing ones included; a JOB, named by its key
+    or the beginning of it, a table of samples. Without either, all studies. Several studies go into
+    one FILE together, or into a FOLDER with a file each.
+    """
+    from compressor.export import export as write
+
+    screen = Screen(quiet, "files")
+    try:
+        found, damaged = write(folder, names, output, form, series, force, screen)
+    finally:
+        screen.end()
+    if as_json:
+        click.echo(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
+    else:
+        for line in told(found, output):
+            click.echo(line)
+    for damage in damaged:
+        say(f"{damage}: left out")
+    return STORE if damaged else DONE
+
+
+def told(found: "list[Exported]", output: str) -> list[str]:
+    """What was written, a line a file; files in a folder of the output are told together."""
+    lines = []
+    for (place, _), group in itertools.groupby(found, key=lambda one: _line_of(one, output)):
+        files = [*group]
+        rows, count = sum(one.rows for one in files), sum(one.bytes for one in files)
+        what = plural(rows) if files[0].kind == "metrics" else f"{rows} samples"
+        if len(files) > 1 or place != files[0].path:
+            what = f"{plural(len(files))}, {what}"
+        lines.append(f"{place}  {what}, {size(count)}")
+    return lines
+
+
+def _line_of(one: "Exported", output: str) -> tuple[str, str]:
+    """The path of the line that tells of a file, and its kind."""
+    above = os.path.dirname(one.path)
+    return (one.path if above in ("", os.path.normpath(output)) or one.path == output else above,
+            one.kind)  # fmt: skip

@@ -1,0 +1,21 @@
+"""`compsim schema`: what editors need to know of case files."""
+
+import json
+
+import click
+
+from compsim.screen import DONE
+
+
+@click.command()
+def schema() -> int:
+    """Print the JSON Schema of case files, for editors.
+
+    An editor with yaml-language-server completes keys, explains them and marks mistakes after
+    `compsim schema > compsim.schema.json`, in files with the first line
+    `# yaml-language-server: $schema=compsim.schema.json`.
+    """
+    from compressor.case_schema import case_schema
+
+    click.echo(json.dumps(case_schema(), indent=1))
+    return DONE

@@ -1,0 +1,55 @@
+"""`compsim verify`: which stored files are damaged, which jobs that costs, and how to mend it."""
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from compsim.screen import DONE, STORE, plural, run_commands, say
+from compsim.status import as_json, results
+
+if TYPE_CHECKING:
+    from compressor.verification import Damage
+
+
+@click.command()
+@results
+@as_json
+def verify(folder: str, as_json: bool) -> int:
+    """Compare every stored file with its checksum; exit code 5 if any is damaged.
+
+    Damaged files are listed with the jobs that are lost with them, by study and swept values, and
+    with the command that computes them again.
+    """
+    from compressor.verification import verify as compare
+
+    damages = compare(folder)
+    if as_json:
+        click.echo(json.dumps([plain(damage) for damage in damages], indent=1))
+    for damage in () if as_json else damages:
+        click.echo(f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy))
+        for job in damage.jobs:
+            click.echo(f"  job {job.key}")
+            for study, point in job.studies.items():
+                values = "".join(f" {key}={value}" for key, value in point.items())
+                click.echo(f"    in {study}{values}")
+    if not damages:
+        say("no damage")
+        return DONE
+    lost = len({key for damage in damages for key in damage.keys})
+    say(f"{len(damages)} damaged file{'s' * (len(damages) != 1)}, {plural(lost)} lost")
+    for command in run_commands((one for damage in damages for one in damage.again), folder):
+        say(f"to mend: {command}")
+    return STORE
+
+
+def plain(damage: "Damage") -> dict[str, Any]:
+    """Damage as JSON has it."""
+    return {
+        "path": str(damage.path),
+        "problem": damage.problem,
+        "jobs": damage.keys,
+        "studies": {job.key: job.studies for job in damage.jobs},
+        "case_files": [study.case_file for study in damage.again],
+        "remedy": damage.remedy,
+    }

@@ -1,0 +1,84 @@
+"""A second motion in step with the first: how fast neighbours part, without noise of step control.
+
+Two runs that choose their steps for themselves differ by their errors. Here the twin takes every
+step that the first motion took, by the same method and of the same length to the bit: twins that
+start alike stay alike to the bit, and what parts others are the steps' own laws. These are those
+of the motion only at a tight tolerance: at a loose one the explicit pair's steps cross the edge of
+stability now and then, where a difference grows by as much as rtol exceeds rounding.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import inlined, jit
+from compressor.physics.kinematics import crank_direction, ideal
+from compressor.physics.march import DONE, RUNNING, attempt, march
+from compressor.physics.motion import turned
+from compressor.physics.observe import (
+    COLUMNS,
+    ECCENTRICITY,
+    derivative_with_flows,
+    eccentricity_row,
+)
+from compressor.physics.runge_kutta import STAGES
+
+
+def new_rows():
+    """Two observed rows, in which eccentricities are compared."""
+    return np.zeros((2, COLUMNS))
+
+
+@jit
+def separation(t, y, other, p, rows):
+    """Greatest distance of two states' eccentricities, over the joint's clearance."""
+    motion = ideal(t, p)
+    n = y.size // 2
+    eccentricity_row(y, turned(motion, y[n - 1], y[2 * n - 1]), p, rows[0])
+    eccentricity_row(other, turned(motion, other[n - 1], other[2 * n - 1]), p, rows[1])
+    worst = 0.0
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            i = ECCENTRICITY + 2 * joint
+            x, y_apart = rows[1, i] - rows[0, i], rows[1, i + 1] - rows[0, i + 1]
+            apart = math.sqrt(x * x + y_apart * y_apart) / p.clearance[joint]
+            if not apart <= worst:  # keeps a nan
+                worst = apart
+    return worst
+
+
+@inlined
+def follow(w, fellow, twin, work, atol, size, phase, p):
+    """Take the step that a walker took, from fellow.t on, in the twin's motion."""
+    if fellow.fresh:
+        derivative_with_flows(fellow.t, twin, phase, p, work.k[0])
+    base = crank_direction(fellow.t, p)
+    attempt(fellow, base, w.taken, twin, work, atol, size, phase, p)
+    for i in range(twin.size):
+        twin[i] = work.new[i]
+        work.k[0, i] = work.k[STAGES - 1, i]
+    fellow.fresh = w.fresh
+
+
+@jit
+def march_twins(
+    w, fellow, p, z, twin, work, twin_work, atol, size, edges, phases, times, states, tally,
+    rows, far, limit,
+):  # fmt: skip
+    """`march` with a twin in step, until they are `far` apart; fellow.status is then DONE.
+
+    fellow: the twin's walker, of the same pair; twin: its motion and flows, (n + 4,); far: as
+    share of the clearance; rows: of `new_rows`. The rest as for `march`.
+    """
+    n = size.size
+    for _ in range(limit):
+        if w.status != RUNNING:
+            return
+        steps, phase = w.steps, phases[w.segment]
+        fellow.t, fellow.stiff = w.t, w.stiff
+        march(w, p, z, work, atol, size, edges, phases, times, states, tally, 1)
+        if w.steps > steps:
+            follow(w, fellow, twin, twin_work, atol, size, phase, p)
+            if not separation(w.t, z[:n], twin[:n], p, rows) <= far:
+                fellow.status = DONE
+                return

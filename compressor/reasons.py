@@ -1,0 +1,104 @@
+"""Why a job fails: the stable names that are stored, what each means, and what to do about it.
+
+The one list of them: the physics stops with these, workers report with these, and `compsim run`,
+`status`, `show`, the report and the README tell of them from here.
+"""
+
+from enum import StrEnum
+
+
+class Reason(StrEnum):
+    """A reason's name; `meaning`: what has happened; `remedy`: what to do next."""
+
+    meaning: str
+    remedy: str
+
+    def __new__(cls, name: str, meaning: str, remedy: str) -> "Reason":
+        member = str.__new__(cls, name)
+        member._value_, member.meaning, member.remedy = name, meaning, remedy
+        return member
+
+    INVALID_INPUT = (
+        "invalid_input",
+        "a `Case` made in Python holds values that a case file would be refused for; nothing is "
+        "simulated",
+        "mend what the detail lists; Case.from_values raises it at once",
+    )
+    NON_FINITE = (
+        "non_finite",
+        "the motion or its rates have left the finite numbers, such as the load when the piston "
+        "passes the cylinder head",
+        "the motion leaves what the model can describe: check the values that are swept furthest, "
+        "and gas.head_clearance_mm",
+    )
+    PENETRATION_IMPLAUSIBLE = (
+        "penetration_implausible",
+        "a journal sank deeper into its bearing than a tenth of its radius, for which no contact "
+        "law is meant",
+        "the contact is too soft for the forces: check contact.stiffness, masses and speed, and "
+        "their units",
+    )
+    STEP_UNDERFLOW = (
+        "step_underflow",
+        "the integrator's step has become too short to move the time",
+        "try another solve.method, such as Radau, or a looser rtol",
+    )
+    BUDGET_STEPS = (
+        "budget_steps",
+        "solve.max_steps were taken, refused ones included, before the end was reached",
+        "raise solve.max_steps",
+    )
+    BUDGET_SECONDS = (
+        "budget_seconds",
+        "solve.timeout_s had passed before the end was reached",
+        "the same command tries again; raise solve.timeout_s if that is not enough",
+    )
+    CONTACT_UNDERRESOLVED = (
+        "contact_underresolved",
+        "a contact began and ended within one step, and its impulse is more than the tolerance "
+        "allows: the method stepped over it",
+        "use solve.method: auto, which lands on every onset of contact, or a smaller rtol",
+    )
+    ENERGY_AUDIT_FAILED = (
+        "energy_audit_failed",
+        "the energy does not balance within what the tolerance allows, in no run of up to a "
+        "hundredth of it: metrics cannot be trusted, and none are stored",
+        "try solve.method: DOP853, which takes time; very small stiction velocities and friction "
+        "of 0.5 or more at tight tolerances are the usual causes",
+    )
+    ACCURACY_NOT_REACHED = (
+        "accuracy_not_reached",
+        "no run's error bars are as short as solve.accuracy asks for; its numbers are kept",
+        "ask for less in solve.accuracy, or raise solve.max_steps where the detail names steps",
+    )
+    WORKER_DIED = (
+        "worker_died",
+        "the worker process ended or stood still in this job, twice, the second time alone",
+        "a crash, or killed from outside, or for want of memory: use a smaller -j; if it stays, a "
+        "bug of compsim: please report it with the case",
+    )
+    OUT_OF_MEMORY = (
+        "out_of_memory",
+        "the job needs more memory than its worker may use, also alone",
+        "use a smaller -j, which gives each worker more memory, a longer solve.output_step_deg, or "
+        "output.keep=metrics",
+    )
+    INTERNAL_ERROR = (
+        "internal_error",
+        "the program raised an exception that nobody foresaw",
+        "a bug of compsim: please report it, with what Python prints for "
+        "compressor.store.read_job(FOLDER, JOB).traceback",
+    )
+
+
+def remedy(name: str) -> str:
+    """What to do about a stored reason, also one of another version's."""
+    known = Reason.__members__.get(name.upper())
+    return known.remedy if known else "compsim show JOB tells its detail"
+
+
+def reason_table() -> str:
+    """The reasons in Markdown, for the README."""
+    lines = ["| reason | what it means | what to do |", "|---|---|---|"]
+    lines += [f"| `{one}` | {one.meaning} | {one.remedy} |" for one in Reason]
+    return "\n".join(lines) + "\n"

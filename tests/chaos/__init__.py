@@ -1,0 +1,1 @@
+"""Fault injection: what must survive, tried many times."""

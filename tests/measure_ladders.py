@@ -1,0 +1,156 @@
+"""Error against tolerance, and the limit of no clearance (make ladders, about two minutes).
+
+The ladder: the paper's three faults at 0.2 mm by `auto`, from rtol 1e-2 to 1e-10, against SciPy's
+DOP853 at 1e-12; RODAS at 1e-12 says how far that can be trusted. The limit: clearances from 1 mm
+to 1 nm with the contact scaled along, so that compliance shrinks as the clearance does: K with
+c^-1.5, the penetration of full damping with c, the damping with c^-0.5. Writes a small JSON file
+and, beside it, both figures.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from measure_accuracy import provenance
+
+from compressor.analysis import FAULTS
+from compressor.bench import (
+    REFERENCES,
+    default_cases,
+    errors,
+    faulty,
+    reference,
+    solved,
+    stored_values,
+)
+from compressor.case import Case, Contact
+from compressor.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
+from compressor.figures.style import render
+from compressor.simulation import simulate
+
+TOLERANCES = [10.0**-k for k in range(2, 11)]
+CLEARANCES = [10.0**-k for k in range(7)]  # mm
+PAPER = 0.1  # mm: the clearance at which the contact is the paper's
+AUDIT = 10  # rtol a revolution: the bound of the energy residual
+
+
+def short(value):
+    """A number to three digits."""
+    return float(f"{value:.3g}")
+
+
+def rung(case, rtol, truth):
+    """One tolerance of the ladder: the variables of RUNGS."""
+    run = simulate(solved(case, "auto", rtol))
+    assert run.attrs["complete"], run["reason"].item()
+    found = errors(stored_values(run, faulty(case)), truth)
+    numbers = {name: found[name.removeprefix("error_")] for name in list(RUNGS)[:2]}
+    return {**numbers, "energy_residual": float(run["energy_residual"])}
+
+
+def ladder():
+    """Rows of (scene, rtol), and how far apart the references are, by scene."""
+    rows, apart = [], {}
+    for name, case in default_cases().items():
+        truth, other = (reference(name, case, method) for method in REFERENCES)
+        apart[f"{name} mm"] = short(errors(other, truth)["acceleration"])
+        for rtol in TOLERANCES:
+            numbers = {key: short(value) for key, value in rung(case, rtol, truth).items()}
+            rows.append({"scene": f"{name} mm", "rtol": rtol, **numbers})
+    return rows, apart
+
+
+def scaled(joint, clearance):
+    """A case with the contact scaled to its clearance (mm); its first revolution."""
+    ratio = clearance / PAPER
+    paper = Contact()
+    contact = {
+        "stiffness_N_per_mm15": paper.stiffness_N_per_mm15 * ratio**-1.5,
+        "full_damping_mm": paper.full_damping_mm * ratio,
+        "damping_N_s_per_mm": paper.damping_N_s_per_mm * ratio**-0.5,
+    }
+    solve = {"duration_rev": 1, "settle_rev": 0, "error_bars": False}
+    values = {"joint": joint, "contact": contact, "solve": solve}
+    if joint != "none":
+        values["clearance_mm"] = clearance
+    return Case.from_values(values)
+
+
+def limit(joints=FAULTS, clearances=CLEARANCES):
+    """Rows of (scene, clearance): the greatest deviation of x from the ideal machine's (m)."""
+    ideal = simulate(scaled("none", PAPER))["displacement"].values
+    rows = []
+    for joint in joints:
+        for clearance in clearances:
+            case = scaled(joint, clearance)
+            run = simulate(case)
+            assert run.attrs["complete"], run["reason"].item()
+            away = np.abs(run["displacement"].values - ideal).max()
+            rows.append({
+                "scene": joint, "clearance": clearance / 1000, "deviation": short(away),
+                "residual": short(float(run["energy_residual"]) / (AUDIT * case.rtol)),
+            })  # fmt: skip
+    return rows
+
+
+def slopes(rows):
+    """By scene the slope of log deviation over log clearance: fitted, and of each decade."""
+    found = {}
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        points = [row for row in rows if row["scene"] == scene]
+        x, y = (np.log10([row[key] for row in points]) for key in ("clearance", "deviation"))
+        steps = np.diff(y) / np.diff(x)
+        found[scene] = {
+            "fitted": short(np.polyfit(x, y, 1)[0]),
+            "least": short(steps.min()),
+            "greatest": short(steps.max()),
+        }
+    return found
+
+
+def table(rows, along, **coordinate):
+    """Rows of (scene, along) as a Dataset."""
+    scenes = [*dict.fromkeys(row["scene"] for row in rows)]
+    names = [name for name in rows[0] if name not in ("scene", along)]
+    ((dim, values),) = coordinate.items()
+    shape = len(scenes), len(values)
+    data = {name: (("scene", dim), np.reshape([r[name] for r in rows], shape)) for name in names}
+    return xr.Dataset(data, {"scene": scenes, dim: values})
+
+
+def figures(kept):
+    """Both figures of a kept measurement, by file name."""
+    rungs = table(kept["ladder"], "rtol", tolerance=kept["tolerances"])
+    rungs["reference_uncertainty"] = "scene", [*kept["references_apart"].values()]
+    revolutions = next(iter(default_cases().values())).solve.duration_rev
+    rungs["residual_bound"] = "tolerance", AUDIT * revolutions * rungs["tolerance"].values
+    clearances = [*dict.fromkeys(row["clearance"] for row in kept["limit"])]
+    vanishing = table(kept["limit"], "clearance", clearance=clearances)
+    return {
+        "ladders.svg": draw_tolerance_ladder(rungs),
+        "limit.svg": draw_scaled_limit(vanishing),
+    }
+
+
+def main(target):
+    rows, apart = ladder()
+    vanishing = limit()
+    kept = {
+        **provenance("make ladders"),
+        "reference": f"{REFERENCES[0]} at 1e-12, {REFERENCES[1]} at 1e-12 beside it",
+        "tolerances": TOLERANCES,
+        "references_apart": apart,
+        "ladder": rows,
+        "limit": vanishing,
+        "slopes": slopes(vanishing),
+    }
+    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    for name, drawing in figures(kept).items():
+        Path(target).with_name(name).write_bytes(render(drawing, "svg"))
+    print(json.dumps({"slopes": kept["slopes"], "references_apart": apart}, indent=1))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,103 @@
+"""Measure a sweep of 100,000 jobs, and every command on it: seconds and peak memory (RSS).
+
+    python tests/measure_scale.py tests/results/scale.json [jobs]               (make scale)
+
+The sweep is a real one but for its physics: workers answer every job with the outcome of one, so
+that what is measured is all that a sweep does beside simulating. Each command is a process of its
+own, started cold; its memory is the greatest resident set, of the parent where it has workers.
+"""
+
+import dataclasses
+import json
+import os
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from measure_accuracy import provenance
+from measure_throughput import many
+
+from compressor import sweep
+from compressor.manifest import read_studies
+from compressor.plan import load_studies
+
+JOBS = 100_000
+PYTHON = {"open_study": "import compressor; compressor.open_study('results').load()"}
+COMMANDS = {
+    "run, nothing missing": "run many.yaml --max-jobs {jobs} --quiet",
+    "plan": "plan many.yaml --max-jobs {jobs}",
+    "status": "status",
+    "show": "show {key}",
+    "verify": "verify",
+    "export to CSV": "export -o many.csv",
+    "export to netCDF": "export -o many.nc",
+}
+
+
+def answered(place, case):
+    """A worker's answer: the outcome of one job under the key of another."""
+    found = answered.outcome
+    attributes = found.attributes | {"key": case.key, "physics_key": case.physics_key}
+    return dataclasses.replace(found, attributes=attributes)
+
+
+def stub_sweep(jobs):
+    """Sweep many.yaml in this process, with workers that do not simulate."""
+    from compressor.simulation import measure
+
+    (study,) = load_studies("many.yaml", max_jobs=jobs)
+    answered.outcome = measure(study.cases[0])
+    sweep.run_job, sweep.warm_up = answered, lambda cases, remark: None
+    sweep.sweep([study], "results", 2)
+
+
+def process(*arguments):
+    """Wall time (s) and peak resident set (MB) of a Python process."""
+    began = time.perf_counter()
+    pid = os.fork()
+    if not pid:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.execv(sys.executable, [sys.executable, *arguments])
+    _, status, usage = os.wait4(pid, 0)
+    assert status == 0, arguments
+    seconds = time.perf_counter() - began
+    print(
+        f"{seconds:.1f} s, {usage.ru_maxrss / 1024:.0f} MB: {' '.join(arguments)}", file=sys.stderr
+    )
+    return {"seconds": round(seconds, 2), "peak_MB": round(usage.ru_maxrss / 1024)}
+
+
+def scale(jobs):
+    """What the sweep and each command take, in the working directory."""
+    Path("many.yaml").write_text(many(jobs), encoding="utf-8")
+    found = {"sweep": process(__file__, "--sweep", str(jobs))}
+    (study,) = read_studies("results")
+    for name, code in PYTHON.items():
+        found[name] = process("-c", code)
+    for name, command in COMMANDS.items():
+        words = command.format(jobs=jobs, key=study.keys[-1]).split()
+        found[name] = process("-m", "compsim", *words)
+    sizes = {name: Path(name).stat().st_size for name in ("many.csv", "many.nc")}
+    return {"jobs": study.jobs, "bytes": sizes, "processes": found}
+
+
+def main(target, jobs=JOBS):
+    target, home = Path(target).absolute(), os.getcwd()
+    place = tempfile.mkdtemp(prefix="scale-", dir=".")
+    os.chdir(place)
+    try:
+        kept = {**provenance("make scale"), **scale(int(jobs))}
+    finally:
+        os.chdir(home)
+        shutil.rmtree(place)
+    target.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(kept, indent=1))
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "--sweep":
+        stub_sweep(int(sys.argv[2]))
+    else:
+        main(*sys.argv[1:3])

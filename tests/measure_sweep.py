@@ -1,0 +1,141 @@
+"""Measure a sweep of 100,000 jobs that is killed at random three times and resumed.
+
+    python tests/measure_sweep.py tests/results/sweep.json [jobs]      (make sweep-bench)
+
+The sweep runs through the real command on two workers, once undisturbed and once killed (SIGKILL of
+the parent alone, or with its workers) and resumed; both stores must hold the same, to the bit,
+timings apart. Memory is each process's greatest resident set, as /proc tells it while they run.
+"""
+
+import contextlib
+import json
+import random
+import re
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from chaos.processes import Run, members
+from chaos.stored import contents, damage
+from measure_accuracy import provenance
+from measure_store import timed
+from measure_throughput import WORKERS, many
+
+from compressor import open_study
+from compressor.store import read_store
+
+JOBS = 100_000
+KILLS = 3
+SEED = 1
+LONGEST = 4 * 3600.0  # s
+LOOK = 0.5  # s between two looks at memory
+PEAK = re.compile(r"VmHWM:\s*(\d+) kB")
+
+
+class Sweep:
+    """The sweep in a folder, run once or several times."""
+
+    def __init__(self, folder, jobs):
+        self.folder, self.jobs = folder, jobs
+        self.peaks = {"parent": 0, "worker": 0}  # kB
+        folder.mkdir()
+        (folder / "many.yaml").write_text(many(jobs), encoding="utf-8")
+
+    def start(self):
+        """Start the real command."""
+        limit = ["--max-jobs", str(self.jobs)]
+        return Run(["run", "many.yaml", "-j", str(WORKERS), *limit], self.folder, real=True)
+
+    def watch(self, run, seconds):
+        """Take note of memory for so long, or until the run ends; whether it runs."""
+        until = time.monotonic() + seconds
+        while run.watch(min(LOOK, until - time.monotonic())) and time.monotonic() < until:
+            for pid in members(run.pid):
+                with contextlib.suppress(OSError):
+                    if found := PEAK.search(Path(f"/proc/{pid}/status").read_text()):
+                        whose = "parent" if pid == run.pid else "worker"
+                        self.peaks[whose] = max(self.peaks[whose], int(found[1]))
+        return run.runs()
+
+    def complete(self):
+        """Seconds of a run to its end."""
+        began = time.monotonic()
+        run = self.start()
+        assert not self.watch(run, LONGEST), "the sweep takes too long"
+        code = run.finish()
+        assert code == 0, run.text()[-2000:]
+        return time.monotonic() - began
+
+    def kill(self, seconds, whole):
+        """Start it and kill it after a time: jobs that it had told of, and that are stored."""
+        run = self.start()
+        assert self.watch(run, seconds), f"it ended within {seconds:.1f} s, before its kill"
+        run.kill(whole)
+        code = run.finish()
+        assert code == -signal.SIGKILL, f"{code}: {run.text()[-2000:]}"
+        stored = len(read_store(self.folder / "results").rows)
+        assert stored >= run.told(), f"told of {run.told()} jobs, {stored} are stored"
+        assert not damage(self.folder / "results"), damage(self.folder / "results")
+        return {
+            "after_s": round(seconds, 2), "of": "all" if whole else "parent",
+            "told": run.told(), "stored": stored,
+        }  # fmt: skip
+
+
+def disturbed(sweep, seconds):
+    """Kill and resume a sweep that takes so many seconds: its kills, seconds of its last run.
+
+    The kills are at random moments of one undisturbed run, cut into equal parts.
+    """
+    draw = random.Random(SEED)
+    part = seconds / (KILLS + 1)
+    kills = [sweep.kill(draw.uniform(0.3, 1) * part, draw.random() < 0.5) for _ in range(KILLS)]
+    return kills, sweep.complete()
+
+
+def size(folder):
+    """Bytes and files of a store."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    return sum(path.stat().st_size for path in files), len(files)
+
+
+def main(target, jobs=JOBS):
+    jobs, place = int(jobs), Path(tempfile.mkdtemp(prefix="sweep-bench-", dir=".")).absolute()
+    try:
+        calm, torn = Sweep(place / "undisturbed", jobs), Sweep(place / "killed", jobs)
+        seconds = calm.complete()
+        kills, last = disturbed(torn, seconds)
+        results = place / "killed" / "results"
+        assert not damage(results), damage(results)
+        opened, study = timed(lambda: open_study(results))
+        count = int((study.status == "ok").sum())
+        assert count == study.status.size == len(read_store(results).rows), "not complete"
+        same = contents(place / "undisturbed" / "results") == contents(results)
+        assert same, "the resumed study differs from the undisturbed one"
+        total, files = size(results)
+    finally:
+        shutil.rmtree(place)
+    peaks = {name: max(calm.peaks[name], torn.peaks[name]) for name in calm.peaks}
+    kept = {
+        **provenance("make sweep-bench"),
+        "jobs": count,
+        "workers": WORKERS,
+        "wall_s": round(seconds, 1),
+        "jobs_per_s": round(count / seconds, 1),
+        "kills": kills,
+        "last_run_s": round(last, 1),
+        "bit_equal": same,
+        "peak_MB": {name: round(peak * 1024 / 1e6) for name, peak in peaks.items()},
+        "bytes": total,
+        "files": files,
+        "open_study_s": round(opened, 3),
+    }
+    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(kept, indent=1))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,132 @@
+"""The energy audit: what it lets pass, what is repeated tighter, what fails by its name."""
+
+import numpy as np
+import pytest
+
+from compressor import simulation
+from compressor.audit import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
+from compressor.case import Case
+from compressor.schema import METRICS
+
+SHORT = {"duration_rev": 0.5, "settle_rev": 0}
+BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
+
+
+def case(**solve):
+    return Case.from_values({**BIG_END, "solve": SHORT | solve})
+
+
+@pytest.fixture
+def unbalance(monkeypatch):
+    """Runs with an energy imbalance of so many times what their case allows."""
+    asked = []
+    original = simulation.integrate
+
+    def made(*times):
+        def run(request):
+            found = original(request)
+            if request.rtol <= 1e-5 * (1 + 1e-9):  # the bars' own run apart
+                factor = times[min(len(asked), len(times) - 1)]
+                asked.append(request.rtol)
+                ratio = factor * allowed(1e-5, 0.5) / energy_residual(found.tally)
+                found.tally.worst_imbalance *= ratio
+            return found
+
+        monkeypatch.setattr(simulation, "integrate", run)
+        return asked
+
+    return made
+
+
+def test_what_is_allowed_follows_the_tolerance():
+    assert allowed(1e-6, 4) == pytest.approx(4e-5)
+    assert allowed(1e-6, 0.25) == pytest.approx(1e-5)  # an impact costs as much in a short run
+    assert (allowed(1e-13, 4), allowed(1e-2, 4)) == (ROUNDING, GREATEST)
+
+
+def test_a_run_that_balances_is_run_once(unbalance):
+    asked = unbalance(0.9)
+    found = simulation.measure(case(rtol=1e-5))
+    assert (found.status, asked) == ("ok", [1e-5])
+
+
+def test_a_run_that_does_not_balance_is_repeated_tighter(unbalance):
+    asked = unbalance(5, 0.5)
+    found = simulation.measure(case(rtol=1e-5))
+    assert found.status == "ok"
+    assert asked == pytest.approx([1e-5, 1e-6])
+    assert found.attributes["rtol"] == pytest.approx(1e-6)
+    assert np.isfinite(found.numbers["peak_acceleration_error"])  # the first run is the looser one
+
+
+def test_a_run_that_never_balances_fails_and_its_metrics_are_not_stored(unbalance):
+    asked = unbalance(5)
+    found = simulation.simulate(case(rtol=1e-5))
+    assert len(asked) == RUNGS + 1
+    assert (found["status"].item(), found["reason"].item()) == ("failed", "energy_audit_failed")
+    assert found.attrs["detail"] == "energy residual 0.0005, more than 0.0001; at rtol 1e-07"
+    assert found.attrs["complete"] == 1
+    assert np.isfinite(found["acceleration"]).all()
+    assert float(found["energy_residual"]) == pytest.approx(5e-4)
+    for name in METRICS:
+        assert np.isnan(found[name]).all(), name
+
+
+def test_an_imbalance_that_is_not_a_number_does_not_pass(unbalance):
+    unbalance(np.nan)
+    assert simulation.measure(case(rtol=1e-5)).reason == "energy_audit_failed"
+
+
+@pytest.mark.parametrize(
+    ("solve", "reason"),
+    [({"max_steps": 900}, "energy_audit_failed"), ({"timeout_s": 600}, "budget_seconds")],
+)
+def test_a_repetition_that_does_not_end_says_so(solve, reason, unbalance, monkeypatch):
+    unbalance(5)
+    run = simulation.integrate
+
+    def slow(request):
+        if request.rtol < 5e-6 and reason == "budget_seconds":
+            request.max_steps, request.timeout = 10**6, 0.0
+        return run(request)
+
+    monkeypatch.setattr(simulation, "integrate", slow)
+    monkeypatch.setattr("compressor.integrate.CHUNK", 100)
+    found = simulation.measure(case(rtol=1e-5, **solve))
+    assert found.reason == reason
+    assert "; the next run: more than " in found.detail
+
+
+def test_a_ladder_of_accuracy_keeps_the_audit(unbalance):
+    unbalance(1e3)
+    found = simulation.measure(case(accuracy={"peak_acceleration": 1e-5}))
+    assert found.reason == "energy_audit_failed"
+    assert found.detail.endswith("no run is tighter")
+
+
+@pytest.mark.parametrize("load", ["design", "typical", "none"])
+def test_the_ideal_machine_balances(load):
+    assert simulation.measure(Case.from_values({"load": load})).status == "ok"
+
+
+EXTREMES = {
+    "stiff contact": {"contact": {"stiffness_N_per_mm15": 3.36e8}},
+    "undamped": {"contact": {"damping_N_s_per_mm": 0}},
+    "sticking": {"friction": {"stiction_velocity_mm_per_s": 0.1}},
+    "rough": {"friction": {"static": 0.5, "dynamic": 0.4}},
+    "light rod": {"machine": {"rod_mass_kg": 0.1, "reciprocating_mass_kg": 50}},
+    "slow": {"machine": {"speed_rpm": 50}},
+    "1 nm": {"clearance_mm": 1e-6},
+    "1 mm": {"clearance_mm": 1.0},
+}
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+@pytest.mark.parametrize("extreme", EXTREMES)
+def test_good_runs_of_extremes_pass(extreme, joint):
+    """Within the supported range, at standard; a few only at a tenth of the tolerance."""
+    values = {"joint": joint, "clearance_mm": 0.2, **EXTREMES[extreme]}
+    solve = SHORT | {"error_bars": False}
+    found = simulation.measure(Case.from_values({**values, "solve": solve}))
+    assert (found.status, found.reason) == ("ok", "")
+    assert found.numbers["energy_residual"] <= allowed(4e-6, 0.5)

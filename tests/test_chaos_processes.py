@@ -1,0 +1,56 @@
+"""Samples of the campaigns with processes: kills, poison jobs, runs at once (`make chaos`: all)."""
+
+import os
+import signal
+import time
+
+import pytest
+from chaos import concurrent, kill, poison
+from chaos.processes import Run, members
+
+# seeds by what they do, so that a sample has something of everything
+KILLS = {"parent amid metrics": 18, "worker amid series": 16, "both, series over metrics": 20}
+REAL = 15
+AT_ONCE = 6  # shards and a whole run; the next one: --wait
+
+
+@pytest.mark.parametrize("seed", KILLS.values(), ids=KILLS)
+def test_killed_sweeps_resume(seed, tmp_path):
+    found = kill.campaign(1, seed, tmp_path)
+    assert found["failures"] == []
+    assert sum(n for name, n in found["counts"].items() if name.startswith("killed")) == 1
+
+
+@pytest.mark.slow
+def test_the_real_command_is_killed_and_resumes(tmp_path):
+    found = kill.campaign(1, REAL, tmp_path)
+    assert found["counts"]["real commands"] == 1
+    assert found["failures"] == []
+
+
+def test_mixes_of_good_and_bad_jobs(tmp_path):
+    found = poison.campaign(2, 1, tmp_path)
+    assert found["failures"] == []
+    assert sum(found["counts"].values()) > found["counts"]["good jobs"] > 0
+
+
+def test_runs_on_one_store_at_once(tmp_path):
+    found = concurrent.campaign(2, AT_ONCE, tmp_path)
+    assert found["failures"] == []
+    assert found["counts"]["runs that were done"] >= 2
+
+
+# ---- what the campaigns see ---------------------------------------------------------------------
+
+
+def test_an_orphan_is_seen_and_ended(tmp_path):
+    def leave_one():
+        if not os.fork():
+            signal.pause()
+
+    run = Run(["--version"], tmp_path, prepare=leave_one)
+    assert run.finish(orphans=0.3) == "1 processes outlived it by 0.3 s"
+    deadline = time.monotonic() + 5
+    while members(run.pid) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert members(run.pid) == {}

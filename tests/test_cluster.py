@@ -1,0 +1,345 @@
+"""A dask cluster does as one machine does, whatever becomes of its workers."""
+
+import contextlib
+import itertools
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import distributed
+import numpy as np
+import pytest
+from compsim.cli import main
+from test_workers import POISON, lost, named, results
+from test_workers import work as poisoned
+
+from compressor import cluster, remote, store
+from compressor.cluster import Cluster, ClusterError, run_batches
+from compressor.durable import StoreError
+from compressor.plan import load_studies
+from compressor.sweep import sweep
+from compressor.verification import verify
+from compressor.workers import MOST_BATCH
+
+MEMORY = "800MB"  # of a worker, of which a job may add three quarters
+TIMES = ("seconds",)  # what two runs of a job may differ in
+
+
+@pytest.fixture(scope="module")
+def dask():
+    """A cluster of two worker processes on this machine."""
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
+        memory_limit=MEMORY,
+    ) as made:  # fmt: skip
+        made.wait_for_workers(2, timeout=60)
+        yield made
+
+
+@pytest.fixture
+def client(dask):
+    dask.wait_for_workers(2, timeout=60)
+    with Cluster(dask.scheduler_address) as made:
+        yield made.client
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory):
+    """One study of many jobs without time series, one of few with."""
+    folder = tmp_path_factory.mktemp("studies")
+    solve = {"duration_rev": 2, "accuracy": "draft", "error_bars": False, "output_step_deg": 0.9}
+    many = {"joint": "big_end", "output": {"keep": "metrics"}}
+    for name, values in {
+        "many": many | {"clearance_mm": {"linspace": [0.1, 0.3, 120]}},
+        "few": {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 10]}},
+    }.items():
+        (folder / f"{name}.yaml").write_text(json.dumps(values | {"solve": solve}))
+    return load_studies(folder / "many.yaml", folder / "few.yaml")
+
+
+@pytest.fixture(scope="module")
+def locally(studies, tmp_path_factory):
+    """The store of the studies' jobs, run by a process of this machine."""
+    folder = tmp_path_factory.mktemp("local")
+    sweep(studies, folder, 1)
+    return store.read_store(folder)
+
+
+def assert_same(folder, expected):
+    """Two stores hold the same jobs and bits, timings apart; no file of another is there."""
+    found = store.read_store(folder)
+    assert found.keys() == expected.keys()
+    for key in expected.keys():  # noqa: SIM118
+        ours, theirs = (s.outcome(s.position(key)) for s in (found, expected))
+        assert (ours.status, ours.reason) == (theirs.status, theirs.reason)
+        for name in set(ours.numbers.dtype.names) - {*TIMES}:
+            assert ours.numbers[name].tobytes() == theirs.numbers[name].tobytes(), name
+        if expected.rows.path(expected.position(key)):
+            one, other = found.job(key), expected.job(key)
+            assert set(one.variables) == set(other.variables)
+            for name in set(one.variables) - {*TIMES}:
+                np.testing.assert_array_equal(one[name].values, other[name].values)
+    assert verify(folder) == []
+    assert not list(Path(folder).glob("**/.*"))
+
+
+def watched(backend, after, act):
+    """A backend that calls act() when so many jobs have ended."""
+
+    def run(*arguments):
+        ends = backend(*arguments)
+        for number, end in enumerate(ends, 1):
+            if number == after:
+                act()
+            yield end
+
+    return run
+
+
+# ---- sweeps -------------------------------------------------------------------------------------
+
+
+def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "store_series", lambda *_: pytest.fail("the folder is shared"))
+    victim = dask.workers[0].process.pid
+    with Cluster(dask.scheduler_address) as backend:
+        killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
+        summary = sweep(studies, tmp_path / "out", backend=killing)
+    assert (summary.run_now, summary.failed) == (130, ())
+    assert_same(tmp_path / "out", locally)
+    with pytest.raises(ProcessLookupError):
+        os.kill(victim, 0)
+
+
+def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path, monkeypatch):
+    @contextlib.contextmanager
+    def elsewhere(place):
+        yield tmp_path / "of another machine" / "token", "text"
+
+    stored = []
+
+    def noted(*arguments, real=cluster.store_series):
+        stored.append(arguments)
+        return real(*arguments)
+
+    monkeypatch.setattr(cluster, "visible", elsewhere)
+    monkeypatch.setattr(cluster, "store_series", noted)
+    with Cluster(dask.scheduler_address) as backend:
+        sweep(studies, tmp_path / "out", backend=backend)
+    assert len(stored) == 10
+    assert_same(tmp_path / "out", locally)
+
+
+def test_a_folder_is_shared_if_our_file_is_seen(tmp_path):
+    with cluster.visible(tmp_path) as (token, text):
+        assert cluster.sees(token, text)
+        assert not cluster.sees(token, "of another run")
+    assert not cluster.sees(token, text)
+
+
+def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_path, monkeypatch):
+    def full(place, *_):
+        raise StoreError(place, "No space left on device", "free some")
+
+    monkeypatch.setattr(cluster, "visible", lambda place: contextlib.nullcontext((place, "")))
+    monkeypatch.setattr(cluster, "store_series", full)
+    with (
+        Cluster(dask.scheduler_address) as backend,
+        pytest.raises(StoreError, match="No space left on device"),
+    ):
+        sweep(studies[1:], tmp_path / "out", backend=backend)
+
+
+# ---- jobs that fail -----------------------------------------------------------------------------
+
+
+def run(client, work, payloads, **options):
+    """The ends of jobs by `cluster.run_batches`."""
+    jobs = named(payloads)
+    options = {"total": len(payloads), "grace": 0.3, "prepare": len} | options
+    return list(run_batches(client, work, jobs, **options))
+
+
+def test_poison_jobs_cost_themselves_only(client):
+    bad = ["crash", "leave", "hang", "bomb", "raise"]
+    ends = run(client, poisoned, [*range(40), *bad, *range(40, 80)])
+    assert results(ends) == {n: n for n in range(80)}
+    assert {end.id: end.reason for end in lost(ends).values()} == {n: POISON[n][1] for n in bad}
+    assert all(POISON[name][2] in end.detail for name, end in lost(ends).items() if name != "bomb")
+
+
+def parent_of(pid):
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+
+def felling(payload):
+    """Kill the cluster's worker, or the process that keeps us away from it."""
+    beside = os.getppid()
+    if payload == "worker":
+        os.kill(parent_of(beside), signal.SIGKILL)
+    if payload == "beside":
+        os.kill(beside, signal.SIGKILL)
+    if isinstance(payload, str):
+        time.sleep(60)
+    return payload
+
+
+@pytest.mark.parametrize(
+    ("name", "detail"), [("worker", "1 workers of the cluster died"), ("beside", "SIGKILL")]
+)
+def test_a_job_that_fells_workers_is_tried_alone_then_lost(name, detail, dask, client, monkeypatch):
+    monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
+    ends = run(client, felling, [*range(20), name, *range(20, 40)])
+    assert results(ends) == {n: n for n in range(40)}
+    (end,) = lost(ends).values()
+    assert (end.id, end.reason) == (name, "worker_died")
+    assert detail in end.detail
+    assert end.detail.endswith("also when it ran again alone")
+
+
+def test_many_jobs_are_never_listed(client):
+    issued = itertools.count()
+    jobs = ((n, n, 9.0) for n in issued)
+    ends = run_batches(client, abs, jobs, total=10**6, grace=1, prepare=len)
+    first = [end.id for end in itertools.islice(ends, 3000)]
+    ends.close()
+    assert len(set(first)) == 3000
+    assert next(issued) < 3000 + 2 * (2 * cluster.A_THREAD + 1) * MOST_BATCH
+
+
+def large(payload):
+    return bytes(payload)
+
+
+def test_few_large_results_are_on_their_way(client, monkeypatch):
+    monkeypatch.setattr(cluster, "MOST_BYTES", 3_000_000)
+    issued = itertools.count()
+    jobs = ((n, 1_000_000, 9.0) for n in issued)
+    ends = run_batches(client, large, jobs, total=10**6, grace=1, prepare=len, target_seconds=1e-9)
+    for taken in range(1, 30):
+        next(ends)
+        assert next(issued) < 2 * taken + 15  # one of each two is ours
+    ends.close()
+
+
+# ---- versions -----------------------------------------------------------------------------------
+
+
+def other_versions():
+    return remote.passport() | {"numpy": "1.0", "model": "none"}
+
+
+def test_workers_with_other_versions_are_refused(dask, monkeypatch):
+    monkeypatch.setattr(cluster, "passport", other_versions)
+    with pytest.raises(ClusterError) as told, Cluster(dask.scheduler_address):
+        pass
+    lines = str(told.value).splitlines()
+    assert len(lines) == 2
+    for line in lines:
+        assert line.startswith("worker tcp://")
+        assert f"numpy {np.__version__} in place of 1.0" in line
+        assert "have the same programs on all machines" in line
+
+
+def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
+    monkeypatch.setattr(cluster, "passport", other_versions)
+    with pytest.raises(ClusterError, match=r"worker tcp://.*: has model 1 in place of none, numpy"):
+        run(client, abs, range(10))
+
+
+def test_a_passport_tells_programs_apart():
+    ours = remote.passport()
+    assert {"compsim", "model", "sources of compsim", "Python", "numpy", "numba"} <= ours.keys()
+    assert remote.differences(ours, ours) == ""
+    without = {name: text for name, text in ours.items() if name != "numba"}
+    assert remote.differences(ours, without).startswith("numba unknown in place of ")
+
+
+# ---- schedulers ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(cluster, "CONNECTING", 1.0)
+
+
+def test_a_scheduler_that_is_not_there_is_an_error(impatient):
+    with socket.socket() as deaf:  # takes calls and never answers
+        deaf.bind(("127.0.0.1", 0))
+        deaf.listen()
+        for port in (1, deaf.getsockname()[1]):
+            with (
+                pytest.raises(ClusterError, match=rf"127.0.0.1:{port}: no scheduler answers"),
+                Cluster(f"tcp://127.0.0.1:{port}"),
+            ):
+                pass
+
+
+def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path):
+    told = []
+    with distributed.LocalCluster(
+        n_workers=0, processes=False, dashboard_address=":0", silence_logs=50
+    ) as empty, Cluster(empty.scheduler_address) as backend:  # fmt: skip
+
+        def remark(done, total, text):
+            told.append(text)
+            if text == cluster.WAITING:
+                empty.close()
+
+        with pytest.raises(ClusterError, match="the scheduler was lost; the same command goes on"):
+            sweep(studies, tmp_path / "out", progress=remark, backend=backend)
+    assert told.count(cluster.WAITING) == 1
+
+
+def test_without_distributed_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ClusterError, match=r"pip install 'compsim\[dask\]'"), Cluster("tcp://a:1"):
+        pass
+
+
+# ---- the command line ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--backend", "dask"], "needs --scheduler ADDRESS, such as tcp://host:8786"),
+        (["--backend", "dask", "--scheduler", "tcp://a:1", "-j", "2"], "-j counts processes here"),
+        (["--scheduler", "tcp://a:1"], "--scheduler goes with --backend dask"),
+        (["--backend", "dask", "--scheduler", "tcp://127.0.0.1:1"], "no scheduler answers"),
+    ],
+)
+def test_options_of_the_cluster(options, message, studies, tmp_path, capsys, impatient):
+    assert main(["run", studies[0].path, "-o", str(tmp_path / "out"), *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
+    config = tmp_path / "long.yaml"
+    sizes = {"linspace": [0.1, 0.3, 5000]}
+    config.write_text(json.dumps({"joint": "big_end", "clearance_mm": sizes} | {
+        "output": {"keep": "metrics"}}))  # fmt: skip
+    out = tmp_path / "out"
+    call = [sys.executable, "-m", "compsim", "run", str(config), "-o", str(out)]
+    call += ["--backend", "dask", "--scheduler", dask.scheduler_address]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, env=environment)
+    until = time.monotonic() + 60
+    while not list(out.glob("rows/*.h5")) and time.monotonic() < until:
+        time.sleep(0.05)
+    running.send_signal(signal.SIGTERM)
+    _, told = running.communicate(timeout=20)
+    assert running.returncode == 143, told
+    assert "interrupted by SIGTERM" in told
+    assert 0 < len(store.finished_keys(out)) < 5000
+    assert not list(out.glob("jobs/.*"))
+    until = time.monotonic() + 20
+    while dask.scheduler.tasks and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not dask.scheduler.tasks

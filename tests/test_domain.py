@@ -1,0 +1,123 @@
+"""Warnings before a run: what is odd, told once, and nothing about what is not."""
+
+import pytest
+import readme_tables
+from compsim import cli
+from test_layers import ROOT
+
+from compressor.case import Case
+from compressor.domain import Caution, cautions, remarks
+from compressor.plan import load_studies
+
+BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
+
+
+def odd(**values):
+    return [(one.key, one.kind) for one in remarks(Case.from_values(values))]
+
+
+@pytest.mark.parametrize("load", ["design", "typical", "none"])
+@pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
+def test_nothing_is_odd_about_the_defaults(load, joint):
+    assert odd(load=load, joint=joint, **({} if joint == "none" else {"clearance_mm": 0.1})) == []
+
+
+@pytest.mark.parametrize("study", load_studies(*(ROOT / "configs").glob("*.yaml")), ids=str)
+def test_nothing_is_odd_about_the_paper_s_cases(study):
+    assert cautions(study) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"machine": {"speed_rpm": 52.36}}, ("machine.speed_rpm", "unit")),
+        ({"machine": {"rod_length_mm": 0.6, "crank_radius_mm": 0.12},
+          "spring": {"stroke_mm": 0.12}},
+         ("machine.rod_length_mm", "unit")),
+        ({"machine": {"pin_radius_mm": 0.01}}, ("machine.pin_radius_mm", "unit")),
+        ({"machine": {"rod_inertia_kg_m2": 141000}}, ("machine.rod_inertia_kg_m2", "unit")),
+        ({"spring": {"stroke_mm": 0.12}}, ("spring.stroke_mm", "unit")),
+        ({"load": "typical", "gas": {"piston_radius_mm": 0.05}},
+         ("gas.piston_radius_mm", "unit")),
+        (BIG_END | {"clearance_mm": 0.0001}, ("clearance_mm", "unit")),
+        (BIG_END | {"clearance_mm": 0.02}, ("clearance_mm", "shallow")),
+        (BIG_END | {"contact": {"stiffness_N_per_mm15": 1.0625e10}},
+         ("contact.stiffness_N_per_mm15", "unit")),
+        (BIG_END | {"contact": {"stiffness_N_per_mm15": 3.36e2}},
+         ("contact.stiffness_N_per_mm15", "deep")),
+        (BIG_END | {"machine": {"speed_rpm": 20000}}, ("contact.stiffness_N_per_mm15", "deep")),
+        (BIG_END | {"friction": {"stiction_velocity_mm_per_s": 0.001}},
+         ("friction.stiction_velocity_mm_per_s", "stiction")),
+        (BIG_END | {"solve": {"max_steps": 200}}, ("solve.max_steps", "steps")),
+        (BIG_END | {"solve": {"timeout_s": 1e-4}}, ("solve.timeout_s", "seconds")),
+    ],
+)  # fmt: skip
+def test_what_is_odd(values, expected):
+    assert expected in odd(**values)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"machine": {"speed_rpm": 52.4}},
+        {"machine": {"speed_rpm": 5484.21}},
+        {"machine": {"speed_rpm": 300}},
+        {"load": "none", "spring": {"stroke_mm": 0.5}},  # what is not simulated
+        {"contact": {"stiffness_N_per_mm15": 1.0625e10}},
+        {"solve": {"max_steps": 1}},  # nothing is integrated
+    ],
+)
+def test_what_is_not_odd(values):
+    assert odd(**values) == []
+
+
+def study(tmp_path, text):
+    path = tmp_path / "odd.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_studies(path, max_jobs=10**6)[0]
+
+
+def test_a_sweep_is_told_of_once(tmp_path):
+    found = cautions(study(tmp_path, "joint: both\nclearance_mm: [0.2, 0.3, 0.0001, 0.0002]\n"))
+    assert found == [Caution("clearance_mm", "0.0001 mm is 100 nm; as metres, 0.1 mm", 2, 4)]
+
+
+def test_a_large_sweep_is_sampled_evenly_and_always_the_same(tmp_path):
+    many = study(
+        tmp_path,
+        "joint: big_end\nclearance_mm: {linspace: [0.2, 0.4, 40]}\n"
+        "machine: {speed_rpm: [500, 20000], rod_mass_kg: {linspace: [3, 5, 25]}}\n",
+    )
+    (deep, *_) = found = cautions(many)
+    assert found == cautions(many)
+    assert deep.of == 500
+    assert 0.4 < deep.jobs / deep.of < 0.6
+
+
+def test_only_selected_jobs_are_told_of(tmp_path):
+    path = tmp_path / "odd.yaml"
+    path.write_text("joint: both\nclearance_mm: [0.2, 0.0001]\n", encoding="utf-8")
+    (one,) = load_studies(path, only="clearance_mm > 0.1")
+    assert cautions(one) == []
+
+
+def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
+    path = tmp_path / "odd.yaml"
+    path.write_text(
+        "joint: both\nclearance_mm: [0.3, 0.4]\nload: none\n"
+        "machine: {rod_length_mm: 6, crank_radius_mm: 1, pin_radius_mm: 0.4, speed_rpm: 52.36,\n"
+        "          rod_inertia_kg_m2: 5}\n"
+        "friction: {stiction_velocity_mm_per_s: 0.01}\nsolve: {max_steps: 1}\n",
+        encoding="utf-8",
+    )
+    cli.main(["plan", str(path), "-o", str(tmp_path / "results")])
+    told = [line for line in capsys.readouterr().err.splitlines() if str(path) in line]
+    assert len(told) == 6
+    assert told[0].startswith(f"{path}: warning: machine.crank_radius_mm: 1 looks like metres (2 ")
+    assert told[-1] == f"{path}: and 2 more warnings"
+
+
+def test_the_readme_s_examples_that_are_plain_are_told_nothing(tmp_path):
+    text = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
+    example = text.split("```yaml\n# bearing-wear.yaml\n")[1].split("```")[0]
+    assert cautions(study(tmp_path, example)) == []

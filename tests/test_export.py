@@ -1,0 +1,221 @@
+"""Results for other programs: what `compsim export` writes reads back as what is stored."""
+
+import csv
+import json
+import os
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from compsim import cli
+from conftest import keep
+
+from compressor import export as module
+from compressor import open_study
+from compressor.durable import StoreError
+from compressor.export import ExportError, export
+from compressor.plan import load_studies
+from compressor.schema import METRICS, SIZES
+from compressor.simulation import simulate
+from compressor.store import read_job, write_study
+
+SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+GRID = {
+    "joint": "both",
+    "clearance_mm": [0.1, 0.2],
+    "solve": SHORT | {"max_steps": [5, 10**6]},
+}
+LIST = {
+    "joint": "big_end",
+    "clearance_mm": 0.1,
+    "machine": {"speed_rpm": {"lhs": [400, 600]}},
+    "sample": {"n": 2},
+    "solve": SHORT,
+    "output": {"precision": "single"},
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A grid of four jobs, of which two failed, one is ok and one is missing; two sampled jobs."""
+    place = tmp_path_factory.mktemp("export")
+    for name, values in (("grid", GRID), ("list", LIST)):
+        (place / f"{name}.yaml").write_text(json.dumps(values))
+    folder = place / "results"
+    for study in load_studies(place / "grid.yaml", place / "list.yaml"):
+        write_study(folder, study, "compsim run")
+        keep(folder, *(simulate(case) for n, case in enumerate(study.cases) if n != 3))
+    return folder
+
+
+def table(path):
+    """The rows of a CSV file by header."""
+    with open(path, newline="", encoding="utf-8") as file:
+        return [*csv.DictReader(file)]
+
+
+def number(cell):
+    return float(cell) if cell else np.nan
+
+
+def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
+    ((one,), damaged) = export(results, ["grid"], tmp_path / "grid.csv")
+    rows = table(tmp_path / "grid.csv")
+    assert (one.kind, one.name, one.rows, damaged) == ("metrics", "grid", 4, [])
+    assert one.bytes == os.path.getsize(tmp_path / "grid.csv")
+    study = open_study(results, "grid")
+    for row in rows:
+        where = {"clearance_mm": float(row["clearance_mm"]), "max_steps": int(row["max_steps"])}
+        job = study.sel(where)
+        assert row["status"] == job.status
+        assert row["reason"] == job.reason
+        assert row["key"] == job.key
+        for name, (dims, unit, _) in METRICS.items():
+            ending = "" if unit == "1" else f" [{unit}]"
+            for index in np.ndindex(*(SIZES[dim] for dim in dims)):
+                labels = [str(job[dim].values[i]) for dim, i in zip(dims, index, strict=True)]
+                cell = row["_".join([name, *labels]) + ending]
+                np.testing.assert_array_equal(number(cell), job[name].values[index])
+    assert sorted(row["status"] for row in rows) == ["failed", "failed", "missing", "ok"]
+
+
+def test_metrics_in_netcdf_open_as_the_study(results, tmp_path):
+    export(results, ["grid"], tmp_path / "grid.nc")
+    study = open_study(results, "grid")
+    with xr.open_dataset(tmp_path / "grid.nc", engine="h5netcdf") as kept:
+        assert dict(kept.sizes) == {n: s for n, s in study.sizes.items() if n != "time"}
+        assert {*kept.coords} == {*study.coords} - {"time"}
+        for name in kept.variables:
+            xr.testing.assert_equal(kept[name].variable, study[name].variable)
+            assert kept[name].attrs == study[name].attrs
+        (origin,) = json.loads(kept.attrs["studies"])
+        assert origin["fixed"]["joint"] == "both"
+
+
+def test_studies_together_have_a_dimension_of_jobs(results, tmp_path):
+    export(results, [], tmp_path / "all.nc")
+    export(results, [], tmp_path / "all.csv")
+    study = open_study(results)
+    with xr.open_dataset(tmp_path / "all.nc", engine="h5netcdf") as kept:
+        assert kept.sizes["job"] == 6
+        assert kept.study.values.tolist() == ["grid"] * 4 + ["list"] * 2
+        xr.testing.assert_equal(kept.speed_rpm, study.speed_rpm)
+    assert [row["key"] for row in table(tmp_path / "all.csv")] == study.key.values.tolist()
+
+
+def test_ncdump_reads_an_export(results, tmp_path):
+    export(results, [], tmp_path / "all.nc")
+    done = subprocess.run(
+        ["ncdump", "-h", tmp_path / "all.nc"], capture_output=True, text=True, check=True
+    )
+    assert "job = 6" in done.stdout
+    assert 'peak_acceleration:coordinates = "key study' in done.stdout
+
+
+@pytest.mark.parametrize("name", ["grid", "list"])
+def test_series_read_back_to_the_bit(results, name, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "BLOCK", 7)
+    (key, *_) = (k for k in open_study(results, name).key.values.flat if stored(results, k))
+    for suffix in ("csv", "nc"):
+        export(results, [key[:12]], tmp_path / f"job.{suffix}")
+    job = read_job(results, key)
+    rows = table(tmp_path / "job.csv")
+    expected = {
+        "time [s]": job.time,
+        "acceleration [m/s2]": job.acceleration,
+        "contact_force_big_end_x [N]": job.contact_force.sel(joint="big_end", axis="x"),
+        "penetration_small_end [m]": job.penetration.sel(joint="small_end"),
+    }
+    assert next(iter(rows[0])) == "time [s]"
+    for header, values in expected.items():
+        np.testing.assert_array_equal([number(row[header]) for row in rows], values.values)
+    with xr.open_dataset(tmp_path / "job.nc", engine="h5netcdf") as kept:
+        xr.testing.assert_equal(kept.acceleration, job.acceleration)
+        assert kept.acceleration.attrs == job.acceleration.attrs
+    with h5py.File(tmp_path / "job.nc") as file:
+        assert file["acceleration"].dtype == ("f4" if name == "list" else "f8")
+
+
+def stored(results, key):
+    try:
+        return "time" in read_job(results, key).dims
+    except StoreError:
+        return False
+
+
+def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
+    out = tmp_path / "out"
+    command = ["export", "-i", str(results), "-o", str(out), "--series", "--format", "csv"]
+    assert cli.main(command) == 0
+    told = capsys.readouterr().out.split("\n")
+    jobs = {path.stem for path in (out / "grid").iterdir()}
+    assert {*table(out / "grid.csv")[0]} > {"key", "clearance_mm", "max_steps", "status"}
+    assert jobs == {row["key"] for row in table(out / "grid.csv") if row["status"] != "missing"}
+    assert told[0].startswith(f"{out / 'grid.csv'}  4 jobs, ")
+    assert told[1].startswith(f"{out / 'grid'}  3 jobs, ")
+    assert len(told) == 5  # and two of the other study, and the end of the last line
+    assert cli.main(command) == 2
+    assert f"{out / 'grid.csv'} exists: --force replaces it" in capsys.readouterr().err
+    (out / "list.csv").write_text("old")
+    assert cli.main([*command, "--force", "--quiet", "--json"]) == 0
+    found = capsys.readouterr()
+    assert found.err == ""
+    assert {one["path"] for one in json.loads(found.out)} == set(map(str, out.rglob("*.csv")))
+    assert len(table(out / "list.csv")) == 2
+
+
+@pytest.mark.parametrize(
+    ("names", "file", "more", "message"),
+    [
+        ([], "x.csv", {"series": True}, "x.csv is one file, and this needs several"),
+        (["grid", "KEY"], "x.nc", {}, "x.nc is one file, and this needs several"),
+        (["grid"], "x.csv", {"form": "netcdf"}, "x.csv is no name for netcdf: end it in .nc"),
+    ],
+)
+def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_path):
+    key = open_study(results, "list").key.values[0]
+    names = [key if name == "KEY" else name for name in names]
+    with pytest.raises(ExportError, match=message):
+        export(results, names, tmp_path / file, **more)
+    assert not any(tmp_path.iterdir())
+
+
+def test_what_is_not_there_is_named(results, tmp_path, capsys):
+    missing = str(open_study(results, "grid").key.values[1, 1])
+    for name, problem in (
+        ("gird", "holds no study 'gird'; it holds grid, list"),
+        (missing, f"job {missing} is not stored; run its case file first"),
+        ("0" * 20, "no job's key begins with '00000000000000000000'"),
+    ):
+        assert cli.main(["export", name, "-i", str(results), "-o", str(tmp_path / "x.csv")]) == 5
+        assert problem in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+def test_damaged_series_are_left_out_and_told(results, tmp_path, capsys):
+    copy = tmp_path / "results"
+    subprocess.run(["cp", "-r", results, copy], check=True)
+    (hurt, *others) = sorted((copy / "jobs").iterdir())
+    data = bytearray(hurt.read_bytes())
+    data[len(data) // 2] ^= 1
+    hurt.write_bytes(data)
+    out = tmp_path / "out"
+    assert cli.main(["export", "-i", str(copy), "-o", str(out), "--series"]) == 5
+    assert f"{hurt}: is damaged" in capsys.readouterr().err
+    assert {path.stem for path in out.rglob("*/*.nc")} == {p.name[:20] for p in others}
+    assert cli.main(["export", hurt.name[:20], "-i", str(copy), "-o", str(out)]) == 5
+
+
+def test_a_disk_that_fills_up_leaves_no_part(results, tmp_path, monkeypatch):
+    (tmp_path / "all.csv").write_text("old")
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StoreError, match="No space left"):
+        export(results, [], tmp_path / "all.csv", force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["all.csv"]
+    assert (tmp_path / "all.csv").read_text() == "old"

@@ -1,0 +1,177 @@
+"""Twins in step: what parts them is the motion, not the steps."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from compsim import cli
+from conftest import keep
+
+from compressor.case import Case
+from compressor.horizon import CLOSE, FAR, predictability_horizon, time_of_parting
+from compressor.integrate import Request, integrate
+from compressor.physics.motion import start
+from compressor.physics.observe import COLUMNS, Column, observe_all
+from compressor.physics.parameters import FREEDOMS
+from compressor.quantities import ERRORS, METRICS
+from compressor.record import offsets, record, scene
+from compressor.simulation import measure, simulate
+from compressor.store import read_store
+from compressor.sweep import serving_both
+
+REGULAR = {"joint": "both", "clearance_mm": 0.3}
+CHAOTIC = {
+    "joint": "big_end",
+    "clearance_mm": 0.3,
+    "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
+    "contact": {"damping_N_s_per_mm": 0},
+}
+QUICK = {"duration_rev": 1.2, "settle_rev": 0}
+
+
+def case(values, **solve):
+    return Case.from_values({**values, "solve": {**QUICK, **solve}})
+
+
+def request(made, shift, rtol, method="auto", samples=1):
+    p = record(made)
+    y = np.zeros(2 * FREEDOMS[scene(made)])
+    start(offsets(made) + shift * p["clearance"][:, None] / math.sqrt(2), y, p)
+    times = made.duration * np.arange(samples + 1) / samples
+    return Request(p, y, times, 0.0, rtol, method)
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+@pytest.mark.parametrize(("method", "damping"), [("auto", 336), ("auto", 336e3), ("RODAS", 336)])
+def test_twins_that_start_alike_stay_alike_to_the_bit(joint, method, damping):
+    """Over load corners, onsets of contact and changes of method: any distance at all is too far.
+
+    So is it seen when they do not start alike.
+    """
+    made = case({**REGULAR, "joint": joint, "contact": {"damping_N_s_per_mm": damping}})
+    asked = request(made, 0.0, 1e-5, method)
+    assert time_of_parting(asked, asked.start.copy(), far=0.0) == math.inf
+    assert time_of_parting(asked, request(made, 1e-15, 1e-5).start, far=0.0) < 1e-4
+
+
+def eccentricities(asked):
+    found = integrate(asked)
+    rows = np.empty((asked.times.size, COLUMNS))
+    observe_all(asked.times, found.states, found.phases, asked.p, rows)
+    return rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 2]
+
+
+def test_a_horizon_is_that_of_two_separate_runs():
+    """Each with its own steps, so tight that their errors are far below the shift."""
+    made = case(CHAOTIC)
+    pair = [eccentricities(request(made, s, 1e-13, samples=20000)) for s in (0.0, CLOSE)]
+    apart = np.hypot(*(pair[1] - pair[0]).T) / 0.3e-3
+    parted = made.duration * np.flatnonzero(apart > FAR)[0] / 20000
+    horizon = predictability_horizon(made)
+    assert 0.9 * made.turn < horizon < made.duration
+    assert horizon == pytest.approx(parted, rel=0.01)
+    assert predictability_horizon(made, rtol=1e-13) == pytest.approx(horizon, rel=0.01)
+
+
+def test_a_farther_twin_parts_earlier():
+    made = case(CHAOTIC)
+    times = [predictability_horizon(made, close=close) for close in (1e-5, 1e-7, 1e-9)]
+    assert times == sorted(times)
+    assert times[0] < 0.9 * times[2]
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+def test_the_paper_s_motions_are_regular(joint):
+    assert predictability_horizon(case({**REGULAR, "joint": joint})) == math.inf
+
+
+def test_the_case_s_own_solver_does_not_count():
+    ours = predictability_horizon(case(CHAOTIC))
+    assert predictability_horizon(case(CHAOTIC, method="LSODA", rtol=1e-3)) == ours
+
+
+def test_ideal_joints_never_part():
+    assert predictability_horizon(case({"joint": "none"})) == math.inf
+
+
+def test_a_run_that_stops_tells_how_far_it_came():
+    stopped, later = (predictability_horizon(case(REGULAR, max_steps=n)) for n in (100, 1000))
+    assert 0 < stopped < later < case(REGULAR).duration
+    assert 0 < predictability_horizon(case(REGULAR), timeout=0.0) < case(REGULAR).duration
+
+
+# Beside a job's other numbers
+
+BRIEF = {"duration_rev": 1.2, "settle_rev": 0.2, "output_step_deg": 0.9}
+
+
+def brief(values, **solve):
+    return Case.from_values({**values, "solve": BRIEF | solve, "output": {"keep": "metrics"}})
+
+
+def test_bars_are_claimed_within_the_horizon_only():
+    plain, asked = (measure(brief(CHAOTIC, horizon=asked)).numbers for asked in (False, True))
+    assert math.isnan(plain["predictability_horizon"])
+    assert asked["predictability_horizon"] == predictability_horizon(brief(CHAOTIC))
+    for name in METRICS:
+        assert np.array_equal(asked[name], plain[name]), name
+        assert np.isfinite(plain[f"{name}_error"]).all()
+        assert np.isposinf(asked[f"{name}_error"]).all()
+
+
+def test_a_motion_that_can_be_foretold_keeps_its_bars():
+    plain, asked = (measure(brief(REGULAR, horizon=asked)).numbers for asked in (False, True))
+    assert asked["predictability_horizon"] == math.inf
+    for name in (*METRICS, *ERRORS):
+        assert np.array_equal(asked[name], plain[name]), name
+
+
+def test_accuracy_by_number_is_not_reached_beyond_the_horizon():
+    """Bars of rms may be short there, but speak for nothing."""
+    accuracy = {"rms_acceleration": 0.4}
+    assert measure(brief(CHAOTIC, accuracy=accuracy)).status == "ok"
+    found = measure(brief(CHAOTIC, accuracy=accuracy, horizon=True))
+    assert (found.status, found.reason) == ("failed", "accuracy_not_reached")
+    assert "beyond the horizon" in found.detail
+    assert found.numbers["predictability_horizon"] < brief(CHAOTIC).duration
+    assert measure(brief(REGULAR, accuracy=accuracy, horizon=True)).status == "ok"
+
+
+def test_a_failed_job_has_no_horizon():
+    found = measure(brief(REGULAR, horizon=True, max_steps=5))
+    assert found.reason == "budget_steps"
+    assert math.isnan(found.numbers["predictability_horizon"])
+
+
+def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
+    plain, asked = (brief(CHAOTIC, horizon=asked) for asked in (False, True))
+    assert plain.key == asked.key
+    assert serving_both(plain, asked).solve.horizon
+    keep(tmp_path, simulate(plain))
+    assert not read_store(tmp_path).status(plain.key).serves(asked)
+    keep(tmp_path, simulate(asked))
+    stored = read_store(tmp_path).status(plain.key)
+    assert stored.serves(asked)
+    assert stored.serves(plain)
+    assert 0 < stored.numbers["predictability_horizon"] < asked.duration
+
+
+def test_show_and_report_tell_of_jobs_beyond_their_horizon(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    solve = {**BRIEF, "horizon": True}
+    both = {**CHAOTIC, "contact": {"damping_N_s_per_mm": [0, 336]}, "solve": solve}
+    (tmp_path / "ring.yaml").write_text(json.dumps({**both, "output": {"keep": "metrics"}}))
+    assert cli.main(["run", "ring.yaml", "-j", "1"]) == 0
+    keys = json.loads((tmp_path / "results/studies/ring.json").read_text())["keys"]
+    told = []
+    for key in keys:
+        capsys.readouterr()
+        assert cli.main(["show", key]) == 0
+        told.append(capsys.readouterr().out)
+    assert "± inf" in told[0]
+    assert "beyond the horizon" in told[0]
+    assert "predictability_horizon       inf s" in told[1]
+    assert "beyond the horizon" not in told[1]
+    assert cli.main(["report"]) == 0
+    assert "Of 1 of the jobs the run is longer" in (tmp_path / "report/index.html").read_text()

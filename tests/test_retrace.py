@@ -1,0 +1,123 @@
+"""What is kept of a run that stops: where, in which state, driven by what, and its last steps."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor import integrate as integration
+from compressor.case import METHODS, Case
+from compressor.retrace import LAST
+from compressor.simulation import STATE_NAMES, measure, simulate
+
+BOTH = {"joint": "both", "clearance_mm": 0.3}
+SCIPY = [name for name in METHODS if name not in integration.COMPILED]
+
+
+def stopped(**values):
+    return measure(Case.from_values({**BOTH, **values})).attributes
+
+
+def words(attributes):
+    return attributes["stop_history_words"].split("; ")
+
+
+def test_the_history_ends_where_the_run_stopped():
+    found = stopped(solve={"max_steps": 500})
+    times, steps = found["stop_history_time"], found["stop_history_step"]
+    assert len(times) == len(steps) == len(found["stop_history_error"]) == LAST
+    taken = np.array([text.endswith(("taken", "to an onset")) for text in words(found)])
+    assert (times + np.where(taken, steps, 0))[-1] == pytest.approx(found["stop_time"], rel=1e-12)
+    assert times[1:] == pytest.approx((times + np.where(taken, steps, 0))[:-1], rel=1e-12)
+    errors = found["stop_history_error"]
+    refused = np.array([text.endswith("refused") for text in words(found)])
+    assert (errors[refused] > 1).all()
+    assert (errors[[text.endswith("taken") for text in words(found)]] <= 1).all()
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "RODAS"])
+def test_a_history_is_that_of_the_run(method, monkeypatch):
+    """Looked at step by step from the start, or only from the last chunk on: the same."""
+    solve = {"max_steps": 300, "method": method}
+    found = stopped(solve=solve)
+    monkeypatch.setattr(integration, "CHUNK", 40)
+    again = stopped(solve=solve)
+    for name in ("time", "step", "error"):
+        assert again[f"stop_history_{name}"].tolist() == found[f"stop_history_{name}"].tolist()
+    assert again["stop_history_words"] == found["stop_history_words"]
+    assert again["stop_state"].tolist() == found["stop_state"].tolist()
+    expected = {"auto": "TSIT5"}.get(method, method)
+    assert {text.split()[0] for text in words(found)} == {expected}
+
+
+def test_the_errors_are_those_that_the_control_saw():
+    """After a step that is taken the control remembers the logarithm of its error's norm."""
+    request = simulate_request(max_steps=60)
+    now = []
+    original = integration.retrace
+
+    def looking(before, after, *rest):
+        now.append(float(after.walker.error))
+        return original(before, after, *rest)
+
+    integration.retrace, kept = looking, integration.retrace
+    try:
+        history = integration.integrate(request).history
+    finally:
+        integration.retrace = kept
+    last = [e for e, text in zip(history.errors, history.words, strict=True) if "taken" in text][-1]
+    assert math.log(max(last, 1e-4)) == pytest.approx(now[0], abs=1e-9)
+
+
+def simulate_request(max_steps):
+    from compressor.physics.motion import start
+    from compressor.record import offsets, record
+
+    case = Case.from_values(BOTH)
+    p, y = record(case), np.zeros(8)
+    start(offsets(case), y, p)
+    times = np.array([0.0, case.duration])
+    return integration.Request(p, y, times, 0.0, case.rtol, max_steps=max_steps)
+
+
+def test_what_is_not_finite_is_named():
+    gas = {"head_clearance_mm": 0.601, "switching": "exact"}
+    solve = {"duration_rev": 1.25, "accuracy": "draft"}
+    found = simulate(Case.from_values({**BOTH, "load": "typical", "gas": gas, "solve": solve}))
+    assert found.attrs["stop_dominant"] in STATE_NAMES[8]
+    assert words(found.attrs)[-1].endswith("refused")
+    assert not np.isfinite(found.attrs["stop_history_error"][-1])
+
+
+def test_a_run_that_ends_well_has_no_history():
+    found = measure(Case.from_values({**BOTH, "solve": {"duration_rev": 0.1, "settle_rev": 0}}))
+    assert not [name for name in found.attributes if name.startswith("stop")]
+
+
+@pytest.mark.parametrize("method", [*METHODS])
+@pytest.mark.parametrize("most", [1, 37])
+def test_the_budget_of_steps_is_kept_exactly(method, most):
+    found = measure(Case.from_values({**BOTH, "solve": {"max_steps": most, "method": method}}))
+    assert found.reason == "budget_steps"
+    assert found.numbers["steps"] + found.numbers["rejected"] == most
+    assert len(words(found.attributes)) == min(most, LAST)
+
+
+@pytest.mark.parametrize("method", SCIPY)
+def test_steps_of_scipy_s_methods_are_told_without_errors(method):
+    found = stopped(solve={"max_steps": 20, "method": method})
+    assert words(found) == [f"{method} taken"] * LAST
+    assert np.isnan(found["stop_history_error"]).all()
+
+
+def test_a_contact_that_lies_within_one_step_is_named(monkeypatch):
+    """RK45 at a loose tolerance steps over DESIGN 2.6's second pulse."""
+    values = {"load": "typical", "joint": "big_end", "clearance_mm": 0.2,
+              "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}  # fmt: skip
+    solve = {"duration_rev": 0.25, "settle_rev": 0, "rtol": 1e-5}
+    case = Case.from_values({**values, "solve": solve | {"method": "RK45"}})
+    found = measure(case)
+    assert found.reason == "contact_underresolved"
+    assert "N within one step of" in found.detail
+    assert 4.7e-3 < found.attributes["stop_time"] < 5.0e-3  # where the step begins
+    assert measure(Case.from_values({**values, "solve": solve})).status == "ok"
