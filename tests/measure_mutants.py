@@ -37,7 +37,9 @@ DRAWN = 60
 # the order in which tests are tried, but for a file's own, which come first
 PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "control",
         "runge_kutta", "rosenbrock", "case", "integrate", "motion", "march")  # fmt: skip
-COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulation", "accuracy")
+COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulation", "accuracy",
+            "horizon")  # fmt: skip
+TESTED_IN = {"twin": "horizon"}  # where not in the module of the same name
 NO_JIT, JIT = "not slow and not compiled", "not slow"
 # s of processor time with the JIT off and on; a mutant that takes longer is caught: it never ends
 PATIENCE = {False: 120, True: 900}
@@ -126,7 +128,8 @@ def load_reference():
 
 def in_turn(modules, mutant):
     """Modules of tests, that of the mutant's own file first."""
-    return sorted(modules, key=lambda name: name != Path(mutant.file).stem)
+    stem = Path(mutant.file).stem
+    return sorted(modules, key=lambda name: name != TESTED_IN.get(stem, stem))
 
 
 def try_mutant(mutant, tree, pure, compiled):

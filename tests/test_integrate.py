@@ -175,6 +175,7 @@ EXTREMES = {
 LOOKS = 6  # at the clock, a second each, the first before anything is done
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "RODAS", "LSODA", "Radau", "DOP853"])
 @pytest.mark.parametrize("extreme", EXTREMES)
 def test_the_clock_is_looked_at_however_hard_the_case(extreme, method, monkeypatch):

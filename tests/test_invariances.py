@@ -17,7 +17,7 @@ from compressor.case import Case
 from compressor.integrate import Request, integrate
 from compressor.physics.motion import derivative, start
 from compressor.physics.observe import COLUMNS, Column, observe_all
-from compressor.physics.parameters import FREEDOMS
+from compressor.physics.parameters import FREEDOMS, derive
 from compressor.plan import load_studies
 from compressor.record import offsets, record, scene
 from compressor.schema import METRICS
@@ -137,15 +137,18 @@ DIMENSIONS = {
 }  # fmt: skip
 PURE_NUMBERS = {"scene", "load", "law", "friction", "exponent", "static", "dynamic", "corners",
                 "gas_exponent"}  # fmt: skip
+DERIVED = {"crank_ratio", "per_rod_mass", "per_rod_inertia", "per_reciprocating_mass",
+           "per_full_damping", "per_stiction", "per_transition"}  # fmt: skip
 
 
 def in_other_units(p, length, mass, time):
     """The record with every quantity told in units that are shorter by these factors."""
-    assert {*DIMENSIONS, *PURE_NUMBERS, "stiffness"} == set(p.dtype.names)
+    assert {*DIMENSIONS, *PURE_NUMBERS, *DERIVED, "stiffness"} == set(p.dtype.names)
     other = p.copy()
     for name, (a, b, c) in DIMENSIONS.items():
         other[name] = p[name] * length**a * mass**b * time**c
     other["stiffness"] = p["stiffness"] * length ** (1 - p["exponent"]) * mass / time**2
+    derive(other)
     return other
 
 

@@ -10,6 +10,7 @@ import planted_bugs
 import pytest
 from equivalent_mutants import EQUIVALENT
 from mutation import Mutant, drawn, mutants_of, planted
+from readme_tables import kept
 
 SAMPLE = ("K a hundredth too large", "the cam does not close", "friction's velocity in mm/s")
 
@@ -73,6 +74,17 @@ def test_every_kind_of_change(tmp_path):
 def test_equivalent_mutants_are_drawn_ones():
     """An entry that is not drawn any more is to be removed."""
     assert set(EQUIVALENT) <= {mutant.identity for mutant in drawn(60)}
+
+
+def test_what_was_measured_reaches_the_aims():
+    rows = kept("mutants.json")["mutants"]
+    planted_rows = [row for row in rows if row["kind"] == "planted"]
+    others = [row for row in rows if row["kind"] != "planted" and "equivalent" not in row]
+    assert len(planted_rows) == 30
+    assert len(rows) == 90
+    assert not any(row["caught_by"] for row in rows if "equivalent" in row)
+    assert sum(bool(row["caught_by"]) for row in planted_rows) >= 29
+    assert sum(bool(row["caught_by"]) for row in others) >= 0.9 * len(others)
 
 
 @pytest.mark.slow
