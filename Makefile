@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements readme clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -29,7 +29,7 @@ test: install  ## run the whole test suite
 	$(BIN)/python -m pytest -n 2
 
 test-pure: install  ## run the physics tests on the same source with the JIT off
-	COMPSIM_JIT=0 $(BIN)/python -m pytest -n 2 -m 'not slow' tests/test_kinematics.py \
+	COMPSIM_JIT=0 $(BIN)/python -m pytest -n 2 -m 'not slow and not compiled' tests/test_kinematics.py \
 	  tests/test_loads.py tests/test_contact.py tests/test_cam.py tests/test_motion.py \
 	  tests/test_observe.py tests/test_tally.py tests/test_runge_kutta.py tests/test_rosenbrock.py
 
@@ -80,6 +80,9 @@ stress: install  ## run and judge 2,000 extreme scenes (within the hour on two c
 
 chaos: install  ## inject faults, thousands, and count what did not survive (an hour)
 	$(BIN)/python tests/measure_chaos.py tests/results/chaos.json
+
+mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
+	$(BIN)/python tests/measure_mutants.py tests/results/mutants.json
 
 measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers readme  ## all of these (40 minutes)
 

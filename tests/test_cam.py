@@ -19,6 +19,16 @@ def test_the_cam_closes():
     assert np.abs(np.diff(cam.cam_profile(P, ANGLES))).max() < 2e-4
 
 
+def test_a_cam_of_another_stroke_closes_too():
+    """Where the follower's lift, 2R less the stroke, is not the stroke."""
+    p = record(Case.from_values({"spring": {"stroke_mm": 90}}))
+    profile = cam.cam_profile(p, ANGLES)
+    assert profile.max() == pytest.approx(0.150)
+    assert np.abs(np.diff(profile)).max() < 2e-4
+    _, bottom, fall = p.corners
+    assert np.ptp(cam.cam_profile(p, np.linspace(bottom, fall, 99)[1:-1])) == 0.0
+
+
 @pytest.mark.parametrize(
     ("degrees", "s_mm"), [(50, 0), (84.26, 0), (180, 120), (250, 120), (355, 0.2)]
 )

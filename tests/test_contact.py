@@ -36,6 +36,12 @@ def test_rise_values(s, h):
     assert rise(s) == pytest.approx(h)
 
 
+@pytest.mark.parametrize("s", [1e-3, 5e-3, 9e-3])
+def test_rise_is_constant_outside_to_the_bit(s):
+    """There the cubic would be off by 3 s^2."""
+    assert (rise(-s), rise(1.0 + s)) == (0.0, 1.0)
+
+
 @given(st.floats(-10, 10))
 def test_friction_is_odd_and_bounded(slip):
     p = law()

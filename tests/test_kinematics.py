@@ -2,11 +2,19 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
 from compressor.case import Case
-from compressor.physics.kinematics import angle_at, ideal, motion, series_motion
+from compressor.physics.kinematics import (
+    angle_at,
+    ideal,
+    ideal_after,
+    motion,
+    series_motion,
+    small_angle,
+)
 from compressor.record import record
 
 R, L, OMEGA = 0.12, 0.6, 500 * math.pi / 30
@@ -44,6 +52,35 @@ def test_compiled_equals_array_form():
     assert rows[:, 6:] == pytest.approx(expected, rel=1e-13, abs=1e-11)
     assert rows[:, 2] == pytest.approx(R / L * np.sin(p.omega * times), abs=1e-15)
     assert rows[:, 2] ** 2 + rows[:, 3] ** 2 == pytest.approx(1.0, abs=1e-15)
+
+
+def test_sine_and_cosine_of_a_small_angle_are_exact():
+    """To the last digit on both sides of the change from series to library, at 0.01 rad."""
+    for angle in np.concatenate((np.linspace(-0.0105, 0.0105, 401), [1e-9, -2.0, 0.7])):
+        with mpmath.workdps(30):
+            exact = [float(f(mpmath.mpf(float(angle)))) for f in (mpmath.sin, mpmath.cos)]
+        for found, e in zip(small_angle(angle), exact, strict=True):
+            assert abs(found - e) <= np.spacing(abs(e))
+
+
+def test_the_series_of_a_small_angle_lacks_no_term():
+    """Just below 0.01 rad, where a last term would be missed most: by more than its last digit."""
+    biases = np.zeros(2)
+    angles = np.linspace(0.0099, 0.00999, 200)
+    with mpmath.workdps(30):
+        for angle in angles:
+            exact = mpmath.sin(mpmath.mpf(float(angle))), mpmath.cos(mpmath.mpf(float(angle)))
+            for k, (found, e) in enumerate(zip(small_angle(angle), exact, strict=True)):
+                biases[k] += float((mpmath.mpf(found) - e) / np.spacing(float(e)))
+    assert biases / angles.size == pytest.approx(0, abs=0.25)
+
+
+def test_the_motion_a_span_later_is_that_of_the_later_time():
+    p = record(Case())
+    for t, span in ((0.0, 0.0), (0.013, 1e-5), (0.05, 1e-4), (0.11, 0.07)):
+        base = (math.cos(p.omega * t), math.sin(p.omega * t))
+        found, expected = np.array(ideal_after(base, span, p)), np.array(ideal(t + span, p))
+        assert found == pytest.approx(expected, rel=1e-13, abs=1e-11)
 
 
 def test_rod_spin_and_its_rate_are_derivatives():

@@ -95,6 +95,16 @@ def test_segments_cover_the_run_in_order():
     )
 
 
+@pytest.mark.parametrize("stroke_mm", [60, 90, 200])
+def test_a_follower_of_any_stroke_dwells_for_it_each_way(stroke_mm):
+    p = record(Case.from_values({"spring": {"stroke_mm": stroke_mm, "damping_N_s_per_mm": 0}}))
+    x = [motion(a, p.crank_radius, p.rod_length, p.omega)[0] for a in (0, *p.corners)]
+    assert (x[0] - x[1], x[3] - x[2]) == pytest.approx((p.spring_stroke, p.spring_stroke))
+    for phase, corner in enumerate([*np.degrees(p.corners), 360]):
+        before, after = ideal_force(p, corner, phase), ideal_force(p, corner, (phase + 1) % 4)
+        assert before == pytest.approx(after, abs=1e-8)
+
+
 def test_no_load_has_no_corners():
     assert segments(record(Case.from_values({"load": "none"})), 0.48)[0].tolist() == [0, 0.48]
 

@@ -6,10 +6,15 @@ import reference
 
 from compressor import integrate as integration
 from compressor.case import Case
-from compressor.integrate import Request, integrate
+from compressor.integrate import Request, integrate, natural_sizes
+from compressor.physics.control import Mode
+from compressor.physics.loads import segments
+from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.parameters import FREEDOMS
+from compressor.physics.runge_kutta import FLOWS, Pair
+from compressor.physics.tally import new_tally
 from compressor.record import offsets, record, scene
 
 PULSES = {"load": "typical", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
@@ -21,7 +26,7 @@ def request(rtol, duration=None, **values):
     y = np.zeros(2 * FREEDOMS[scene(case)])
     start(offsets(case), y, p)
     times = (duration or case.duration) * np.arange(1201) / 1200
-    return Request(p, y, times, 0.0, rtol)
+    return Request(p, y, times, 0.0, rtol, max_steps=10_000)
 
 
 def accelerations(found, p):
@@ -30,6 +35,7 @@ def accelerations(found, p):
     return rows[:, Column.ACCELERATION]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_chunks_change_nothing(joint, monkeypatch):
     asked = request(1e-5, 0.12, joint=joint)
@@ -41,9 +47,29 @@ def test_chunks_change_nothing(joint, monkeypatch):
     assert (chunked.steps, chunked.evaluations) == (whole.steps, whole.evaluations)
 
 
+def test_a_corner_costs_no_step_that_is_refused():
+    """The rates are evaluated anew in the phase that begins: those of the old one would be wrong
+    by the damper's force, which jumps there."""
+    asked = request(1e-8, joint="both", clearance_mm=9)
+    edges, phases = segments(asked.p, 0.05)
+    walker, work, size = new_walker(Mode.EXPLICIT), new_work(8), natural_sizes(asked.p)
+    walker.pair, walker.rtol, walker.deepest, walker.settle = Pair.TSIT5, 1e-8, np.inf, np.inf
+    walker.t = edges[1] - 1e-3
+    z, states, tally = np.zeros(8 + FLOWS), np.zeros((1, 8)), new_tally()
+    times = np.array([edges[1] + 1e-3])
+    ends = np.array([0.0, edges[1], times[0]])
+    march(
+        walker, asked.p, z, work, 1e-8 * size, size, ends, phases[:2], times, states, tally, 200
+    )  # fmt: skip
+    assert walker.status == Status.DONE
+    assert walker.t == times[0]
+    assert walker.rejected == 0
+
+
 PULSE_TIMES = [(0.2, 4.986e-3, 5.128e-3), (0.3, 5.878e-3, 5.931e-3), (0.3, 10.494e-3, 10.511e-3)]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
 @pytest.mark.parametrize(("clearance", "begin", "end"), PULSE_TIMES)
 def test_known_pulses_are_found(clearance, begin, end, rtol):

@@ -19,11 +19,15 @@ from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.motion import evaluate, start
 from compressor.physics.observe import COLUMNS, Column, derivative_with_flows, observe_all
 from compressor.physics.onset import (
+    EDGE,
+    LOOKS,
     NEVER,
+    SAMPLES,
     crossing,
     first_onset,
     joint_onset,
     nearness_at,
+    place,
     touching_between,
 )
 from compressor.physics.parameters import FREEDOMS, SMALL_END
@@ -124,6 +128,20 @@ def test_a_maximum_is_searched_for_contact(height):
         assert found == NEVER
 
 
+def test_a_journal_that_rests_at_the_edge_does_not_touch():
+    """F_N = 0 at a penetration of 0."""
+    dense, p, y = small_end_only([CLEARANCE]), parameters(), np.zeros(4)
+    assert nearness_at(SMALL_END, 0.5, 0.0, H, dense, 0, p, y) == 0.0
+    assert joint_onset(SMALL_END, 0.0, H, dense, 0, p, y) == (NEVER, NEVER)
+    assert touching_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, p, y) == NEVER
+
+
+def test_looks_stand_evenly_and_beside_both_ends():
+    looks = [place(i) for i in range(LOOKS + 1)]
+    inner = [i / SAMPLES for i in range(1, SAMPLES)]
+    assert looks == pytest.approx([0.0, EDGE, *inner, 1.0 - EDGE, 1.0], abs=1e-15)
+
+
 FIRST = {
     "neither": (APART, APART, NEVER),
     "big end": (hump(0.4, PULSE, WIDTH), APART, 0.4 - WIDTH),
@@ -154,6 +172,17 @@ def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     normal, elastic, unclamped = impact(penetration, rate, p.stiffness[1], p)
     contact = Contact(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
     assert (nearness(contact, p.stiffness[1], p) > 0) == (normal > 0)
+
+
+@pytest.mark.parametrize("exponent", [1.5, 2.0])
+def test_a_clamped_force_counts_as_a_length(exponent):
+    """As the penetration of full damping, when it pulls as much as the spring would push there."""
+    p = parameters()
+    p.exponent = exponent
+    pull = p.stiffness[1] * p.full_damping**exponent
+    for share in (1.0, 0.01):
+        contact = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 1e-6, -1.0, 0.0, 0.0, -share * pull)
+        assert nearness(contact, p.stiffness[1], p) == pytest.approx(-share * p.full_damping)
 
 
 # ---- constructed re-engagements: a free flight drawn backwards from its contact

@@ -97,6 +97,7 @@ def test_auto_turns_to_the_stiff_partner(values):
     assert np.linalg.norm(a["auto"] - a["RODAS"]) < 5e-3 * np.linalg.norm(a["RODAS"])
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_auto_stays_explicit_where_that_is_cheaper(joint):
     solve = {"duration_rev": 1, "settle_rev": 0, "rtol": 1e-5}

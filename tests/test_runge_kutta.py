@@ -14,6 +14,7 @@ from compressor.physics.runge_kutta import (
     E,
     P,
     Pair,
+    error_norm,
     extend,
     interpolate,
     midway,
@@ -54,6 +55,18 @@ def test_order_conditions(pair):
         assert weights @ a @ a @ c == pytest.approx(1 / 24, abs=2e-14)
     assert b @ c**4 == pytest.approx(1 / 5)
     assert (b - E[pair]) @ c**4 != pytest.approx(1 / 5, abs=1e-4)  # the estimate is of order 4
+
+
+@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("n", [4, 8])
+def test_the_error_is_a_root_mean_square_over_the_tolerance(pair, n):
+    """Of every number of the motion, none of the flows."""
+    rng = np.random.default_rng(n)
+    z, new, k = (rng.normal(size=shape) for shape in (n + FLOWS, n + FLOWS, (STAGES, n + FLOWS)))
+    atol, rtol, h = rng.uniform(0.1, 1, n), 0.3, 0.01
+    scale = atol + rtol * np.maximum(np.abs(z), np.abs(new))[:n]
+    expected = np.sqrt(np.mean((h * E[pair] @ k[:, :n] / scale) ** 2))
+    assert error_norm(pair, h, z, new, k, rtol, atol) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("pair", Pair)

@@ -1,0 +1,230 @@
+"""Plant bugs and see whether the fast tests bite (make mutants).
+
+Each of the thirty planted bugs and sixty drawn mutants is tried in a copy of the tree: with the JIT
+off first, which needs no minute of compiling, and what no test caught then with the JIT on against
+tests of whole runs. Writes a small JSON file; what escaped is listed there and in the README.
+
+Tests run in forks of this process, in which their libraries, and the independent reference with
+all that sympy derives for it, are loaded already; the program is not, so that each fork loads its
+own copy.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import re
+import resource
+import shutil
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+import reference
+import scipy.optimize  # noqa: F401
+import xarray  # noqa: F401
+from equivalent_mutants import EQUIVALENT
+from mutation import PHYSICS, ROOT, SEED, drawn
+from planted_bugs import bugs
+
+COPIED = ("compressor", "cmd", "tests", "configs", "pyproject.toml", "README.md", "Makefile")
+DRAWN = 60
+# the order in which tests are tried, but for a file's own, which come first
+PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "control",
+        "runge_kutta", "rosenbrock", "case", "integrate", "motion", "march")  # fmt: skip
+COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulation", "accuracy",
+            "horizon")  # fmt: skip
+TESTED_IN = {"twin": "horizon"}  # where not in the module of the same name
+NO_JIT, JIT = "not slow and not compiled", "not slow"
+# s of processor time with the JIT off and on; a mutant that takes longer is caught: it never ends
+PATIENCE = {False: 120, True: 900}
+
+
+class Copy:
+    """A copy of the tree in which one mutant after the other is tried."""
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        for name in COPIED:
+            source, target = ROOT / name, self.folder / name
+            if source.is_dir():
+                shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+            else:
+                shutil.copy2(source, target)
+
+    def attempt(self, mutant, jit, modules):
+        """The first test of some modules that fails, "" if none does."""
+        if not mutant:
+            return self.run(jit, modules, "machine-code")
+        path = self.folder / mutant.file
+        whole, stamp = path.read_bytes(), path.stat()
+        try:
+            write(path, mutant.source(self.folder))
+            physics = mutant.file.startswith(PHYSICS)
+            return self.run(jit, modules, "other-code" if physics else "machine-code")
+        finally:  # numba's cache goes by the time of the sources
+            write(path, whole)
+            os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+
+    def run(self, jit, modules, cache):
+        """Run the tests of some modules in a fork; machine code is kept in the folder `cache`."""
+        for made in (self.folder / "other-code", self.folder / ".hypothesis"):
+            shutil.rmtree(made, ignore_errors=True)
+        report = self.folder / "report.txt"
+        child = os.fork()
+        if not child:
+            try:
+                self.become(report, jit, cache)
+                call = ["-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider"]
+                call += ["--hypothesis-seed=0", "-m", JIT if jit else NO_JIT]
+                os._exit(pytest.main(call + [f"tests/test_{name}.py" for name in modules]))
+            finally:
+                os._exit(99)
+        _, status = os.waitpid(child, 0)
+        if os.WIFSIGNALED(status):
+            return f"ended by signal {os.WTERMSIG(status)}"
+        failed = re.search(
+            r"^(?:FAILED|ERROR) tests/(.+?)(?: - |$)", report.read_text(), re.MULTILINE
+        )
+        if not failed and status:
+            return "cannot be loaded"
+        return failed[1] if failed else ""
+
+    def become(self, report, jit, cache):
+        """Make of this process one that tests the copy, and writes what it says to a file."""
+        resource.setrlimit(resource.RLIMIT_CPU, (PATIENCE[jit], PATIENCE[jit]))
+        out = os.open(report, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        os.chdir(self.folder)
+        kept = [path for path in sys.path if not Path(path or ".").resolve().is_relative_to(ROOT)
+                or ".venv" in path]  # fmt: skip
+        sys.path[:] = [str(self.folder), str(self.folder / "cmd"), *kept]
+        os.environ["COMPSIM_JIT"] = str(int(jit))
+        numba.config.CACHE_DIR = str(self.folder / cache)
+
+
+def write(path, source):
+    """Write a source, and remove its bytecode: Python tells sources apart by whole seconds."""
+    path.write_bytes(source)
+    for stale in path.parent.glob(f"__pycache__/{path.stem}.*"):
+        stale.unlink()
+
+
+def load_reference():
+    """Let sympy derive, and numba compile, what tests ask of the independent reference."""
+    for joint in ("big_end", "small_end", "both"):
+        params = reference.paper_params("typical", joint, 2e-4)
+        y = np.zeros(len(reference.COORDINATES[joint]))
+        reference.joint_forces(joint, y, y, 0.0, 0, params)
+        reference.reference_solution(params, joint, np.array([0.0, 1e-5]), rtol=1e-3)
+    reference.ideal_joint_forces(0.0, 0, reference.paper_params("none", "none", 0.0))
+
+
+def in_turn(modules, mutant):
+    """Modules of tests, that of the mutant's own file first."""
+    stem = Path(mutant.file).stem
+    return sorted(modules, key=lambda name: name != TESTED_IN.get(stem, stem))
+
+
+def try_mutant(mutant, tree, pure, compiled):
+    """What became of a mutant: its row of the kept measurement."""
+    began = time.monotonic()
+    row = {"kind": mutant.kind, "mutant": mutant.identity, "jit": False}
+    row["caught_by"] = tree.attempt(mutant, False, in_turn(pure, mutant))
+    reason = EQUIVALENT.get(mutant.identity)
+    if reason:
+        row["equivalent"] = reason
+    elif compiled and not row["caught_by"]:
+        row["jit"] = True
+        row["caught_by"] = tree.attempt(mutant, True, in_turn(compiled, mutant))
+    outcome = row["caught_by"] or (f"equivalent: {reason}" if reason else "ESCAPED")
+    tell(began, f"{mutant.identity}\n        {outcome}")
+    return row
+
+
+def tell(began, what):
+    print(f"{time.monotonic() - began:4.0f} s  {what}", file=sys.stderr, flush=True)
+
+
+WORKER = []  # a worker process's own: its copy, and the modules of tests
+
+
+def prepare(folder, pure, compiled):
+    """Give a worker its copy, and see that the tests pass there without a mutant."""
+    tree = Copy(Path(folder) / str(os.getpid()))
+    for jit, modules in ((False, pure), (True, compiled)):
+        began = time.monotonic()
+        failed = modules and tree.attempt(None, jit, modules)
+        if failed:
+            raise RuntimeError(f"without a mutant {failed} fails: mend that first")
+        tell(began, f"without a mutant, JIT {'on' if jit else 'off'}")
+    WORKER[:] = tree, pure, compiled
+
+
+def tried(mutant):
+    return try_mutant(mutant, *WORKER)
+
+
+def campaign(mutants, jobs, pure=PURE, compiled=COMPILED):
+    """Rows of mutants, `jobs` at a time, tried on modules of tests with the JIT off, then on.
+
+    Raises BrokenProcessPool where the sources without a mutant fail.
+    """
+    fork = multiprocessing.get_context("fork")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        ProcessPoolExecutor(jobs, fork, prepare, (folder, pure, compiled)) as pool,
+    ):
+        return list(pool.map(tried, mutants))
+
+
+def earlier(target, rows):
+    """The whole campaign of a file with the rows of these mutants in place of theirs, if any."""
+    if not Path(target).exists():
+        return {}
+    whole = json.loads(Path(target).read_text(encoding="utf-8"))
+    again = {row["mutant"]: row for row in rows}
+    mutants = [again.get(row["mutant"], row) for row in whole["mutants"]]
+    return {"minutes": whole["minutes"], "mutants": mutants}
+
+
+def main(target, jobs, only, pure, compiled):
+    mutants = [m for m in [*bugs(), *drawn(DRAWN)] if any(text in m.identity for text in only)]
+    began = time.monotonic()
+    if {"motion", "march"} & {*pure}:
+        load_reference()
+    rows = campaign(mutants, jobs, pure, compiled)
+    minutes = round((time.monotonic() - began) / 60, 1)
+    from measure_accuracy import provenance  # which loads the program
+
+    kept = {**provenance("make mutants"), "seed": SEED, "minutes": minutes, "mutants": rows}
+    if only != [""]:
+        kept |= earlier(target, rows)
+    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    escaped = sum(not row["caught_by"] and "equivalent" not in row for row in rows)
+    print(f"{len(rows)} mutants in {minutes} minutes, {escaped} escaped")
+    wrong = [row["mutant"] for row in rows if "equivalent" in row and row["caught_by"]]
+    if wrong:
+        sys.exit(f"said to change nothing, but caught: {wrong}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("target", help="JSON file to write")
+    parser.add_argument("-j", "--jobs", type=int, default=2, help="mutants at a time")
+    parser.add_argument(
+        "--only",
+        nargs="*",
+        default=[""],
+        help="try mutants whose identity has one of these texts, and keep the target's others",
+    )
+    parser.add_argument("--pure", nargs="*", default=PURE, help="tests to run with the JIT off")
+    parser.add_argument("--compiled", nargs="*", default=COMPILED, help="tests to run with it on")
+    arguments = parser.parse_args()
+    main(*vars(arguments).values())

@@ -1,0 +1,73 @@
+"""Thirty bugs of the kinds that such a program gets: name, file, text, what stands in its place."""
+
+from mutation import planted
+
+BUGS = [
+    # contact
+    ("friction pushes along the slip", "physics/contact.py",
+     "-friction_coefficient(slip, p) * normal", "friction_coefficient(slip, p) * normal"),
+    ("K a hundredth too large", "physics/contact.py",
+     "elastic = stiffness * power", "elastic = 1.01 * stiffness * power"),
+    ("STEP is a parabola", "physics/contact.py", "(3.0 - 2.0 * s)", "1.0"),
+    ("contact pulls", "physics/contact.py", "return max(0.0, unclamped), ", "return unclamped, "),
+    ("the bore's radius is the pin's", "physics/contact.py",
+     "bore = p.pin_radius + clearance", "bore = p.pin_radius"),
+    ("journal and bearing swapped in the slip", "physics/contact.py",
+     "journal_spin * arm - rod_spin * bore", "rod_spin * bore - journal_spin * arm"),
+    # motion
+    ("the rod's centripetal term lost", "physics/motion.py",
+     "contact.fx - load - p.rod_mass * b * cos_phi * rate * rate", "contact.fx - load"),
+    ("gravity upwards", "physics/motion.py", "* per_mass - p.gravity", "* per_mass + p.gravity"),
+    ("friction's moment at the small end turned", "physics/motion.py",
+     "big.moment + small.moment", "big.moment - small.moment"),
+    ("journal and bearing swapped at the small end", "physics/motion.py",
+     "ey_rate, 0.0, -motion.rate - y[3], p)", "ey_rate, -motion.rate - y[3], 0.0, p)"),
+    ("the rod's inertia about its mass centre", "physics/motion.py",
+     "p.rod_inertia + p.rod_mass * b * b", "p.rod_inertia"),
+    ("an offset the other way", "physics/motion.py",
+     "p.rod_centre * less - offset[0, 0]", "p.rod_centre * less + offset[0, 0]"),
+    # kinematics, loads, cam
+    ("a lost term of the rod's ideal spin-up", "physics/kinematics.py",
+     "(rate * rate - p.omega * p.omega)", "(-p.omega * p.omega)"),
+    ("a wrong term of the series of cosine", "physics/kinematics.py",
+     "(1.0 - square * TWELFTH", "(1.0 - square * SIXTH"),
+    ("the stroke is a radius, not a diameter", "physics/loads.py",
+     "p.head_clearance + 2.0 * p.crank_radius", "p.head_clearance + p.crank_radius"),
+    ("the cam does not close", "physics/loads.py",
+     "angle_at(rod_length - crank_radius + stroke", "angle_at(rod_length + crank_radius - stroke"),
+    ("the follower's lift is the spring's stroke", "physics/cam.py",
+     "lift = 2 * p.crank_radius - p.spring_stroke", "lift = p.spring_stroke"),
+    # record
+    ("K as the paper prints it, per mm", "record.py",
+     "1000.0**contact.exponent", "1000.0"),
+    ("friction's velocity in mm/s", "record.py",
+     'to_si(friction.friction_velocity_mm_per_s, "mm/s")', "friction.friction_velocity_mm_per_s"),
+    ("the piston's diameter for its radius", "record.py",
+     "math.pi * to_si(gas.piston_radius_mm", "math.pi / 4 * to_si(gas.piston_radius_mm"),
+    # march, control, onset, tally, observe, integrate
+    ("no restart at a corner", "physics/march.py",
+     "if was_stiff or at_edge else", "if was_stiff else"),
+    ("steps a hundred times too long accepted", "physics/march.py",
+     "if not error <= 1.0", "if not error <= 100.0"),
+    ("the control's order as its power", "physics/control.py",
+     "error ** (-1.0 / order)", "error ** (1.0 / order)"),
+    ("a pulse between two looks stepped over", "physics/onset.py",
+     "before + rise + fall > 0.0", "before > 0.0"),
+    ("contact always counts as touching", "physics/tally.py",
+     "= 0 if apart else 1", "= 1"),
+    ("the small end's friction loss left out", "physics/observe.py",
+     "- small.friction * small.slip", ""),
+    ("the rod's inertia missing in an ideal joint's force", "physics/observe.py",
+     "-p.rod_inertia * now.spin_up", "0.0"),
+    ("the march's atol is 1e-6", "integrate.py",
+     "work, request.rtol * size, size", "work, 0.0 * size + 1e-6, size"),
+    ("SciPy's atol is 1e-6", "integrate.py",
+     "return rtol * np.concatenate((natural_sizes", "return 1e-6 * np.concatenate((natural_sizes"),
+    ("SciPy's phase is not changed at a corner", "integrate.py",
+     "right_hand_side.phase = int(phase)", "right_hand_side.phase = 0"),
+]  # fmt: skip
+
+
+def bugs():
+    """The thirty as mutants; raises LookupError where a text is no longer there."""
+    return [planted(*bug) for bug in BUGS]
