@@ -50,17 +50,14 @@ if ENABLED:
         numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]
 
     def _compiled(function: Function, **options: Any) -> Function:
-        made: Any = numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, **options)(
-            function
-        )
+        made: Any = numba.njit(cache=True, error_model="numpy", **options)(function)
         return made
 
     def jit(function: Function) -> Function:
         """Compile `function` on its first call and keep the machine code on disk.
 
-        IEEE arithmetic is kept, but that a product and a sum may be fused where the processor can,
-        which rounds once instead of twice. A division by zero gives inf or nan, not an exception,
-        so that the caller can judge a state that went wrong.
+        IEEE arithmetic is kept (no fast-math) and a division by zero gives inf or nan, not an
+        exception, so that the caller can judge a state that went wrong.
         """
         return _compiled(function)
 
