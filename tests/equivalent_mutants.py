@@ -11,6 +11,8 @@ EQUIVALENT: dict[str, str] = {
         "`held` counts in fours and is never 15: both change over at 16",
     "cam.py, cam_profile: turned < bottom -> turned <= bottom":
         "the follower stands at the same height on both sides of bottom dead centre",
+    "runge_kutta.py, error_norm: a += weight * k[j, i] -> a -= weight * k[j, i]":
+        "the whole sum changes its sign, and only its square is used",
     "runge_kutta.py, take_step: stage < STAGES - 1 -> stage > STAGES - 1":
         "every stage is gauged, where the last is asked for, with the last word: the same "
         "numbers to the bit, later",

@@ -437,6 +437,27 @@ def chaos_table():
     return markdown(head, rows)
 
 
+def mutants_table():
+    rows = kept("mutants.json")["mutants"]
+    lines = ["| mutants | of them | change nothing | caught | with the JIT off | escaped |",
+             "|---|---|---|---|---|---|"]  # fmt: skip
+    kinds = list(dict.fromkeys(row["kind"] for row in rows))
+    for name, group in [*((kind, {kind}) for kind in kinds), ("all drawn", {*kinds[1:]})]:
+        some = [row for row in rows if row["kind"] in group]
+        same = sum("equivalent" in row for row in some)
+        caught = [row for row in some if row["caught_by"]]
+        quick = sum(not row["jit"] for row in caught)
+        lines.append(
+            f"| {name} | {len(some)} | {same} | {len(caught)} | {quick} "
+            f"| {len(some) - same - len(caught)} |"
+        )
+    lines.append("")
+    for row in rows:
+        if not row["caught_by"]:
+            lines.append(f"- `{row['mutant']}`: {row.get('equivalent', '**escaped**')}")
+    return "\n".join(lines) + "\n"
+
+
 TABLES = {
     "parameters": lambda: parameter_table(table().values()),
     "reasons": reason_table,
@@ -455,6 +476,7 @@ TABLES = {
     "fastest": fastest_table,
     "paper-numerics": paper_table,
     "modelling": modelling_table,
+    "mutants": mutants_table,
     "ladders": ladders_table,
     "limit": limit_table,
     "chaotic": chaotic_table,
