@@ -104,6 +104,8 @@ def read_bytes(path: Path) -> bytes:
         data = path.read_bytes()
     except FileNotFoundError as error:
         raise StoreError(path, "is not there any more", "run its study again") from error
+    except OSError as error:
+        raise system_error(path, error) from error
     if named is None or digest(data) != named[2]:
         raise DamagedJob(path, "is damaged: its bytes are not those that were written", REMEDY)
     return data

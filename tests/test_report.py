@@ -321,17 +321,17 @@ def test_a_sweep_has_its_table_and_plots(own, tmp_path):
 
 def test_failed_jobs_are_highlighted_and_everything_is_escaped(own, tmp_path):
     (study,) = read_studies(own)
-    fail(own, study.keys[2], EVIL, f"detail {EVIL}")
+    fail(own, study.keys[2], "non_finite", f"detail {EVIL}")
     forget(own, study.keys[3])
-    evil = replace(study, name=EVIL, case_file=f"/{EVIL}.yaml", command=EVIL)
+    evil = replace(study, case_file=f"/{EVIL}.yaml", command=EVIL)
     (own / "studies" / "own.json").write_bytes(encode(evil))
     write_report(own, tmp_path / "out", EVIL)
     text = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     found = Reader(text)
     assert "<script" not in text
     assert "script" not in found.tags
-    assert f"Study {EVIL}" in found.text
-    assert f"clearance_mm 0.2, rod_mass_kg 3: {EVIL}: detail {EVIL}" in found.text
+    assert f"Case file /{EVIL}.yaml ." in found.text
+    assert f"clearance_mm 0.2, rod_mass_kg 3: non_finite: detail {EVIL}" in found.text
     assert "4 jobs: 2 ok, 1 failed, 1 not run." in found.text
     kinds = {cells[-1]: kind for kind, cells in found.rows}
     assert [kinds[key] for key in study.keys] == [None, None, "failed", "missing"]

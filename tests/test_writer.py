@@ -541,5 +541,7 @@ def test_a_job_that_may_not_be_read_is_not_damaged(tmp_path, monkeypatch):
             raise OSError(number, os.strerror(number), str(self))
 
         monkeypatch.setattr(Path, "read_bytes", refused)
+        with pytest.raises(store.StoreError, match=path.name):
+            jobfiles.read_values(path, ["time"])
         with pytest.raises(store.StoreError) if raised else contextlib.nullcontext():
             assert not jobfiles.intact(path)
