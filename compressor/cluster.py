@@ -23,6 +23,7 @@ from typing import Any
 from compressor.case import Case
 from compressor.durable import StoreError, publish
 from compressor.jobfiles import store_series
+from compressor.reasons import Reason
 from compressor.remote import REMEDY, Batch, Broken, Unfit, do_batch, passport
 from compressor.schema import Outcome
 from compressor.sweep import GRACE, Carried, as_jobs, run_job, warm_up
@@ -378,7 +379,7 @@ class Flight:
         elif len(batch) > 1:
             self.suspects.extend([job] for job in batch)
         else:
-            self.ready.append(Lost(batch[0][0], "worker_died", f"{how}, {AGAIN}"))
+            self.ready.append(Lost(batch[0][0], Reason.WORKER_DIED, f"{how}, {AGAIN}"))
 
     def cancel(self) -> None:
         """Have what has not begun never begin."""

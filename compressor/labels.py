@@ -17,6 +17,7 @@ from compressor.case import table
 from compressor.durable import StoreWarning
 from compressor.hdf5 import DamagedJob
 from compressor.manifest import StoredStudy, points
+from compressor.reasons import Reason
 from compressor.schema import NUMBERS, coordinates
 from compressor.segments import Rows
 
@@ -106,7 +107,7 @@ def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
     positions = rows.find(layout.keys)
     variables = _outcomes(layout, rows, positions)
     found = positions[positions >= 0]
-    if (rows.words["reason"][found] != "internal_error").any():
+    if (rows.words["reason"][found] != Reason.INTERNAL_ERROR).any():
         variables |= _metrics(layout, rows, positions)
         variables |= {n: xr.Variable(*parts) for n, parts in coordinates().items()}
     return _with_coordinates(variables, layout)

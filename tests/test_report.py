@@ -93,7 +93,16 @@ def fail(folder, key, reason, detail):
     metrics = {n: v * np.nan for n, v in bad.items() if "time" not in v.dims and v.dtype == float}
     bad = bad.assign(status="failed", reason=reason, **metrics)
     bad.attrs |= {"detail": detail, "complete": 0}
-    keep(folder, bad)
+    replace_jobs(folder, bad)
+
+
+def replace_jobs(folder, *jobs):
+    """Put jobs in place of what was stored of them, which a failed run by itself never is."""
+    kept = {key: read_job(folder, key) for key in finished_keys(folder)}
+    kept |= {job.attrs["key"]: job for job in jobs}
+    for name in ("rows", "jobs"):
+        shutil.rmtree(folder / name)
+    keep(folder, *kept.values())
 
 
 # ---- the paper's report -----------------------------------------------------------------------
@@ -253,7 +262,7 @@ def test_a_damaged_case_is_told(paper_store, tmp_path):
 def test_metrics_without_series_have_tables_but_no_figures(paper_store, tmp_path):
     part = part_of(paper_store, tmp_path, "typical")
     (key,) = finished_keys(part)
-    keep(part, read_job(part, key).drop_dims("time"))
+    replace_jobs(part, read_job(part, key).drop_dims("time"))
     write_report(part, tmp_path / "out")
     found = read(tmp_path / "out")
     assert "stored without its time series" in found.text
@@ -348,9 +357,11 @@ def test_long_tables_are_cut_and_say_so(own, tmp_path, monkeypatch):
 
 
 def test_a_study_whose_jobs_all_broke_has_a_page(own, tmp_path):
+    broken = []
     for key in finished_keys(own):
         attrs = {"key": key, "detail": "ValueError: a bug", "case": json.dumps(Case().values())}
-        keep(own, xr.Dataset({"status": "failed", "reason": "internal_error"}, attrs=attrs))
+        broken.append(xr.Dataset({"status": "failed", "reason": "internal_error"}, attrs=attrs))
+    replace_jobs(own, *broken)
     write_report(own, tmp_path / "out")
     found = read(tmp_path / "out")
     assert found.text.count("internal_error: ValueError: a bug") == 4

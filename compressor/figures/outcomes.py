@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 
 from compressor.extremes import SPANS
 from compressor.figures.style import BLACK, BLUE, GOLD, GREY, RED, legend_above, sheet, styled
+from compressor.reasons import Reason
 
 PLANES = (
     ("clearance", "stiffness"),
@@ -24,8 +25,8 @@ PLANES = (
 LOOKS = {
     "ok": (BLUE, "o", 2.2, 2.0),
     "budget": (GOLD, "s", 2.8, 2.2),
-    "penetration_implausible": (GREY, "v", 3.2, 2.1),
-    "energy_audit_failed": ("#8c5fa8", "D", 3.0, 2.3),
+    Reason.PENETRATION_IMPLAUSIBLE: (GREY, "v", 3.2, 2.1),
+    Reason.ENERGY_AUDIT_FAILED: ("#8c5fa8", "D", 3.0, 2.3),
     "other failure": (BLACK, "^", 3.2, 2.4),
     "unjudged": (RED, "x", 4.0, 2.5),
     "silent_wrong": (RED, "*", 9.0, 2.6),
