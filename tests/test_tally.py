@@ -9,6 +9,7 @@ from compressor.physics.tally import (
     add_flows,
     deepest_of,
     lobatto,
+    near_record,
     new_tally,
     peak_of,
     tally_energy,
@@ -70,6 +71,19 @@ def test_every_other_node_of_a_step_will_do():
     rows[1::2] = np.nan
     tally_step(1e-4, NODES, weights, rows, 2, True, sparse, p)
     assert sparse == whole
+
+
+@pytest.mark.parametrize("column", [Column.ACCELERATION, Column.FORCE_SIZE, Column.PENETRATION])
+@pytest.mark.parametrize("node", [0, 4, 8])
+def test_a_step_near_a_record_is_told(node, column):
+    p = record(Case.from_values({"joint": "both", "clearance_mm": 0.2}))
+    tally, rows = new_tally(), np.zeros((NODES.size, COLUMNS))
+    rows[:, Column.ACCELERATION : Column.NORMAL + 2] = 1.0
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, True, tally, p)
+    rows *= 0.97
+    assert not near_record(rows, 4, tally)
+    rows[node, column] = 0.99
+    assert near_record(rows, 4, tally)
 
 
 def test_energy_ledger_of_a_known_step():

@@ -41,7 +41,7 @@ from compressor.physics.runge_kutta import (
     midway,
     take_step,
 )
-from compressor.physics.tally import lobatto, tally_energy, tally_step
+from compressor.physics.tally import lobatto, near_record, tally_energy, tally_step
 
 LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
@@ -180,11 +180,12 @@ def lay(w, h, z, work):
 
 
 @inlined
-def look_at_step(w, base, h, z, work, phase, p):
+def look_at_step(w, base, h, z, work, phase, p, tally):
     """Observe the step's interpolant at its nodes; returns every which one.
 
     An explicit step is looked at in its middle and at its ends, where its last stage has gauged
-    it already; also between them if contact may change. The interpolant is laid if that needs it.
+    it already; also between them if contact may change or a peak be beaten, for which the
+    interpolant is laid.
     """
     last = NODES.size - 1
     n = work.y.size
@@ -206,9 +207,11 @@ def look_at_step(w, base, h, z, work, phase, p):
         else:
             break
         glance(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
-        if i == MIDDLE and not w.stiff and may_change(work.rows, p):
-            every = 1
-            lay(w, h, z, work)
+        if i == MIDDLE and not w.stiff:
+            beaten = w.t >= w.settle and near_record(work.rows, MIDDLE, tally)
+            if beaten or may_change(work.rows, p):
+                every = 1
+                lay(w, h, z, work)
     return every
 
 
@@ -338,7 +341,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
                 continue
             longer = controlled(w, h, error)
             w.h = max(w.h, longer) if h < w.h else longer
-        every = look_at_step(w, base, h, z, work, phase, p)
+        every = look_at_step(w, base, h, z, work, phase, p, tally)
         if landing:
             w.landing = 0.0
             w.landed = 1

@@ -19,6 +19,7 @@ from compressor.physics.observe import (
     POTENTIAL,
 )
 
+NEAR = 0.98  # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
 
 
@@ -142,6 +143,23 @@ def add_flows(rows, weights, span, flows):
     for k in range(4):
         for i in range(rows.shape[0]):
             flows[k] += span * weights[i] * rows[i, CRANK_POWER + k]
+
+
+@inlined
+def near_record(rows, middle, tally):
+    """Whether a peak may be beaten within a step, by the rows at its ends and in its middle."""
+    last = rows.shape[0] - 1
+    for k in range(PEAKED):
+        column = ACCELERATION + k
+        top = max(abs(rows[0, column]), abs(rows[middle, column]), abs(rows[last, column]))
+        if top >= NEAR * tally.peak[k] and top > 0.0:
+            return True
+    for joint in range(2):
+        column = PENETRATION + joint
+        top = max(rows[0, column], rows[middle, column], rows[last, column])
+        if top > 0.0 and top >= NEAR * tally.max_penetration[joint]:
+            return True
+    return False
 
 
 @inlined
