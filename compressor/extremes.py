@@ -148,7 +148,8 @@ def _numbers(point: Iterator[float], inside: bool) -> dict[str, float]:
         low, high = narrow if inside and narrow else whole
         u = next(point)
         if name == "damping":
-            found[name] = 0.0 if u < UNDAMPED else low * (high / low) ** ((u - UNDAMPED) / 0.9)
+            share = (u - UNDAMPED) / (1.0 - UNDAMPED)
+            found[name] = low * (high / low) ** share if share >= 0.0 else 0.0
         else:
             found[name] = low * (high / low) ** u if log else low + u * (high - low)
     rod = found["rod_mass"]

@@ -17,17 +17,17 @@ def looking(times: np.ndarray) -> np.ndarray:
     return np.union1d(times, _looks(times[-1]))
 
 
-def looked_at(p: np.record, run: Trajectory, times: np.ndarray) -> tuple[Trajectory, np.ndarray]:
-    """A run on the grid `looking(times)` as one on `times`, and eccentricities (m) at the looks.
+def looked_at(p: np.record, run: Trajectory, times: np.ndarray) -> np.ndarray:
+    """Eccentricities (m) at the looks of a run on `looking(times)`, which is put on `times`.
 
-    The latter have the shape (LOOKS + 1, joint, axis), and are nan from where the run stopped.
+    Shape (LOOKS + 1, joint, axis); nan from where the run stopped.
     """
     seen = np.searchsorted(run.times, _looks(times[-1]))
     rows = np.empty((seen.size, COLUMNS))
     observe_all(run.times[seen], run.states[seen], run.phases[seen], p, rows)
     kept = np.searchsorted(run.times, times)
     run.times, run.states, run.phases = times, run.states[kept], run.phases[kept]
-    return run, rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(-1, 2, 2)
+    return rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(-1, 2, 2)
 
 
 def parted(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:

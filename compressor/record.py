@@ -10,8 +10,8 @@ import numpy as np
 from compressor.case import Case
 from compressor.parameter import JOINTS, to_si
 from compressor.physics.loads import cam_corners, gas_corners, printed_corners
-from compressor.physics.materials import contact_stiffness
 from compressor.physics.parameters import Law, Load, Scene, derive, new_record
+from compressor.scales import stiffness_of
 
 LOADS = {"none": Load.NONE, "typical": Load.TYPICAL, "design": Load.DESIGN}
 LAWS = {"impact": Law.IMPACT}
@@ -79,11 +79,7 @@ def _contact(case: Case, p: np.record) -> None:
     p["full_damping"] = to_si(contact.full_damping_mm, "mm")
     for i, joint in enumerate(JOINTS):
         p["clearance"][i] = to_si(getattr(case.clearance_mm, joint), "mm")
-        if contact.materials:
-            bore = p["pin_radius"] + p["clearance"][i]
-            p["stiffness"][i] = contact_stiffness(*contact.materials, p["pin_radius"], bore)
-        else:
-            p["stiffness"][i] = (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
+        p["stiffness"][i] = stiffness_of(case, joint)
     if friction:
         p["friction"] = 1
         p["static"], p["dynamic"] = friction.static, friction.dynamic

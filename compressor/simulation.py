@@ -57,6 +57,7 @@ SERIES = {
     ),
 }  # fmt: skip
 
+NO_LOOKS = np.zeros((1, 2, 2))  # of a run that is compared with no other, or has ideal joints
 PIECES = 32  # of the ideal scene's quadrature; twice as many a rung
 OUT_OF_BUDGET = (
     Reason.BUDGET_STEPS,
@@ -256,15 +257,16 @@ def attempt(case: Case, rung: int, timeout: float, sampled: bool) -> Solution:
     times = case.duration * (np.arange(samples + 1) / samples)
     if scene(case) == Scene.IDEAL:
         trajectory = closed_form(p, times, case.settle, round(PIECES * 2.0**rung), timeout)
-        looks = np.zeros((1, 2, 2))
+        looks = NO_LOOKS
     else:
         y = np.zeros(2 * FREEDOMS[scene(case)])
         start(offsets(case), y, p)
         how = case.solve
-        run = integrate(
-            Request(p, y, looking(times), case.settle, rtol, how.method, how.max_steps, timeout)
+        grid = looking(times) if case.wants_bars else times
+        trajectory = integrate(
+            Request(p, y, grid, case.settle, rtol, how.method, how.max_steps, timeout)
         )
-        trajectory, looks = looked_at(p, run, times)
+        looks = looked_at(p, trajectory, times) if case.wants_bars else NO_LOOKS
     found = {} if trajectory.reason else metrics(p, trajectory.tally)
     return Solution(p, trajectory, rtol, found, {}, looks, trajectory.reason, trajectory.detail)
 

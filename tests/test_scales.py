@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from compressor.case import Case
 from compressor.parameter import JOINTS
 from compressor.physics.control import BOUNDARY
+from compressor.physics.materials import contact_stiffness
 from compressor.record import record
 from compressor.scales import (
     STABILITY,
@@ -74,12 +75,15 @@ def test_the_greatest_force_bounds_the_ideal_machine_s(load, speed):
         assert force <= greatest_force(case, joint) <= 3 * force
 
 
-def test_stiffness_is_the_record_s():
-    for contact in ({"exponent": 2}, {"materials": ["steel", "copper"]}):
-        case = Case.from_values({**BOTH, "contact": contact})
-        assert [stiffness_of(case, joint) for joint in JOINTS] == pytest.approx(
-            record(case)["stiffness"].tolist(), rel=1e-14
-        )
+def test_stiffness_is_given_or_of_the_materials():
+    squared = Case.from_values({**BOTH, "contact": {"exponent": 2}})
+    mixed = Case.from_values({**BOTH, "contact": {"materials": ["steel", "copper"]}})
+    pin = 0.01
+    bores = [pin + getattr(mixed.clearance_mm, joint) / 1e3 for joint in JOINTS]
+    expected = [contact_stiffness("steel", "copper", pin, bore) for bore in bores]
+    for case, values in ((squared, [3.36e11, 3.36e11]), (mixed, expected)):
+        assert [stiffness_of(case, joint) for joint in JOINTS] == pytest.approx(values, rel=1e-12)
+        assert record(case)["stiffness"].tolist() == pytest.approx(values, rel=1e-12)
 
 
 def test_the_ideal_machine_has_no_scales_and_no_cost():

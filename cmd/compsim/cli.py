@@ -29,6 +29,7 @@ from compsim.screen import (
     caution,
     configs_argument,
     duration,
+    jobs_option,
     limit,
     only_option,
     output_option,
@@ -88,10 +89,7 @@ def cli() -> None:
 @cli.command()
 @configs_argument
 @output_option
-@click.option(
-    "-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
-    help="Worker processes.",
-)  # fmt: skip
+@jobs_option("Worker processes.")
 @setting
 @only_option
 @limit

@@ -10,6 +10,7 @@ from compsim.screen import (
     caution,
     configs_argument,
     duration,
+    jobs_option,
     limit,
     only_option,
     output_option,
@@ -22,10 +23,7 @@ from compsim.screen import (
 @click.command()
 @configs_argument
 @output_option
-@click.option(
-    "-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
-    help="Worker processes that the time is told for.",
-)  # fmt: skip
+@jobs_option("Worker processes that the time is told for.")
 @setting
 @only_option
 @limit

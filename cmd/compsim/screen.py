@@ -4,8 +4,8 @@ import contextlib
 import shlex
 import sys
 import time
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,6 +24,13 @@ setting = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
     help="Set a key in all case files, such as machine.speed_rpm=300.",
 )  # fmt: skip
+
+
+def jobs_option(words: str) -> Callable[..., Any]:
+    """-j, by default as many as this process may use."""
+    return click.option("-j", "--jobs", type=click.IntRange(min=1),
+                        show_default="cores available", help=words)  # fmt: skip
+
 
 only_option = click.option(
     "--only", default="", metavar="COMPARISON",

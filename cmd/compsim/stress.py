@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, Screen, duration, say
+from compsim.screen import DONE, SOME_FAILED, Screen, duration, jobs_option, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
               help="How many scenes are drawn.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
               help="Of the draws.")  # fmt: skip
-@click.option("-j", "--jobs", type=click.IntRange(min=1), show_default="cores available",
-              help="Worker processes.")  # fmt: skip
+@jobs_option("Worker processes.")
 @click.option("-o", "--output", default="stress", show_default=True,
               help="Folder of the campaign.")  # fmt: skip
 @click.option("--scene", type=click.IntRange(min=0),

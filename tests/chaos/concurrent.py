@@ -10,11 +10,11 @@ import re
 import shutil
 import tempfile
 import time
-from collections import Counter
 from pathlib import Path
 
 from chaos.processes import Run
 from chaos.stored import case_file, contents, damage, rows
+from chaos.tally import Tally
 from compressor import writer
 from compressor.plan import load_studies
 from compressor.store import read_store, read_studies
@@ -173,7 +173,7 @@ def compared(folder, commands, expected, before):
 
 def campaign(trials, seed, folder):
     """Run `trials` arrangements of runs, every tenth with the real command."""
-    began, counts, failures = time.monotonic(), Counter(), []
+    tally = Tally(WHAT, seed)
     place = Path(tempfile.mkdtemp(prefix="concurrent-", dir=folder))
     expected = {}
     for keep in KEEPS:
@@ -185,16 +185,10 @@ def campaign(trials, seed, folder):
     for own in range(seed, seed + trials):
         (place / "trial").mkdir()
         real = own % REAL == 0
-        if problem := trial(place / "trial", expected, random.Random(own), counts, real):
-            failures.append(f"seed {own}: {problem}")
-        counts["of real commands"] += real
+        if problem := trial(place / "trial", expected, random.Random(own), tally.counts, real):
+            tally.failures.append(f"seed {own}: {problem}")
+        tally.counts["of real commands"] += real
         shutil.rmtree(place / "trial")
+        tally.trials += 1
     shutil.rmtree(place)
-    return {
-        "what": WHAT,
-        "trials": trials,
-        "failed": len(failures),
-        "counts": dict(sorted(counts.items())),
-        "seconds": round(time.monotonic() - began, 1),
-        "failures": failures,
-    }
+    return tally.result()

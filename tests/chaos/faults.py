@@ -26,7 +26,6 @@ from typing import Any
 
 from chaos.common import (
     Said,
-    Tally,
     case_files,
     command,
     complete_store,
@@ -34,6 +33,7 @@ from chaos.common import (
     forked,
     fresh,
 )
+from chaos.tally import Tally
 from compressor import report, writer
 
 KINDS = {  # of calls that write -> the errors that each of them is refused by
@@ -268,7 +268,7 @@ class Campaign:
             faults = Faults(place, kind, number, error)
             said = self.say(*self.words(scene, place), faults=faults)
             if faults.counts[NAMES.index(kind)] < number:
-                self.tally.count("calls that did not come")
+                self.tally.counts["calls that did not come"] += 1
             self.judge(label, said)
             self.complete_again(label, scene, place)
 
@@ -280,7 +280,9 @@ class Campaign:
         elif said.code == 5 and not (named(said.err) or "damaged file" in said.err):
             self.tally.fail(label, f"unnamed: {said.err}")
         else:
-            self.tally.count("named errors" if said.code == 5 else "calls that were not needed")
+            self.tally.counts[
+                "named errors" if said.code == 5 else "calls that were not needed"
+            ] += 1
 
     def complete_again(self, label: str, scene: Scene, place: Path) -> None:
         """Give the command again, undisturbed: then all is there."""
@@ -391,7 +393,7 @@ def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
         planned += [partial(tried.small_tmpfs, option) for option in options]
         planned += [partial(tried.read_only, scene) for scene in SCENES]
     else:
-        tally.count("mounts that were not allowed", len(SCENES))
+        tally.counts["mounts that were not allowed"] += len(SCENES)
     if trials < len(planned):
         planned = random.Random(seed).sample(planned, trials)
     for trial in planned:

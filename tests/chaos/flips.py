@@ -16,7 +16,6 @@ import numpy as np
 
 from chaos.common import (
     TIMINGS,
-    Tally,
     case_files,
     command,
     complete_store,
@@ -24,6 +23,7 @@ from chaos.common import (
     forked,
     fresh,
 )
+from chaos.tally import Tally
 from compressor import open_study, report, writer
 from compressor.durable import StoreError, StoreWarning
 from compressor.store import read_store
@@ -109,10 +109,10 @@ class Campaign:
             store = place / "store"
             shutil.copytree(self.complete, store)
             (store / file).write_bytes(data)
-            self.tally.count(f"in {kind}")
+            self.tally.counts[f"in {kind}"] += 1
             reader, key = rng.choice(READERS), rng.choice(self.keys)
             mend = number % MEND_EVERY == 0
-            self.tally.count("mended", mend)
+            self.tally.counts["mended"] += mend
 
             def looked_at() -> str:
                 return (

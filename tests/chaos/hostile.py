@@ -24,13 +24,13 @@ import numpy as np
 
 from chaos.common import (
     Said,
-    Tally,
     case_files,
     command,
     complete_store,
     forked,
     fresh,
 )
+from chaos.tally import Tally
 from compressor import hdf5, report, sweep
 from compressor.manifest import read_study
 from compressor.plan import CaseFileError
@@ -442,7 +442,7 @@ class Campaign:
             kind, words = words_of_case(trial, self.texts, rng)
             before = set(trial.rglob("*"))
             ended = forked(lambda: said_of_case(words), HANG)
-            self.tally.count(f"case files, {kind}")
+            self.tally.counts[f"case files, {kind}"] += 1
             problem = problem_of(ended.result, ended.death, (0, 2, 3))
             problem = problem or self.strayed(trial, before)
         return f"{kind} {words}", problem, ended.seconds
@@ -457,7 +457,7 @@ class Campaign:
             before = set(trial.rglob("*"))
             reader, key = rng.choice(READERS), rng.choice(self.keys)
             ended = forked(lambda: said_of_store(reader, key, self.cases, store), HANG)
-            self.tally.count(f"files of a store, {what.partition(',')[0]}")
+            self.tally.counts[f"files of a store, {what.partition(',')[0]}"] += 1
             problem = problem_of(ended.result, ended.death, (0, 3, 5))
             problem = problem or self.strayed(trial, before)
         return f"{what}, {reader}", problem, ended.seconds

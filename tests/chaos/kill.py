@@ -11,12 +11,12 @@ import shutil
 import signal
 import tempfile
 import time
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 from chaos.processes import Run
 from chaos.stored import case_file, contents, damage, rows, unfinished
+from chaos.tally import Tally
 from compressor import writer
 from compressor.plan import load_studies
 from compressor.store import read_store
@@ -170,24 +170,18 @@ def trial(scene, folder, draw, counts):
 
 def campaign(trials, seed, folder):
     """Kill `trials` sweeps, every third of them the real command; trial n has the seed seed + n."""
-    began, scenes, counts, failures = time.monotonic(), {}, Counter(), []
+    tally, scenes = Tally(WHAT, seed), {}
     place = Path(tempfile.mkdtemp(prefix="kill-", dir=folder))
     for own in range(seed, seed + trials):
         draw = random.Random(own)
         name, real = draw.choice(list(KINDS)), own % REAL == 0
         if (name, real) not in scenes:
             scenes[name, real] = Scene(place / f"scene-{len(scenes)}", KINDS[name], real)
-        problem = trial(scenes[name, real], place / "trial", draw, counts)
+        problem = trial(scenes[name, real], place / "trial", draw, tally.counts)
         shutil.rmtree(place / "trial")
-        counts["real commands"] += real
+        tally.trials += 1
+        tally.counts["real commands"] += real
         if problem:
-            failures.append(f"seed {own}, {name}{', real' if real else ''}: {problem}")
+            tally.failures.append(f"seed {own}, {name}{', real' if real else ''}: {problem}")
     shutil.rmtree(place)
-    return {
-        "what": WHAT,
-        "trials": trials,
-        "failed": len(failures),
-        "counts": dict(sorted(counts.items())),
-        "seconds": round(time.monotonic() - began, 1),
-        "failures": failures,
-    }
+    return tally.result()

@@ -11,8 +11,6 @@ import re
 import shutil
 import signal
 import tempfile
-import time
-from collections import Counter
 from pathlib import Path
 
 import compressor.simulation
@@ -20,6 +18,7 @@ import compressor.sweep
 import compressor.workers
 from chaos.processes import Run
 from chaos.stored import LEAN, case_file, contents, damage
+from chaos.tally import Tally
 from compressor.plan import load_studies
 from compressor.store import read_store
 
@@ -152,20 +151,14 @@ def undisturbed(folder):
 
 def campaign(trials, seed, folder):
     """Run `trials` mixes of one to five bad jobs and up to forty good ones."""
-    began, counts, failures = time.monotonic(), Counter(), []
+    tally = Tally(WHAT, seed)
     place = Path(tempfile.mkdtemp(prefix="poison-", dir=folder))
     expected = undisturbed(place / "good")
     for own in range(seed, seed + trials):
         (place / "trial").mkdir()
-        if problem := trial(place / "trial", expected, random.Random(own), counts):
-            failures.append(f"seed {own}: {problem}")
+        if problem := trial(place / "trial", expected, random.Random(own), tally.counts):
+            tally.failures.append(f"seed {own}: {problem}")
         shutil.rmtree(place / "trial")
+        tally.trials += 1
     shutil.rmtree(place)
-    return {
-        "what": WHAT,
-        "trials": trials,
-        "failed": len(failures),
-        "counts": dict(sorted(counts.items())),
-        "seconds": round(time.monotonic() - began, 1),
-        "failures": failures,
-    }
+    return tally.result()

@@ -25,7 +25,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from chaos.common import SOLVE, Tally, contents, forked, fresh
+from chaos.common import SOLVE, contents, forked, fresh
+from chaos.tally import Tally
 from compressor import writer
 from compressor.plan import load_studies
 from compressor.store import read_store
@@ -187,7 +188,7 @@ class Campaign:
             time.sleep(0.01)
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)
-            self.tally.count("writers that had to be killed")
+            self.tally.counts["writers that had to be killed"] += 1
 
     def trial(self, number: int, control: str = "") -> bool:
         """Cut the power once; whether an acknowledged result is lost."""
@@ -202,7 +203,7 @@ class Campaign:
                 if control:
                     return bool(lost)
                 self.tally.trials += 1
-                self.tally.count("acknowledged results", len(acknowledged))
+                self.tally.counts["acknowledged results"] += len(acknowledged)
                 if lost:
                     self.tally.fail(f"trial {number}", f"lost {len(lost)}: {ended.death}")
                 again = forked(lambda: (sweep(self.studies, store, 1), contents(store))[1])
@@ -234,8 +235,8 @@ def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
     for control in CONTROLS:
         tally.counts[f"controls, {control}"] = tally.counts[f"of these lost, {control}"] = 0
         for number in range(max(FEWEST_CONTROLS, trials // CONTROL_EVERY)):
-            tally.count(f"controls, {control}")
-            tally.count(f"of these lost, {control}", tried.trial(number, control))
+            tally.counts[f"controls, {control}"] += 1
+            tally.counts[f"of these lost, {control}"] += tried.trial(number, control)
         if not tally.counts[f"of these lost, {control}"]:
             tally.fail(f"controls, {control}", "nothing is lost: the campaign would not notice")
     return tally.result()
