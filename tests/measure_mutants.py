@@ -187,18 +187,19 @@ def campaign(mutants, jobs, pure=PURE, compiled=COMPILED):
         return list(pool.map(tried, mutants))
 
 
-def earlier(target, rows):
-    """The whole campaign of a file with the rows of these mutants in place of theirs, if any."""
+def earlier(target, rows, mutants):
+    """The whole campaign of a file, if any: these rows, and its own of the other mutants."""
     if not Path(target).exists():
         return {}
     whole = json.loads(Path(target).read_text(encoding="utf-8"))
-    again = {row["mutant"]: row for row in rows}
-    mutants = [again.get(row["mutant"], row) for row in whole["mutants"]]
-    return {"minutes": whole["minutes"], "mutants": mutants}
+    known = {row["mutant"]: row for row in [*whole["mutants"], *rows]}
+    rows = [known[mutant.identity] for mutant in mutants if mutant.identity in known]
+    return {"minutes": whole["minutes"], "mutants": rows}
 
 
 def main(target, jobs, only, pure, compiled):
-    mutants = [m for m in [*bugs(), *drawn(DRAWN)] if any(text in m.identity for text in only)]
+    everyone = [*bugs(), *drawn(DRAWN)]
+    mutants = [m for m in everyone if any(text in m.identity for text in only)]
     began = time.monotonic()
     if {"motion", "march"} & {*pure}:
         load_reference()
@@ -208,7 +209,7 @@ def main(target, jobs, only, pure, compiled):
 
     kept = {**provenance("make mutants"), "seed": SEED, "minutes": minutes, "mutants": rows}
     if only != [""]:
-        kept |= earlier(target, rows)
+        kept |= earlier(target, rows, everyone)
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     escaped = sum(not row["caught_by"] and "equivalent" not in row for row in rows)
     print(f"{len(rows)} mutants in {minutes} minutes, {escaped} escaped")
