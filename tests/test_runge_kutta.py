@@ -8,17 +8,19 @@ from compressor.physics.kinematics import crank_direction
 from compressor.physics.observe import COLUMNS, derivative_with_flows
 from compressor.physics.runge_kutta import (
     FLOWS,
+    MIDWAY,
     STAGES,
     A,
     C,
     E,
     P,
     Pair,
+    combine,
     error_norm,
     extend,
     interpolate,
-    midway,
     take_step,
+    weights_at,
 )
 from compressor.record import record
 
@@ -74,14 +76,24 @@ def test_dense_output_ends_at_the_step(pair):
     assert P[pair].sum(axis=1) == pytest.approx(A[pair, -1], abs=1e-13)
 
 
+@pytest.mark.parametrize("s", [0.0, 0.1, 0.5, 0.93, 1.0])
 @pytest.mark.parametrize("pair", Pair)
-def test_the_middle_of_a_step_is_the_interpolants(pair):
+def test_stages_combine_to_the_interpolant(pair, s):
     k = np.sin(np.arange(7.0 * 12)).reshape(STAGES, 12)
-    z, dense, y, middle = np.arange(12.0), np.zeros((5, 8)), np.zeros(8), np.zeros(8)
+    z, dense, y, combined = np.arange(12.0), np.zeros((5, 8)), np.zeros(8), np.zeros(8)
     extend(pair, 0.3, z, k, dense)
-    interpolate(0.5, dense, y)
-    midway(pair, 0.3, z, k, middle)
-    assert middle == pytest.approx(y, rel=1e-13)
+    interpolate(s, dense, y)
+    weights = np.zeros(STAGES)
+    weights_at(pair, s, weights)
+    combine(weights, 0.3, z, k, combined)
+    assert combined == pytest.approx(y, rel=1e-12)
+
+
+@pytest.mark.parametrize("pair", Pair)
+def test_the_middles_weights_are_stored(pair):
+    weights = np.zeros(STAGES)
+    weights_at(pair, 0.5, weights)
+    assert MIDWAY[pair] == pytest.approx(weights, abs=1e-15)
 
 
 @pytest.mark.parametrize("pair", Pair)

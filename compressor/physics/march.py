@@ -34,12 +34,14 @@ from compressor.physics.observe import (
 from compressor.physics.onset import first_onset
 from compressor.physics.runge_kutta import (
     FLOWS,
+    MIDWAY,
     STAGES,
+    combine,
     error_norm,
     extend,
     interpolate,
-    midway,
     take_step,
+    weights_at,
 )
 from compressor.physics.tally import lobatto, near_record, tally_energy, tally_step
 
@@ -112,6 +114,7 @@ class Work(NamedTuple):
     column: np.ndarray  # (n + 4,)
     jacobian: np.ndarray  # (n + 4, n)
     dense: np.ndarray  # (5, n): the step's interpolant
+    weights: np.ndarray  # (7,): of the stages, at a fraction of the step
     y: np.ndarray  # (n,)
     rows: np.ndarray  # gauged at a step's nodes
     row: np.ndarray
@@ -133,7 +136,7 @@ def new_work(n):
     size = n + FLOWS
     return Work(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
-        np.zeros((5, n)), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
+        np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
         np.zeros(COLUMNS),
     )  # fmt: skip
 
@@ -171,14 +174,6 @@ def may_change(rows, p):
     return False
 
 
-@jit
-def lay(w, h, z, work):
-    """Lay the interpolant through an explicit step, unless it has been."""
-    if not w.laid:
-        extend(w.pair, h, z, work.k, work.dense)
-        w.laid = 1
-
-
 @inlined
 def look_at_step(w, base, h, z, work, phase, p, tally):
     """Observe the step's interpolant at its nodes; returns every which one.
@@ -203,7 +198,7 @@ def look_at_step(w, base, h, z, work, phase, p, tally):
         if w.laid:
             interpolate(NODES[i], work.dense, work.y)
         elif i == MIDDLE:
-            midway(w.pair, h, z, work.k, work.y)
+            combine(MIDWAY[w.pair], h, z, work.k, work.y)
         else:
             break
         glance(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
@@ -211,7 +206,8 @@ def look_at_step(w, base, h, z, work, phase, p, tally):
             beaten = w.t >= w.settle and near_record(work.rows, MIDDLE, tally)
             if beaten or may_change(work.rows, p):
                 every = 1
-                lay(w, h, z, work)
+                extend(w.pair, h, z, work.k, work.dense)
+                w.laid = 1
     return every
 
 
@@ -254,11 +250,17 @@ def onset_ahead(w, h, every, work, phase, p):
 
 @inlined
 def sample_grid(w, t_end, h, z, work, times, states):
-    """Fill the output samples up to t_end from the step's interpolant."""
+    """Fill the output samples up to t_end.
+
+    Most steps hold one sample or none, for which laying the whole interpolant is not worth it.
+    """
     while w.sample < times.size and times[w.sample] <= t_end:
-        lay(w, h, z, work)
-        s = (times[w.sample] - w.t) / h
-        interpolate(min(1.0, max(0.0, s)), work.dense, states[w.sample])
+        s = min(1.0, max(0.0, (times[w.sample] - w.t) / h))
+        if w.laid:
+            interpolate(s, work.dense, states[w.sample])
+        else:
+            weights_at(w.pair, s, work.weights)
+            combine(work.weights, h, z, work.k, states[w.sample])
         w.sample += 1
 
 
@@ -311,7 +313,8 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
     """
     work = Work(
         borrowed(work.k), borrowed(work.new), borrowed(work.column), borrowed(work.jacobian),
-        borrowed(work.dense), borrowed(work.y), borrowed(work.rows), borrowed(work.row),
+        borrowed(work.dense), borrowed(work.weights), borrowed(work.y), borrowed(work.rows),
+        borrowed(work.row),
     )  # fmt: skip
     z, atol, size = borrowed(z), borrowed(atol), borrowed(size)
     times, states = borrowed(times), borrowed(states)

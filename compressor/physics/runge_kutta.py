@@ -153,12 +153,21 @@ def error_norm(pair, h, z, new, k, rtol, atol):
 
 
 @inlined
-def midway(pair, h, z, k, out):
-    """The motion in the middle of a step into out, (n,): `extend` and `interpolate` at once."""
+def weights_at(pair, s, weights):
+    """Weights of the stages at the fraction s of a step into weights, (STAGES,)."""
+    for stage in range(STAGES):
+        a, b = P[pair, stage, 0], P[pair, stage, 1]
+        c, d = P[pair, stage, 2], P[pair, stage, 3]
+        weights[stage] = s * (a + s * (b + s * (c + s * d)))
+
+
+@inlined
+def combine(weights, h, z, k, out):
+    """The motion where the stages have these weights into out, (n,): no interpolant is laid."""
     for i in range(0, out.size, LANES):
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for stage in range(STAGES):
-            weight = MIDWAY[pair, stage]
+            weight = weights[stage]
             a += weight * k[stage, i]
             b += weight * k[stage, i + 1]
             c += weight * k[stage, i + 2]
