@@ -141,6 +141,7 @@ def trial(scene, folder, draw, counts):
         run.watch(draw.uniform(0, scene.between))
     struck = strike(run, victim, draw)
     code = run.finish()
+    struck = struck and (victim == "worker" or code != 0)  # 0: it was leaving when it was hit
     after, left = scene.served(folder), unfinished(folder)
     whole = damage(folder / "out")
     found = read_store(folder / "out")

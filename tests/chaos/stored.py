@@ -42,8 +42,8 @@ def contents(folder, foreign=()):
     """
     stored, found = read_store(folder), {}
     names = [name for name in ROW.names if name != TIMED]
-    for position, key in enumerate(stored.rows.columns["key"]):
-        columns = stored.rows.columns
+    columns = stored.rows.columns
+    for position in np.argsort(stored.rows.source, kind="stable"):  # segment by segment: quicker
         parts = [stored.rows.numbers[name][position].tobytes() for name in names]
         parts += [bytes(columns[name][position]) for name in ("status", "reason", "precision")]
         parts += [columns[name][position].tobytes() for name in ("samples", "end")]
@@ -58,7 +58,7 @@ def contents(folder, foreign=()):
                 parts += [name.encode(), text if values.dtype == object else values.tobytes()]
         for name in sorted(set(attributes) - set(foreign)):
             parts += [name.encode(), repr(attributes[name]).encode()]
-        found[key.decode()] = hashlib.sha256(b"\0".join(parts)).hexdigest()
+        found[columns["key"][position].decode()] = hashlib.sha256(b"\0".join(parts)).hexdigest()
     return found
 
 
