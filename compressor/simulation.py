@@ -102,14 +102,17 @@ def simulate(case: Case) -> "xr.Dataset":
 
 def observe(case: Case) -> tuple[Outcome, Table]:
     """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
-    more: dict[str, tuple] = {}
-    if case.problems:
-        end = refused(case)
-    else:
-        found = solve(case)
-        end = outcome(case, found)
-        if case.output.keep == "series":
-            more = series(found.p, found.trajectory)
+    return tabled(refused(case), {}) if case.problems else told(case, solve(case))
+
+
+def told(case: Case, found: Solution) -> tuple[Outcome, Table]:
+    """The `Outcome` of a solution and what its Dataset is made of."""
+    kept = case.output.keep == "series"
+    return tabled(outcome(case, found), series(found.p, found.trajectory) if kept else {})
+
+
+def tabled(end: Outcome, more: dict[str, tuple]) -> tuple[Outcome, Table]:
+    """An outcome and, with more variables, what its Dataset is made of."""
     variables = end.variables() | coordinates() | more
     named = {name: Variable(d, np.asarray(v), attrs) for name, (d, v, attrs) in variables.items()}
     return end, Table(named, end.attributes)

@@ -1,10 +1,10 @@
 """Error against tolerance, and the limit of no clearance (make ladders, about two minutes).
 
 The ladder: the paper's three faults at 0.2 mm by `auto`, from rtol 1e-2 to 1e-10, against SciPy's
-DOP853 at 1e-12; RODAS at 1e-12 says how far that can be trusted. The limit: clearances from 1 mm
-to 1 nm with the contact scaled along, so that compliance shrinks as the clearance does: K with
-c^-1.5, the penetration of full damping with c, the damping with c^-0.5. Writes a small JSON file
-and, beside it, both figures.
+DOP853 at 1e-12; RODAS at 1e-12 says how far that can be trusted. Runs that fail the energy audit
+are not repeated here. The limit: clearances from 1 mm to 1 nm with the contact scaled along, so
+that compliance shrinks as the clearance does: K with c^-1.5, the penetration of full damping with
+c, the damping with c^-0.5. Writes a small JSON file and, beside it, both figures.
 """
 
 import json
@@ -16,6 +16,7 @@ import xarray as xr
 from measure_accuracy import provenance
 
 from compressor.analysis import FAULTS
+from compressor.audit import allowed
 from compressor.bench import (
     REFERENCES,
     default_cases,
@@ -28,7 +29,7 @@ from compressor.bench import (
 from compressor.case import Case, Contact
 from compressor.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
 from compressor.figures.style import render
-from compressor.simulation import simulate
+from compressor.simulation import attempt, simulate, told
 
 TOLERANCES = [10.0**-k for k in range(2, 11)]
 CLEARANCES = [10.0**-k for k in range(7)]  # mm
@@ -41,10 +42,17 @@ def short(value):
     return float(f"{value:.3g}")
 
 
+def alone(case):
+    """The Dataset of one run at the case's own tolerance, whatever the energy audit says of it."""
+    found = attempt(case, 0, case.solve.timeout_s, sampled=True)
+    assert not found.reason, found.detail
+    table = told(case, found)[1]
+    return xr.Dataset(table.variables, attrs=table.attrs)
+
+
 def rung(case, rtol, truth):
     """One tolerance of the ladder: the variables of RUNGS."""
-    run = simulate(solved(case, "auto", rtol))
-    assert run.attrs["complete"], run["reason"].item()
+    run = alone(solved(case, "auto", rtol))
     found = errors(stored_values(run, faulty(case)), truth)
     numbers = {name: found[name.removeprefix("error_")] for name in list(RUNGS)[:2]}
     return {**numbers, "energy_residual": float(run["energy_residual"])}
@@ -125,7 +133,8 @@ def figures(kept):
     rungs = table(kept["ladder"], "rtol", tolerance=kept["tolerances"])
     rungs["reference_uncertainty"] = "scene", [*kept["references_apart"].values()]
     revolutions = next(iter(default_cases().values())).solve.duration_rev
-    rungs["residual_bound"] = "tolerance", AUDIT * revolutions * rungs["tolerance"].values
+    bound = [allowed(rtol, revolutions) for rtol in kept["tolerances"]]
+    rungs["residual_bound"] = "tolerance", bound
     clearances = [*dict.fromkeys(row["clearance"] for row in kept["limit"])]
     vanishing = table(kept["limit"], "clearance", clearance=clearances)
     return {
