@@ -29,7 +29,7 @@ class Tier:
 ACCURACY = {
     "draft": Tier(2e-5, 2e-2, 2e-2),
     "standard": Tier(4e-6, 5e-3, 5e-3),
-    "fine": Tier(2e-8, 1e-4, 1e-4),
+    "fine": Tier(1e-8, 1e-4, 1e-4),
     "reference": Tier(5e-11, 1e-6, 1e-6),
 }
 # Accuracy by number: a ladder of runs, each ten times tighter than the one before. Bars at rtol
