@@ -139,7 +139,7 @@ def try_mutant(mutant, tree, pure, compiled):
     """What became of a mutant: its row of the kept measurement."""
     began = time.monotonic()
     row = {"kind": mutant.kind, "mutant": mutant.identity, "jit": False}
-    row["caught_by"] = tree.attempt(mutant, False, in_turn(pure, mutant))
+    row["caught_by"] = tree.attempt(mutant, False, in_turn(pure, mutant)) if pure else ""
     reason = EQUIVALENT.get(mutant.identity)
     if reason:
         row["equivalent"] = reason
