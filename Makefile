@@ -42,7 +42,7 @@ format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-accuracy: install  ## measure the errors behind accuracy and error bars (about four minutes)
+accuracy: install  ## measure the errors behind accuracy and error bars (about three minutes)
 	$(BIN)/python tests/measure_accuracy.py tests/results/accuracy.json
 
 claims: install  ## measure the paper's claims over a range of masses (seconds)
@@ -51,16 +51,16 @@ claims: install  ## measure the paper's claims over a range of masses (seconds)
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
 	$(BIN)/python tests/measure_store.py tests/results/store.json
 
-scale: install  ## measure 100,000 jobs beside their physics: time and memory (two minutes)
+scale: install  ## measure 100,000 jobs beside their physics: time and memory (a minute)
 	$(BIN)/python tests/measure_scale.py tests/results/scale.json
 
-throughput: install  ## measure starting up, and 10,000 jobs without time series (two minutes)
+throughput: install  ## measure starting up, and 10,000 jobs without time series (a minute)
 	$(BIN)/python tests/measure_throughput.py tests/results/throughput.json
 
-sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (fifteen minutes)
+sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (ten minutes)
 	$(BIN)/python tests/measure_sweep.py tests/results/sweep.json
 
-peers: install  ## time other tools and ours in turn on one problem (about five minutes)
+peers: install  ## time other tools and ours in turn on one problem (about three minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
 	  || echo "going on without numbalsoda: it needs a Fortran compiler"
@@ -69,7 +69,7 @@ peers: install  ## time other tools and ours in turn on one problem (about five 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
 	$(BIN)/python tests/measure_tradeoff.py tests/results/tradeoff.json
 
-ladders: install  ## measure error against tolerance, and the limit of no clearance (two minutes)
+ladders: install  ## measure error against tolerance, and the limit of no clearance (a minute)
 	$(BIN)/python tests/measure_ladders.py tests/results/ladders.json
 
 chaotic: install  ## compare two chaotic scenes' statistics by two integrators (a minute)
@@ -84,7 +84,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(BIN)/python tests/measure_mutants.py tests/results/mutants.json
 
-measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers readme  ## all of these (40 minutes)
+measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers readme  ## all of these (25 minutes)
 
 readme: install  ## write the README's generated tables
 	$(BIN)/python tests/readme_tables.py README.md

@@ -1,4 +1,4 @@
-"""Error against tolerance, and the limit of no clearance (make ladders, about two minutes).
+"""Error against tolerance, and the limit of no clearance (make ladders, about a minute).
 
 The ladder: the paper's three faults at 0.2 mm by `auto`, from rtol 1e-2 to 1e-10, against SciPy's
 DOP853 at 1e-12; RODAS at 1e-12 says how far that can be trusted. Runs that fail the energy audit

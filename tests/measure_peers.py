@@ -32,23 +32,8 @@ from peers.mechanism import DURATION, SCENES, case_values, error, output_grid, p
 from compressor.case import Case
 from compressor.simulation import simulate
 
-LADDER = (
-    1e-3,
-    5e-4,
-    3e-4,
-    2e-4,
-    1e-4,
-    7e-5,
-    5e-5,
-    3e-5,
-    2e-5,
-    1.4e-5,
-    1e-5,
-    7e-6,
-    5e-6,
-    2e-6,
-    1e-6,
-)
+LADDER = (1e-3, 5e-4, 3e-4, 2e-4, 1e-4, 7e-5, 5e-5, 3e-5, 2e-5, 1.4e-5, 1e-5, 7e-6, 5e-6, 2e-6,
+          1e-6)  # fmt: skip
 ROUNDS = 5
 LIBRARIES = ("exudyn", "scikit-sundae", "numbalsoda")
 TIGHT = 1e-9  # tolerance of Exudyn's run that verifies ours

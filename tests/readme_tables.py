@@ -136,7 +136,7 @@ def peers_table():
             continue
         cells = [tool, rows[0]["settings"]]
         for key, digits in (
-            ("seconds", 2), ("error", 1), ("our_seconds", 2), ("our_rtol", 1),
+            ("seconds", 2), ("error", 1), ("our_seconds", 2), ("our_rtol", 2),
             ("ratio", 2), ("kernel_wall_ratio", 2),
         ):  # fmt: skip
             cells.append(of_scenes(rows, key, digits))
@@ -398,8 +398,9 @@ def stress_table():
     text = markdown(["end", "supported range", "whole range"], [*rows, ["ok share", *shares]])
     slow = found["slowest"]
     return text + (
-        f"\n{found['scenes']:,} scenes of seed {found['seed']} took {found['work_s'] / 60:.0f} "
-        f"minutes of one core; {found['silent_wrong']} wrong in silence"
+        f"\n{found['scenes']:,} scenes of seed {found['seed']} took "
+        f"{found['work_s'] / 60:.0f} minutes of workers' time, {found['workers']} at a time; "
+        f"{found['silent_wrong']} wrong in silence"
         + (
             f", so that with 95 % confidence at most {found['at_most']:.2%} of such scenes are"
             if not found["silent_wrong"]

@@ -112,10 +112,10 @@ def published(folder):
 
 
 def strike(run, victim, draw):
-    """Kill; whether there was anything left to kill."""
+    """Kill; whether it was a worker, and there was one."""
     if victim != "worker":
         run.kill(whole=victim == "both")
-        return run.runs() or run.code == -signal.SIGKILL
+        return False
     while run.watch(0.002):
         if workers := run.workers():
             run.kill_one(draw.choice(workers))
@@ -139,9 +139,9 @@ def trial(scene, folder, draw, counts):
             pass
     elif not early:
         run.watch(draw.uniform(0, scene.between))
-    struck = strike(run, victim, draw)
+    worker_struck = strike(run, victim, draw)
     code = run.finish()
-    struck = struck and (victim == "worker" or code != 0)  # 0: it was leaving when it was hit
+    struck = worker_struck or code == -signal.SIGKILL  # or it was leaving, with 0
     after, left = scene.served(folder), unfinished(folder)
     whole = damage(folder / "out")
     found = read_store(folder / "out")
