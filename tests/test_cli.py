@@ -541,6 +541,36 @@ def group_is_gone(group, seconds):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_hits_a_destructor_is_not_lost(number, capsys):
+    class Closing:
+        def __del__(self):
+            signal.raise_signal(number)
+            time.sleep(0)
+
+    def work():
+        Closing()
+        until = time.monotonic() + 30
+        while time.monotonic() < until:
+            time.sleep(0.01)
+
+    with pytest.raises(cli.Interrupted, match=number.name), cli.interruptible():
+        work()
+    assert capsys.readouterr().err == ""
+
+
+def test_other_dropped_exceptions_are_told_as_ever(monkeypatch):
+    class Failing:
+        def __del__(self):
+            raise ValueError("of a destructor")
+
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda what: told.append(what.exc_value))
+    with cli.interruptible():
+        Failing()
+    assert [str(error) for error in told] == ["of a destructor"]
+
+
 @pytest.mark.parametrize(
     ("send", "number", "code"),
     [

@@ -9,6 +9,7 @@ import shlex
 import signal
 import sys
 import tempfile
+import threading
 import traceback
 import warnings
 from collections import Counter
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_FAILURES = 20  # listed one by one
+AGAIN = 0.02  # s until a dropped signal is sent again
 
 # error -> what stands before its text, and the exit code
 FORESEEN = {
@@ -245,18 +247,34 @@ def report_failures(failures: Sequence["Failure"]) -> None:
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Turn the signals that ask a program to end into Interrupted; a second one ends it at once."""
+    """Turn the signals that ask a program to end into Interrupted; a second one ends it at once.
+
+    A signal that comes while a destructor runs, where Python drops every exception, comes again.
+    """
 
     def interrupt(number: int, frame: Any) -> None:
         for other in caught:
             signal.signal(other, signal.SIG_DFL)
         raise Interrupted(number)
 
+    def dropped(what: Any) -> None:
+        if not isinstance(what.exc_value, Interrupted):
+            hook(what)
+            return
+        number = what.exc_value.number
+        for other in caught:
+            signal.signal(other, interrupt)
+        again = threading.Timer(AGAIN, signal.pthread_kill, (threading.get_ident(), number))
+        again.daemon = True
+        again.start()
+
     caught = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
     old = {number: signal.signal(number, interrupt) for number in caught}
+    hook, sys.unraisablehook = sys.unraisablehook, dropped
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for number, handler in old.items():
             signal.signal(number, handler)
 
