@@ -14,7 +14,6 @@ from compressor.physics.control import (
     LEAST_ERROR,
     LONGEST_REST,
     REST,
-    SHORT_STAY,
     STIFF_STEPS,
     SUSPECT,
     Mode,
@@ -186,15 +185,17 @@ def test_a_look_without_suspicion_takes_one_back():
 
 
 def test_calm_steps_bring_the_explicit_pair_back_and_rest_ever_longer():
+    """The longer, the more stays in a row have cost more than they saved."""
     price = (4 + rosenbrock.STAGES + 0.2 * 16) / (STAGES - 1)
     calm, busy = (stiff_work([-f * price * BOUNDARY / H, -2.0, -1.0, 1.0]) for f in (0.9, 1.1))
     w, z = walker(h=H), np.zeros(4 + FLOWS)
     pauses = []
-    for stay in (SHORT_STAY - 1, SHORT_STAY, *[CALM_STEPS] * 6):
-        w.stiff, w.stay, w.h, w.rest = 1, stay - CALM_STEPS, H, 0
+    cost = CALM_STEPS * 0.1 * price
+    for saved in (0.9 * cost, 1.1 * cost, *[0.0] * 7):
+        w.stiff, w.h, w.rest = 1, H, 0
         choose_method(w, H, z, calm, SIZE)
         choose_method(w, H, z, busy, SIZE)  # all over again
-        w.stay = stay - CALM_STEPS
+        w.gain = saved
         for i in range(CALM_STEPS):
             assert w.stiff, i
             choose_method(w, H, z, calm, SIZE)
@@ -202,6 +203,6 @@ def test_calm_steps_bring_the_explicit_pair_back_and_rest_ever_longer():
         assert w.h == pytest.approx(H / (0.9 * price), rel=1e-3)  # what stability allows
         assert w.rest == w.pause
         pauses.append(int(w.pause))
-    assert pauses == [REST, REST, 100, 200, 400, LONGEST_REST, LONGEST_REST, LONGEST_REST]
+    assert pauses == [REST, REST, 100, 200, 400, 800, 1600, LONGEST_REST, LONGEST_REST]
     explicit_steps(w, 0.1, 101)
     assert w.rest == LONGEST_REST - 100

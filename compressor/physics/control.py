@@ -21,8 +21,7 @@ BOUNDARY = 3.25  # of both pairs on the negative real axis, about
 SUSPECT = 0.6  # of the boundary: under PI control, steps held by stability swing around it
 EVERY = 4  # explicit steps from one test to the next
 STIFF_STEPS, CALM_STEPS = 15, 10  # in a row, before a change of method
-REST, LONGEST_REST = 50, 500  # steps without a test after a change back; doubled after each
-SHORT_STAY = 100  # stiff steps or fewer
+REST, LONGEST_REST = 50, 2000  # steps without a test after a change back; doubled after each
 
 spectral_radius = rosenbrock.spectral_radius
 
@@ -114,7 +113,8 @@ def choose_method(w, h, z, work, size):
     """Change to the stiff partner where stability holds the explicit steps, and back.
 
     A stiff step costs as much as `price` explicit ones; where it is not longer than that many
-    stable explicit steps for a while, the explicit pair comes back and rests from the test.
+    stable explicit steps for a while, the explicit pair comes back and rests from the test: the
+    longer, the more such stays in a row have cost more than they saved.
     """
     if w.mode != AUTO:
         return
@@ -127,13 +127,13 @@ def choose_method(w, h, z, work, size):
     if w.stiff:
         price = (size.size + rosenbrock.STAGES + 0.2 * size.size**2) / (STAGES - 1)
         w.calm = w.calm + 1 if reach < price else 0
-        w.stay += 1
+        w.gain += reach - price
         if w.calm >= CALM_STEPS:
             w.stiff, w.calm, w.held = 0, 0, 0
-            w.pause = min(2 * w.pause, LONGEST_REST) if w.stay < SHORT_STAY else REST
+            w.pause = REST if w.gain > 0.0 else min(2 * w.pause, LONGEST_REST)
             w.rest = w.pause
             w.h = min(w.h, h / max(reach, 1.0))
     else:
         w.held = w.held + EVERY if reach > SUSPECT else max(0, w.held - EVERY)
         if w.held >= STIFF_STEPS:
-            w.stiff, w.held, w.calm, w.stay = 1, 0, 0, 0
+            w.stiff, w.held, w.calm, w.gain = 1, 0, 0, 0.0

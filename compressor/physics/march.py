@@ -96,7 +96,7 @@ WALKER = np.dtype(
         ("calm", "i8"),  # stiff steps in a row that an explicit method could have h
         ("rest", "i8"),  # steps until stiffness is tested again
         ("pause", "i8"),  # the rest after the last change back
-        ("stay", "i8"),  # stiff steps since the last change
+        ("gain", "f8"),  # stable explicit steps' worth that stiff ones have saved since the change
         ("rtol", "f8"),
         ("settle", "f8"),
         ("contact_step", "f8"),  # s: a step that resolves the contact's own frequency
