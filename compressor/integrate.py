@@ -28,7 +28,14 @@ from compressor.physics.observe import (
 )
 from compressor.physics.parameters import FREEDOMS, Load, Scene
 from compressor.physics.runge_kutta import FLOWS, Pair
-from compressor.physics.tally import add_flows, lobatto, new_tally, tally_energy, tally_step
+from compressor.physics.tally import (
+    add_flows,
+    lobatto,
+    new_tally,
+    shares_apart,
+    tally_energy,
+    tally_step,
+)
 from compressor.reasons import Reason
 from compressor.retrace import LAST, History, Snapshot, Standing, retrace
 
@@ -363,8 +370,9 @@ class Segment:
         phases = np.full(times.size, self.right_hand_side.phase)
         observe_all(times, states, phases, self.request.p, rows)
         self.check_contact(begin, end - begin, rows)
-        tally, p = self.result.tally, self.request.p
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, measured, tally, p)
+        tally, p, apart = self.result.tally, self.request.p, np.empty(2)
+        shares_apart(NODES, rows, apart)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, measured, tally, p)
 
     def check_contact(self, begin: float, span: float, rows: np.ndarray) -> None:
         """Raise Stop where a whole contact lies within a step and its impulse is no small error."""
@@ -414,7 +422,7 @@ def closed_form(
     owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
     states = np.zeros((NODES.size, 4))
     rows = np.empty((NODES.size, COLUMNS))
-    flows = np.zeros(FLOWS)
+    flows, apart = np.zeros(FLOWS), np.zeros(2)
     for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
         phase = phases[owner[number]]
         if number % PIECES_A_LOOK == 0 and time.monotonic() > deadline:
@@ -427,7 +435,7 @@ def closed_form(
         tally_energy(rows[0], flows, result.tally)
         add_flows(rows, WEIGHTS, end - begin, flows)
         tally_energy(rows[-1], flows, result.tally)
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, begin >= settle, result.tally, p)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, begin >= settle, result.tally, p)
     result.seconds = time.perf_counter() - began
     return result
 

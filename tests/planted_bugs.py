@@ -54,7 +54,7 @@ BUGS = [
     ("a pulse between two looks stepped over", "physics/onset.py",
      "before + rise + fall > 0.0", "before > 0.0"),
     ("contact always counts as touching", "physics/tally.py",
-     "= 0 if apart else 1", "= 1"),
+     "tally.touching[joint] = touching", "tally.touching[joint] = 1"),
     ("the small end's friction loss left out", "physics/observe.py",
      "- small.friction * small.slip", ""),
     ("the rod's inertia missing in an ideal joint's force", "physics/observe.py",

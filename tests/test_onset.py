@@ -15,14 +15,22 @@ from compressor.physics._jit import ENABLED
 from compressor.physics.contact import Contact, impact, nearness
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
-from compressor.physics.march import Status, march, new_walker, new_work
+from compressor.physics.march import NODES, Status, march, measure_apart, new_walker, new_work
 from compressor.physics.motion import evaluate, start
-from compressor.physics.observe import COLUMNS, Column, derivative_with_flows, observe_all
+from compressor.physics.observe import (
+    COLUMNS,
+    Column,
+    derivative_with_flows,
+    glance,
+    observe_all,
+)
 from compressor.physics.onset import (
     EDGE,
     LOOKS,
     NEVER,
+    PLACED,
     SAMPLES,
+    change,
     crossing,
     first_onset,
     joint_onset,
@@ -31,7 +39,7 @@ from compressor.physics.onset import (
     touching_between,
 )
 from compressor.physics.parameters import FREEDOMS, SMALL_END
-from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, take_step
+from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, interpolate, take_step
 from compressor.physics.tally import new_tally
 from compressor.record import offsets, record, scene
 
@@ -81,6 +89,7 @@ def both_ends(big, small):
 APART, INSIDE = [0.5 * CLEARANCE], [1.1 * CLEARANCE]
 CLOSING = [0.5 * CLEARANCE, CLEARANCE]  # touches at s = 0.5
 RELEASE = [1.2 * CLEARANCE, -0.4 * CLEARANCE]  # at 0.08 m/s, out at s = 0.5
+LEAVING = [1.002 * CLEARANCE, -0.04 * CLEARANCE]  # out at s = 0.05, pushed until then
 RELEASED = 0.477775  # where K delta^1.5 outgrows STEP(delta) 0.08 m/s
 WIDTH = 1e-3  # half of a pulse, in steps
 PULSE = 1e-10  # m, its height
@@ -116,6 +125,35 @@ def test_crossing_is_found_to_the_last_digits():
     found = crossing(SMALL_END, 0.25, 1.0, 0.0, H, dense, 0, parameters(), np.zeros(4))
     assert found == pytest.approx(0.5, abs=1e-11)
     assert nearness_at(SMALL_END, found, 0.0, H, dense, 0, parameters(), np.zeros(4)) > 0
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "low", "high", "at"),
+    [(CLOSING, 0.2, 0.9, 0.5), (LEAVING, 0.0, 1.0, 0.05), (RELEASE, 0.0, 0.49, RELEASED),
+     (hump(0.5, 1e-7, 0.2), 0.0, 0.5, 0.3), (hump(0.5, 1e-7, 0.2), 0.5, 1.0, 0.7)],
+)  # fmt: skip
+def test_a_change_of_contact_is_placed(coefficients, low, high, at):
+    def at_fraction(s):
+        return nearness_at(SMALL_END, s, 0.0, H, dense, 0, p, np.zeros(4))
+
+    p, dense = parameters(), small_end_only(coefficients)
+    ends = at_fraction(low), at_fraction(high)
+    found = change(SMALL_END, low, high, *ends, 0.0, H, dense, 0, p, np.zeros(4))
+    assert found == pytest.approx(at, abs=PLACED)
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "apart"),
+    [(APART, 1.0), (INSIDE, 0.0), (CLOSING, 0.5), (LEAVING, 0.95), (hump(0.5, 1e-7, 0.2), 0.6)],
+)  # fmt: skip
+def test_the_share_of_a_step_without_contact_ends_where_contact_does(coefficients, apart):
+    p, walker, work = parameters(), new_walker(1), new_work(4)
+    walker.laid, work.dense[:] = 1, small_end_only(coefficients)
+    for s, row in zip(NODES, work.rows, strict=True):
+        interpolate(s, work.dense, work.y)
+        glance(ideal(s * H, p), work.y, 0, p, row)
+    measure_apart(walker, H, 1, work, 0, p)
+    assert work.apart == pytest.approx([0.0, apart], abs=2 * PLACED)
 
 
 @pytest.mark.parametrize("height", [PULSE, 1e-14, -1e-14, -PULSE])

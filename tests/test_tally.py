@@ -12,12 +12,15 @@ from compressor.physics.tally import (
     near_record,
     new_tally,
     peak_of,
+    share_apart,
+    shares_apart,
     tally_energy,
     tally_step,
 )
 from compressor.record import record
 
 NODES, WEIGHTS = lobatto(9)
+APART = np.array([0.25, 0.75])  # shares of a step without contact
 
 
 @pytest.mark.parametrize("n", [3, 5, 9])
@@ -53,12 +56,29 @@ def test_tally_of_a_known_step():
     rows[:, Column.NORMAL] = np.where(NODES > 0.5, 10.0, 0.0)
     rows[:, Column.PENETRATION] = NODES - 0.5
     tally = new_tally()
-    tally_step(1e-4, NODES, WEIGHTS, rows, 1, True, tally, p)
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, True, tally, p)
     assert tally.seconds == pytest.approx(1e-4)
     assert tally.square_acceleration == pytest.approx(9e-4)
     assert tally.impacts.tolist() == [1, 0]
     assert tally.max_penetration[0] == pytest.approx(0.5)
-    assert tally.loss_seconds[0] == pytest.approx(1e-4 * WEIGHTS[NODES <= 0.5].sum())
+    assert tally.loss_seconds.tolist() == [pytest.approx(0.25e-4), 0.0]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "share"),
+    [(2.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 1.0), (-1.0, -2.0, 1.0), (3.0, -1.0, 0.25),
+     (-1.0, 3.0, 0.25), (0.0, 0.0, 1.0)],
+)  # fmt: skip
+def test_contact_is_a_positive_nearness(before, after, share):
+    assert share_apart(before, after) == pytest.approx(share)
+
+
+def test_time_apart_is_measured_by_lines_between_nodes():
+    rows, apart = np.zeros((NODES.size, COLUMNS)), np.empty(2)
+    rows[:, Column.NEARNESS] = 1e-9 * (NODES - 0.47)
+    rows[:, Column.NEARNESS + 1] = 0.8 - NODES
+    shares_apart(NODES, rows, apart)
+    assert apart == pytest.approx([0.47, 0.2])
 
 
 def test_every_other_node_of_a_step_will_do():
@@ -67,9 +87,11 @@ def test_every_other_node_of_a_step_will_do():
     weights = np.zeros(NODES.size)
     weights[::2] = np.linspace(1, 2, 5)
     whole, sparse = new_tally(), new_tally()
-    tally_step(1e-4, NODES[::2].copy(), weights[::2].copy(), rows[::2].copy(), 1, True, whole, p)
+    tally_step(
+        1e-4, NODES[::2].copy(), weights[::2].copy(), rows[::2].copy(), 1, APART, True, whole, p
+    )
     rows[1::2] = np.nan
-    tally_step(1e-4, NODES, weights, rows, 2, True, sparse, p)
+    tally_step(1e-4, NODES, weights, rows, 2, APART, True, sparse, p)
     assert sparse == whole
 
 
@@ -79,7 +101,7 @@ def test_a_step_near_a_record_is_told(node, column):
     p = record(Case.from_values({"joint": "both", "clearance_mm": 0.2}))
     tally, rows = new_tally(), np.zeros((NODES.size, COLUMNS))
     rows[:, Column.ACCELERATION : Column.NORMAL + 2] = 1.0
-    tally_step(1e-4, NODES, WEIGHTS, rows, 1, True, tally, p)
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, True, tally, p)
     rows *= 0.97
     assert not near_record(rows, 4, tally)
     rows[node, column] = 0.99

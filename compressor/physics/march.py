@@ -31,7 +31,7 @@ from compressor.physics.observe import (
     gauge,
     glance,
 )
-from compressor.physics.onset import first_onset
+from compressor.physics.onset import change, first_onset
 from compressor.physics.runge_kutta import (
     FLOWS,
     MIDWAY,
@@ -43,7 +43,13 @@ from compressor.physics.runge_kutta import (
     take_step,
     weights_at,
 )
-from compressor.physics.tally import lobatto, near_record, tally_energy, tally_step
+from compressor.physics.tally import (
+    lobatto,
+    near_record,
+    share_apart,
+    tally_energy,
+    tally_step,
+)
 
 LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
@@ -117,6 +123,7 @@ class Work(NamedTuple):
     weights: np.ndarray  # (7,): of the stages, at a fraction of the step
     y: np.ndarray  # (n,)
     rows: np.ndarray  # gauged at a step's nodes
+    apart: np.ndarray  # (2,): share of the step without contact, by joint
     row: np.ndarray
 
 
@@ -137,7 +144,7 @@ def new_work(n):
     return Work(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
         np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
-        np.zeros(COLUMNS),
+        np.zeros(2), np.zeros(COLUMNS),
     )  # fmt: skip
 
 
@@ -265,6 +272,29 @@ def sample_grid(w, t_end, h, z, work, times, states):
 
 
 @inlined
+def measure_apart(w, h, every, work, phase, p):
+    """Write the share of a step that each joint is without contact.
+
+    Where it changes between two nodes, to where it does on the interpolant, if that is laid.
+    """
+    for joint in range(2):
+        apart = 0.0
+        if p.clearance[joint] > 0.0:
+            for i in range(every, NODES.size, every):
+                low, high = NODES[i - every], NODES[i]
+                before = work.rows[i - every, NEARNESS + joint]
+                after = work.rows[i, NEARNESS + joint]
+                share = share_apart(before, after)
+                if 0.0 < share < 1.0 and w.laid:
+                    s = change(
+                        joint, low, high, before, after, w.t, h, work.dense, phase, p, work.y
+                    )
+                    share = (s - low if after > 0.0 else high - s) / (high - low)
+                apart += share * (high - low)
+        work.apart[joint] = apart
+
+
+@inlined
 def take_in(w, h, every, work, phase, p, tally):
     """Tally an accepted step that has been looked at, and audit its energy."""
     last = NODES.size - 1
@@ -273,8 +303,11 @@ def take_in(w, h, every, work, phase, p, tally):
     w.observed = 1
     n = work.y.size
     tally_energy(work.row, work.new[n:], tally)
+    measured = w.t >= w.settle
+    if measured:
+        measure_apart(w, h, every, work, phase, p)
     weights = WEIGHTS if every == 1 else COARSE_WEIGHTS
-    tally_step(h, NODES, weights, work.rows, every, w.t >= w.settle, tally, p)
+    tally_step(h, NODES, weights, work.rows, every, work.apart, measured, tally, p)
 
 
 @jit
@@ -314,7 +347,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
     work = Work(
         borrowed(work.k), borrowed(work.new), borrowed(work.column), borrowed(work.jacobian),
         borrowed(work.dense), borrowed(work.weights), borrowed(work.y), borrowed(work.rows),
-        borrowed(work.row),
+        borrowed(work.apart), borrowed(work.row),
     )  # fmt: skip
     z, atol, size = borrowed(z), borrowed(atol), borrowed(size)
     times, states = borrowed(times), borrowed(states)

@@ -1,8 +1,9 @@
-"""When contact begins within a step: no pulse is stepped over, whatever the tolerance.
+"""When contact begins or ends within a step: no pulse is stepped over, whatever the tolerance.
 
 Contact is F_N > 0. A journal that flies touches when its gap closes; one that is released, but
 not yet out of its bearing, is held off by the clamp and touches again when the unclamped force
-turns positive. Both are watched on the step's interpolant while F_N = 0.
+turns positive. Both are watched on the step's interpolant while F_N = 0. Where contact ends, the
+step goes on; how much of it was without contact is told to the metrics.
 """
 
 from compressor.physics._jit import jit
@@ -15,6 +16,7 @@ SAMPLES = 12  # intervals of a step that are looked at
 EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
 LOOKS = SAMPLES + 2
 HALVINGS = 40
+PLACED = 1e-5  # of a step: as well as a change of contact is placed for the metrics
 NEVER = 2.0  # a fraction of the step beyond its end
 
 
@@ -120,3 +122,25 @@ def first_onset(t, h, dense, phase, p, y):
             if found < begin:
                 begin, end = found, until
     return begin, end
+
+
+@jit
+def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
+    """Fraction at which contact begins or ends between two others, to PLACED.
+
+    at_low, at_high: the nearness at low and high, of different signs. Two looks where the line
+    through both ends crosses zero, then one halfway: where contact ends, the nearness has a corner.
+    """
+    looks = 0
+    while high - low > PLACED:
+        looks += 1
+        s = 0.5 * (low + high)
+        if looks % 3 > 0:
+            s = (low * at_high - high * at_low) / (at_high - at_low)
+            s = min(max(s, low + 0.5 * PLACED), high - 0.5 * PLACED)
+        now = nearness_at(joint, s, t, h, dense, phase, p, y)
+        if (now > 0.0) == (at_high > 0.0):
+            high, at_high = s, now
+        else:
+            low, at_low = s, now
+    return 0.5 * (low + high)

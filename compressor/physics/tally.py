@@ -14,6 +14,7 @@ from compressor.physics.observe import (
     CRANK_POWER,
     DEVIATION,
     KINETIC,
+    NEARNESS,
     NORMAL,
     PENETRATION,
     POTENTIAL,
@@ -163,37 +164,53 @@ def near_record(rows, middle, tally):
 
 
 @inlined
-def tally_contact(joint, span, nodes, weights, rows, every, measured, tally):
+def share_apart(before, after):
+    """Share of the way from one nearness to another that is without contact, by a straight line."""
+    low, high = min(before, after), max(before, after)
+    if high <= 0.0:
+        return 1.0
+    return low / (low - high) if low < 0.0 else 0.0
+
+
+@jit
+def shares_apart(nodes, rows, apart):
+    """Write the share of a step that each joint is without contact, by lines between its nodes."""
+    apart[:] = 0.0
+    for joint in range(2):
+        for i in range(1, nodes.size):
+            before, after = rows[i - 1, NEARNESS + joint], rows[i, NEARNESS + joint]
+            apart[joint] += (nodes[i] - nodes[i - 1]) * share_apart(before, after)
+
+
+@inlined
+def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
     """Add a step's contact loss, impacts and penetration at one joint."""
-    lost = 0.0
     for i in range(0, nodes.size, every):
-        apart = rows[i, NORMAL + joint] <= 0.0
-        if apart:
-            lost += weights[i]
-        elif measured and not tally.touching[joint]:
+        touching = rows[i, NORMAL + joint] > 0.0
+        if measured and touching and not tally.touching[joint]:
             tally.impacts[joint] += 1
-        tally.touching[joint] = 0 if apart else 1
+        tally.touching[joint] = touching
         tally.deepest = max(tally.deepest, rows[i, PENETRATION + joint])
     if measured:
         known = tally.max_penetration[joint]
         column = PENETRATION + joint
         tally.max_penetration[joint] = deepest_of(nodes, rows, every, column, known)
-        tally.loss_seconds[joint] += lost * span
+        tally.loss_seconds[joint] += apart[joint] * span
 
 
 @inlined
-def tally_step(span, nodes, weights, rows, every, measured, tally, p):
+def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
 
     nodes, weights: (m,), both ends of the step and between them; rows: (m, COLUMNS), observed at
     the nodes; every: 1, or 2 where only the first, third, ... row is filled, with `weights` zero
-    at the others; measured: whether the metrics count (after settling); the depth of contact over
-    the whole run always does.
+    at the others; apart: (2,), share of the step without contact, by joint; measured: whether the
+    metrics count (after settling); the depth of contact over the whole run always does.
     """
     if p.clearance[0] > 0.0:
-        tally_contact(0, span, nodes, weights, rows, every, measured, tally)
+        tally_contact(0, span, nodes, rows, every, apart, measured, tally)
     if p.clearance[1] > 0.0:
-        tally_contact(1, span, nodes, weights, rows, every, measured, tally)
+        tally_contact(1, span, nodes, rows, every, apart, measured, tally)
     if not measured:
         return
     tally.seconds += span
