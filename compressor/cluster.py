@@ -40,7 +40,7 @@ POLL = 0.01  # s
 PATIENCE = 5.0  # s without a result before a remark on it
 STARTING = "the cluster's workers load, or compile, the equations (under a minute)"
 WAITING = "the cluster has no workers: waiting for the first"
-WARM: set[str] = set()  # methods that this process has loaded, on a worker
+WARM: set[tuple[str, bool]] = set()  # methods, and horizons, that this process has loaded
 
 
 class ClusterError(Exception):
@@ -147,10 +147,10 @@ def on_worker(ours: dict[str, str], batch: bytes) -> bytes:
 
 def load(cases: Sequence[Case]) -> None:
     """Load, or compile, what cases need, before a worker process is forked for them."""
-    new = [case for case in cases if case.solve.method not in WARM]
+    new = [case for case in cases if (case.solve.method, case.solve.horizon) not in WARM]
     if new:
         warm_up(new, lambda remark: None)
-        WARM.update(case.solve.method for case in new)
+        WARM.update((case.solve.method, case.solve.horizon) for case in new)
 
 
 def run_near(place: Path, token: Path, text: str, case: Case) -> Outcome | Carried | StoreError:

@@ -124,7 +124,7 @@ def campaign(
     total, written = count, time.monotonic()
     progress(total - len(missing), total, "")
     if missing:
-        warm_up([], lambda remark: progress(total - len(missing), total, remark))
+        warm_up([], lambda remark: progress(total - len(missing), total, remark), horizon=True)
     tasks = ((number, (number, seed, budget), TIMEOUT) for number in missing)
     running = run_batches(run_scene, tasks, workers, total=len(missing))
     try:

@@ -264,8 +264,11 @@ def endings(
     return tuple(counts), tuple(failures)
 
 
-def warm_up(cases: Sequence[Case], remark: Callable[[str], None]) -> None:
-    """Load what the cases need, and compile the equations, before any worker has to."""
+def warm_up(cases: Sequence[Case], remark: Callable[[str], None], horizon: bool = False) -> None:
+    """Load what the cases need, and compile the equations, before any worker has to.
+
+    horizon: whether twins are needed though no case asks for its horizon.
+    """
     from compressor.simulation import measure  # needs numba: only where something is simulated
 
     timer = threading.Timer(PATIENCE, remark, [COMPILING])
@@ -275,8 +278,13 @@ def warm_up(cases: Sequence[Case], remark: Callable[[str], None]) -> None:
     try:
         solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
         measure(Case.from_values({"solve": solve}))
-        for method in sorted({"auto"} | {case.solve.method for case in cases}):
-            values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | {"method": method}}
+        hows: list[dict[str, object]] = [
+            {"method": method} for method in sorted({"auto"} | {c.solve.method for c in cases})
+        ]
+        if horizon or any(case.solve.horizon for case in cases):
+            hows.append({"horizon": True})
+        for how in hows:
+            values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | how}
             measure(Case.from_values(values))
     finally:
         timer.cancel()
