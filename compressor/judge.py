@@ -204,29 +204,23 @@ def compare(found: Solution, other: Solution) -> Excess:
     """The metric whose error is farthest beyond what the run tells of it."""
     expected = min(EXPECTED * found.rtol, MOST_EXPECTED)
     least = {name: max(expected, RESOLVED if name in ABSOLUTE else 0.0) for name in JUDGED}
-    return max(
-        excess(name, found, other, max(FACTOR * bar(name, found), least[name])) for name in JUDGED
-    )
+    return max(excess(name, found, other, least[name]) for name in JUDGED)
 
 
 def compare_statistics(found: Solution, other: Solution) -> Excess:
     """The statistic whose error is farthest beyond its bound."""
-    return max(
-        excess(name, found, other, max(FACTOR * bar(name, found), bound))
-        for name, bound in STATISTICS.items()
-    )
+    return max(excess(name, found, other, bound) for name, bound in STATISTICS.items())
 
 
-def excess(name: str, found: Solution, other: Solution, bound: float) -> Excess:
-    """How far a metric is from a judge's."""
-    truth = np.asarray(other.metrics[name])
-    error = float(np.abs(found.metrics[name] - truth).max()) / size(name, other.metrics)
-    return Excess(error / bound, name, error, bar(name, found))
+def excess(name: str, found: Solution, other: Solution, least: float) -> Excess:
+    """How far a metric is from a judge's, over ten bars or the least that counts if that is more.
 
-
-def bar(name: str, found: Solution) -> float:
-    """A metric's bar at its worst joint, over what errors are relative to."""
-    return float(np.max(found.bars[name])) / size(name, found.metrics)
+    Error and bar are relative to the judge's size of the metric.
+    """
+    one = size(name, other.metrics)
+    error = float(np.abs(found.metrics[name] - np.asarray(other.metrics[name])).max()) / one
+    bar = float(np.max(found.bars[name])) / one
+    return Excess(error / max(FACTOR * bar, least), name, error, bar)
 
 
 def size(name: str, metrics: Metrics) -> float:

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import metadata
@@ -14,7 +15,7 @@ import numpy as np
 import compressor
 from compressor.accuracy import LOOSEST, TIGHTEST
 from compressor.audit import RUNGS, allowed, energy_residual
-from compressor.bars import Metrics, bars, unmet
+from compressor.bars import Metrics, Witness, bars, unmet
 from compressor.case import MODEL_VERSION, Case
 from compressor.horizon import predictability_horizon
 from compressor.integrate import Request, Trajectory, closed_form, integrate
@@ -151,44 +152,50 @@ def beyond_horizon(case: Case, found: Solution) -> None:
 
 def once(case: Case) -> Solution:
     """A case's motion at its own tolerance, with error bars where they are wanted."""
-    found, looser = audited(case, case.output.keep == "series")
+    found = audited(case, case.output.keep == "series")
     if case.wants_bars and not found.reason:
         left = case.solve.timeout_s - found.trajectory.seconds
-        found.bars = error_bars(found, second(case, found, looser, left))
+        found.bars = error_bars(found, witnesses(case, found, left))
     return found
 
 
-def second(case: Case, found: Solution, looser: Solution | None, timeout: float) -> Solution:
-    """The run that tells the error of another: ten times looser, or by the stiff partner.
+def witnesses(case: Case, found: Solution, timeout: float) -> list[Solution]:
+    """The runs that tell the error of another; none if the first of them fails.
 
-    Where the tolerance is so loose that explicit steps may run over friction's fast modes, and
-    looser ones over the same, the stiff partner at a tenth of it tells.
+    The first is ten times looser; or ten times tighter where the tolerance is so loose that
+    explicit steps may run over friction's fast modes, then by the stiff partner, and where the
+    looser run has failed its audit. A second one is a thousand times looser, if that is not too
+    loose.
     """
-    if found.rtol > LOOSEST:
-        stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return attempt(stiff, 1, timeout, sampled=False)
-    return looser or attempt(case, -1, timeout, sampled=False)
+    rung, retried = round(math.log10(case.rtol / found.rtol)), found.rtol < 0.5 * case.rtol
+    stiff = replace(case, solve=replace(case.solve, method="RODAS"))
+    loose = found.rtol > LOOSEST
+    tighter = loose or (retried and found.rtol > 5.0 * TIGHTEST)
+    near = attempt(stiff if loose else case, rung + (1 if tighter else -1), timeout, False)
+    if near.reason or 1e3 * found.rtol > LOOSEST:
+        return [] if near.reason else [near]
+    far = attempt(case, rung - 3, timeout - near.trajectory.seconds, False)
+    return [near] if far.reason else [near, far]
 
 
-def audited(case: Case, sampled: bool) -> tuple[Solution, Solution | None]:
+def audited(case: Case, sampled: bool) -> Solution:
     """A run whose energy balances: at the case's tolerance, or up to RUNGS times ten tighter.
 
-    Also the run before it, ten times looser, if there was one. Where no run passes the audit, the
-    last whole one is a failed job.
+    Where no run passes the audit, the last whole one is a failed job.
     """
     left = case.solve.timeout_s
     best: Solution | None = None
     for rung in range(RUNGS + 1):
         found = attempt(case, rung, left, sampled)
         if best and found.reason in OUT_OF_BUDGET:
-            return unbalanced(case, best, found.reason, f"the next run: {found.detail}"), None
+            return unbalanced(case, best, found.reason, f"the next run: {found.detail}")
         if found.reason or balanced(case, found):
-            return found, best
+            return found
         left -= found.trajectory.seconds
         best = found
         if found.rtol < 9.9 * TIGHTEST:
             break
-    return unbalanced(case, found, "", f"at rtol {found.rtol:.2g}"), None
+    return unbalanced(case, found, "", f"at rtol {found.rtol:.2g}")
 
 
 def balanced(case: Case, found: Solution) -> bool:
@@ -210,13 +217,14 @@ def unbalanced(case: Case, best: Solution, reason: str, detail: str) -> Solution
 def climb(case: Case) -> Solution:
     """Ever tighter runs, until the bars of the metrics that accuracy is asked for are met.
 
-    Each run is the looser one of the next, so that bars cost nothing. A ladder that ends before
-    keeps its last whole run, and says how far it came.
+    The looser runs are the witnesses of the next, so that bars cost nothing. A ladder that ends
+    before keeps its last whole run, and says how far it came.
     """
     left = case.solve.timeout_s
     sampled = case.output.keep == "series"
-    best = attempt(case, 0, left, sampled)
+    runs = [attempt(case, 0, left, sampled)]
     for rung in itertools.count(1):
+        best = runs[-1]
         if best.reason:
             return best
         left -= best.trajectory.seconds
@@ -231,10 +239,11 @@ def climb(case: Case) -> Solution:
             )
             return short_of(case, best, reason, f"the next run: {found.detail}")
         if not found.reason:
-            found.bars = error_bars(found, best)
-            if not unmet(case.targets, found.metrics, found.bars) and balanced(case, found):
+            found.bars = error_bars(found, [best, *runs[-3:-2]])
+            told = balanced(case, best) and balanced(case, found)
+            if told and not unmet(case.targets, found.metrics, found.bars):
                 return found
-        best = found
+        runs.append(found)
     raise AssertionError("the ladder has an end")
 
 
@@ -242,7 +251,7 @@ def short_of(case: Case, best: Solution, reason: str, detail: str) -> Solution:
     """The best run of a ladder as a failed job that tells how far it came."""
     if not balanced(case, best):
         return unbalanced(case, best, reason, detail)
-    best.bars = best.bars or error_bars(best, None)
+    best.bars = best.bars or error_bars(best, [])
     missed = unmet(case.targets, best.metrics, best.bars)
     best.reason = reason
     best.detail = "; ".join([*missed, f"at rtol {best.rtol:.2g}", detail])
@@ -274,14 +283,10 @@ def attempt(case: Case, rung: int, timeout: float, sampled: bool) -> Solution:
     return Solution(p, trajectory, rtol, found, {}, looks, trajectory.reason, trajectory.detail)
 
 
-def error_bars(found: Solution, other: Solution | None) -> Metrics:
-    """The error bar of each metric; unknown where there is no other run, or it failed."""
-    residual = energy_residual(found.trajectory.tally)
-    if not other or other.reason:
-        return bars(found.metrics, {}, found.rtol, residual)
-    apart = parted(found.p, found.looks, other.looks)
-    tighter = other.rtol < found.rtol
-    return bars(found.metrics, other.metrics, found.rtol, residual, apart, tighter)
+def error_bars(found: Solution, others: Sequence[Solution]) -> Metrics:
+    """The error bar of each metric by other runs of the case; unknown where there are none."""
+    told = [Witness(o.metrics, o.rtol, parted(found.p, found.looks, o.looks)) for o in others]
+    return bars(found.metrics, told, found.rtol, energy_residual(found.trajectory.tally))
 
 
 def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:

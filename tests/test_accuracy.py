@@ -7,7 +7,7 @@ from random_cases import random_cases
 
 from compressor import simulation
 from compressor.accuracy import ACCURACY, TIGHTEST, first_rung
-from compressor.bars import OWN, bars, unmet
+from compressor.bars import LARGE, OWN, PEAKS, SHARES, Witness, bars, unmet
 from compressor.case import Case
 from compressor.parting import LOOKS, parted
 from compressor.plan import CaseFileError, load_studies
@@ -69,7 +69,8 @@ def test_bars_of_the_same_run_twice_would_cover_little(eight):
     covered = []
     for found, truth in eight:
         metrics = {name: found[name] for name in METRICS}
-        same = bars(metrics, metrics, ACCURACY["draft"].rtol, 0.0)
+        rtol = ACCURACY["draft"].rtol
+        same = bars(metrics, [Witness(metrics, 10 * rtol)], rtol, 0.0)
         wrong = [np.ravel(np.abs(found[n] - truth[n]) > same[n]) for n in METRICS]
         covered.append(~np.concatenate(wrong))
     assert np.concatenate(covered).mean() < 0.6
@@ -85,6 +86,28 @@ def test_the_looser_run_is_ten_times_looser(monkeypatch):
     assert [request.rtol for request in asked] == pytest.approx([1e-5, 1e-4])
     assert asked[1].times.size == LOOKS + 1
     assert set(asked[1].times) <= set(asked[0].times)
+
+
+@pytest.mark.parametrize(
+    ("rtol", "others"), [(1e-3, [1e-4]), (2e-7, [2e-6, 2e-4]), (1e-8, [1e-7, 1e-5])]
+)
+def test_the_witnesses_of_a_run(rtol, others):
+    case = Case.from_values(
+        {**BOTH, "solve": {"duration_rev": 0.25, "settle_rev": 0, "rtol": rtol}}
+    )
+    found = simulation.attempt(case, 0, 60.0, False)
+    runs = simulation.witnesses(case, found, 60.0)
+    assert [run.rtol for run in runs] == pytest.approx(others)
+
+
+def test_a_run_that_was_repeated_is_told_of_by_a_tighter_one():
+    """Its looser run has failed the audit of its energy."""
+    case = Case.from_values(
+        {**BOTH, "solve": {"duration_rev": 0.25, "settle_rev": 0, "rtol": 1e-5}}
+    )
+    found = simulation.attempt(case, 1, 60.0, False)
+    (other,) = simulation.witnesses(case, found, 60.0)
+    assert other.rtol == pytest.approx(1e-7)
 
 
 def test_a_looser_run_that_fails_leaves_the_error_unknown(monkeypatch):
@@ -121,7 +144,7 @@ def test_beyond_loose_tolerances_the_stiff_partner_tells_the_error():
         for how in ({"rtol": 2.5e-4}, {"rtol": 1e-7, "method": "RODAS"})
     )
     found, truth = simulation.solve(case), simulation.solve(exact)
-    looser = simulation.error_bars(found, simulation.attempt(case, -1, 60.0, False))
+    looser = simulation.error_bars(found, [simulation.attempt(case, -1, 60.0, False)])
     name = "rms_acceleration_deviation"
     error = abs(found.metrics[name] - truth.metrics[name])
     assert error > 10 * looser[name]
@@ -131,11 +154,42 @@ def test_beyond_loose_tolerances_the_stiff_partner_tells_the_error():
 def test_bars_do_not_trust_metrics_that_agree_by_chance(eight):
     """Runs whose journals have parted, but whose metrics have not."""
     metrics = {name: eight[0][0][name] for name in METRICS}
-    together, astray = (bars(metrics, metrics, 1e-6, 0.0, parted=d) for d in (0.009, 0.1))
+    near, together, astray = (
+        bars(metrics, [Witness(metrics, 1e-5, parted)], 1e-6, 0.0) for parted in (0.0, 0.009, 0.1)
+    )
     for name, value in metrics.items():
-        size = np.maximum(np.abs(value), 1.0) if name in OWN else np.abs(value)
-        assert (together[name] <= 1e-12 * size).all(), name
-        assert astray[name] == pytest.approx(0.03 * size), name
+        if name in OWN:
+            assert astray[name] == pytest.approx(0.03 * np.maximum(value, 1.0)), name
+            continue
+        assert (near[name] <= 1e-12 * np.abs(value)).all(), name
+        path = 0.009 * SHARES[name][2]
+        assert together[name] == pytest.approx(path * np.abs(value), rel=2 * path / LARGE), name
+        grown = 0.03 * np.abs(value) * (1 + 0.03 * np.abs(value) / (LARGE * np.max(np.abs(value))))
+        assert astray[name] == pytest.approx(grown), name
+
+
+def test_a_second_witness_catches_what_the_first_misses(eight):
+    """A run ten times looser that agrees by chance, and one a thousand times looser."""
+    metrics = {name: eight[0][0][name] for name in METRICS}
+    other = {name: 1.1 * value for name, value in metrics.items()}
+    twin, far = Witness(metrics, 1e-7), Witness(other, 1e-5)
+    alone, both = bars(metrics, [twin], 1e-8, 0.0), bars(metrics, [twin, far], 1e-8, 0.0)
+    near = bars(metrics, [Witness(other, 1e-7)], 1e-8, 0.0)
+    for name in PEAKS:
+        size = np.max(np.abs(metrics[name]))
+        assert np.max(alone[name]) < 1e-12 * size
+        assert 2e-3 * size < np.max(both[name]) < 0.1 * np.max(near[name])
+
+
+def test_long_bars_grow(eight):
+    metrics = {name: eight[0][0][name] for name in METRICS}
+    rms, ratio = metrics["rms_acceleration"], []
+    for share in (1e-4, 1e-2, 1.0):
+        other = Witness({**metrics, "rms_acceleration": (1 + share) * rms}, 1e-5)
+        ratio.append(bars(metrics, [other], 1e-6, 0.0)["rms_acceleration"] / (share * rms))
+    own = SHARES["rms_acceleration"][0]
+    grown = [own * (1 + own * share / LARGE) for share in (1e-4, 1e-2, 1.0)]
+    assert ratio == pytest.approx(grown, rel=1e-3)
 
 
 def test_bars_do_not_depend_on_the_output_grid():

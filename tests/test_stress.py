@@ -19,6 +19,7 @@ from compressor.judge import (
     compare,
     compare_statistics,
     cut,
+    excess,
     judge,
     judges,
     settled,
@@ -160,11 +161,22 @@ def test_a_wrong_number_that_no_bar_tells_of_is_silent(run):
     assert verdict == "silent_wrong"
     assert excess.ratio > 1
     assert len(result.by) == 2
-    other.bars = bars(
-        other.metrics, {}, other.rtol, 0.0
-    )  # inf: the run tells that it knows nothing
+    other.bars = bars(other.metrics, [], other.rtol, 0.0)  # inf: it tells that it knows nothing
     verdict, _, _ = settled(Case.from_values(CASE), other, compare, finding(other))
     assert verdict == "ok"
+
+
+@pytest.mark.parametrize("factor", [0.01, 100.0])
+def test_a_bar_is_as_long_as_it_says_whatever_the_number(run, factor):
+    """Both a number far too large and one far too small lie ten bars off, or they do not."""
+    case = Case.from_values(CASE)
+    other = solve(case)
+    name = "rms_acceleration"
+    other.metrics = {**run.metrics, name: factor * run.metrics[name]}
+    off = abs(factor - 1) * run.metrics[name]
+    for length, ratio in ((off / 9, 0.9), (off / 11, 1.1)):
+        other.bars = {**run.bars, name: length}
+        assert excess(name, other, run, 0.05).ratio == pytest.approx(ratio)
 
 
 def test_statistics_bound_what_lies_beyond_the_horizon(run):
