@@ -51,7 +51,7 @@ FLOOR = 0.1  # of the energy residual, relative to the metric
 ASTRAY, SHARE_ASTRAY = 0.01, 0.3  # of a journal's room: runs parted farther agree by chance
 WHOLE = 1.5  # of the difference to a tighter run, which is mostly the run's own error
 FAR, SHARE_FAR = 100.0, 0.04  # times the tolerance: witnesses beyond; share of what they tell
-LARGE = 0.03  # of a metric: a bar that long doubles
+LARGE = 0.015  # of a metric: a bar that long doubles
 ROUNDING = 1e-13  # of the metric
 
 
