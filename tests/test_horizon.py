@@ -78,7 +78,6 @@ def shifted(joint, method, damping):
     return time_of_parting(request(made, 0.0, 1e-5, method), other, far=0.0)
 
 
-@pytest.mark.slow
 def test_twins_that_start_alike_stay_alike_to_the_bit():
     """Over load corners, onsets of contact and changes of method: any distance at all is too far.
 
