@@ -9,15 +9,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from compressor.case import Case
-    from compressor.plan import load_cases
-    from compressor.simulation import simulate
-    from compressor.store import open_study
+    from compressor.cases.case import Case
+    from compressor.cases.load import load_cases
+    from compressor.solve.simulate import simulate
+    from compressor.store.reader import open_study
 
 __version__ = "0.1.0"
 __all__ = ["Case", "load_cases", "open_study", "simulate"]
 
-HOMES = {"Case": "case", "load_cases": "plan", "simulate": "simulation", "open_study": "store"}
+HOMES = {
+    "Case": "cases.case",
+    "load_cases": "cases.load",
+    "simulate": "solve.simulate",
+    "open_study": "store.reader",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -20,13 +20,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from compressor.case import Case
-from compressor.durable import StoreError, publish
-from compressor.jobfiles import store_series
+from compressor.cases.case import Case
+from compressor.outcome import Outcome
 from compressor.reasons import Reason
 from compressor.remote import REMEDY, Batch, Broken, Unfit, do_batch, passport
-from compressor.schema import Outcome
-from compressor.sweep import GRACE, Carried, as_jobs, run_job, warm_up
+from compressor.store.files import StoreError, publish
+from compressor.store.series_file import store_series
+from compressor.sweep.sweep import GRACE, Carried, as_jobs, run_job, warm_up
 from compressor.workers import AGAIN, MEMORY, MOST_BATCH, TICK, Done, Input, Lost
 
 EXTRA = "--backend dask needs dask.distributed: pip install 'compsim[dask]'"
@@ -48,7 +48,7 @@ class ClusterError(Exception):
 
 
 class Cluster:
-    """A dask cluster as a `compressor.sweep.Backend`; a context manager.
+    """A dask cluster as a `compressor.sweep.sweep.Backend`; a context manager.
 
     Raises ClusterError: at entry where there is no scheduler, or a worker with other versions.
     """
@@ -113,7 +113,7 @@ class Cluster:
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]:
-        """Run cases; `compressor.sweep.Backend` tells the rest."""
+        """Run cases; `compressor.sweep.sweep.Backend` tells the rest."""
         with visible(place) as (token, text):
             yield from run_batches(
                 self.client,

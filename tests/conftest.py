@@ -8,13 +8,13 @@ import hypothesis
 import numpy as np
 import pytest
 
-from compressor.analysis import paper_cases
-from compressor.case import Case
-from compressor.plan import load_studies
-from compressor.schema import NUMBERS, ROW, Outcome
-from compressor.simulation import simulate
-from compressor.store import finished_keys, read_store, write_series, write_study
-from compressor.writer import Writer
+from compressor.analysis.claims import paper_cases
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.outcome import NUMBERS, ROW, Outcome
+from compressor.solve.simulate import simulate
+from compressor.store.reader import finished_keys, read_store, write_series, write_study
+from compressor.store.writer import Writer
 
 hypothesis.settings.register_profile("untimed", deadline=None)  # other work shares the machine
 hypothesis.settings.load_profile("untimed")

@@ -19,10 +19,10 @@ import reference
 from joblib import Parallel, delayed
 from random_cases import SEED, random_cases
 
-from compressor.accuracy import ACCURACY
-from compressor.case import Case
-from compressor.schema import METRICS
-from compressor.simulation import measure, simulate
+from compressor.cases.accuracy import ACCURACY
+from compressor.cases.case import Case
+from compressor.outcome import METRICS
+from compressor.solve.simulate import measure, simulate
 
 RTOLS = [10.0**-k for k in range(3, 10)]
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from measure_accuracy import provenance
 
-from compressor.case import Case
-from compressor.horizon import predictability_horizon
-from compressor.parameter import JOINTS
-from compressor.simulation import simulate
+from compressor.cases.case import Case
+from compressor.cases.parameter import JOINTS
+from compressor.solve.horizon import predictability_horizon
+from compressor.solve.simulate import simulate
 
 REVOLUTIONS, SETTLE = 200, 8
 BATCHES = 16

@@ -12,9 +12,9 @@ from pathlib import Path
 from joblib import Parallel, delayed
 from measure_accuracy import provenance
 
-from compressor.analysis import RULES, claims, held_share, paper_cases
-from compressor.case import Solve
-from compressor.simulation import simulate
+from compressor.analysis.claims import RULES, claims, held_share, paper_cases
+from compressor.cases.case import Solve
+from compressor.solve.simulate import simulate
 
 ROD_KG = (2.0, 4.7, 8.0)
 RECIPROCATING_KG = (4.0, 8.0, 14.0, 25.0)

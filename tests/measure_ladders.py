@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 from measure_accuracy import provenance
 
-from compressor.analysis import FAULTS
-from compressor.audit import allowed
-from compressor.bench import (
+from compressor.analysis.claims import FAULTS
+from compressor.cases.case import Case, Contact
+from compressor.measure.work_precision import (
     REFERENCES,
     default_cases,
     errors,
@@ -26,10 +26,10 @@ from compressor.bench import (
     solved,
     stored_values,
 )
-from compressor.case import Case, Contact
-from compressor.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
-from compressor.figures.style import render
-from compressor.simulation import attempt, simulate, told
+from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
+from compressor.report.figures.style import render
+from compressor.solve.energy_audit import allowed
+from compressor.solve.simulate import attempt, simulate, told
 
 TOLERANCES = [10.0**-k for k in range(2, 11)]
 CLEARANCES = [10.0**-k for k in range(7)]  # mm

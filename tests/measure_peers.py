@@ -29,8 +29,8 @@ from measure_accuracy import provenance
 from peers import multibody, notebook, soda
 from peers.mechanism import DURATION, SCENES, case_values, error, output_grid, params
 
-from compressor.case import Case
-from compressor.simulation import simulate
+from compressor.cases.case import Case
+from compressor.solve.simulate import simulate
 
 LADDER = (1e-3, 5e-4, 3e-4, 2e-4, 1e-4, 7e-5, 5e-5, 3e-5, 2e-5, 1.4e-5, 1e-5, 7e-6, 5e-6, 2e-6,
           1e-6)  # fmt: skip
@@ -39,8 +39,8 @@ LIBRARIES = ("exudyn", "scikit-sundae", "numbalsoda")
 TIGHT = 1e-9  # tolerance of Exudyn's run that verifies ours
 FIRST_CALL = """
 import json, sys, time
-from compressor.case import Case
-from compressor.simulation import simulate
+from compressor.cases.case import Case
+from compressor.solve.simulate import simulate
 case = Case.from_values(json.loads(sys.argv[1]))
 began = time.perf_counter()
 simulate(case)

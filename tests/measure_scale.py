@@ -19,9 +19,9 @@ from pathlib import Path
 from measure_accuracy import provenance
 from measure_throughput import many
 
-from compressor import sweep
-from compressor.manifest import read_studies
-from compressor.plan import load_studies
+from compressor.cases.load import load_studies
+from compressor.store.studies import read_studies
+from compressor.sweep import sweep
 
 JOBS = 100_000
 PYTHON = {"open_study": "import compressor; compressor.open_study('results').load()"}
@@ -45,7 +45,7 @@ def answered(place, case):
 
 def stub_sweep(jobs):
     """Sweep many.yaml in this process, with workers that do not simulate."""
-    from compressor.simulation import measure
+    from compressor.solve.simulate import measure
 
     (study,) = load_studies("many.yaml", max_jobs=jobs)
     answered.outcome = measure(study.cases[0])

@@ -22,13 +22,13 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor import open_study
-from compressor.case import Case, Output
-from compressor.jobfiles import read_series, series_path, write_series
-from compressor.manifest import StoredAxis, StoredStudy, encode
-from compressor.simulation import measure, simulate
-from compressor.store import read_store
-from compressor.verification import verify
-from compressor.writer import Writer
+from compressor.cases.case import Case, Output
+from compressor.solve.simulate import measure, simulate
+from compressor.store.reader import read_store
+from compressor.store.series_file import read_series, series_path, write_series
+from compressor.store.studies import StoredAxis, StoredStudy, encode
+from compressor.store.verify import verify
+from compressor.store.writer import Writer
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
 OUTPUTS = [Output(precision=p, compress=c) for p in ("double", "single") for c in (False, True)]

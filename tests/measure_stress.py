@@ -15,8 +15,8 @@ from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
 from measure_accuracy import provenance
 
-from compressor.extremes import SPANS
-from compressor.stress import FILE, counts, slowest, worst
+from compressor.measure.extremes import SPANS
+from compressor.measure.stress import FILE, counts, slowest, worst
 
 WORST = 10
 SHOWN = ("verdict", "reason", "joint", "load", "rtol", "judges", "worst_metric", "horizon",

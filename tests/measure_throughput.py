@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from measure_accuracy import provenance
 
-from compressor.plan import load_studies
-from compressor.simulation import measure
-from compressor.store import read_store
+from compressor.cases.load import load_studies
+from compressor.solve.simulate import measure
+from compressor.store.reader import read_store
 
 ROOT = Path(__file__).parent.parent
 CONFIGS = sorted(map(str, (ROOT / "configs").glob("*.yaml")))

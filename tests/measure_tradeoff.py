@@ -15,9 +15,9 @@ import xarray as xr
 from compsim import cli
 from measure_accuracy import provenance
 
-from compressor.accuracy import ACCURACY
-from compressor.bench import ERRORS, default_cases, fastest, solved
-from compressor.simulation import simulate
+from compressor.cases.accuracy import ACCURACY
+from compressor.measure.work_precision import ERRORS, default_cases, fastest, solved
+from compressor.solve.simulate import simulate
 
 COMPILED = ("auto", "DOPRI5", "RODAS")
 

@@ -5,15 +5,15 @@ import pytest
 from conftest import keep
 from random_cases import random_cases
 
-from compressor import simulation
-from compressor.accuracy import ACCURACY, TIGHTEST, first_rung
-from compressor.bars import LARGE, OWN, PEAKS, SHARES, Witness, bars, unmet
-from compressor.case import Case
-from compressor.parting import LOOKS, parted
-from compressor.plan import CaseFileError, load_studies
-from compressor.schema import ERRORS, METRICS
-from compressor.simulation import measure, simulate
-from compressor.store import job_status, open_study, read_studies, write_study
+from compressor.cases.accuracy import ACCURACY, TIGHTEST, first_rung
+from compressor.cases.case import Case
+from compressor.cases.load import CaseFileError, load_studies
+from compressor.outcome import ERRORS, METRICS
+from compressor.solve import simulate as simulation
+from compressor.solve.error_bars import LARGE, OWN, PEAKS, SHARES, Witness, bars, unmet
+from compressor.solve.parting import LOOKS, parted
+from compressor.solve.simulate import measure, simulate
+from compressor.store.reader import job_status, open_study, read_studies, write_study
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 BOTH = {"joint": "both", "clearance_mm": 0.2}

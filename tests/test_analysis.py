@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor.analysis import (
+from compressor.analysis.claims import (
     CLEARANCES,
     FAULT_LABELS,
     RULES,

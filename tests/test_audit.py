@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from compressor import simulation
-from compressor.audit import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
-from compressor.case import Case
-from compressor.schema import METRICS
+from compressor.cases.case import Case
+from compressor.outcome import METRICS
+from compressor.solve import simulate as simulation
+from compressor.solve.energy_audit import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
@@ -91,7 +91,7 @@ def test_a_repetition_that_does_not_end_says_so(solve, reason, unbalance, monkey
         return run(request)
 
     monkeypatch.setattr(simulation, "integrate", slow)
-    monkeypatch.setattr("compressor.integrate.CHUNK", 100)
+    monkeypatch.setattr("compressor.solve.integrate.CHUNK", 100)
     found = simulation.measure(case(rtol=1e-5, **solve))
     assert found.reason == reason
     assert "; the next run: more than " in found.detail

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.bench import (
+from compressor.cases.case import Case
+from compressor.measure.work_precision import (
     ReferenceFailed,
     default_cases,
     errors,
@@ -14,11 +15,10 @@ from compressor.bench import (
     stored_values,
     work_precision,
 )
-from compressor.case import Case
-from compressor.figures.style import render
-from compressor.figures.work_precision import draw_work_precision
-from compressor.simulation import simulate
-from compressor.store import write_dataset
+from compressor.report.figures.style import render
+from compressor.report.figures.work_precision import draw_work_precision
+from compressor.solve.simulate import simulate
+from compressor.store.reader import write_dataset
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 METHODS = ("auto", "RODAS", "LSODA")

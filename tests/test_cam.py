@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from compressor.case import Case
-from compressor.physics import cam
-from compressor.record import record
+from compressor.analysis import cam
+from compressor.cases.case import Case
+from compressor.solve.si_record import record
 
 P = record(Case())
 ANGLES = np.linspace(0, 2 * math.pi, 7201)

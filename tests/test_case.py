@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compressor.case import ACCURACY, Case, table
-from compressor.parameter import JOINTS, CaseError, Problem, shown, to_si
+from compressor.cases.case import ACCURACY, Case, table
+from compressor.cases.parameter import JOINTS, CaseError, Problem, shown, to_si
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
 EXACT_GAS = {"switching": "exact"}

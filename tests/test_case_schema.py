@@ -8,10 +8,10 @@ from compsim import cli
 from conftest import CONFIGS
 from test_readme import blocks
 
-from compressor.case import table
-from compressor.case_schema import case_schema
-from compressor.plan import CaseFileError, load_studies
-from compressor.reading import Place, read_text
+from compressor.cases.case import table
+from compressor.cases.json_schema import case_schema
+from compressor.cases.load import CaseFileError, load_studies
+from compressor.cases.yaml_reader import Place, read_text
 
 SCHEMA = jsonschema.Draft202012Validator(case_schema())
 EXAMPLES = [path.read_text(encoding="utf-8") for path in CONFIGS] + blocks("yaml")

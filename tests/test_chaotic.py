@@ -17,7 +17,7 @@ from measure_chaotic import (
 )
 from readme_tables import kept
 
-from compressor.simulation import simulate
+from compressor.solve.simulate import simulate
 
 REVOLUTIONS = 8 + 7 * BATCHES
 MOST = 4.0  # standard errors of a mean over 16 batches: exceeded by chance once in 2,000

@@ -14,10 +14,11 @@ from pathlib import Path
 import pytest
 from compsim import cli, plan
 
-from compressor import load_cases, store
-from compressor.analysis import paper_cases
-from compressor.plan import MAX_JOBS
-from compressor.writer import Writer
+from compressor import load_cases
+from compressor.analysis.claims import paper_cases
+from compressor.cases.load import MAX_JOBS
+from compressor.store import reader as store
+from compressor.store.writer import Writer
 
 CONFIGS = Path(__file__).parent.parent / "configs"
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
@@ -309,15 +310,15 @@ def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
 
 @pytest.fixture
 def reporter(monkeypatch):
-    """Stands in for compressor.report, which draws for seconds."""
+    """Stands in for compressor.report.report, which draws for seconds."""
 
     def write_report(results, report, command):
         store.read_studies(results)
         return Path(report, command)
 
-    module = types.ModuleType("compressor.report")
+    module = types.ModuleType("compressor.report.report")
     module.write_report = write_report
-    monkeypatch.setitem(sys.modules, "compressor.report", module)
+    monkeypatch.setitem(sys.modules, "compressor.report.report", module)
 
 
 def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
@@ -338,7 +339,7 @@ def break_simulation(monkeypatch):
     def broken(*arguments, **options):
         raise ZeroDivisionError("no reason")
 
-    monkeypatch.setattr("compressor.plan.load_studies", broken)
+    monkeypatch.setattr("compressor.cases.load.load_studies", broken)
 
 
 def test_the_unforeseen_is_one_line_and_a_file(case_file, capsys, monkeypatch):
@@ -435,7 +436,7 @@ def test_explain_of_an_effect_that_failed():
 def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     import xarray as xr
 
-    from compressor import bench
+    from compressor.measure import work_precision as bench
 
     few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
     monkeypatch.setattr(bench.work_precision, "__defaults__",
@@ -503,7 +504,7 @@ def test_exit_codes_of_signals(number, code, case_file, capsys, monkeypatch):
     number = signal.Signals[f"SIG{number}"]
     before = signal.getsignal(number)
     monkeypatch.setattr(  # to this thread: another one may be slow to hand it over
-        "compressor.plan.load_studies", lambda *_, **__: signal.raise_signal(number)
+        "compressor.cases.load.load_studies", lambda *_, **__: signal.raise_signal(number)
     )
     assert cli.main(["run", case_file("one.yaml")]) == code
     assert capsys.readouterr().err == f"interrupted by {number.name}\n"

@@ -18,12 +18,13 @@ from compsim.cli import main
 from test_workers import POISON, lost, named, results
 from test_workers import work as poisoned
 
-from compressor import cluster, remote, store
+from compressor import cluster, remote
+from compressor.cases.load import load_studies
 from compressor.cluster import Cluster, ClusterError, run_batches
-from compressor.durable import StoreError
-from compressor.plan import load_studies
-from compressor.sweep import sweep
-from compressor.verification import verify
+from compressor.store import reader as store
+from compressor.store.files import StoreError
+from compressor.store.verify import verify
+from compressor.sweep.sweep import sweep
 from compressor.workers import MOST_BATCH
 
 MEMORY = "800MB"  # of a worker, of which a job may add three quarters

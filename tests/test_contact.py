@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from compressor.case import Case
+from compressor.cases.case import Case
+from compressor.cases.materials import contact_stiffness
 from compressor.physics.contact import friction_coefficient, impact, joint_contact, rise
-from compressor.physics.materials import contact_stiffness
-from compressor.record import record
+from compressor.solve.si_record import record
 
 K = 3.36e5 * 1000**1.5
 finite = st.floats(-1e3, 1e3)

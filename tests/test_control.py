@@ -5,9 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics import rosenbrock
-from compressor.physics.control import (
+from compressor.physics.march import new_walker, new_work
+from compressor.physics.observe import derivative_with_flows
+from compressor.physics.runge_kutta import FLOWS, STAGES, A, Pair
+from compressor.physics.step_control import (
     BOUNDARY,
     CALM_STEPS,
     EVERY,
@@ -23,10 +26,7 @@ from compressor.physics.control import (
     refuse,
     stiff_rate,
 )
-from compressor.physics.march import new_walker, new_work
-from compressor.physics.observe import derivative_with_flows
-from compressor.physics.runge_kutta import FLOWS, STAGES, A, Pair
-from compressor.record import record
+from compressor.solve.si_record import record
 
 H = 1e-3
 SIZE = np.array([1.0, 2.0, 0.5, 4.0])

@@ -5,9 +5,9 @@ import readme_tables
 from compsim import cli
 from test_layers import ROOT
 
-from compressor.case import Case
-from compressor.domain import Caution, cautions, remarks
-from compressor.plan import load_studies
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.solve.cautions import Caution, cautions, remarks
 
 STUDIES = load_studies(*sorted((ROOT / "configs").glob("*.yaml")))
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from compressor.accuracy import ACCURACY
-from compressor.case import Case
-from compressor.explain import explain, promise, scales, terms
-from compressor.plan import load_studies
+from compressor.cases.accuracy import ACCURACY
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.measure.explain import explain, promise, scales, terms
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0}
 

@@ -11,11 +11,11 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 
-from compressor.analysis import paper_cases
-from compressor.figures import FIGURES, curves, style, sweep_metric
-from compressor.figures.response import MOTION
-from compressor.physics import cam
-from compressor.record import record
+from compressor.analysis import cam
+from compressor.analysis.claims import paper_cases
+from compressor.report.figures import FIGURES, curves, style, sweep_metric
+from compressor.report.figures.response import MOTION
+from compressor.solve.si_record import record
 
 FIGURE = {figure.number: figure for figure in FIGURES}
 SETTLED = slice(1200, None)  # 0.3 degrees a sample: the first revolution is start-up
@@ -319,7 +319,7 @@ def test_rendered_files_are_what_they_are_called(drawn):
 
 
 def test_pyplot_is_never_imported():
-    code = "import sys, compressor.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
+    code = "import sys, compressor.report.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 

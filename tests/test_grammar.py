@@ -10,12 +10,12 @@ from conftest import keep
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compressor import store
-from compressor.case import Case
-from compressor.manifest import points
-from compressor.plan import CaseFileError, load_studies
-from compressor.sampling import design
-from compressor.simulation import simulate
+from compressor.cases.case import Case
+from compressor.cases.load import CaseFileError, load_studies
+from compressor.cases.sampling import design
+from compressor.solve.simulate import simulate
+from compressor.store import reader as store
+from compressor.store.studies import points
 
 ONE = "joint: big_end\n"
 SHORT = "solve: {duration_rev: 0.25, settle_rev: 0, accuracy: draft, output_step_deg: 0.9}\n"
@@ -76,8 +76,8 @@ def test_whole_numbers_stay_whole(plan):
 
 @given(st.decimals(-500, 500, places=3), st.decimals("0.001", 5, places=3), st.integers(1, 60))
 def test_a_range_is_that_of_decimal_numbers(first, step, count):
-    from compressor.axes import sweep_of
-    from compressor.reading import Place, read_text
+    from compressor.cases.swept import sweep_of
+    from compressor.cases.yaml_reader import Place, read_text
 
     problems = []
     last = first + (count - 1) * step

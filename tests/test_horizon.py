@@ -12,17 +12,17 @@ import pytest
 from compsim import cli
 from conftest import keep
 
-from compressor.case import Case
-from compressor.horizon import CLOSE, FAR, RTOL, predictability_horizon, time_of_parting
-from compressor.integrate import Request, integrate
+from compressor.cases.case import Case
+from compressor.metrics import ERRORS, METRICS
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
-from compressor.physics.parameters import FREEDOMS
-from compressor.quantities import ERRORS, METRICS
-from compressor.record import offsets, record, scene
-from compressor.simulation import measure, simulate
-from compressor.store import read_store
-from compressor.sweep import serving_both
+from compressor.physics.record import FREEDOMS
+from compressor.solve.horizon import CLOSE, FAR, RTOL, predictability_horizon, time_of_parting
+from compressor.solve.integrate import Request, integrate
+from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.simulate import measure, simulate
+from compressor.store.reader import read_store
+from compressor.sweep.sweep import serving_both
 
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
 CHAOTIC = {

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from compsim import cli
 
-from compressor.inquiry import report_job, standings
-from compressor.plan import load_studies
-from compressor.store import StoreError
-from compressor.sweep import sweep
+from compressor.cases.load import load_studies
+from compressor.store.reader import StoreError
+from compressor.store.status import report_job, standings
+from compressor.sweep.sweep import sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 MIX = {

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import reference
 
-from compressor.case import ACCURACY, METHODS, Case
-from compressor.integrate import CHUNK, COMPILED, absolute_tolerances, cut
-from compressor.physics.parameters import FREEDOMS
-from compressor.record import record, scene
-from compressor.simulation import measure, simulate
+from compressor.cases.case import ACCURACY, METHODS, Case
+from compressor.physics.record import FREEDOMS
+from compressor.solve.integrate import CHUNK, COMPILED, absolute_tolerances, cut
+from compressor.solve.si_record import record, scene
+from compressor.solve.simulate import measure, simulate
 
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
 
@@ -72,8 +72,8 @@ def test_energy_residual_of_every_method(method, joint):
 @pytest.mark.compiled
 def test_the_audit_sees_a_lost_flow(monkeypatch):
     """Without the damping loss in the ledger the energy no longer balances."""
-    from compressor import integrate
     from compressor.physics.observe import derivative_with_flows
+    from compressor.solve import integrate
 
     def lossless(t, z, phase, p, out):
         derivative_with_flows(t, z, phase, p, out)

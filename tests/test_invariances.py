@@ -13,17 +13,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compressor.case import Case
-from compressor.integrate import Request, integrate
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.outcome import METRICS
 from compressor.physics.motion import derivative, start
 from compressor.physics.observe import COLUMNS, Column, observe_all
-from compressor.physics.parameters import FREEDOMS, derive
-from compressor.plan import load_studies
-from compressor.record import offsets, record, scene
-from compressor.schema import METRICS
-from compressor.simulation import measure
-from compressor.store import finished_keys, read_job
-from compressor.sweep import sweep
+from compressor.physics.record import FREEDOMS, derive
+from compressor.solve.integrate import Request, integrate
+from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.simulate import measure
+from compressor.store.reader import finished_keys, read_job
+from compressor.sweep.sweep import sweep
 
 pytestmark = pytest.mark.compiled
 FEW = settings(max_examples=40, deadline=None, derandomize=True,

@@ -16,7 +16,7 @@ import numpy as np
 from compressor import Case, simulate
 from compressor.physics import _jit
 from compressor.physics.observe import COLUMNS, observe
-from compressor.record import record
+from compressor.solve.si_record import record
 
 rows, runs, rng = [], [], np.random.default_rng(7)
 for joint in ("big_end", "small_end", "both"):

@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics.kinematics import (
     angle_at,
     ideal,
@@ -15,7 +15,7 @@ from compressor.physics.kinematics import (
     series_motion,
     small_angle,
 )
-from compressor.record import record
+from compressor.solve.si_record import record
 
 R, L, OMEGA = 0.12, 0.6, 500 * math.pi / 30
 

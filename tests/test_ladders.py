@@ -5,8 +5,8 @@ import pytest
 from measure_ladders import AUDIT, TOLERANCES, figures, limit, slopes
 from readme_tables import RESULTS, kept
 
-from compressor.case import Case
-from compressor.simulation import measure
+from compressor.cases.case import Case
+from compressor.solve.simulate import measure
 
 NEAR_ONE = pytest.approx(1.0, abs=0.1)
 

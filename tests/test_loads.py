@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics.kinematics import motion
 from compressor.physics.loads import piston_force, sample_segments, segments
-from compressor.record import record
+from compressor.solve.si_record import record
 
 EXACT = {"load": "typical", "gas": {"switching": "exact"}}
 GAS, SPRING = {"load": "typical"}, {"load": "design"}

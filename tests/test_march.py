@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 import reference
 
-from compressor import integrate as integration
-from compressor.case import Case
-from compressor.integrate import Request, integrate, natural_sizes
-from compressor.physics.control import Mode
+from compressor.cases.case import Case
 from compressor.physics.loads import segments
 from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
-from compressor.physics.parameters import FREEDOMS
+from compressor.physics.record import FREEDOMS
 from compressor.physics.runge_kutta import FLOWS, Pair
+from compressor.physics.step_control import Mode
 from compressor.physics.tally import new_tally
-from compressor.record import offsets, record, scene
+from compressor.solve import integrate as integration
+from compressor.solve.integrate import Request, integrate, natural_sizes
+from compressor.solve.si_record import offsets, record, scene
 
 PULSES = {"load": "typical", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor.case import Case, Friction
-from compressor.modelling import (
+from compressor.cases.case import Case, Friction
+from compressor.measure.features import (
     FEATURES,
     GRID,
     SERIES,

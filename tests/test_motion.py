@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import reference
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics.motion import derivative
 from compressor.physics.observe import COLUMNS, Column, observe
-from compressor.record import record
+from compressor.solve.si_record import record
 
 STATES = 1000
 SCENES = ("big_end", "small_end", "both")

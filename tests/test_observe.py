@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics.motion import derivative, start
 from compressor.physics.observe import COLUMNS, Column, observe, observe_all
-from compressor.record import offsets, record
+from compressor.solve.si_record import offsets, record
 
 JOINTS = ("big_end", "small_end", "both")
 

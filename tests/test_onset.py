@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from compressor.analysis import paper_cases
-from compressor.case import Case
-from compressor.integrate import COMPILED as METHODS
-from compressor.integrate import CONTACT_STEP, natural_sizes, scales
+from compressor.analysis.claims import paper_cases
+from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED
 from compressor.physics.contact import Contact, impact, nearness
 from compressor.physics.kinematics import crank_direction, ideal
@@ -38,10 +36,12 @@ from compressor.physics.onset import (
     place,
     touching_between,
 )
-from compressor.physics.parameters import FREEDOMS, SMALL_END
+from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, interpolate, take_step
 from compressor.physics.tally import new_tally
-from compressor.record import offsets, record, scene
+from compressor.solve.integrate import COMPILED as METHODS
+from compressor.solve.integrate import CONTACT_STEP, natural_sizes, scales
+from compressor.solve.si_record import offsets, record, scene
 
 H = 1e-3  # s, of the hand-made steps
 CLEARANCE = 2e-4  # m

@@ -10,8 +10,8 @@ import readme_tables
 from measure_peers import Contest, Peer, first_call, loosest
 from peers import mechanism, multibody, notebook, soda
 
-from compressor.case import Case
-from compressor.simulation import simulate
+from compressor.cases.case import Case
+from compressor.solve.simulate import simulate
 
 SHORT = 0.03  # s: a quarter of a revolution, with landings and two phases of the load
 

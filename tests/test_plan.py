@@ -11,10 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compressor.case import Case, table
-from compressor.parameter import parameter_table
-from compressor.plan import Axis, CaseFileError, load_cases, load_studies, to_yaml
-from compressor.reading import MAX_BYTES, resolved
+from compressor.cases.case import Case, table
+from compressor.cases.load import Axis, CaseFileError, load_cases, load_studies, to_yaml
+from compressor.cases.parameter import parameter_table
+from compressor.cases.yaml_reader import MAX_BYTES, resolved
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
 one_file = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=3000)
@@ -574,7 +574,9 @@ def test_the_table_has_a_row_for_every_key_and_six_columns():
 
 
 def test_reading_needs_no_heavy_library():
-    code = "import sys, compressor.plan; print({'numpy', 'scipy', 'numba'} & set(sys.modules))"
+    code = (
+        "import sys, compressor.cases.load; print({'numpy', 'scipy', 'numba'} & set(sys.modules))"
+    )
     run = [sys.executable, "-c", code]
     assert subprocess.run(run, capture_output=True, text=True, check=True).stdout == "set()\n"
 

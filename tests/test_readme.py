@@ -11,9 +11,9 @@ import readme_tables
 from measure_tradeoff import fingerprint
 
 import compressor
-from compressor.axes import FORMS
-from compressor.case_schema import case_schema
-from compressor.plan import MAX_JOBS, load_studies
+from compressor.cases.json_schema import case_schema
+from compressor.cases.load import MAX_JOBS, load_studies
+from compressor.cases.swept import FORMS
 
 README = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
 MAKEFILE = (readme_tables.ROOT / "Makefile").read_text(encoding="utf-8")

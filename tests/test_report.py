@@ -11,15 +11,15 @@ import pytest
 import xarray as xr
 from conftest import CONFIGS, keep, store
 
-from compressor import page, report
-from compressor.analysis import paper_cases
-from compressor.case import Case
-from compressor.durable import StoreWarning
-from compressor.manifest import encode
-from compressor.plan import load_cases
+from compressor.analysis.claims import paper_cases
+from compressor.cases.case import Case
+from compressor.cases.load import load_cases
 from compressor.reasons import Reason
-from compressor.report import find_paper_runs, paper_candidates, write_report
-from compressor.store import StoreError, finished_keys, read_job, read_store, read_studies
+from compressor.report import page, report
+from compressor.report.report import find_paper_runs, paper_candidates, write_report
+from compressor.store.files import StoreWarning
+from compressor.store.reader import StoreError, finished_keys, read_job, read_store, read_studies
+from compressor.store.studies import encode
 
 SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
 DRAFT = ["solve.accuracy=draft"]

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from compressor import integrate as integration
-from compressor.case import METHODS, Case
-from compressor.retrace import LAST
-from compressor.simulation import STATE_NAMES, measure, simulate
+from compressor.cases.case import METHODS, Case
+from compressor.solve import integrate as integration
+from compressor.solve.last_steps import LAST
+from compressor.solve.simulate import STATE_NAMES, measure, simulate
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
 SCIPY = [name for name in METHODS if name not in integration.COMPILED]
@@ -71,7 +71,7 @@ def test_the_errors_are_those_that_the_control_saw():
 
 def simulate_request(max_steps):
     from compressor.physics.motion import start
-    from compressor.record import offsets, record
+    from compressor.solve.si_record import offsets, record
 
     case = Case.from_values(BOTH)
     p, y = record(case), np.zeros(8)

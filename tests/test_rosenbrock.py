@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics import rosenbrock
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, interpolate
-from compressor.record import record
-from compressor.simulation import attempt, simulate
+from compressor.solve.si_record import record
+from compressor.solve.simulate import attempt, simulate
 
 FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))
 BEGIN, SPAN, PHASE = 0.09, 0.008, 3

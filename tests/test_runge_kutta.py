@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics.kinematics import crank_direction
 from compressor.physics.observe import COLUMNS, derivative_with_flows
 from compressor.physics.runge_kutta import (
@@ -22,7 +22,7 @@ from compressor.physics.runge_kutta import (
     take_step,
     weights_at,
 )
-from compressor.record import record
+from compressor.solve.si_record import record
 
 # a wide clearance and a short flight: a smooth motion without contact
 FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))

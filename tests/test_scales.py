@@ -7,12 +7,11 @@ import pytest
 from random_cases import random_cases
 from scipy.integrate import solve_ivp
 
-from compressor.case import Case
-from compressor.parameter import JOINTS
-from compressor.physics.control import BOUNDARY
-from compressor.physics.materials import contact_stiffness
-from compressor.record import record
-from compressor.scales import (
+from compressor.cases.case import Case
+from compressor.cases.materials import contact_stiffness
+from compressor.cases.parameter import JOINTS
+from compressor.physics.step_control import BOUNDARY
+from compressor.solve.scales import (
     STABILITY,
     expected_seconds,
     expected_steps,
@@ -23,7 +22,8 @@ from compressor.scales import (
     static_depth,
     stiffness_of,
 )
-from compressor.simulation import attempt, simulate
+from compressor.solve.si_record import record
+from compressor.solve.simulate import attempt, simulate
 
 K = 3.36e5 * 1000**1.5
 BOTH = {"joint": "both", "clearance_mm": 0.2}

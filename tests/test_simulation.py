@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor.case import Case, Machine, Output, PerJoint, Solve
-from compressor.schema import NUMBERS
-from compressor.simulation import SERIES, measure, simulate
+from compressor.cases.case import Case, Machine, Output, PerJoint, Solve
+from compressor.outcome import NUMBERS
+from compressor.solve.simulate import SERIES, measure, simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 

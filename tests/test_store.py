@@ -15,12 +15,14 @@ import pytest
 import xarray as xr
 from conftest import keep
 
-from compressor import hdf5, labels, store
-from compressor.case import Case, Output, table
-from compressor.jobfiles import series_image, series_path
-from compressor.plan import load_studies
-from compressor.schema import METRICS
-from compressor.simulation import simulate
+from compressor.cases.case import Case, Output, table
+from compressor.cases.load import load_studies
+from compressor.outcome import METRICS
+from compressor.solve.simulate import simulate
+from compressor.store import dataset as labels
+from compressor.store import hdf5
+from compressor.store import reader as store
+from compressor.store.series_file import series_image, series_path
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 

@@ -8,12 +8,9 @@ import xarray as xr
 from compsim import cli
 from compsim.stress import summary
 
-from compressor.bars import bars
-from compressor.case import Case
-from compressor.extremes import SPANS, Budget, place, supported, values
-from compressor.figures.outcomes import draw_outcomes, outcomes
-from compressor.figures.style import render
-from compressor.judge import (
+from compressor.cases.case import Case
+from compressor.measure.extremes import SPANS, Budget, place, supported, values
+from compressor.measure.judge import (
     PARTS,
     Finding,
     compare,
@@ -24,9 +21,12 @@ from compressor.judge import (
     judges,
     settled,
 )
-from compressor.simulation import solve
-from compressor.store import StoreError
-from compressor.stress import FILE, campaign, counts, dataset, slowest, worst
+from compressor.measure.stress import FILE, campaign, counts, dataset, slowest, worst
+from compressor.report.figures.outcomes import draw_outcomes, outcomes
+from compressor.report.figures.style import render
+from compressor.solve.error_bars import bars
+from compressor.solve.simulate import solve
+from compressor.store.reader import StoreError
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
 COUNT, SEED = 100, 1
@@ -241,7 +241,7 @@ def test_a_scene_is_repeated_as_a_case_file(capsys, tmp_path):
     assert cli.main(["stress", "--scene", str(number), "--seed", str(SEED)]) == 0
     text = capsys.readouterr().out
     assert "# verdict: " in text
-    from compressor.plan import load_studies
+    from compressor.cases.load import load_studies
 
     path = tmp_path / "scene.yaml"
     path.write_text(text, encoding="utf-8")

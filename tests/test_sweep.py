@@ -7,14 +7,14 @@ import signal
 
 import pytest
 
-import compressor.simulation
-import compressor.sweep
-import compressor.writer
-from compressor import store
-from compressor.case import Case
-from compressor.plan import load_studies
-from compressor.sweep import COMPILING, Failure, sweep, wanted
-from compressor.verification import verify
+import compressor.solve.simulate
+import compressor.store.writer
+import compressor.sweep.sweep
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.store import reader as store
+from compressor.store.verify import verify
+from compressor.sweep.sweep import COMPILING, Failure, sweep, wanted
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 BOTH = {"joint": "both", "clearance_mm": 0.1}
@@ -177,7 +177,7 @@ def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path):
 
 def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypatch):
     """A shard keeps the time series of a job that another run, which ends later, runs without."""
-    monkeypatch.setattr(compressor.writer, "MOST_AGE", 0)
+    monkeypatch.setattr(compressor.store.writer, "MOST_AGE", 0)
     shared = studies(all={"machine": {"rod_mass_kg": 6}})
     masses = {"machine": {"rod_mass_kg": [3, 4, 5, 6]}}
     fewer = studies(few={**masses, "output": {"keep": "metrics"}})
@@ -193,10 +193,10 @@ def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypat
 
 
 def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):
-    def breaking(case, real=compressor.simulation.observe):
+    def breaking(case, real=compressor.solve.simulate.observe):
         return real(case) if case.load != "none" else {}["the bug"]
 
-    monkeypatch.setattr(compressor.simulation, "observe", breaking)
+    monkeypatch.setattr(compressor.solve.simulate, "observe", breaking)
     made = studies(one={"load": ["none", "design"]})
     summary = sweep(made, tmp_path / "out", 1)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]
@@ -220,13 +220,13 @@ def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monk
     ],
 )
 def test_a_poison_job_is_a_failed_job(end, reason, detail, again, studies, tmp_path, monkeypatch):
-    def poisoned(case, real=compressor.simulation.observe):
+    def poisoned(case, real=compressor.solve.simulate.observe):
         if case.load == "none":
             end()
         return real(case)
 
-    monkeypatch.setattr(compressor.simulation, "observe", poisoned)
-    monkeypatch.setattr(compressor.sweep, "GRACE", 0.5)
+    monkeypatch.setattr(compressor.solve.simulate, "observe", poisoned)
+    monkeypatch.setattr(compressor.sweep.sweep, "GRACE", 0.5)
     made = studies(one={"load": ["design", "none", "typical"], "solve": {"timeout_s": 0.5}})
     summary = sweep(made, tmp_path / "out", 2)
     assert statuses(tmp_path / "out", made[0]) == ["ok", "failed", "ok"]
@@ -245,7 +245,7 @@ def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path):
 
 
 def test_compiling_that_takes_long_is_told(studies, tmp_path, monkeypatch):
-    monkeypatch.setattr(compressor.sweep, "PATIENCE", 0)
+    monkeypatch.setattr(compressor.sweep.sweep, "PATIENCE", 0)
     told = []
     sweep(studies(one={}), tmp_path / "out", 1, lambda *event: told.append(event))
     assert [remark for _, _, remark in told if remark] == [COMPILING, "compiled in 0 s"]

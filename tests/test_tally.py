@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.case import Case
+from compressor.cases.case import Case
 from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.tally import (
     add_flows,
@@ -17,7 +17,7 @@ from compressor.physics.tally import (
     tally_energy,
     tally_step,
 )
-from compressor.record import record
+from compressor.solve.si_record import record
 
 NODES, WEIGHTS = lobatto(9)
 APART = np.array([0.25, 0.75])  # shares of a step without contact

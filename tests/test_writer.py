@@ -19,12 +19,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor import hdf5, jobfiles, segments, store, writer
-from compressor.manifest import StoredAxis, StoredStudy, encode
-from compressor.schema import NUMBERS, ROW, Outcome, SeriesFile
-from compressor.simulation import simulate
-from compressor.verification import verify
-from compressor.writer import Writer
+from compressor.outcome import NUMBERS, ROW, Outcome, SeriesFile
+from compressor.solve.simulate import simulate
+from compressor.store import hdf5, writer
+from compressor.store import reader as store
+from compressor.store import rows as segments
+from compressor.store import series_file as jobfiles
+from compressor.store.studies import StoredAxis, StoredStudy, encode
+from compressor.store.verify import verify
+from compressor.store.writer import Writer
 
 
 def key(number):
@@ -211,7 +214,7 @@ def test_readers_merge_shards(tmp_path):
 
 
 def short_cases():
-    from compressor.case import Case
+    from compressor.cases.case import Case
 
     solve = {"duration_rev": 0.1, "settle_rev": 0, "output_step_deg": 1}
     return [Case.from_values({"load": load, "solve": solve}) for load in ("none", "design")] + [
@@ -256,7 +259,7 @@ def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
 
 WAITING = """
     import sys
-    from compressor.writer import Writer
+    from compressor.store.writer import Writer
     with Writer(sys.argv[1], wait=True):
         print("has it")
 """
@@ -276,7 +279,7 @@ def test_a_second_writer_can_wait(tmp_path):
 
 DRIVER = """
     import sys
-    from compressor import writer
+    from compressor.store import writer
     from test_writer import outcome
     folder, begin = sys.argv[1], int(sys.argv[2])
     writer.MOST_AGE, writer.MOST_SMALL = 0.002, 4

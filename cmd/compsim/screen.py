@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from compressor.manifest import Again
-    from compressor.study import Study
+    from compressor.cases.study import Study
+    from compressor.store.studies import Again
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 MOST_CAUTIONS = 5  # told of one case file
@@ -55,7 +55,7 @@ class Screen:
         self.before: int | None = None
 
     def __call__(self, done: int, total: int, remark: str) -> None:
-        """Take note of a sweep's progress (`compressor.sweep.Progress`)."""
+        """Take note of a sweep's progress (`compressor.sweep.sweep.Progress`)."""
         self.done, self.total = done, total
         if self.before in (None, done):
             self.before, self.began = done, time.monotonic()
@@ -110,7 +110,7 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
 
 def caution(studies: "Sequence[Study]") -> None:
     """Say once what is odd about case files, in a few lines however many jobs they have."""
-    from compressor.domain import cautions
+    from compressor.solve.cautions import cautions
 
     for study in studies:
         found = cautions(study)

@@ -11,7 +11,7 @@ import click
 from compsim.screen import DONE, plural, run_commands, say
 
 if TYPE_CHECKING:
-    from compressor.inquiry import JobReport
+    from compressor.store.status import JobReport
 
 results = click.option("-i", "--input", "folder", default="results", show_default=True,
                        help="Folder of results.")  # fmt: skip
@@ -23,8 +23,8 @@ as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON
 @as_json
 def status(folder: str, as_json: bool) -> int:
     """Tell how many jobs of each stored study are done, failed or missing, and why they failed."""
-    from compressor.inquiry import standings
     from compressor.reasons import remedy
+    from compressor.store.status import standings
 
     found = standings(folder)
     if as_json:
@@ -52,9 +52,9 @@ def show(job: str, folder: str, as_json: bool) -> int:
     error bars, in SI, and what it was run with. Of one that stopped, where, in which state, driven
     by which number of it, and its last steps.
     """
-    from compressor.inquiry import report_job
-    from compressor.reading import printable
+    from compressor.cases.yaml_reader import printable
     from compressor.reasons import remedy
+    from compressor.store.status import report_job
 
     found = report_job(folder, job)
     if as_json:
@@ -106,7 +106,7 @@ def stop(found: "JobReport") -> list[str]:
 
 def numbers(found: "JobReport") -> list[str]:
     """A job's numbers, a line each, with what is known of their errors."""
-    from compressor.quantities import ERRORS, HORIZON, NUMBERS
+    from compressor.metrics import ERRORS, HORIZON, NUMBERS
 
     lines = []
     for name, value in found.numbers.items():
@@ -121,7 +121,7 @@ def numbers(found: "JobReport") -> list[str]:
 
 def cautions(found: "JobReport") -> list[str]:
     """What is to be said of numbers that no error bar can be claimed of."""
-    from compressor.quantities import HORIZON
+    from compressor.metrics import HORIZON
 
     if not math.isfinite(found.numbers.get(HORIZON, math.nan)):
         return []

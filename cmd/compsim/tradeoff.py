@@ -12,7 +12,7 @@ from compsim.screen import DONE, Screen, say, setting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from compressor.case import Case
+    from compressor.cases.case import Case
 
 
 @click.command()
@@ -40,9 +40,10 @@ def tradeoff(
     the effects of the features go to stdout.
     """
     cases = chosen(configs, overrides)
-    from compressor import bench, modelling
-    from compressor.durable import make_folder
-    from compressor.store import write_dataset
+    from compressor.measure import features as modelling
+    from compressor.measure import work_precision as bench
+    from compressor.store.files import make_folder
+    from compressor.store.reader import write_dataset
 
     folder = Path(output)
     make_folder(folder)  # minutes before it is needed
@@ -66,10 +67,10 @@ def tradeoff(
 
 def write_study(folder: Path, study: "xr.Dataset") -> None:
     """Store a study of methods and draw it."""
-    from compressor.durable import publish
-    from compressor.figures.style import render
-    from compressor.figures.work_precision import draw_work_precision
-    from compressor.store import write_dataset
+    from compressor.report.figures.style import render
+    from compressor.report.figures.work_precision import draw_work_precision
+    from compressor.store.files import publish
+    from compressor.store.reader import write_dataset
 
     write_dataset(folder / "tradeoff.nc", study)
     drawing = draw_work_precision(study)
@@ -79,11 +80,11 @@ def write_study(folder: Path, study: "xr.Dataset") -> None:
 
 def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, Case]":
     """The cases to be studied, by label; each needs a joint with clearance."""
-    from compressor.bench import default_cases
-    from compressor.manifest import points
-    from compressor.physics.parameters import Scene
-    from compressor.plan import load_studies
-    from compressor.record import scene
+    from compressor.cases.load import load_studies
+    from compressor.measure.work_precision import default_cases
+    from compressor.physics.record import Scene
+    from compressor.solve.si_record import scene
+    from compressor.store.studies import points
 
     if not configs:
         if overrides:
@@ -109,7 +110,7 @@ def plain(value: object) -> str:
 
 def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
     """The fastest method for each decade of error, and the paper's numerics."""
-    from compressor.bench import fastest
+    from compressor.measure.work_precision import fastest
 
     width = max(len(name) for name in study["scene"].values)
     yield f"{'scene':<{width}}  {'error below':>11}  {'method':<7} {'rtol':>7}  {'ms':>7}"
@@ -129,7 +130,7 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
 
 def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
     """What each change of the model does; changes that do not apply to a scene are left out."""
-    from compressor.modelling import SERIES
+    from compressor.measure.features import SERIES
 
     scenes = max(len(name) for name in trade["scene"].values)
     names = max(len(name) for name in trade["change"].values)

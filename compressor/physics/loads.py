@@ -10,7 +10,7 @@ import numpy as np
 
 from compressor.physics._jit import jit
 from compressor.physics.kinematics import angle_at
-from compressor.physics.parameters import Load
+from compressor.physics.record import Load
 
 TYPICAL = int(Load.TYPICAL)
 DESIGN = int(Load.DESIGN)

@@ -13,15 +13,6 @@ import numpy as np
 
 from compressor.physics import rosenbrock
 from compressor.physics._jit import borrowed, inlined, jit
-from compressor.physics.control import (
-    LEAST_ERROR,
-    REST,
-    Mode,
-    choose_method,
-    controlled,
-    first_step,
-    refuse,
-)
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
 from compressor.physics.observe import (
     ACCELERATION,
@@ -42,6 +33,15 @@ from compressor.physics.runge_kutta import (
     interpolate,
     take_step,
     weights_at,
+)
+from compressor.physics.step_control import (
+    LEAST_ERROR,
+    REST,
+    Mode,
+    choose_method,
+    controlled,
+    first_step,
+    refuse,
 )
 from compressor.physics.tally import (
     lobatto,

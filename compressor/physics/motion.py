@@ -14,9 +14,9 @@ from compressor.physics._jit import inlined, jit
 from compressor.physics.contact import Contact, joint_contact
 from compressor.physics.kinematics import Motion, ideal, small_angle
 from compressor.physics.loads import piston_force
-from compressor.physics.parameters import BIG_END as AT_BIG_END
-from compressor.physics.parameters import SMALL_END as AT_SMALL_END
-from compressor.physics.parameters import Scene
+from compressor.physics.record import BIG_END as AT_BIG_END
+from compressor.physics.record import SMALL_END as AT_SMALL_END
+from compressor.physics.record import Scene
 
 BIG_END = int(Scene.BIG_END)
 SMALL_END = int(Scene.SMALL_END)

@@ -17,7 +17,7 @@ from compressor.physics.motion import (
     evaluate,
     write_derivative,
 )
-from compressor.physics.parameters import Scene
+from compressor.physics.record import Scene
 
 IDEAL = int(Scene.IDEAL)
 BIG_END = int(Scene.BIG_END)

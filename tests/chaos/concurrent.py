@@ -15,11 +15,11 @@ from pathlib import Path
 from chaos.processes import Run
 from chaos.stored import case_file, contents, damage, rows
 from chaos.tally import Tally
-from compressor import writer
-from compressor.plan import load_studies
-from compressor.store import read_store, read_studies
-from compressor.study import shard
-from compressor.sweep import stored, wanted
+from compressor.cases.load import load_studies
+from compressor.cases.study import shard
+from compressor.store import writer
+from compressor.store.reader import read_store, read_studies
+from compressor.sweep.sweep import stored, wanted
 
 WHAT = "two to four runs on one store at once"
 MASSES = [4 + n / 100 for n in range(24)]  # rod masses, kg; a study has a stretch of them

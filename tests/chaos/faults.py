@@ -34,7 +34,8 @@ from chaos.common import (
     fresh,
 )
 from chaos.tally import Tally
-from compressor import report, writer
+from compressor.report import report
+from compressor.store import writer
 
 KINDS = {  # of calls that write -> the errors that each of them is refused by
     "write": (errno.ENOSPC, errno.EIO, errno.EFBIG),

@@ -24,9 +24,11 @@ from chaos.common import (
     fresh,
 )
 from chaos.tally import Tally
-from compressor import open_study, report, writer
-from compressor.durable import StoreError, StoreWarning
-from compressor.store import read_store
+from compressor import open_study
+from compressor.report import report
+from compressor.store import writer
+from compressor.store.files import StoreError, StoreWarning
+from compressor.store.reader import read_store
 
 READERS = ("status", "status --json", "show", "show --json", "report")
 PROVENANCE = re.compile(r"<dl>.*?</dl>", re.DOTALL)  # when a page was written, of what

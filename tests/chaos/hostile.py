@@ -31,12 +31,14 @@ from chaos.common import (
     fresh,
 )
 from chaos.tally import Tally
-from compressor import hdf5, report, sweep
-from compressor.manifest import read_study
-from compressor.plan import CaseFileError
-from compressor.segments import decode, encode, segment_name
-from compressor.store import read_store
-from compressor.study import Study
+from compressor.cases.load import CaseFileError
+from compressor.cases.study import Study
+from compressor.report import report
+from compressor.store import hdf5
+from compressor.store.reader import read_store
+from compressor.store.rows import decode, encode, segment_name
+from compressor.store.studies import read_study
+from compressor.sweep import sweep
 
 ROOT = Path(__file__).parent.parent.parent
 SECONDS = 2.0  # of processor time that a command may take

@@ -17,10 +17,10 @@ from pathlib import Path
 from chaos.processes import Run
 from chaos.stored import case_file, contents, damage, rows, unfinished
 from chaos.tally import Tally
-from compressor import writer
-from compressor.plan import load_studies
-from compressor.store import read_store
-from compressor.sweep import stored, wanted
+from compressor.cases.load import load_studies
+from compressor.store import writer
+from compressor.store.reader import read_store
+from compressor.sweep.sweep import stored, wanted
 
 WHAT = "SIGKILL of the parent, a worker or both at a random moment, then resumed"
 VICTIMS = ("parent", "worker", "both")

@@ -13,14 +13,14 @@ import signal
 import tempfile
 from pathlib import Path
 
-import compressor.simulation
-import compressor.sweep
+import compressor.solve.simulate
+import compressor.sweep.sweep
 import compressor.workers
 from chaos.processes import Run
 from chaos.stored import LEAN, case_file, contents, damage
 from chaos.tally import Tally
-from compressor.plan import load_studies
-from compressor.store import read_store
+from compressor.cases.load import load_studies
+from compressor.store.reader import read_store
 
 WHAT = "jobs that crash, leave, hang, stand still or eat memory, among good ones"
 GOOD = [4 + n / 100 for n in range(24)]  # rod masses, kg
@@ -68,9 +68,9 @@ def poisoned(kinds):
 
     def prepare():
         for name in ("measure", "observe"):
-            real = getattr(compressor.simulation, name)
-            setattr(compressor.simulation, name, harmful(real))
-        compressor.sweep.GRACE = 0.2
+            real = getattr(compressor.solve.simulate, name)
+            setattr(compressor.solve.simulate, name, harmful(real))
+        compressor.sweep.sweep.GRACE = 0.2
         compressor.workers.memory_share = lambda count: LEAST
 
     def harmful(real):

@@ -27,11 +27,11 @@ from typing import Any
 
 from chaos.common import SOLVE, contents, forked, fresh
 from chaos.tally import Tally
-from compressor import writer
-from compressor.plan import load_studies
-from compressor.store import read_store
-from compressor.study import Study
-from compressor.sweep import sweep
+from compressor.cases.load import load_studies
+from compressor.cases.study import Study
+from compressor.store import writer
+from compressor.store.reader import read_store
+from compressor.sweep.sweep import sweep
 
 SHUTDOWN = 0x8004587D  # FS_IOC_SHUTDOWN, _IOR('X', 125, __u32) of linux/fs.h
 NO_FLUSH = 2  # FS_SHUTDOWN_FLAGS_NOLOGFLUSH

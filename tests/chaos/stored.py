@@ -5,14 +5,14 @@ import json
 
 import numpy as np
 
-from compressor import hdf5
-from compressor.durable import StoreError
-from compressor.hdf5 import DamagedJob, opened
-from compressor.jobfiles import intact
-from compressor.manifest import study_paths
-from compressor.schema import ROW
-from compressor.store import places, read_store
-from compressor.verification import verify
+from compressor.outcome import ROW
+from compressor.store import hdf5
+from compressor.store.files import StoreError
+from compressor.store.hdf5 import DamagedJob, opened
+from compressor.store.reader import places, read_store
+from compressor.store.series_file import intact
+from compressor.store.studies import study_paths
+from compressor.store.verify import verify
 
 TIMED = "seconds"
 LEAN = {  # of a quick job

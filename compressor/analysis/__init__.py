@@ -1,0 +1,1 @@
+"""What runs mean, and what the paper says of them."""

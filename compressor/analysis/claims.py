@@ -1,0 +1,331 @@
+"""What the stored runs say: relations, activity of the vibration, and the paper's claims.
+
+The thresholds of the claims were written before the first comparison and stay as they are: the
+masses are our assumption, so a claim that fails is a result.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray as xr
+
+from compressor.cases.case import Case
+from compressor.cases.parameter import JOINTS
+from compressor.physics.kinematics import motion
+from compressor.solve.si_record import record
+
+CLEARANCES = (0.1, 0.2, 0.3)
+FAULTS = ("big_end", "small_end", "both")
+SPOKEN = {"big_end": "big end", "small_end": "small end", "both": "both joints"}
+
+Runs = Mapping[str, xr.Dataset]
+
+
+def label(fault: str, clearance: float) -> str:
+    """The name of one of the paper's fault cases, such as `big_end 0.2`."""
+    return f"{fault} {clearance:g}"
+
+
+def paper_cases(**machine: float) -> dict[str, Case]:
+    """The paper's eleven cases by label; `machine` overrides keys such as rod_mass_kg."""
+    base: dict = {"machine": machine} if machine else {}
+    cases = {load: Case.from_values({**base, "load": load}) for load in ("typical", "design")}
+    for fault in FAULTS:
+        for clearance in CLEARANCES:
+            values = {**base, "load": "design", "joint": fault, "clearance_mm": clearance}
+            cases[label(fault, clearance)] = Case.from_values(values)
+    return cases
+
+
+def settled(run: xr.Dataset) -> xr.Dataset:
+    """The samples from `settle_rev` on: start-up is not the machine."""
+    return run.isel(time=run["time"].values >= run.attrs["settle"] * (1 - 1e-12))
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Least squares of the horizontal joint force against acceleration: force = slope a + b."""
+
+    slope: float  # kg
+    intercept: float  # N
+    r2: float
+
+
+def force_relation(run: xr.Dataset, joint: str) -> Relation:
+    """`Relation` of a run's settled series at one joint (force on the rod)."""
+    kept = settled(run)
+    a = kept["acceleration"].values
+    force = kept["contact_force"].sel(joint=joint, axis="x").values
+    slope, intercept = np.polyfit(a, force, 1)
+    return Relation(float(slope), float(intercept), float(np.corrcoef(a, force)[0, 1] ** 2))
+
+
+def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Displacement, velocity and acceleration (SI) of the run's ideal twin on its own grid."""
+    case = case_of(run)
+    lengths = case.machine.crank_radius_mm / 1000, case.machine.rod_length_mm / 1000
+    return motion(run["crank_angle"].values, *lengths, case.omega)
+
+
+def case_of(run: xr.Dataset) -> Case:
+    """The case that a stored run belongs to, from its attributes."""
+    return Case.from_attribute(run.attrs["case"])
+
+
+def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = 0.1) -> float:
+    """Share of the settled time in which the machine vibrates.
+
+    It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation
+    from the ideal motion exceeds `level` times the ideal peak acceleration.
+    """
+    kept = settled(run)
+    _, _, ideal = ideal_motion(kept)
+    angle = kept["crank_angle"].values
+    width = max(1, round(np.radians(window_deg) / (angle[1] - angle[0])))
+    square = (kept["acceleration"].values - ideal) ** 2
+    rms = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
+    return float((rms > level * np.abs(ideal).max()).mean())
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of the paper, measured: `held` is None when its cases are not there."""
+
+    number: int
+    statement: str
+    threshold: str
+    held: bool | None
+    measured: list[tuple[str, str]] = field(default_factory=list)
+    note: str = ""
+
+
+Verdict = tuple[bool, list[tuple[str, str]]]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How a claim is measured: the labels it needs and the function that judges it."""
+
+    statement: str
+    threshold: str
+    needs: tuple[str, ...]
+    judge: Callable[[Runs], Verdict]
+    note: str = ""
+
+
+FAULT_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
+
+
+def claims(runs: Runs) -> list[Claim]:
+    """Measure every claim on the runs at hand, complete ones by label (see `paper_cases`)."""
+    found = []
+    for number, rule in enumerate(RULES, 1):
+        missing = [name for name in rule.needs if name not in runs]
+        if missing:
+            verdict: tuple[bool | None, list] = (None, [("missing", ", ".join(missing))])
+        else:
+            verdict = rule.judge(runs)
+        found.append(Claim(number, rule.statement, rule.threshold, *verdict, rule.note))
+    return found
+
+
+def same_motion(runs: Runs) -> Verdict:
+    """Claim 1: both ideal machines move alike."""
+    rows, held = [], True
+    for name in ("displacement", "velocity", "acceleration"):
+        one, other = runs["design"][name].values, runs["typical"][name].values
+        apart = float(np.abs(one - other).max() / np.abs(other).max())
+        held = held and apart <= 1e-12
+        rows.append((name, f"{apart:.1e}"))
+    return held, rows
+
+
+def design_force(runs: Runs) -> Verdict:
+    """Claim 2: the design load peaks higher, and its corners lie elsewhere."""
+    peaks = {load: float(runs[load]["piston_force"].max()) for load in ("design", "typical")}
+    corners = {load: np.degrees(case_corners(runs[load])) for load in peaks}
+    apart = np.abs(corners["design"] - corners["typical"])[[0, 2]]
+    rows = [(f"peak, {load}", f"{peak:.1f} N") for load, peak in peaks.items()]
+    rows += [
+        (f"corners, {load}", ", ".join(f"{angle:.2f}°" for angle in angles))
+        for load, angles in corners.items()
+    ]
+    return bool(peaks["design"] >= 1.01 * peaks["typical"] and apart.min() >= 1.0), rows
+
+
+def case_corners(run: xr.Dataset) -> np.ndarray:
+    """Crank angles (rad) of a run's load corners."""
+    return np.array(record(case_of(run)).corners)
+
+
+def acceleration_alone(runs: Runs) -> Verdict:
+    """Claim 3: displacement and velocity hardly change with clearance, acceleration does."""
+    rows, held = [], True
+    for name in FAULT_LABELS:
+        kept = settled(runs[name])
+        changes = []
+        for series, ideal in zip(
+            ("displacement", "velocity", "acceleration"), ideal_motion(kept), strict=True
+        ):
+            spread = np.std(ideal)
+            changes.append(float(np.sqrt(np.mean((kept[series].values - ideal) ** 2)) / spread))
+        held = held and changes[0] <= 0.01 and changes[1] <= 0.05 and changes[2] >= 0.10
+        rows.append((name, "x {:.2%}, v {:.2%}, a {:.1%}".format(*changes)))
+    return held, rows
+
+
+def growing_peaks(runs: Runs) -> Verdict:
+    """Claim 4: peaks of acceleration and contact force grow with clearance."""
+    rows, held = [], True
+    for fault in FAULTS:
+        line = [runs[label(fault, c)] for c in CLEARANCES]
+        peaks = {"a, m/s²": [float(run["peak_acceleration"]) for run in line]}
+        for joint in faulty_joints(fault):
+            forces = [float(run["peak_contact_force"].sel(joint=joint)) for run in line]
+            peaks[f"F {SPOKEN[joint]}, N"] = forces
+        for what, values in peaks.items():
+            grows = all(b >= 1.01 * a for a, b in itertools.pairwise(values))
+            held = held and grows
+            rows.append((f"{SPOKEN[fault]}, {what}", " → ".join(f"{v:.0f}" for v in values)))
+    return held, rows
+
+
+def faulty_joints(fault: str) -> tuple[str, ...]:
+    """The joints with clearance of a fault."""
+    return JOINTS if fault == "both" else (fault,)
+
+
+def horizontal_force(runs: Runs) -> Verdict:
+    """Claim 5: the horizontal contact force far exceeds the vertical one."""
+    rows, held = [], True
+    for fault in FAULTS:
+        for joint in faulty_joints(fault):
+            ratios = []
+            for c in CLEARANCES:
+                peak = runs[label(fault, c)]["peak_contact_force_axis"].sel(joint=joint)
+                ratios.append(float(peak.sel(axis="x") / peak.sel(axis="y")))
+            held = held and min(ratios) >= 3.0
+            where = SPOKEN[fault] if fault != "both" else f"both, {SPOKEN[joint]}"
+            rows.append((where, ", ".join(f"{ratio:.1f}" for ratio in ratios)))
+    return held, rows
+
+
+def proportional_force(runs: Runs) -> Verdict:
+    """Claim 6: acceleration is proportional to the horizontal contact force."""
+    rows, held = [], True
+    for name in FAULT_LABELS:
+        fault = name.split()[0]
+        machine = case_of(runs[name]).machine
+        masses = {
+            "m_p": machine.reciprocating_mass_kg,
+            "m_p + 0.5 m_cr": machine.reciprocating_mass_kg + 0.5 * machine.rod_mass_kg,
+        }
+        for joint in faulty_joints(fault):
+            relation = force_relation(runs[name], joint)
+            held = held and relation.r2 >= 0.9
+            slope = abs(relation.slope)
+            beside = ", ".join(f"{slope / mass - 1:+.0%} of {m}" for m, mass in masses.items())
+            rows.append(
+                (f"{name}, {SPOKEN[joint]}", f"r² {relation.r2:.3f}, {slope:.2f} kg ({beside})")
+            )
+    return held, rows
+
+
+def continuity(runs: Runs) -> Verdict:
+    """Claim 7: nearly continuous impacts at the big end, intermittent ones at the small end."""
+    rows, held = [], True
+    for c in CLEARANCES:
+        big, small = (active_share(runs[label(fault, c)]) for fault in ("big_end", "small_end"))
+        held = held and big >= 0.5 and small < 0.5 and big >= 1.5 * small
+        impacts = [
+            float(runs[label(joint, c)]["impact_count"].sel(joint=joint)) for joint in JOINTS
+        ]
+        rows.append(
+            (
+                f"{c:g} mm",
+                f"active: big end {big:.0%}, small end {small:.0%}; "
+                f"contact begun {impacts[0]:.0f} and {impacts[1]:.0f} times",
+            )
+        )
+    return held, rows
+
+
+def two_are_worse(runs: Runs) -> Verdict:
+    """Claim 8: two clearances are worse than one of the same size."""
+    rows, held = [], True
+    for c in CLEARANCES:
+        for name, unit in (("peak_acceleration", "peak"), ("rms_acceleration_deviation", "rms")):
+            big, small, both = (float(runs[label(fault, c)][name]) for fault in FAULTS)
+            held = held and both > max(big, small)
+            rows.append(
+                (f"{c:g} mm, {unit}", f"big {big:.0f}, small {small:.0f}, both {both:.0f} m/s²")
+            )
+    return held, rows
+
+
+RULES = (
+    Rule(
+        "The design and the typical model agree in displacement, velocity and acceleration.",
+        "greatest difference ≤ 1e-12 of the greatest value",
+        ("design", "typical"),
+        same_motion,
+        "True by construction: with ideal joints and a prescribed crank both are the same curve.",
+    ),
+    Rule(
+        "The design force peaks higher than the typical one and its corners lie elsewhere.",
+        "peak ≥ 1.01 times the typical; first and third corner ≥ 1° apart",
+        ("design", "typical"),
+        design_force,
+        "Figure 7; peaks of the stored series, corners of the load.",
+    ),
+    Rule(
+        "Displacement and velocity hardly change with clearance; acceleration does.",
+        "rms deviation from the ideal motion, relative to its standard deviation: displacement "
+        "≤ 1 %, velocity ≤ 5 %, acceleration ≥ 10 %, in all nine cases",
+        FAULT_LABELS,
+        acceleration_alone,
+    ),
+    Rule(
+        "Peaks grow with clearance, for each joint and for both.",
+        "peak acceleration and peak contact force each grow by ≥ 1 % from 0.1 to 0.2 to 0.3 mm",
+        FAULT_LABELS,
+        growing_peaks,
+    ),
+    Rule(
+        "The horizontal contact force far exceeds the vertical one.",
+        "ratio of the peaks ≥ 3 at every joint with clearance, for 0.1, 0.2 and 0.3 mm",
+        FAULT_LABELS,
+        horizontal_force,
+    ),
+    Rule(
+        "Acceleration is proportional to the horizontal contact force.",
+        "r² ≥ 0.9 at every joint with clearance; the slope stands beside the reciprocating mass "
+        "m_p and Eq. 7's m_p + 0.5 m_cr",
+        FAULT_LABELS,
+        proportional_force,
+    ),
+    Rule(
+        "Impacts are nearly continuous at the big end, intermittent at the small end.",
+        "active share of the time: big end ≥ 50 %, small end < 50 %, ratio ≥ 1.5, at every "
+        "clearance (active: the rms over 6° of the acceleration's deviation from the ideal motion "
+        "exceeds 10 % of the ideal peak)",
+        tuple(label(fault, c) for fault in JOINTS for c in CLEARANCES),
+        continuity,
+    ),
+    Rule(
+        "Two clearances are worse than one.",
+        "peak acceleration and rms deviation with both joints exceed those of either alone, at "
+        "every clearance",
+        FAULT_LABELS,
+        two_are_worse,
+    ),
+)
+
+
+def held_share(all_claims: list[list[Claim]]) -> Iterator[tuple[int, int, int]]:
+    """For each claim, over several sets of claims: its number, in how many it held, of how many."""
+    for same in zip(*all_claims, strict=True):
+        judged = [claim.held for claim in same if claim.held is not None]
+        yield same[0].number, sum(judged), len(judged)

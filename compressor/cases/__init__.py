@@ -1,0 +1,1 @@
+"""A YAML text -> checked cases and studies."""

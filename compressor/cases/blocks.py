@@ -1,0 +1,284 @@
+"""A block of a case file: fixed values, and factors of swept ones that multiply.
+
+A factor is one key, or several whose values advance together: a `zip` group, or the keys of a
+sampling design. Counts are known first (`draft`); values are made when the counts are bearable
+(`Draft.block`), and a combination of them when it is asked for (`Block.chosen`).
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from compressor.cases.case import checked, table
+from compressor.cases.conditions import NoComparison, Test, comparison
+from compressor.cases.conflicts import IN_PLACE_OF
+from compressor.cases.keys import SWEEP, Leaves, suggestion
+from compressor.cases.parameter import Problem, shown
+from compressor.cases.sampling import KINDS as SAMPLED
+from compressor.cases.sampling import design
+from compressor.cases.swept import Sweep, is_swept, sweep_of
+from compressor.cases.yaml_reader import FileProblem, Node
+
+MAX_EXCLUSIONS = 20
+MAX_SEED = 2**63
+UNSWEPT = (  # no part of a job's identity
+    "name",
+    "solve.error_bars",
+    "solve.horizon",
+    "solve.timeout_s",
+    "output.keep",
+    "output.precision",
+    "output.compress",
+)
+RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
+Row = tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """The combinations of a block; `kept` holds the numbers, in C order, of those not excluded."""
+
+    leaves: Leaves
+    fixed: dict[str, Node]
+    factors: tuple[tuple[tuple[str, ...], list[Row]], ...]  # keys, and their values together
+    kept: Sequence[int]
+    is_grid: bool  # whether every key is an axis of its own, and no combination is left out
+
+    def chosen(self, number: int) -> dict[str, Node]:
+        """The values of one combination by dotted key."""
+        found = dict(self.fixed)
+        for keys, rows in reversed(self.factors):
+            number, place = divmod(number, len(rows))
+            found.update(zip(keys, rows[place], strict=True))
+        if "joint" in self.swept and found["joint"].value == "none":
+            return {key: n for key, n in found.items() if not key.startswith("clearance_mm")}
+        return found
+
+    @property
+    def swept(self) -> list[str]:
+        """The keys of all factors."""
+        return [key for keys, _ in self.factors for key in keys]
+
+
+@dataclass
+class Draft:
+    """A block that is being read: what is swept, how, and what is wrong with it."""
+
+    leaves: Leaves
+    problems: list[FileProblem]
+    fixed: dict[str, Node] = field(default_factory=dict)
+    sweeps: dict[str, Sweep] = field(default_factory=dict)
+    factors: list[tuple[str, ...]] = field(default_factory=list)  # keys that advance together
+    samples: int = 0
+    seed: int = 0
+    exclusions: list[Test] = field(default_factory=list)
+
+    def refuse(self, node: Node, key: str, message: str) -> None:
+        self.problems.append(FileProblem(node.place, key, message))
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether any key is drawn by a design."""
+        return any(sweep.kind in SAMPLED for sweep in self.sweeps.values())
+
+    def sizes(self) -> dict[str, int]:
+        """How many values each factor has, by its keys."""
+        return {" with ".join(keys): self.size(keys[0]) for keys in self.factors}
+
+    def size(self, key: str) -> int:
+        return self.sweeps[key].count or self.samples
+
+    def block(self) -> Block:
+        """The block, its values made; wrong ones join `problems`, and leave it without jobs."""
+        factors = tuple((keys, self.rows(keys)) for keys in self.factors)
+        count = math.prod(len(rows) for _, rows in factors)
+        if self.problems:
+            count = 0
+        is_grid = not self.exclusions and not self.is_sampled and len(factors) == len(self.sweeps)
+        found = Block(self.leaves, self.fixed, factors, range(count), is_grid)
+        if not self.exclusions:
+            return found
+        readers = ((n, reader(found.chosen(n))) for n in range(count))
+        kept = [n for n, value in readers if not any(test(value) for test in self.exclusions)]
+        if count and not kept:
+            self.refuse(self.leaves.values["exclude"], "exclude", "leaves no job")
+        return replace(found, kept=kept)
+
+    def rows(self, keys: tuple[str, ...]) -> list[Row]:
+        """The values of keys that advance together; each wrong one, and repetition, is told."""
+        points: list[list[float]] = []
+        if self.sweeps[keys[0]].kind in SAMPLED:
+            points = design(self.sweeps[keys[0]].kind, self.samples, len(keys), self.seed)
+        columns = []
+        for number, key in enumerate(keys):
+            sweep = self.sweeps[key]
+            drawn = sweep.placed([sweep.spread(point[number]) for point in points])
+            columns.append(self.checked(sweep, drawn or sweep.nodes()))
+        if len({len(column) for column in columns}) > 1:
+            return []  # a value is wrong
+        rows = list(zip(*columns, strict=True))
+        seen: set[tuple[Any, ...]] = set()
+        for row in rows:
+            values = tuple(node.value for node in row)
+            if values in seen:
+                where = "in the list" if self.sweeps[keys[0]].kind == "list" else "among its values"
+                told = ", ".join(map(shown, values))
+                self.refuse(row[0], " with ".join(keys), f"{told} is {where} twice")
+            seen.add(values)
+        return rows
+
+    def checked(self, sweep: Sweep, nodes: Sequence[Node]) -> list[Node]:
+        """The valid ones of a key's values; of wrong ones that were made, one is told."""
+        good = []
+        for node in nodes:
+            value = check(sweep.key, node, self.problems)
+            if value:
+                good.append(value)
+            elif sweep.kind != "list":
+                break
+        return good
+
+
+def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
+    """A block as far as it goes without making any value."""
+    found = Draft(leaves, problems)
+    for key, node in leaves.values.items():
+        if key.partition(".")[0] in SWEEP:
+            continue
+        if not is_swept(key, node):
+            if good := check(key, node, problems):
+                found.fixed[key] = good
+        elif key in UNSWEPT:
+            found.refuse(node, key, "cannot be swept: it does not change what a job computes")
+        elif sweep := sweep_of(key, node, problems):
+            found.sweeps[key] = sweep
+    sampled = _sampled(found)
+    groups = [*([sampled] if sampled else []), *_zipped(found)]
+    first = {key: group for group in groups for key in group}
+    found.factors = list(dict.fromkeys(first.get(key, (key,)) for key in found.sweeps))
+    found.exclusions = list(_exclusions(found))
+    return found
+
+
+def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
+    """A node with its value as the case holds it; None if that is wrong, which joins `problems`."""
+    if node.value is None or key == "friction":  # told when it was read; or false, which is valid
+        return node if node.value is False else None
+    if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
+        return None
+    found: list[Problem] = []
+    row = "clearance_mm.big_end" if key == "clearance_mm" else key
+    value = checked(row, node.plain(), found)
+    parts = node.value if isinstance(node.value, dict) else {}
+    for problem in found:
+        part = parts.get(problem.key.removeprefix(f"{row}."))
+        place, about = (part.place, problem.key) if part else (node.place, key)
+        problems.append(FileProblem(place, about, problem.message))
+    return None if found else replace(node, value=value)
+
+
+def _sampled(found: Draft) -> tuple[str, ...]:
+    """The keys that one sampling design draws together, in the order of the file."""
+    keys = tuple(key for key, sweep in found.sweeps.items() if sweep.kind in SAMPLED)
+    for name, least, most in (("n", 1, math.inf), ("seed", 0, MAX_SEED)):
+        node = found.leaves.values.get(f"sample.{name}")
+        if node and not (type(node.value) is int and least <= node.value <= most):
+            found.refuse(node, f"sample.{name}", f"needs a whole number from {least}")
+        elif node and name == "n":
+            found.samples = node.value
+        elif node:
+            found.seed = node.value
+    kinds = list(dict.fromkeys(found.sweeps[key].kind for key in keys))
+    for key in keys:
+        sweep = found.sweeps[key]
+        if sweep.kind != kinds[0]:
+            message = f"one design draws all sampled keys: {kinds[0]} or {sweep.kind}, not both"
+            found.refuse(sweep.node, key, message)
+    if keys and "sample.n" not in found.leaves.values:
+        message = "needs a number of samples: add `sample: {n: 64, seed: 1}` to the file"
+        found.refuse(found.sweeps[keys[0]].node, keys[0], message)
+    return keys
+
+
+def _zipped(found: Draft) -> Iterable[tuple[str, ...]]:
+    """The good groups of `zip`: swept keys, each in one group, with equally many values."""
+    node = found.leaves.values.get("zip")
+    taken: set[str] = set()
+    for keys, group in _words(found, node) if node else ():
+        swept = [key for key in keys if key in found.sweeps]
+        sizes = {key: found.sweeps[key].count for key in swept}
+        bad = [key for key in keys if key not in swept]
+        if any(found.sweeps[key].kind in SAMPLED for key in swept):
+            found.refuse(group, "zip", "sampled keys go together by their design already")
+        elif bad and bad[0] in found.leaves.values and bad[0] not in found.fixed:
+            pass  # how it is swept is wrong, and told
+        elif bad:
+            hint = "" if bad[0] in table() else suggestion(bad[0], "")
+            found.refuse(group, "zip", f"{shown(bad[0])} is not swept here{hint}")
+        elif taken & {*keys} or len({*keys}) < len(keys):
+            twice = next(key for key in keys if key in taken or keys.count(key) > 1)
+            found.refuse(group, "zip", f"{twice} is named twice")
+        elif len({*sizes.values()}) > 1:
+            told = ", ".join(f"{key} has {size}" for key, size in sizes.items())
+            found.refuse(group, "zip", f"needs equally many values of each key: {told}")
+        else:
+            taken |= {*keys}
+            yield tuple(sorted(keys, key=[*found.sweeps].index))
+
+
+def _words(found: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
+    """The groups of keys that `zip` lists."""
+    groups = node.value if isinstance(node.value, list) else [node]
+    for group in groups:
+        items = group.value if isinstance(group.value, list) else []
+        if len(items) > 1 and all(isinstance(item.value, str) for item in items):
+            yield [item.value for item in items], group
+        else:
+            message = "needs a list of groups of keys, such as [[machine.speed_rpm, clearance_mm]]"
+            found.refuse(group, "zip", message)
+
+
+def _exclusions(found: Draft) -> Iterable[Test]:
+    """What `exclude` says; a combination is left out where any of its comparisons holds."""
+    node = found.leaves.values.get("exclude")
+    if not node:
+        return
+    texts = node.value if isinstance(node.value, list) else [node]
+    if len(texts) > MAX_EXCLUSIONS:
+        found.refuse(node, "exclude", f"has more than {MAX_EXCLUSIONS} comparisons: join by `or`")
+    for text in texts[:MAX_EXCLUSIONS]:
+        if not isinstance(text.value, str):
+            found.refuse(text, "exclude", "needs comparisons, such as clearance_mm > 0.2")
+            continue
+        try:
+            yield comparison(text.value)
+        except NoComparison as error:
+            found.refuse(text, "exclude", str(error))
+
+
+def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
+    """The function that gives a combination's value of a key, or its default, or None."""
+
+    def value(key: str) -> Any:
+        group = key.partition(".")[0]
+        if key in chosen:
+            return chosen[key].value
+        if key == "clearance_mm":
+            sizes = {n.value for k, n in chosen.items() if k.startswith("clearance_mm.")}
+            return sizes.pop() if len(sizes) == 1 else None
+        if RIVALS.get(key) in chosen or (key != group and group in chosen):
+            return chosen[group].value if group == "clearance_mm" else None
+        return table()[key].default
+
+    return value
+
+
+def columns(blocks: Sequence[Block]) -> list[str]:
+    """The keys by which the jobs of blocks differ: swept in one, or not the same in all."""
+    found = dict.fromkeys(key for block in blocks for key in block.swept)
+    given = dict.fromkeys(key for block in blocks for key in block.fixed if key not in UNSWEPT)
+    for key in given:
+        if len({block.fixed[key].value if key in block.fixed else None for block in blocks}) > 1:
+            found[key] = None
+    return list(found)

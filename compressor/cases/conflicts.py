@@ -1,0 +1,147 @@
+"""What does not fit together in a case whose values are each in range."""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from compressor.cases.parameter import IMPLAUSIBLE, JOINTS, Problem
+
+if TYPE_CHECKING:
+    from compressor.cases.case import Case
+
+# One key, and the other whose place it takes; a case gives one of the two.
+IN_PLACE_OF = (
+    ("solve.duration_s", "solve.duration_rev"),
+    ("solve.output_step_s", "solve.output_step_deg"),
+    ("solve.rtol", "solve.accuracy"),
+    ("contact.materials", "contact.stiffness_N_per_mm15"),
+)
+
+
+def conflicts(case: "Case", given: frozenset[str]) -> Iterator[Problem]:
+    """Everything in a case that does not fit together; `given` holds the keys set by hand."""
+    yield from _geometry_conflicts(case)
+    yield from _clearance_conflicts(case, given)
+    yield from _choice_conflicts(given)
+    yield from _load_conflicts(case)
+    yield from _time_conflicts(case)
+    if case.contact.materials is not None and case.contact.exponent != 1.5:
+        yield Problem("contact.exponent", "Eq. 15's stiffness from materials needs exponent 1.5")
+    friction = case.friction
+    if friction and friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
+        yield Problem(
+            "friction.friction_velocity_mm_per_s", "must exceed the stiction_velocity_mm_per_s"
+        )
+
+
+def _geometry_conflicts(case: "Case") -> Iterator[Problem]:
+    machine, play = case.machine, _play(case)
+    if machine.crank_radius_mm + play >= machine.rod_length_mm:
+        loose = f" and {play:g} mm of clearance" if play else ""
+        yield Problem(
+            "machine.crank_radius_mm",
+            f"the crank, {machine.crank_radius_mm:g} mm{loose}, must be shorter than the rod, "
+            f"{machine.rod_length_mm:g} mm, or the mechanism locks",
+        )
+    if (machine.rod_centre_mm or 0) > machine.rod_length_mm:
+        yield Problem("machine.rod_centre_mm", "the mass centre lies beyond the rod's small end")
+
+
+def _clearance_conflicts(case: "Case", given: frozenset[str]) -> Iterator[Problem]:
+    pin = case.machine.pin_radius_mm
+    for joint in JOINTS:
+        clearance = getattr(case.clearance_mm, joint)
+        key = f"clearance_mm.{joint}"
+        if case.joint in (joint, "both") and not given & {key, "clearance_mm"}:
+            yield Problem(key, f"is needed with joint: {case.joint}")
+        if clearance > pin:
+            yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm")
+        shift = math.hypot(*(getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy"))
+        if 0 < clearance < shift - IMPLAUSIBLE * pin:
+            yield Problem(
+                f"initial_offset_mm.{joint}_x",
+                f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
+                f"more than a tenth of the pin radius; lower it, or raise {key}",
+            )
+    if case.joint == "none" and any(key.startswith("clearance_mm") for key in given):
+        yield Problem("clearance_mm", "has no joint to be at; set joint, or leave it out")
+
+
+def _choice_conflicts(given: frozenset[str]) -> Iterator[Problem]:
+    for one, other in IN_PLACE_OF:
+        if one in given and other in given:
+            yield Problem(one, f"stands in place of {other}: give one of the two")
+
+
+def _load_conflicts(case: "Case") -> Iterator[Problem]:
+    machine, gas = case.machine, case.gas
+    if case.load == "design" and case.spring.stroke_mm >= 2 * machine.crank_radius_mm:
+        yield Problem(
+            "spring.stroke_mm",
+            f"must be less than the piston's stroke, {2 * machine.crank_radius_mm:g} mm",
+        )
+    if case.load != "typical":
+        return
+    play = _play(case)
+    if gas.head_clearance_mm <= play:
+        yield Problem(
+            "gas.head_clearance_mm",
+            f"{gas.head_clearance_mm:g} mm does not exceed the clearances, {play:g} mm in all: the "
+            "piston would reach the cylinder head, where the gas force has no bound",
+        )
+    if gas.discharge_MPa <= gas.suction_MPa:
+        yield Problem("gas.discharge_MPa", "must exceed suction_MPa")
+    elif gas.switching == "exact":
+        full = 2 * machine.crank_radius_mm + gas.head_clearance_mm
+        growth = (gas.discharge_MPa / gas.suction_MPa) ** (1 / gas.exponent)
+        if gas.head_clearance_mm * growth >= full:
+            yield Problem(
+                "gas.head_clearance_mm",
+                "the gas left at the head never expands to the suction pressure; "
+                "lower it, or the pressure ratio",
+            )
+    elif _gas_geometry(case) != _gas_geometry(type(case)()):
+        yield Problem(
+            "gas.switching",
+            "the printed corners hold for the paper's geometry and pressures only; "
+            "set switching: exact",
+        )
+
+
+def _play(case: "Case") -> float:
+    """How much farther than ideal joints those with clearance let the crosshead go (mm)."""
+    return case.clearance_mm.big_end + case.clearance_mm.small_end
+
+
+def _gas_geometry(case: "Case") -> tuple[float, ...]:
+    """What decides where the gas cycle's corners lie."""
+    gas, machine = case.gas, case.machine
+    return (
+        machine.crank_radius_mm,
+        machine.rod_length_mm,
+        gas.head_clearance_mm,
+        gas.suction_MPa,
+        gas.discharge_MPa,
+        gas.exponent,
+    )
+
+
+def _time_conflicts(case: "Case") -> Iterator[Problem]:
+    solve = case.solve
+    span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
+    step_key = "solve.output_step_s" if solve.output_step_s is not None else "solve.output_step_deg"
+    if not case.steps <= 1e8:  # which may be inf, or nan
+        yield Problem(step_key, f"makes {case.steps:.3g} samples; at most 1e8")
+    elif round(case.steps) < 1:
+        yield Problem(step_key, "is longer than the duration")
+    elif abs(case.steps - round(case.steps)) > 1e-6 * max(1.0, 1e-3 * case.steps):
+        yield Problem(
+            step_key, f"the duration is {case.steps:.6g} output steps, not a whole number of them"
+        )
+    if case.settle >= case.duration * (1 - 1e-12):
+        revolutions = case.duration / case.turn
+        yield Problem(
+            "solve.settle_rev",
+            f"{solve.settle_rev:g} revolutions leave nothing of a run of {revolutions:g}; "
+            f"lengthen {span_key}, or shorten settle_rev",
+        )

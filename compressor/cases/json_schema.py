@@ -1,0 +1,130 @@
+"""The JSON Schema of case files, so that editors complete their keys and mark mistakes.
+
+It comes from the table of parameters. What it cannot tell, such as whether values fit each other,
+reading the file does (`compressor.cases.load`).
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+from compressor.cases.accuracy import TARGET
+from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED, UNSWEPT
+from compressor.cases.case import GROUPS, table
+from compressor.cases.conflicts import IN_PLACE_OF
+from compressor.cases.parameter import JOINTS, NAME, Parameter
+from compressor.cases.sampling import KINDS as SAMPLED
+from compressor.cases.swept import FORMS, row_kind
+from compressor.metrics import METRICS
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+WHOLE_FILE = ("name", "blocks")  # what cannot stand in a block
+
+Schema = dict[str, Any]
+
+
+def case_schema() -> Schema:
+    """The schema of a whole case file, in the dialect 2020-12."""
+    found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in _top_keys()}
+    found |= _sweeps()
+    in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}
+    blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
+    blocks["description"] = "sets of jobs, one after the other; each over the keys of the file"
+    top = _mapping(found | {"blocks": blocks})
+    return {"$schema": DIALECT, "title": "compsim case file", **top, "$defs": {"made": _made()}}
+
+
+def _top_keys() -> list[str]:
+    """The keys at the top of a case file that are of a case, in its order."""
+    return list(dict.fromkeys(key.partition(".")[0] for key in table()))
+
+
+def _mapping(properties: Schema) -> Schema:
+    return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _group(name: str) -> Schema:
+    """The schema of a group of keys."""
+    rows = [row for row in table().values() if row.key.startswith(f"{name}.")]
+    mapping = _mapping({row.key.removeprefix(f"{name}."): _value(row) for row in rows})
+    rivals = [pair for pair in IN_PLACE_OF if pair[0].startswith(f"{name}.")]
+    if rivals:
+        short = ([key.removeprefix(f"{name}.") for key in pair] for pair in rivals)
+        mapping["allOf"] = [{"not": {"required": pair}} for pair in short]
+    about = (GROUPS[name].__doc__ or "").partition("\n")[0]
+    if name == "friction":
+        return {"description": about, "anyOf": [{"const": False}, mapping]}
+    if name == "clearance_mm":
+        both = _value(table()[f"{name}.{JOINTS[0]}"])
+        return {"description": "radial clearance, of both joints or each", "anyOf": [
+            *both["anyOf"], mapping
+        ]}  # fmt: skip
+    return {"description": about, **mapping}
+
+
+def _value(row: Parameter) -> Schema:
+    """The schema of a parameter: one value, or a sweep of it."""
+    one = _one(row)
+    about = f"{row.phrase}, {row.unit}" if row.unit else row.phrase
+    found: Schema = {"description": f"{about} ({row.source})"}
+    if row.default is not None and row.kind != "text":
+        found["default"] = row.default
+    if row.key in UNSWEPT:
+        return found | one
+    listed = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
+    made = [{"$ref": "#/$defs/made"}] if row_kind(row.key) in ("number", "integer") else []
+    return found | {"anyOf": [one, listed, *made]}
+
+
+def _one(row: Parameter) -> Schema:
+    """The schema of one value of a parameter, as `Parameter.check` has it."""
+    words = {"enum": list(row.choices)}
+    if row.kind in ("number", "integer"):
+        lower = {"exclusiveMinimum" if row.above else "minimum": row.low}
+        return {"type": row.kind, **lower, "maximum": row.high}
+    if row.kind == "materials":
+        return {"type": "array", "items": words, "minItems": 2, "maxItems": 2}
+    if row.kind == "accuracy":
+        targets = _mapping(dict.fromkeys(METRICS, _one(TARGET)))
+        return {"anyOf": [words, targets | {"minProperties": 1}]}
+    kinds: dict[str, Schema] = {
+        "boolean": {"type": "boolean"},
+        "choice": words,
+        "text": {"type": "string", "pattern": rf"^(?!\.){NAME.pattern}$"},
+    }
+    return kinds[row.kind]
+
+
+def _made() -> Schema:
+    """The schema of values that are made, such as {linspace: [0.1, 0.3, 5]}."""
+    counted = {**NUMBER, "multipleOf": 1, "minimum": 2}
+    forms = []
+    for word, inside in FORMS.items():
+        items = [counted if part.strip(" []") == "count" else NUMBER for part in inside.split(",")]
+        numbers = {"type": "array", "prefixItems": items, "items": False, "minItems": len(items)}
+        more = {"log": {"type": "boolean"}} if word in SAMPLED else {}
+        forms.append(_mapping({word: numbers | {"description": inside}} | more))
+        forms[-1]["required"] = [word]
+    return {"anyOf": forms}
+
+
+def _sweeps() -> Schema:
+    """The schemas of the keys that say how values are swept together."""
+    whole = {"type": "integer", "minimum": 1}
+    sample = _mapping({"n": whole, "seed": {"type": "integer", "minimum": 0, "maximum": MAX_SEED}})
+    keys = {"enum": [*_sweepable()]}
+    group = {"type": "array", "items": keys, "minItems": 2, "uniqueItems": True}
+    texts = {"type": "array", "items": TEXT, "maxItems": MAX_EXCLUSIONS}
+    return {
+        "sample": {"description": "how many samples, and from which seed", **sample},
+        "zip": {"description": "keys whose values advance together", "type": "array",
+                "items": group},
+        "exclude": {"description": "comparisons; jobs for which one holds are left out",
+                    "anyOf": [TEXT, texts]},
+    }  # fmt: skip
+
+
+def _sweepable() -> Iterable[str]:
+    """The keys that can be swept; a clearance also for both joints."""
+    yield "clearance_mm"
+    yield from (key for key in table() if key not in UNSWEPT)

@@ -1,0 +1,109 @@
+"""A case file's tree of values -> leaves by dotted key; an unknown key is told what was meant."""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from compressor.cases.case import GROUPS, Case, table
+from compressor.cases.parameter import shown
+from compressor.cases.swept import FORMS
+from compressor.cases.yaml_reader import FileProblem, Node, Place
+
+MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
+# keys of a case file that are no part of a case: how values are swept together
+SWEEP = ("sample", "zip", "exclude", "blocks")
+SAMPLE = ("n", "seed")
+
+
+@dataclass(frozen=True)
+class Leaves:
+    """The values of a case file by dotted key, and where each known key and group stands.
+
+    A block has its own place at "".
+    """
+
+    values: dict[str, Node]
+    places: dict[str, Place]
+
+
+def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
+    """The leaves of a tree; keys that are unknown, or no group where one is due, are problems."""
+    found = Leaves({}, {})
+    for name, node in _known("", root, problems):
+        found.places[name] = node.key_place
+        mapping = isinstance(node.value, dict)
+        if (name in GROUPS or name == "sample") and mapping and not _is_sweep(name, node):
+            for inner, item in _known(name, node, problems):
+                found.values[f"{name}.{inner}"] = item
+                found.places[f"{name}.{inner}"] = item.key_place
+        elif name == "friction" and node.value is not False:
+            message = f"needs false or a mapping of keys, not {shown(node.plain())}"
+            problems.append(FileProblem(node.place, name, message))
+        elif (name in GROUPS or name == "sample") and name not in ("friction", "clearance_mm"):
+            message = f"needs a mapping of keys, not {shown(node.plain())}"
+            problems.append(FileProblem(node.place, name, message))
+        else:
+            found.values[name] = node
+    return found
+
+
+def _is_sweep(name: str, node: Node) -> bool:
+    """Whether a group's mapping sweeps a value that stands for the whole group."""
+    few = name == "clearance_mm" and len(node.value) <= 2
+    return few and any(get_close_matches(word, FORMS, n=1) for word in node.value)
+
+
+def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tuple[str, Node]]:
+    """The entries of a group (or, for "", of a file) that it may hold and that have a value."""
+    for name, item in node.value.items():
+        if name not in _allowed(group):
+            hint = suggestion(name, group) if len(problems) < MAX_SUGGESTIONS else ""
+            key = f"{group}.{name}" if group else name
+            problems.append(FileProblem(item.key_place, key, "unknown key" + hint))
+        elif item.value is not None:
+            yield name, item
+
+
+def _allowed(group: str) -> list[str]:
+    if group == "sample":
+        return [*SAMPLE]
+    names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Case)]
+    return names if group else [*names, *SWEEP]
+
+
+def suggestion(name: str, group: str) -> str:
+    """The end of an error about an unknown key: what was probably meant, if anything."""
+    if name in table():
+        outer, _, inner = name.partition(".")
+        return f"; write {inner} inside {outer}"
+    if name.partition(":")[0] in _allowed(group):
+        return "; put a space after the colon"
+    near = _nearest(name, _allowed(group), cutoff=0.6)
+    if near:
+        return f"; did you mean {group}.{near}?" if group else f"; did you mean {near}?"
+    near = _nearest(name, [_leaf(key) for key in table()], cutoff=0.8)
+    meant = [key for key in table() if _leaf(key) == near]
+    return f"; did you mean {' or '.join(meant)}?" if meant else ""
+
+
+def _leaf(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
+    """The allowed key with another unit, or else the one most alike."""
+    stems = {_stem(key): key for key in reversed(allowed)}
+    for stem in sorted(stems, key=len, reverse=True):
+        if stem != stems[stem] and f"{name}_".startswith(f"{stem}_"):
+            return stems[stem]
+    return next(iter(get_close_matches(name, allowed, n=1, cutoff=cutoff)), None)
+
+
+def _stem(name: str) -> str:
+    """A key's name without its unit."""
+    for row in table().values():
+        if _leaf(row.key) == name and row.unit:
+            unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")
+            return name.removesuffix(f"_{unit}")
+    return name

@@ -1,0 +1,276 @@
+"""Case files to studies: what is swept multiplies, and all errors are told at once.
+
+A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
+and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
+before any is made; every combination is then built once, which finds the values that do not fit
+each other.
+"""
+
+import itertools
+import json
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from compressor.cases import blocks
+from compressor.cases.case import Case, table
+from compressor.cases.conditions import NoComparison, Test, comparison
+from compressor.cases.keys import Leaves, leaves
+from compressor.cases.overrides import merged, overridden, read_overrides
+from compressor.cases.parameter import CaseError, Problem
+from compressor.cases.study import Axis, Cases, Study, value_of
+from compressor.cases.swept import counted
+from compressor.cases.yaml_reader import FileProblem, Node, Place, cut, read_file, resolved
+
+MAX_JOBS = 10_000
+MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
+WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
+
+
+class CaseFileError(ValueError):
+    """Case files that cannot be read; `problems` lists everything wrong, each with its place."""
+
+    def __init__(self, problems: Sequence[FileProblem]):
+        self.problems = sorted(set(problems))
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.problems))
+
+
+@dataclass(frozen=True)
+class _Draft:
+    """A study that is being read; `name` is empty where the file gives no valid one."""
+
+    path: str
+    name: str
+    leaves: Leaves
+    changes: Mapping[str, Leaves]
+    problems: list[FileProblem]
+
+
+def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
+    """The cases of YAML case files, in the order of the files and of their axes.
+
+    Raises CaseFileError with everything that is wrong in all files, each with its place.
+    """
+    return [case for study in load_studies(*paths) for case in study.cases]
+
+
+def load_studies(
+    *paths: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    max_jobs: int = MAX_JOBS,
+    only: str = "",
+) -> list[Study]:
+    """The studies of YAML case files; each override, `key=value`, replaces a value in all of them.
+
+    A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
+    comparison, selects the jobs to be run. Raises CaseFileError with everything that is wrong in
+    all files, overrides and the comparison.
+    """
+    problems: list[FileProblem] = []
+    changes = read_overrides(overrides, problems)
+    test = _read_only(only, problems) if only else None
+    drafts = [_draft(os.fsdecode(path), changes, problems) for path in paths]
+    _refuse_shared_names(drafts)
+    studies = [_study(draft, max_jobs, test) for draft in drafts]
+    problems += [problem for draft in drafts for problem in draft.problems]
+    if not problems and not any(study.selected for study in studies):
+        problems.append(FileProblem(Place(f"--only {cut(only)}"), "", "selects no job"))
+    if problems:
+        raise CaseFileError(problems)
+    return studies
+
+
+def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
+    """The comparison of the command line."""
+    try:
+        return comparison(text)
+    except NoComparison as error:
+        problems.append(FileProblem(Place(f"--only {cut(text)}"), "", str(error)))
+        return None
+
+
+def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProblem]) -> _Draft:
+    problems = list(earlier)
+    root = read_file(path, problems)
+    found = Leaves({}, {})
+    if root and isinstance(root.value, dict):
+        found = leaves(root, problems)
+    elif root and root.value is not None:
+        message = "needs keys at the top, such as `joint: big_end`"
+        problems.append(FileProblem(root.place, "", message))
+    name = _name(path, overridden(found, changes), problems) if root else ""
+    if "blocks" in changes:
+        found = overridden(found, {"blocks": changes["blocks"]})
+    rest = {key: change for key, change in changes.items() if key != "blocks"}
+    return _Draft(path, name, found, rest, problems)
+
+
+def _name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
+    """The study's name: the file's value, checked later with all others, or the file's stem."""
+    if "name" in found.values:
+        name = found.values["name"].value
+        return "" if table()["name"].check(name) else name
+    name = Path(path).stem
+    message = table()["name"].check(name)
+    if message:
+        message = f"the file's name gives none: {message}; set name"
+        problems.append(FileProblem(Place(path, 1, 1), "name", message))
+    return "" if message else name
+
+
+def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
+    """A name is where a study is stored, and file systems may not tell `A` from `a`."""
+    first: dict[str, _Draft] = {}
+    for draft in drafts:
+        other = first.setdefault(draft.name.casefold(), draft)
+        if draft.name and other is not draft:
+            given = overridden(draft.leaves, draft.changes).values.get("name")
+            place = given.place if given else Place(draft.path, 1, 1)
+            message = f"{other.path} and {draft.path} would be stored under one name, {draft.name}"
+            draft.problems.append(FileProblem(place, "name", message))
+
+
+def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
+    """The study of a draft; without cases if the draft has problems, to which its own are added."""
+    drafts = [blocks.draft(leaves, draft.problems) for leaves in _blocks(draft, max_jobs)]
+    if not _bearable(drafts, draft, max_jobs):
+        return Study(draft.name, draft.path, (), ())
+    found = [one.block() for one in drafts]
+    cases = Cases(draft.name, found)
+    if not draft.problems and not draft.changes:
+        _refuse_idle_sample(drafts, draft)
+    is_grid = len(found) == 1 and found[0].is_grid
+    keys = [] if is_grid else blocks.columns(found)
+    jobs, table = _checked_cases(draft, cases, keys)
+    if is_grid:
+        axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
+    else:
+        found_columns = zip(*table, strict=True)
+        axes = [Axis(key, column) for key, column in zip(keys, found_columns, strict=False)]
+    if draft.problems:
+        cases = Cases(draft.name, ())
+    selected = range(len(cases)) if only is None else cases.where(only)
+    return Study(draft.name, draft.path, tuple(axes), cases, tuple(jobs), is_grid, selected)
+
+
+def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
+    """The leaves of each block, over those of the file; the file's alone where it has no blocks."""
+    node = draft.leaves.values.get("blocks")
+    own = {key: item for key, item in draft.leaves.values.items() if key != "blocks"}
+    file = Leaves(own, draft.leaves.places)
+    if node is None:
+        yield overridden(file, draft.changes)
+        return
+    items = node.value if isinstance(node.value, list) else []
+    if not items or not all(isinstance(item.value, dict) for item in items):
+        message = "needs a list of mappings, such as [{load: none}, {joint: both}]"
+        draft.problems.append(FileProblem(node.place, "blocks", message))
+    elif len(items) > max_jobs:
+        message = f"{len(items)} blocks are more jobs than {max_jobs}; raise --max-jobs"
+        draft.problems.append(FileProblem(node.place, "blocks", message))
+    else:
+        for item in items:
+            yield overridden(merged(file, _block_leaves(item, draft)), draft.changes)
+
+
+def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
+    """A `sample` of which no key is sampled is a mistake."""
+    place = draft.leaves.places.get("sample")
+    if place and not any(one.samples and one.is_sampled for one in drafts):
+        message = "samples nothing: give a key {random: [least, greatest]}, lhs or sobol"
+        draft.problems.append(FileProblem(place, "sample", message))
+
+
+def _block_leaves(item: Node, draft: _Draft) -> Leaves:
+    """What a block says; what only a file can say is a problem."""
+    found = leaves(item, draft.problems)
+    for key in [key for key in found.values if key in ("name", "blocks")]:
+        message = "cannot stand in a block: it belongs to the whole file"
+        draft.problems.append(FileProblem(found.places[key], key, message))
+        del found.values[key]
+    found.places[""] = item.place
+    return found
+
+
+def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> bool:
+    """Whether there are few enough jobs to make their values; too many are a problem."""
+    sizes = [one.sizes() for one in drafts]
+    total = sum(math.prod(one.values()) for one in sizes)
+    if total <= max_jobs:
+        return True
+    largest = max(drafts, key=lambda one: math.prod(one.sizes().values()))
+    keys = max(largest.factors, key=lambda keys: largest.size(keys[0]))
+    told = [" x ".join(f"{name} ({counted(n)})" for name, n in one.items()) for one in sizes]
+    message = (
+        f"{counted(total)} jobs are more than {max_jobs}: {cut(' + '.join(told), 300)}; "
+        "ask for fewer, or raise --max-jobs"
+    )
+    place = largest.sweeps[keys[0]].node.place
+    draft.problems.append(FileProblem(place, keys[0], message))
+    return False
+
+
+def _checked_cases(
+    draft: _Draft, cases: Cases, keys: Sequence[str]
+) -> tuple[list[str], list[tuple[Any, ...]]]:
+    """The job's key of each case, and its values of some keys of the file.
+
+    Conflicts in any combination are problems of the draft.
+    """
+    found: dict[Problem, FileProblem] = {}
+    jobs, rows = [], []
+    for block, chosen in cases.combinations():
+        try:
+            case = cases.case(chosen)
+        except CaseError as error:
+            for problem in error.problems:
+                found.setdefault(problem, _located(problem, chosen, block, draft.path))
+        else:
+            jobs.append(case.key)
+            rows.append(tuple(value_of(case, key) for key in keys))
+    draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
+    if len(found) > MAX_CONFLICTS:
+        message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
+        draft.problems.append(FileProblem(Place(draft.path), "", message))
+    return jobs, rows
+
+
+def _located(
+    problem: Problem, chosen: Mapping[str, Node], block: blocks.Block, path: str
+) -> FileProblem:
+    """A case's problem at the value it is about, or at the nearest key, group or block."""
+    group = problem.key.partition(".")[0]
+    for key in (problem.key, group):
+        if key in chosen:
+            return FileProblem(chosen[key].place, key, problem.message)
+    for key in (problem.key, group):
+        if key in block.leaves.places:
+            return FileProblem(block.leaves.places[key], problem.key, problem.message)
+    place = block.leaves.places.get("", Place(path, 1, 1))
+    return FileProblem(place, problem.key, problem.message)
+
+
+def to_yaml(case: Case) -> str:
+    """A resolved case as the text of a case file, which reads back to an equal case."""
+    lines = []
+    for key, value in case.values().items():
+        if isinstance(value, dict):
+            lines.append(f"{key}:")
+            lines += [f"  {name}: {_scalar(item)}" for name, item in value.items()]
+        else:
+            lines.append(f"{key}: {_scalar(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _scalar(value: Any) -> str:
+    """A value in YAML: as JSON, but plain where a word reads back as text."""
+    if isinstance(value, str) and WORD.fullmatch(value) and resolved(value) == value:
+        return value
+    return json.dumps(value)

@@ -1,0 +1,113 @@
+"""A study: the jobs of one case file, each built when it is asked for."""
+
+import bisect
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, overload
+
+from compressor.cases import blocks
+from compressor.cases.case import Case
+from compressor.cases.conditions import Test
+from compressor.cases.yaml_reader import Node
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept key of a study, such as `machine.rod_mass_kg`, and its values."""
+
+    key: str
+    values: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Study:
+    """One case file. In a grid, jobs are in C order over the axes, in the file's order.
+
+    Otherwise every axis is a column, with a value for each job, None where the job has none.
+    """
+
+    name: str
+    path: str
+    axes: tuple[Axis, ...]
+    cases: Sequence[Case]
+    keys: tuple[str, ...] = ()  # of the cases
+    is_grid: bool = True
+    selected: Sequence[int] = ()  # numbers of the jobs to be run now
+
+    @property
+    def jobs(self) -> int:
+        return len(self.keys)
+
+
+def shard(study: Study, number: int, of: int) -> Study:
+    """A study of which the jobs of one shard are selected, 1 <= number <= of.
+
+    A job's key says which shard it belongs to, so that any number of machines agree without asking
+    each other, and studies that share a job put it in the same one.
+    """
+    mine = [n for n in study.selected if int(study.keys[n], 16) % of == number - 1]
+    return replace(study, selected=mine)
+
+
+class Cases(Sequence[Case]):
+    """The cases of blocks one after the other, each built when it is asked for."""
+
+    def __init__(self, name: str, parts: Sequence[blocks.Block]):
+        self.name, self.parts = name, parts
+        self.ends = list(itertools.accumulate(len(part.kept) for part in parts))
+
+    def __len__(self) -> int:
+        return self.ends[-1] if self.ends else 0
+
+    @overload
+    def __getitem__(self, index: int) -> Case: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Case, ...]: ...
+    def __getitem__(self, index: int | slice) -> Case | tuple[Case, ...]:
+        if isinstance(index, slice):
+            return tuple(self[n] for n in range(len(self))[index])
+        number = range(len(self))[index]
+        at = bisect.bisect_right(self.ends, number)
+        part = self.parts[at]
+        return self.case(part.chosen(part.kept[number - self.ends[at] + len(part.kept)]))
+
+    def case(self, chosen: Mapping[str, Node]) -> Case:
+        """The case of one combination. Raises CaseError where its values do not fit."""
+        return Case.from_values(nested(chosen) | {"name": self.name})
+
+    def combinations(self) -> Iterator[tuple[blocks.Block, dict[str, Node]]]:
+        """The values of every case by dotted key, and the block that they are of."""
+        for part in self.parts:
+            for number in part.kept:
+                yield part, part.chosen(number)
+
+    def where(self, test: Test) -> list[int]:
+        """The numbers of the cases for which a comparison holds."""
+        every = enumerate(self.combinations())
+        return [n for n, (_, chosen) in every if test(blocks.reader(chosen))]
+
+
+def nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
+    """Values by dotted key as a case file has them, group by group."""
+    values: dict[str, Any] = {}
+    for key, node in chosen.items():
+        group, _, name = key.rpartition(".")
+        value = node.value
+        if key == "solve.accuracy" and isinstance(value, tuple):
+            value = dict(value)  # as a case file has it
+        (values.setdefault(group, {}) if group else values)[name] = value
+    return values
+
+
+def value_of(case: Case, key: str) -> Any:
+    """A case's value of a dotted key; None where it has none, or no single one."""
+    if key == "friction":
+        return case.friction is not None
+    if key == "clearance_mm":
+        sizes = {size for size in vars(case.clearance_mm).values() if size > 0}
+        return sizes.pop() if len(sizes) == 1 else None
+    value: Any = case
+    for part in key.split("."):
+        value = getattr(value, part, None)
+    return value

@@ -1,0 +1,199 @@
+"""What a case asks for: its terms, its natural scales, its cost, and what it pays for in vain.
+
+A feature is paid for in vain where leaving it out changes peaks by less than the accuracy that the
+case promises: model only what a scene requires.
+"""
+
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import xarray as xr
+
+from compressor.cases.accuracy import ACCURACY
+from compressor.cases.case import Case
+from compressor.cases.study import Study
+from compressor.measure.features import FEATURES, Effect, Feature, compare
+from compressor.measure.work_precision import SLOW, complete, faulty
+from compressor.physics.record import FREEDOMS, Scene
+from compressor.solve.scales import JointScales, expected_seconds, expected_steps, joint_scales
+from compressor.solve.si_record import scene
+from compressor.solve.simulate import STATE_NAMES, simulate
+from compressor.store.studies import given, points
+
+SCENES = {
+    Scene.IDEAL: "ideal joints",
+    Scene.BIG_END: "clearance at the big end",
+    Scene.SMALL_END: "clearance at the small end",
+    Scene.BOTH: "clearance at both joints",
+}
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What leaving one feature out changes.
+
+    `needed_for` names the quantities that change by more than the case promises; `removable`: none.
+    """
+
+    key: str
+    name: str
+    neutral: str
+    effect: Effect
+    needed_for: tuple[str, ...]
+    removable: bool
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """All that is told of one study: of its first job, measured, and of the sweep."""
+
+    study: str
+    path: str
+    jobs: int
+    point: dict[str, Any]  # of the sweep's axes, at the job explained
+    scene: str
+    unknowns: tuple[str, ...]
+    active: dict[str, str]  # term -> in words
+    absent: tuple[str, ...]  # terms left out, at no cost
+    scales: tuple[JointScales, ...]
+    expected_steps: float  # by the scales alone, before the run
+    expected_seconds: float
+    accuracy: str  # the word, or "" where rtol is given
+    rtol: float
+    promise: float
+    method: str
+    reason: str  # why the job failed; empty when it did not
+    detail: str
+    seconds: float  # wall time of the job, without storing it
+    steps: int
+    evaluations: int
+    workers: int
+    sweep_seconds: float  # of all jobs, if they cost what this one does
+    advice: tuple[Advice, ...]
+
+
+def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
+    """Explain the first job of a study by running it, and it again without each of its features.
+
+    Times are medians of `repeats`; a job above `bench.SLOW` is timed once.
+    """
+    case = study.cases[0]
+    run, seconds = timed(case, repeats)
+    repeats = repeats if seconds < SLOW else 1
+    ended = complete(run)
+    active, absent = terms(case)
+    freedoms = FREEDOMS[scene(case)]
+    found = tuple(scales(case))
+    steps = expected_steps(case, found)
+    return Explanation(
+        study=study.name,
+        path=study.path,
+        jobs=len(study.cases),
+        point=given(next(points(study))),
+        scene=SCENES[scene(case)],
+        unknowns=STATE_NAMES[2 * freedoms][:freedoms],
+        active=active,
+        absent=absent,
+        scales=found,
+        expected_steps=steps,
+        expected_seconds=expected_seconds(case, steps),
+        accuracy=asked(case),
+        rtol=case.rtol,
+        promise=promise(case),
+        method=case.solve.method,
+        reason=run["reason"].item(),
+        detail=run.attrs.get("detail", ""),
+        seconds=seconds,
+        steps=int(run["steps"]),
+        evaluations=int(run["evaluations"]),
+        workers=workers,
+        sweep_seconds=seconds * len(study.cases) / min(workers, len(study.cases)),
+        advice=tuple(advise(case, repeats)) if ended else (),
+    )
+
+
+def timed(case: Case, repeats: int) -> tuple[xr.Dataset, float]:
+    """A run of a case and the median of its wall times (s), compiled code being there already."""
+    run = simulate(case)
+    seconds = []
+    for _ in range(repeats if complete(run) and run["seconds"].item() < SLOW else 1):
+        began = time.perf_counter()
+        run = simulate(case)
+        seconds.append(time.perf_counter() - began)
+    return run, statistics.median(seconds)
+
+
+def asked(case: Case) -> str:
+    """Accuracy as the case file asks for it; "" where it gives a tolerance."""
+    if case.targets:
+        return ", ".join(f"{name} to {target:g}" for name, target in case.targets)
+    return "" if case.solve.rtol is not None else str(case.solve.accuracy)
+
+
+def promise(case: Case) -> float:
+    """The relative error that a case may have: asked for by number, or of its word.
+
+    With an rtol in place of a word it is that of the word it is as tight as, and no less than
+    draft's.
+    """
+    if case.targets:
+        return min(target for _, target in case.targets)
+    kept = [tier.promise for tier in ACCURACY.values() if case.rtol <= tier.rtol]
+    return min(kept, default=ACCURACY["draft"].promise)
+
+
+def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
+    """What a case computes, in words by term, and what it leaves out at no cost."""
+    ideal = scene(case) == Scene.IDEAL
+    shown = [feature for feature in FEATURES if not feature.key.startswith("clearance")]
+    used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
+    active = {feature.name: spoken(case, feature) for feature in used}
+    absent = tuple(feature.name for feature in shown if feature not in used)
+    if ideal:
+        return active, (*absent, "clearance", "contact")
+    widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
+              for joint in faulty(case)]  # fmt: skip
+    contact = case.contact
+    active["clearance"] = ", ".join(widths)
+    stiffness = contact.stiffness_N_per_mm15
+    material = f"K = {stiffness:g} N/mm^p" if stiffness else " on ".join(contact.materials or ())
+    active["contact"] = (
+        f"{contact.law}, {material}, p = {contact.exponent:g}, "
+        f"C_max = {contact.damping_N_s_per_mm:g} N s/mm"
+    )
+    return active, absent
+
+
+def spoken(case: Case, feature: Feature) -> str:
+    """The value by which a case pays for a feature."""
+    group, dot, name = feature.key.partition(".")
+    if feature.key == "friction" and case.friction:
+        return f"static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
+    value = getattr(getattr(case, group), name) if dot else getattr(case, group)
+    return f"{feature.key} = {value}"
+
+
+def scales(case: Case) -> Iterator[JointScales]:
+    """The natural scales of each joint with clearance, under its greatest force when ideal."""
+    ideal = simulate(replace(case, joint="none"))
+    for joint in faulty(case):
+        yield joint_scales(case, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
+
+
+def advise(case: Case, repeats: int) -> Iterator[Advice]:
+    """What each feature that a case pays for changes, and whether it could be left out."""
+    if scene(case) == Scene.IDEAL:
+        return
+    allowed = promise(case)
+    for feature in FEATURES:
+        if feature.paid(case):
+            effect = compare(case, feature.remove(case), repeats)
+            needed = {
+                "peak acceleration": effect.change_peak_acceleration,
+                "contact force": effect.change_peak_contact_force,
+            }
+            kept = tuple(name for name, change in needed.items() if not abs(change) < allowed)
+            yield Advice(feature.key, feature.name, feature.neutral, effect, kept, not kept)

@@ -1,0 +1,183 @@
+"""Extreme scenes: journals in clearances drawn far beyond what a machine is built with.
+
+Scene k of a seed is always the same, however many are drawn. Even scenes lie inside the range that
+is documented as supported, odd ones in the whole range; each kind has a scrambled Sobol sequence of
+its own, over the numbers of `SPANS` and over load, scene, friction's ratio and the start. A span of
+None is the same for both kinds. Contact stiffness is drawn in N/m^1.5; with another exponent it is
+the one whose force at 0.1 mm, the law's full damping, is the same.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from compressor.cases.case import Case
+from compressor.cases.parameter import JOINTS
+from compressor.cases.sampling import design
+
+# name: (unit, whole range, supported range, log-uniform)
+SPANS: dict[str, tuple[str, tuple[float, float], tuple[float, float] | None, bool]] = {
+    "clearance_big_end": ("m", (1e-9, 3e-3), (1e-6, 1e-3), True),
+    "clearance_small_end": ("m", (1e-9, 3e-3), (1e-6, 1e-3), True),
+    "stiffness": ("N/m^1.5", (1e6, 1e14), (1e8, 1e12), True),
+    "exponent": ("1", (1.0, 2.2), None, False),
+    "damping": ("1", (1e-2, 1e2), None, True),  # over the paper's; a tenth of the scenes has none
+    "friction": ("1", (0.0, 1.0), (0.0, 0.5), False),
+    "stiction_velocity": ("m/s", (1e-6, 0.1), (1e-4, 0.1), True),
+    "rod_mass": ("kg", (1e-3, 100.0), (0.1, 50.0), True),
+    "reciprocating_mass": ("kg", (1e-3, 100.0), (0.1, 50.0), True),
+    "speed": ("rpm", (1.0, 20_000.0), (50.0, 6000.0), True),
+    "pin_radius": ("m", (0.01, 0.1), None, True),
+    "rtol": ("1", (1e-10, 1e-2), None, True),
+}
+OTHERS = 3 + 3 * len(JOINTS)  # friction's ratio, load, scene; how each journal starts
+LOADS = ("none", "typical", "design")
+SCENES = ("big_end", "small_end", "both")
+UNDAMPED = 0.1  # share of the scenes
+MASS_RATIO = 1e4  # at most
+PAPER_DAMPING = 336.0  # N s/mm
+FULL_DAMPING = 1e-4  # m
+DEEPEST_START = 0.03  # of the pin radius
+FORCES = {"none": 0.0, "typical": 3087.0, "design": 3347.0}  # N, greatest of each load
+CRANK = 0.12  # m
+SAMPLES = 720  # of the output grid
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How far scenes run, and what each run may cost; `seconds` are more than steps ever need."""
+
+    revolutions: float = 0.25
+    max_steps: int = 500_000
+    seconds: float = 30.0
+
+
+def supported(number: int) -> bool:
+    """Whether a scene lies inside the range that is documented as supported."""
+    return number % 2 == 0
+
+
+def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
+    """Scene `number` of a seed as the values of a case file."""
+    point = iter(_points(seed, number % 2, 1 << (number // 2).bit_length())[number // 2])
+    found = _numbers(point, supported(number))
+    ratio, load, joint = next(point), LOADS[_which(point)], SCENES[_which(point)]
+    exponent = found["exponent"]
+    stiffness = found["stiffness"] * FULL_DAMPING ** (1.5 - exponent)
+    force = found["reciprocating_mass"] * CRANK * (found["speed"] * math.pi / 30) ** 2
+    depth = ((force + FORCES[load]) / stiffness) ** (1 / exponent)
+    worn = [one for one in JOINTS if joint in (one, "both")]
+    offset: dict[str, float] = {}
+    for one in JOINTS:
+        drawn = next(point), next(point), next(point)
+        if one in worn:
+            deepest = min(depth, DEEPEST_START * found["pin_radius"])
+            offset |= _start(one, drawn, found[f"clearance_{one}"], deepest)
+    stiction = 1e3 * found["stiction_velocity"]
+    made = {
+        "name": f"stress-{seed}-{number}",
+        "load": load,
+        "joint": joint,
+        "clearance_mm": {one: 1e3 * found[f"clearance_{one}"] for one in worn},
+        "initial_offset_mm": offset,
+        "machine": {
+            "speed_rpm": found["speed"],
+            "rod_mass_kg": found["rod_mass"],
+            "reciprocating_mass_kg": found["reciprocating_mass"],
+            "pin_radius_mm": 1e3 * found["pin_radius"],
+        },
+        "contact": {
+            "stiffness_N_per_mm15": stiffness / 1000.0**exponent,
+            "exponent": exponent,
+            "damping_N_s_per_mm": PAPER_DAMPING * found["damping"],
+        },
+        "friction": {
+            "static": found["friction"],
+            "dynamic": found["friction"] * (0.3 + 0.7 * ratio),
+            "stiction_velocity_mm_per_s": stiction,
+            "friction_velocity_mm_per_s": 10.0 * stiction,
+        },
+    }
+    return _rounded(made) | {
+        "output": {"keep": "series"},
+        "solve": {
+            "duration_rev": budget.revolutions,
+            "settle_rev": 0.0,
+            "output_step_deg": 360.0 * budget.revolutions / SAMPLES,
+            "rtol": float(f"{found['rtol']:.2g}"),
+            "max_steps": budget.max_steps,
+            "timeout_s": budget.seconds,
+        },
+    }
+
+
+def place(case: Case) -> dict[str, float]:
+    """Where a scene lies on the axes of `SPANS`; the clearance of an ideal joint is nan."""
+    exponent = case.contact.exponent
+    stiffness = (case.contact.stiffness_N_per_mm15 or math.nan) * 1000.0**exponent
+    friction = case.friction
+    clearances = {
+        f"clearance_{one}": getattr(case.clearance_mm, one) / 1e3 or math.nan for one in JOINTS
+    }
+    return clearances | {
+        "stiffness": stiffness / FULL_DAMPING ** (1.5 - exponent),
+        "exponent": exponent,
+        "damping": case.contact.damping_N_s_per_mm / PAPER_DAMPING,
+        "friction": friction.static if friction else 0.0,
+        "stiction_velocity": friction.stiction_velocity_mm_per_s / 1e3 if friction else math.nan,
+        "rod_mass": case.machine.rod_mass_kg,
+        "reciprocating_mass": case.machine.reciprocating_mass_kg,
+        "speed": case.machine.speed_rpm,
+        "pin_radius": case.machine.pin_radius_mm / 1e3,
+        "rtol": case.rtol,
+    }
+
+
+@cache
+def _points(seed: int, kind: int, count: int) -> list[list[float]]:
+    """At least `count` points of a kind of scene; the first ones do not depend on the count."""
+    return design("sobol", count, len(SPANS) + OTHERS, 2 * seed + kind)
+
+
+def _numbers(point: Iterator[float], inside: bool) -> dict[str, float]:
+    """The numbers of `SPANS` at a point of the unit cube."""
+    found = {}
+    for name, (_, whole, narrow, log) in SPANS.items():
+        low, high = narrow if inside and narrow else whole
+        u = next(point)
+        if name == "damping":
+            share = (u - UNDAMPED) / (1.0 - UNDAMPED)
+            found[name] = low * (high / low) ** share if share >= 0.0 else 0.0
+        else:
+            found[name] = low * (high / low) ** u if log else low + u * (high - low)
+    rod = found["rod_mass"]
+    mass = max(found["reciprocating_mass"], rod / MASS_RATIO)
+    found["reciprocating_mass"] = min(mass, rod * MASS_RATIO)
+    return found
+
+
+def _which(point: Iterator[float]) -> int:
+    """One of three."""
+    return int(3 * next(point))
+
+
+def _start(
+    joint: str, drawn: tuple[float, float, float], clearance: float, deepest: float
+) -> dict[str, float]:
+    """A journal's initial offset (mm): none, within the clearance, or sunk into the bearing."""
+    kind, size, turn = drawn
+    if kind < 1 / 3:
+        return {}
+    depth = deepest * 10.0 ** (-3.0 * size)
+    radius = 1e3 * (clearance * size if kind < 2 / 3 else clearance + depth)
+    angle = 2 * math.pi * turn
+    return {f"{joint}_x": radius * math.cos(angle), f"{joint}_y": radius * math.sin(angle)}
+
+
+def _rounded(made: Any) -> Any:
+    """Numbers to five digits, so that a case can be written into a file."""
+    if isinstance(made, dict):
+        return {key: _rounded(value) for key, value in made.items()}
+    return float(f"{made:.5g}") if isinstance(made, float) else made

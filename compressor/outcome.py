@@ -1,0 +1,111 @@
+"""What is known of a finished job, without physics or compiled code.
+
+So that results are read without loading either; the numbers' names and units are those of
+`compressor.metrics`.
+"""
+
+import contextlib
+import json
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+import compressor
+from compressor.cases.parameter import JOINTS
+from compressor.metrics import AXES, ERRORS, LEDGER, METRICS, NUMBERS, SIZES
+
+if TYPE_CHECKING:
+    from compressor.cases.case import Case
+
+__all__ = ["AXES", "ERRORS", "LEDGER", "METRICS", "NUMBERS", "ROW", "SIZES", "Outcome"]
+
+# a job's numbers as one structured scalar: what workers send home and segments hold
+ROW = np.dtype(
+    [(name, "f8", tuple(SIZES[dim] for dim in dims)) for name, (dims, _, _) in NUMBERS.items()]
+)
+
+
+@dataclass(frozen=True)
+class SeriesFile:
+    """The file that holds a job's time series."""
+
+    samples: int
+    end: float  # last time, s
+    precision: str  # double | single
+    digest: str  # of the file's bytes, part of its name
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a job ended, without its time series.
+
+    `numbers`: a scalar of dtype ROW, metrics nan where the run did not reach its end; `reason`: a
+    stable name, empty when ok; `attributes`: those of the job's Dataset, its `key` among them;
+    `series`: where the time series are stored, if they are.
+    """
+
+    status: str
+    reason: str
+    numbers: np.void
+    attributes: dict[str, Any]
+    series: SeriesFile | None = None
+
+    @property
+    def key(self) -> str:
+        """The job's identity."""
+        return str(self.attributes["key"])
+
+    @property
+    def detail(self) -> str:
+        """What is known of a failure beyond its reason."""
+        return str(self.attributes.get("detail", ""))
+
+    def variables(self) -> dict[str, tuple]:
+        """Status, reason and numbers as xarray variables: (dims, values, attributes)."""
+        named: dict[str, tuple] = {
+            "status": ((), self.status, {"long_name": "ok or failed"}),
+            "reason": ((), self.reason, {"long_name": "why a run failed, by a stable name"}),
+        }
+        for name, (dims, unit, phrase) in NUMBERS.items():
+            named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
+        return named
+
+
+def without_run(case: "Case", reason: str, detail: str, **more: Any) -> Outcome:
+    """The outcome of a case of which no run can tell; `more`: attributes.
+
+    The keys of a case with values that none can be made of, such as a speed of 0, are "".
+    """
+    attributes: dict[str, Any] = {"key": "", "physics_key": "", "name": case.name}
+    attributes["case"] = json.dumps(case.values(), sort_keys=True)
+    with contextlib.suppress(ArithmeticError, TypeError, ValueError):
+        attributes |= {"key": case.key, "physics_key": case.physics_key}
+    program = f"compsim {compressor.__version__}"
+    attributes |= {"complete": 0, "program": program, "detail": detail} | more
+    return Outcome("failed", str(reason), np.full(1, math.nan, ROW)[0], attributes)
+
+
+class Variable(NamedTuple):
+    """A variable as xarray has it: names of its dimensions, values, attributes."""
+
+    dims: tuple[str, ...]
+    values: np.ndarray
+    attrs: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Table:
+    """What a Dataset is made of; xarray takes half a second to load, which storing a job spares."""
+
+    variables: dict[str, Variable]
+    attrs: dict[str, Any]
+
+
+def coordinates() -> dict[str, tuple]:
+    """The coordinates of joint and axis as xarray variables."""
+    return {
+        "joint": (("joint",), list(JOINTS), {"long_name": "joint of the rod"}),
+        "axis": (("axis",), list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
+    }

@@ -1,0 +1,1 @@
+"""A store -> figures and a page."""

@@ -1,0 +1,145 @@
+"""What is plotted of a run: stored series after the first revolution, in a reader's units.
+
+Every panel of curves can have an enlarged view beside it, placed where the curves differ most.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MultipleLocator
+from numpy.lib.stride_tricks import sliding_window_view
+
+from compressor.analysis.claims import CLEARANCES, label, settled
+from compressor.report.figures.style import BY_CLEARANCE, BY_LOAD, IDEAL, Line
+
+Runs = Mapping[str, xr.Dataset]
+
+ANGLE_AXIS = "crank angle (°), 0 = top dead centre"
+LOADS = {"typical": "typical model (gas force)", "design": "design model (spring and cam)"}
+KILONEWTON = 1e-3
+SAME = 1e-9  # curves closer than this share of their range are one curve
+NEARLY = 0.98  # of the greatest difference: the first window that has this much is taken
+LEAST_MARK = 0.05  # of a panel's height: a flatter mark would not be seen
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A stored series as it is plotted; `window` is the width (°) of its enlarged view.
+
+    A `steep` one changes by far more than its curves differ, so they are compared in relation to
+    the height that a window needs.
+    """
+
+    series: str
+    title: str
+    axis: str
+    factor: float = 1.0  # from SI to the unit of the axis
+    window: float = 40.0
+    steep: bool = False
+    where: tuple[tuple[str, str], ...] = ()  # joint and axis of a force
+
+    def values(self, run: xr.Dataset) -> np.ndarray:
+        """A run's samples in the unit of the axis."""
+        return run[self.series].sel(dict(self.where)).values * self.factor
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One run in a figure: its name in the legend, its settled samples, and its line."""
+
+    name: str
+    run: xr.Dataset
+    line: Line
+
+    def handle(self) -> Line2D:
+        """The curve's entry in a legend."""
+        return Line2D([], [], label=self.name, **self.line.properties())
+
+
+def degrees(run: xr.Dataset) -> np.ndarray:
+    """Crank angle (°) of a run's samples, counted from the top dead centre where they begin."""
+    angle = np.degrees(run["crank_angle"].values)
+    return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9)
+
+
+def fault_curves(runs: Runs, fault: str, ideal: bool) -> list[Curve]:
+    """The curves of 0.1, 0.2 and 0.3 mm, and that of no clearance before them."""
+    curves = [
+        Curve(f"{c:g} mm", settled(runs[label(fault, c)]), BY_CLEARANCE[c]) for c in CLEARANCES
+    ]
+    return [Curve("no clearance", settled(runs["design"]), IDEAL), *curves] if ideal else curves
+
+
+def load_curves(runs: Runs) -> list[Curve]:
+    """The curves of the typical and the design model, without clearance."""
+    return [Curve(name, settled(runs[load]), BY_LOAD[load]) for load, name in LOADS.items()]
+
+
+def plot(panel: Axes, curves: Sequence[Curve], quantity: Quantity, tick: float = 180.0) -> None:
+    """All curves of one quantity over the whole plotted span; a tick (°) for the crank angle."""
+    for curve in curves:
+        panel.plot(degrees(curve.run), quantity.values(curve.run), **curve.line.properties())
+    angle = degrees(curves[0].run)
+    panel.set_xlim(angle[0], angle[-1])
+    panel.xaxis.set_major_locator(MultipleLocator(tick))
+    panel.set_title(quantity.title)
+    panel.set_ylabel(quantity.axis)
+
+
+def plot_enlarged(
+    full: Axes, enlarged: Axes, curves: Sequence[Curve], quantity: Quantity, part: slice
+) -> None:
+    """The same curves over a part of the span, which is marked in the full panel."""
+    plot(enlarged, curves, quantity)
+    enlarged.xaxis.set_major_locator(MultipleLocator(10 if quantity.window > 30 else 5))
+    angle = degrees(curves[0].run)[part]
+    values = np.array([quantity.values(curve.run)[part] for curve in curves])
+    margin = 0.06 * np.ptp(values)
+    low, high = values.min() - margin, values.max() + margin
+    enlarged.set_xlim(angle[0], angle[-1])
+    enlarged.set_ylim(low, high)
+    bottom, top = full.get_ylim()
+    lift = max(0.0, LEAST_MARK * (top - bottom) - (high - low)) / 2
+    low, high = low - lift, high + lift
+    room = 0.01 * (top - bottom)
+    full.set_ylim(min(bottom, low - room), max(top, high + room))
+    size = angle[-1] - angle[0], high - low
+    full.add_patch(Rectangle((angle[0], low), *size, fill=False, linewidth=1.1, zorder=3))
+
+
+def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:
+    """The samples of the window in which a quantity differs most, and whether it differs at all.
+
+    The window lies around the greatest distance between the outermost curves; for a steep
+    quantity it is the one with the greatest mean distance over the height that it needs. Where all
+    curves are one, it lies around the greatest value.
+    """
+    angle = degrees(curves[0].run)
+    values = np.array([quantity.values(curve.run) for curve in curves])
+    low, high = values.min(axis=0), values.max(axis=0)
+    count = min(angle.size, round(quantity.window / (angle[1] - angle[0])) + 1)
+    half = count // 2
+    inner = slice(half, half + angle.size - count + 1)  # the middle of every window
+    differs = bool((high - low).max() > SAME * np.ptp(values))
+    nearly = NEARLY if differs else 1 - SAME
+    if not differs:
+        score = np.abs(values[0])[inner]
+    elif quantity.steep:
+        height = sliding_window_view(high, count).max(axis=1)
+        height -= sliding_window_view(low, count).min(axis=1)
+        score = sliding_window_view(high - low, count).mean(axis=1) / height
+    else:
+        score = (high - low)[inner]
+    start = first_peak(score, nearly, half)
+    return slice(start, start + count), differs
+
+
+def first_peak(score: np.ndarray, nearly: float, reach: int) -> int:
+    """Where the first maximum that is nearly the greatest lies: equal turns give one place."""
+    first = int(np.argmax(score >= nearly * score.max()))
+    return first + int(np.argmax(score[first : first + reach + 1]))

@@ -1,0 +1,1 @@
+"""A case -> its outcome: motion, metrics, error bars, reasons."""

@@ -1,0 +1,142 @@
+"""Where a case leaves the domain of its laws, or looks like a slip of units.
+
+Nothing here is refused: a case is told of once, before it runs, and grouped over a sweep. What
+cannot be simulated at all is refused by `compressor.cases.conflicts`.
+"""
+
+import math
+import random
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from compressor.cases.case import Case
+from compressor.cases.parameter import IMPLAUSIBLE
+from compressor.cases.study import Study
+from compressor.solve.scales import JointScales, expected_seconds, expected_steps, scales
+
+# key -> values that nobody means in the key's unit, and the unit that they may be in
+SLIPS = {
+    "machine.crank_radius_mm": (0.0, 2.0, "metres"),
+    "machine.rod_length_mm": (0.0, 10.0, "metres"),
+    "machine.pin_radius_mm": (0.0, 0.5, "metres"),
+    "gas.piston_radius_mm": (0.0, 1.0, "metres"),
+    "spring.stroke_mm": (0.0, 1.0, "metres"),
+    "contact.stiffness_N_per_mm15": (1e9, math.inf, "N/m^1.5"),
+}
+SLIP_CLEARANCE = 1e-3  # mm
+ROUND = 10.0  # rpm: speeds that people give are multiples of it
+SAME_SPEED = 0.01  # rpm: how near to a round speed a number of rad/s must come
+SHALLOW = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
+LEAST_STICTION = 0.1  # mm/s: below it, friction all but sticks
+MOST_JOBS = 500  # of a study that are looked at
+SHORT = 4.0  # a budget this many times below what is expected; so far is that to be trusted
+
+
+class Remark(NamedTuple):
+    """What is odd about a case: the key it is about, and why."""
+
+    key: str
+    message: str
+    kind: str  # the same for all cases with the same oddity
+
+
+@dataclass(frozen=True)
+class Caution:
+    """One oddity of a study, told of the first job that has it."""
+
+    key: str
+    message: str
+    jobs: int  # that have it
+    of: int  # jobs looked at
+
+
+def remarks(case: Case) -> Iterator[Remark]:
+    """What is odd about a case; nothing about the defaults."""
+    found = list(scales(case))
+    yield from _slips(case)
+    for joint in found:
+        yield from _depths(case, joint)
+    friction = case.friction
+    if found and friction and 0 < friction.stiction_velocity_mm_per_s < LEAST_STICTION:
+        key = "friction.stiction_velocity_mm_per_s"
+        slow = f"{friction.stiction_velocity_mm_per_s:g} mm/s, below {LEAST_STICTION:g} mm/s"
+        yield Remark(key, f"{slow}: friction all but sticks, and steps get short", "stiction")
+    yield from _budgets(case, found)
+
+
+def _slips(case: Case) -> Iterator[Remark]:
+    """Values that look as if they were in another unit."""
+    unread = {"typical": {"spring"}, "design": {"gas"}}.get(case.load, {"spring", "gas"})
+    if case.joint == "none" or case.contact.exponent != 1.5:
+        unread = unread | {"contact"}
+    for key, (low, high, unit) in SLIPS.items():
+        group, _, name = key.partition(".")
+        if group in unread:
+            continue
+        value = getattr(getattr(case, group), name)
+        if value is not None and low < value < high:
+            yield Remark(key, f"{value:g} looks like {unit}", "unit")
+    rpm = case.machine.speed_rpm
+    meant = rpm * 30 / math.pi
+    near = ROUND * round(meant / ROUND)
+    if abs(meant - near) < SAME_SPEED and rpm != round(rpm):
+        yield Remark("machine.speed_rpm", f"{rpm:g} looks like rad/s: {near:g} rpm", "unit")
+    machine = case.machine
+    most = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2
+    if (machine.rod_inertia_kg_m2 or 0.0) > most:
+        text = f"{machine.rod_inertia_kg_m2:g} kg m2 is more than all mass a rod apart, {most:.3g}"
+        yield Remark("machine.rod_inertia_kg_m2", text, "unit")
+
+
+def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
+    """Penetrations for which the contact law is not meant."""
+    pin, depth = case.machine.pin_radius_mm, 1000 * joint.penetration
+    if depth > IMPLAUSIBLE * pin:
+        text = (
+            f"forces of about {joint.force:.3g} N press {depth:.3g} mm deep, more than a tenth of "
+            "the pin radius, at which a run stops: check stiffness, masses, speed and their units"
+        )
+        yield Remark("contact.stiffness_N_per_mm15", text, "deep")
+        return
+    clearance = 1000 * joint.clearance
+    if clearance < SLIP_CLEARANCE:
+        text = f"{clearance:g} mm is {1e6 * clearance:.3g} nm; as metres, {1000 * clearance:g} mm"
+        yield Remark("clearance_mm", text, "unit")
+    elif depth > SHALLOW * clearance:
+        text = f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm"
+        yield Remark(
+            "clearance_mm", f"{text}: the joint acts as a spring more than as a gap", "shallow"
+        )
+
+
+def _budgets(case: Case, found: list[JointScales]) -> Iterator[Remark]:
+    """Budgets that are likely to run out."""
+    solve, steps = case.solve, expected_steps(case, found)
+    if steps > SHORT * solve.max_steps:
+        text = f"{solve.max_steps} steps, but about {steps:.1g} are expected"
+        yield Remark("solve.max_steps", text, "steps")
+    seconds = expected_seconds(case, steps)
+    if seconds > SHORT * solve.timeout_s:
+        text = f"{solve.timeout_s:g} s, but about {seconds:.1g} s are expected"
+        yield Remark("solve.timeout_s", text, "seconds")
+
+
+def cautions(study: Study, most: int = MOST_JOBS) -> list[Caution]:
+    """What is odd about the selected jobs of a study, an entry for each oddity.
+
+    Of more than `most` jobs as many are looked at, drawn evenly and always the same, so that a
+    large sweep takes no longer.
+    """
+    numbers: Sequence[int] = study.selected
+    if len(numbers) > most:
+        numbers = sorted(random.Random(0).sample(numbers, most))
+    found: dict[tuple[str, str], list[str]] = {}
+    for number in numbers:
+        once = {(one.key, one.kind): one.message for one in remarks(study.cases[number])}
+        for what, message in once.items():
+            found.setdefault(what, []).append(message)
+    return [
+        Caution(key, said[0], len(said), len(numbers))
+        for (key, _), said in sorted(found.items(), key=lambda item: -len(item[1]))
+    ]

@@ -1,0 +1,105 @@
+"""Case -> the SI record of parameters that compiled functions read.
+
+Fields are set as items: as attributes each would take some ten times as long, for every job.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.cases.case import Case
+from compressor.cases.parameter import JOINTS, to_si
+from compressor.physics.loads import cam_corners, gas_corners, printed_corners
+from compressor.physics.record import Law, Load, Scene, derive, new_record
+from compressor.solve.scales import stiffness_of
+
+LOADS = {"none": Load.NONE, "typical": Load.TYPICAL, "design": Load.DESIGN}
+LAWS = {"impact": Law.IMPACT}
+
+
+def scene(case: Case) -> Scene:
+    """The scene of a case: a joint whose clearance is 0 is ideal, whatever `joint` names."""
+    big, small = case.clearance_mm.big_end > 0, case.clearance_mm.small_end > 0
+    return Scene(int(big) * Scene.BIG_END + int(small) * Scene.SMALL_END)
+
+
+def record(case: Case) -> np.record:
+    """The record of a case, every number in SI."""
+    p = new_record()
+    p["scene"], p["load"], p["law"] = scene(case), LOADS[case.load], LAWS[case.contact.law]
+    _machine(case, p)
+    _contact(case, p)
+    _gas(case, p)
+    _spring(case, p)
+    if case.load == "design":
+        p["corners"] = cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
+    elif case.load == "typical":
+        p["corners"] = typical_corners(case)
+    derive(p)
+    return p
+
+
+def typical_corners(case: Case) -> tuple[float, float, float]:
+    """Crank angles (rad) at which suction, compression and discharge begin."""
+    if case.gas.switching == "paper":
+        return printed_corners()
+    return gas_corners(
+        to_si(case.machine.crank_radius_mm, "mm"),
+        to_si(case.machine.rod_length_mm, "mm"),
+        to_si(case.gas.head_clearance_mm, "mm"),
+        case.gas.discharge_MPa / case.gas.suction_MPa,
+        case.gas.exponent,
+    )
+
+
+def offsets(case: Case) -> np.ndarray:
+    """Initial offsets of the journals (m), shape (joint, axis)."""
+    shift = case.initial_offset_mm
+    rows = [[shift.big_end_x, shift.big_end_y], [shift.small_end_x, shift.small_end_y]]
+    return np.array(rows) / 1000
+
+
+def _machine(case: Case, p: np.record) -> None:
+    machine = case.machine
+    p["omega"] = case.omega
+    p["crank_radius"] = to_si(machine.crank_radius_mm, "mm")
+    p["rod_length"] = to_si(machine.rod_length_mm, "mm")
+    p["rod_mass"] = machine.rod_mass_kg
+    p["rod_centre"] = to_si(machine.rod_centre_mm or 0.0, "mm")
+    p["rod_inertia"] = machine.rod_inertia_kg_m2 or 0.0
+    p["reciprocating_mass"] = machine.reciprocating_mass_kg
+    p["gravity"] = machine.gravity_m_per_s2
+    p["pin_radius"] = to_si(machine.pin_radius_mm, "mm")
+
+
+def _contact(case: Case, p: np.record) -> None:
+    contact, friction = case.contact, case.friction
+    p["exponent"] = contact.exponent
+    p["damping"] = to_si(contact.damping_N_s_per_mm, "N s/mm")
+    p["full_damping"] = to_si(contact.full_damping_mm, "mm")
+    for i, joint in enumerate(JOINTS):
+        p["clearance"][i] = to_si(getattr(case.clearance_mm, joint), "mm")
+        p["stiffness"][i] = stiffness_of(case, joint)
+    if friction:
+        p["friction"] = 1
+        p["static"], p["dynamic"] = friction.static, friction.dynamic
+        p["stiction_velocity"] = to_si(friction.stiction_velocity_mm_per_s, "mm/s")
+        p["friction_velocity"] = to_si(friction.friction_velocity_mm_per_s, "mm/s")
+
+
+def _gas(case: Case, p: np.record) -> None:
+    gas = case.gas
+    area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
+    p["suction_force"] = to_si(gas.suction_MPa, "MPa") * area
+    p["discharge_force"] = to_si(gas.discharge_MPa, "MPa") * area
+    p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * area
+    p["head_clearance"] = to_si(gas.head_clearance_mm, "mm")
+    p["gas_exponent"] = gas.exponent
+
+
+def _spring(case: Case, p: np.record) -> None:
+    spring = case.spring
+    p["spring_stiffness"] = to_si(spring.stiffness_N_per_mm, "N/mm")
+    p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")
+    p["preload"] = spring.preload_N
+    p["spring_stroke"] = to_si(spring.stroke_mm, "mm")

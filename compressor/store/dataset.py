@@ -1,0 +1,228 @@
+"""Jobs as one labelled Dataset: metrics in memory, series read when they are used.
+
+How a job's file is read is handed in by `compressor.store.reader`.
+"""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from compressor.cases.case import table
+from compressor.outcome import NUMBERS, coordinates
+from compressor.reasons import Reason
+from compressor.store.files import StoreWarning
+from compressor.store.hdf5 import DamagedJob
+from compressor.store.rows import Rows
+from compressor.store.studies import StoredStudy, points
+
+RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
+UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
+
+# a job's key, names of variables -> those that its file holds
+Values = Callable[[str, Sequence[str]], dict[str, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How jobs are laid out in a Dataset: their keys over named dimensions, and coordinates."""
+
+    dims: tuple[str, ...]
+    keys: np.ndarray
+    coordinates: dict[str, xr.Variable]
+
+
+def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
+    """What swept keys are called as coordinates: their last part, where that is enough."""
+    last = [key.rpartition(".")[2] for key in keys]
+    return {
+        key: RENAMED.get(key, short)
+        if last.count(short) == 1 and key.partition(".")[0] not in UNIT_IN_GROUP
+        else key.replace(".", "_")
+        for key, short in zip(keys, last, strict=True)
+    }
+
+
+def _coordinate(dims: tuple[str, ...], key: str, values: Sequence[Any], units: str) -> xr.Variable:
+    row = table().get(key)
+    attrs = {"units": units} if units else {}
+    attrs |= {"long_name": row.phrase if row else key, "case_key": key}
+    if not units:
+        values = [_word(value) for value in values]
+    return xr.Variable(dims, np.array(values), attrs)
+
+
+def _word(value: Any) -> str:
+    return ", ".join(map(_word, value)) if isinstance(value, tuple) else str(value).lower()
+
+
+def grid(study: StoredStudy) -> Layout:
+    """One study: a dimension for every axis."""
+    names = coordinate_names([axis.key for axis in study.axes])
+    coordinates = {
+        names[axis.key]: _coordinate((names[axis.key],), axis.key, axis.values, axis.units)
+        for axis in study.axes
+    }
+    shape = tuple(len(axis.values) for axis in study.axes)
+    return Layout(tuple(coordinates), np.array(study.keys).reshape(shape), coordinates)
+
+
+def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
+    """Several studies, or one that is no grid: one dimension, `job`."""
+    units = {"joint": "", "load": ""} | {a.key: a.units for s in studies for a in s.axes}
+    rows = [(study, point) for study in studies for point in points(study)]
+    coordinates = {"study": xr.Variable("job", [study.name for study, _ in rows])}
+    for key, name in coordinate_names(list(units)).items():
+        missing = np.nan if units[key] else ""
+        values = [_value(study, point, key, missing) for study, point in rows]
+        coordinates[name] = _coordinate(("job",), key, values, units[key])
+    keys = [key for study in studies for key in study.keys]
+    return Layout(("job",), np.array(keys), coordinates)
+
+
+def _value(study: StoredStudy, point: Mapping[str, Any], key: str, missing: Any) -> Any:
+    """The value of a key in one job of a study."""
+    value = point[key] if key in point else _fixed_value(study.fixed, key, missing)
+    return missing if value is None else value
+
+
+def _fixed_value(fixed: Mapping[str, Any], key: str, missing: Any) -> Any:
+    """The value of a key that a study does not sweep; `missing` where it has no single one."""
+    value: Any = fixed
+    for part in key.split("."):
+        value = value.get(part, missing) if isinstance(value, Mapping) else missing
+    if key == "clearance_mm" and isinstance(value, Mapping):
+        sizes = {size for size in value.values() if size > 0}
+        return sizes.pop() if len(sizes) == 1 else missing
+    return missing if isinstance(value, Mapping) else value
+
+
+def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
+    """The Dataset of a layout from the rows of a store, without time series."""
+    positions = rows.find(layout.keys)
+    variables = _outcomes(layout, rows, positions)
+    found = positions[positions >= 0]
+    if (rows.words["reason"][found] != Reason.INTERNAL_ERROR).any():
+        variables |= _metrics(layout, rows, positions)
+        variables |= {n: xr.Variable(*parts) for n, parts in coordinates().items()}
+    return _with_coordinates(variables, layout)
+
+
+def labelled(
+    layout: Layout, rows: Rows, job: Callable[[str], xr.Dataset], values: Values
+) -> xr.Dataset:
+    """The Dataset of a layout, from the rows of a store and its jobs with time series."""
+    dataset = outcomes(layout, rows)
+    positions = rows.find(layout.keys)
+    found = np.unique(positions[positions >= 0])
+    whole = found[rows.columns["samples"][found] > 0]
+    if not whole.size:
+        return dataset
+    series = _series(layout, rows, positions, whole, job, values)
+    return _with_coordinates(dict(dataset.variables) | series, layout)
+
+
+def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
+    names = ["key", "study", "joint", "axis", "time", *layout.coordinates]
+    dataset = xr.Dataset(variables | layout.coordinates)
+    return dataset.set_coords([name for name in names if name in dataset])
+
+
+def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
+    """Key, status and reason of every job."""
+    there = positions >= 0
+    status = np.where(there, _taken(rows.words["status"], positions), "missing")
+    reason = np.where(there, _taken(rows.words["reason"], positions), "")
+    texts = {
+        "key": (layout.keys, "a job's identity"),
+        "status": (status, "ok, failed or missing"),
+        "reason": (reason, "why a run failed"),
+    }
+    return {
+        name: xr.Variable(layout.dims, values, {"long_name": phrase})
+        for name, (values, phrase) in texts.items()
+    }
+
+
+def _taken(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Values at positions; anything where a position is -1."""
+    return values[positions] if values.size else np.full(positions.shape, "")
+
+
+def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
+    """All numbers of the rows; nan where a job has none."""
+    found = {}
+    for name, (dims, unit, phrase) in NUMBERS.items():
+        values = np.array(rows.numbers[name][positions])
+        values[positions < 0] = np.nan
+        attrs = {"units": unit, "long_name": phrase}
+        found[name] = xr.Variable((*layout.dims, *dims), values, attrs)
+    return found
+
+
+def _series(
+    layout: Layout,
+    rows: Rows,
+    positions: np.ndarray,
+    whole: np.ndarray,
+    job: Callable[[str], xr.Dataset],
+    values: Values,
+) -> dict[str, xr.Variable]:
+    """The time series of all jobs; none but one of the longest is read yet."""
+    samples, ends = rows.columns["samples"], rows.columns["end"]
+    template = _first_readable(rows.columns["key"][whole[np.argsort(-samples[whole])]], job)
+    if not template:
+        return {}
+    shared = len({*zip(samples[whole].tolist(), ends[whole].tolist(), strict=True)}) == 1
+    keys = np.where(np.isin(positions, whole), layout.keys, "").astype(object)
+    found = {"time": template["time"].variable} if shared else {}
+    for name, item in template.variables.items():
+        if "time" in item.dims and name not in found:
+            dims = (*layout.dims, "time" if shared else "sample", *item.dims[1:])
+            lazy = indexing.LazilyIndexedArray(StudySeries(values, str(name), keys, item.shape))
+            found[str(name)] = xr.Variable(dims, lazy, item.attrs)
+    return found
+
+
+def _first_readable(keys: np.ndarray, job: Callable[[str], xr.Dataset]) -> xr.Dataset:
+    """The first of some jobs that is not damaged; who reads the others is told."""
+    for key in keys:
+        try:
+            return job(key.decode())
+        except DamagedJob as error:
+            damage = error
+    warnings.warn(f"{damage}: no time series can be read", StoreWarning, stacklevel=2)
+    return xr.Dataset()
+
+
+class StudySeries(BackendArray):
+    """One series of all jobs of a study; indexing reads the files of the jobs asked for."""
+
+    def __init__(self, values: Values, name: str, keys: np.ndarray, longest: tuple[int, ...]):
+        self.values, self.name, self.keys, self.longest = values, name, keys, longest
+        self.shape = (*keys.shape, *longest)
+        self.dtype = np.dtype(float)
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> np.ndarray:
+        basic = indexing.IndexingSupport.BASIC
+        return indexing.explicit_indexing_adapter(key, self.shape, basic, self._read)
+
+    def _read(self, index: tuple[Any, ...]) -> np.ndarray:
+        jobs, samples = index[: self.keys.ndim], index[self.keys.ndim :]
+        keys = np.asarray(self.keys[jobs], dtype=object)
+        blocks = [self._block(key)[samples] for key in keys.flat]
+        inner = np.empty(self.longest)[samples].shape
+        return np.array(blocks).reshape((*keys.shape, *inner))
+
+    def _block(self, key: str) -> np.ndarray:
+        """A job's series, nan beyond its end."""
+        block = np.full(self.longest, np.nan)
+        if key:
+            values = self.values(key, [self.name])[self.name]
+            block[: len(values)] = values
+        return block

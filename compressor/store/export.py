@@ -1,0 +1,265 @@
+"""Results for other programs: metrics of studies and time series of jobs, as netCDF or as CSV.
+
+A CSV file has one header line, units in brackets where a name does not end in its unit, and
+numbers that read back to the bit; an empty cell is a number that there is not. Rows are written
+block by block, and every file is whole or absent.
+"""
+
+import csv
+import io
+import itertools
+import json
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import compressor
+from compressor.store.files import Folder, StoreError, publish, publishing
+from compressor.store.hdf5 import DamagedJob
+from compressor.store.reader import Stored, read_store
+from compressor.store.series_file import read_bytes, read_series, write_dataset
+from compressor.store.status import whole_key
+from compressor.store.studies import StoredStudy, read_studies
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SUFFIXES = {"netcdf": ".nc", "csv": ".csv"}
+BLOCK = 4096  # rows of a CSV file that are text at the same time
+HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
+
+Progress = Callable[[int, int, str], None]  # files written, files in all, a remark or ""
+
+
+class ExportError(ValueError):
+    """What cannot be exported to where it was asked for."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A file that was written."""
+
+    path: str
+    kind: str  # metrics: of studies, a row a job | series: of one job, a row a sample
+    name: str  # of the studies, or the job's key
+    rows: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class _Task:
+    """A file to be written: with metrics of studies, or with the time series of one job."""
+
+    path: Path
+    studies: tuple[StoredStudy, ...] = ()
+    key: str = ""
+    named: bool = True  # rather than one of all jobs of a study
+
+
+def export(
+    folder: Folder,
+    names: Sequence[str],
+    output: Folder,
+    form: str | None = None,
+    series: bool = False,
+    force: bool = False,
+    progress: Progress = lambda done, total, remark: None,
+) -> tuple[list[Exported], list[DamagedJob]]:
+    """Write what `names` name, studies and jobs by the beginning of their keys, else all studies.
+
+    output: a file, .nc or .csv, for the studies together as one table, or for one job; or a folder,
+    in which each gets a file in `form`, netcdf (the default) or csv. series: also the time series
+    of every job of the studies, in a folder beside each. force: replace what is there.
+
+    Returns what was written, and damage that was met, which costs the jobs in it alone. Raises
+    ExportError before anything is written, StoreError where the store or the disk gives way.
+    """
+    stored, known = read_store(folder), read_studies(folder)
+    studies, keys = _named(folder, names, stored, known)
+    target = Path(output)
+    form, is_file = _form(target, form)
+    if is_file:
+        tasks = [_one_file(target, studies, keys, series)]
+    else:
+        tasks = [*_files(target, SUFFIXES[form], stored, studies, keys, series)]
+    if not force:
+        _refuse_existing(tasks)
+    found, damaged = [], list(stored.damaged)
+    for number, task in enumerate(tasks):
+        progress(number, len(tasks), "")
+        try:
+            found.append((_metrics if task.studies else _series)(task, stored, form))
+        except DamagedJob as error:
+            if task.named:
+                raise
+            damaged.append(error)
+    return found, damaged
+
+
+def _named(
+    folder: Folder, names: Sequence[str], stored: Stored, known: Sequence[StoredStudy]
+) -> tuple[list[StoredStudy], list[str]]:
+    """The studies and the keys of the jobs that are named, each once; all studies by default."""
+    by_name = {study.name: study for study in known}
+    if not names:
+        return list(known), []
+    studies, keys = [], []
+    for name in dict.fromkeys(names):
+        if name in by_name:
+            studies.append(by_name[name])
+        elif HEXADECIMAL.fullmatch(name):
+            keys.append(whole_key(folder, name, stored, known))
+        else:
+            remedy = f"it holds {', '.join(by_name)}; a job is named by its key"
+            raise StoreError(folder, f"holds no study {name!r}", remedy)
+    return studies, list(dict.fromkeys(keys))
+
+
+def _form(target: Path, form: str | None) -> tuple[str, bool]:
+    """The form of an export, and whether it goes to one file, which its suffix tells."""
+    told = {suffix: form for form, suffix in SUFFIXES.items()}.get(target.suffix)
+    if told is None or target.is_dir():
+        return form or "netcdf", False
+    if form not in (None, told):
+        raise ExportError(f"{target} is no name for {form}: end it in {SUFFIXES[form or told]}")
+    return told, True
+
+
+def _one_file(
+    target: Path, studies: Sequence[StoredStudy], keys: Sequence[str], series: bool
+) -> _Task:
+    if series or len(keys) > 1 or (keys and studies):
+        raise ExportError(f"{target} is one file, and this needs several: give a folder")
+    return _Task(target, tuple(studies), "".join(keys))
+
+
+def _files(
+    target: Path,
+    suffix: str,
+    stored: Stored,
+    studies: Sequence[StoredStudy],
+    keys: Sequence[str],
+    series: bool,
+) -> Iterator[_Task]:
+    """A file for each study and each job, and those of the studies' time series."""
+    for study in studies:
+        yield _Task(target / f"{study.name}{suffix}", (study,))
+        if series:
+            positions = stored.rows.find(study.keys)
+            kept = (positions >= 0) & (stored.rows.columns["samples"][positions] > 0)
+            for key in dict.fromkeys(itertools.compress(study.keys, kept.tolist())):
+                yield _Task(target / study.name / f"{key}{suffix}", key=key, named=False)
+    for key in keys:
+        yield _Task(target / f"{key}{suffix}", key=key)
+
+
+def _refuse_existing(tasks: Iterable[_Task]) -> None:
+    for task in tasks:
+        if os.path.lexists(task.path):
+            raise ExportError(f"{task.path} exists: --force replaces it")
+
+
+def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
+    """The numbers of all jobs of studies as one table; in netCDF a lone grid keeps its axes."""
+    from compressor.store.dataset import (  # loads xarray: half a second
+        grid,
+        outcomes,
+        table_of_jobs,
+    )
+
+    studies = task.studies
+    if form == "csv":
+        table = outcomes(table_of_jobs(studies), stored.rows)
+        size = write_csv(task.path, columns(table, "job"))
+    else:
+        is_grid = len(studies) == 1 and studies[0].is_grid
+        layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
+        table = outcomes(layout, stored.rows).assign_attrs(_attributes(studies))
+        size = write_dataset(task.path, _linked(table)).stat().st_size
+    jobs = sum(study.jobs for study in studies)
+    name = " ".join(study.name for study in studies)
+    return Exported(os.fspath(task.path), "metrics", name, jobs, size)
+
+
+def _series(task: _Task, stored: Stored, form: str) -> Exported:
+    """The time series of one job. In netCDF it is the stored file, to the byte."""
+    position = stored.position(task.key)
+    if position is None:
+        raise StoreError(stored.folder, f"job {task.key} is not stored", "run its case file first")
+    source, samples = stored.rows.path(position), int(stored.rows.columns["samples"][position])
+    if source is None:
+        remedy = "run its case file with --set output.keep=series, or export its study"
+        raise StoreError(stored.folder, f"job {task.key} has no time series", remedy)
+    if form == "csv":
+        size = write_csv(task.path, columns(read_series(source), "time"))
+    else:
+        data = read_bytes(source)
+        publish(task.path, data)
+        size = len(data)
+    return Exported(os.fspath(task.path), "series", task.key, samples, size)
+
+
+def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
+    """The variables along a dimension as columns by header, those of joints and axes one by one."""
+    found = {}
+    leading = [name for name in table.coords if table[name].dims == (dim,)]
+    for name in dict.fromkeys([*leading, *table.data_vars]):
+        item = table[name]
+        if item.dims[:1] != (dim,):
+            continue
+        unit = item.attrs.get("units", "1")
+        ending = "" if unit == "1" or "case_key" in item.attrs else f" [{unit}]"
+        inner = [table[other].values.tolist() for other in item.dims[1:]]
+        values = item.values.reshape(len(item), -1)
+        for number, labels in enumerate(itertools.product(*inner)):
+            found["_".join([str(name), *labels]) + ending] = values[:, number]
+    return found
+
+
+def write_csv(path: Path, table: dict[str, np.ndarray]) -> int:
+    """Write columns of equal length as CSV, durably; returns the bytes written."""
+    rows = len(next(iter(table.values())))
+    with publishing(path) as file:
+        text = io.TextIOWrapper(file, "utf-8", newline="", write_through=True)
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(table)
+        for start in range(0, rows, BLOCK):
+            parts = [_cells(values[start : start + BLOCK]) for values in table.values()]
+            writer.writerows(zip(*parts, strict=True))
+        text.detach()
+        return file.tell()
+
+
+def _cells(values: np.ndarray) -> list[Any]:
+    """Values as csv takes them: floats are written to the last digit, nan as nothing."""
+    if values.dtype.kind != "f":
+        return values.tolist()
+    cells = values.astype(float).astype(object)
+    cells[np.isnan(values)] = ""
+    return cells.tolist()
+
+
+def _linked(table: "xr.Dataset") -> "xr.Dataset":
+    """A table whose variables name their coordinates, as netCDF's readers expect."""
+    others = [name for name in table.coords if name not in table.dims]
+    linked = table.copy()
+    for name in table.data_vars:
+        mine = [n for n in others if {*table[n].dims} <= {*table[name].dims}]
+        linked[name].attrs["coordinates"] = " ".join(map(str, mine))
+    return linked
+
+
+def _attributes(studies: Sequence[StoredStudy]) -> dict[str, str]:
+    """Where the numbers of a file come from."""
+    told = ("name", "case_file", "fixed", "command", "versions", "written")
+    origin = [{name: getattr(study, name) for name in told} for study in studies]
+    return {
+        "title": f"compsim: {' '.join(study.name for study in studies)}",
+        "program": f"compsim {compressor.__version__}",
+        "studies": json.dumps(origin),
+    }

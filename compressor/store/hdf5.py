@@ -1,0 +1,216 @@
+"""HDF5 files in memory: built as bytes that are netCDF-4, and opened from bytes, checked.
+
+HDF5 can crash the process when a disk fills up while it writes, or when it follows what a damaged
+file says; so that it never touches a disk here: `compressor.store.files` writes the bytes, and who
+reads them compares their digest first. A digest tells of damage, not of malice: what is opened is
+also checked before HDF5 follows it. Only this module imports h5py.
+"""
+
+import contextlib
+import hashlib
+import math
+import struct
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5d, h5f, h5l, h5o, h5p, h5z
+
+from compressor.store.files import Folder, StoreError, system_error
+
+Variables = Mapping[str, tuple[tuple[str, ...], np.ndarray, Mapping[str, Any]]]
+
+TEXT = h5py.string_dtype()  # variable-length UTF-8
+OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"}  # attributes
+LAYOUTS = {h5d.COMPACT, h5d.CONTIGUOUS, h5d.CHUNKED}  # a virtual dataset lies in other files
+FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
+GZIP_LEVEL = 4
+MOST_EXPANSION = 1100  # deflate's limit is 1032: what claims to hold more is no honest file
+HEAP = b"GCOL\1\0\0\0"  # begins a global heap (version 1), where HDF5 keeps texts of any length
+HEAP_HEAD = struct.Struct("<8sQ")  # signature and version, size with this head
+HEAP_ITEM = struct.Struct("<H6xQ")  # number, size without this head; but of the free rest with it
+TEXT_PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("item", "<u4")])
+MOST_TEXT = 60_000  # bytes in an attribute, which HDF5 limits to 64 KiB
+BARE = "This is a netCDF dimension but not a netCDF variable."  # what netCDF calls such a scale
+# what h5py, numpy and who reads raise on a file that is none of ours
+FOREIGN = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError,
+           ArithmeticError)  # fmt: skip
+REMEDY = "run its study again, which replaces it"
+
+
+class DamagedJob(StoreError):
+    """A file of the store that is not what was written, or holds what none of ours does."""
+
+
+def digest(data: bytes) -> str:
+    """The checksum in the name of a stored file: 20 hexadecimal digits (BLAKE2b)."""
+    return hashlib.blake2b(data, digest_size=10).hexdigest()
+
+
+def image(
+    variables: Variables, attributes: Mapping[str, Any], deflated: Collection[str] = ()
+) -> bytes:
+    """Variables, (dims, values, attributes) by name, as the bytes of a netCDF-4 file.
+
+    A variable with the name of its one dimension is that dimension's coordinate. `deflated` ones
+    are shuffled and compressed.
+    """
+    with h5py.File("image", "w", driver="core", backing_store=False, track_order=True) as file:
+        for name, (dims, values, attrs) in variables.items():
+            dtype = TEXT if values.dtype.kind in "OU" else values.dtype
+            how = {"compression": GZIP_LEVEL, "shuffle": True} if name in deflated else {}
+            stored = file.create_dataset(name, data=values.astype(dtype), dtype=dtype, **how)
+            _set_attributes(stored, attrs)
+            if dims == (name,):
+                stored.make_scale(name)
+        for name, (dims, values, _) in variables.items():
+            for number, dim in enumerate(dims):
+                if dim not in file:  # takes no space: nothing is written to it
+                    bare = file.create_dataset(dim, (values.shape[number],), ">f4")
+                    bare.make_scale(f"{BARE}{values.shape[number]:10}")
+                if dim != name:
+                    file[name].dims[number].attach_scale(file[dim])
+        _set_attributes(file, attributes)
+        file.flush()
+        return file.id.get_file_image()
+
+
+def _set_attributes(stored: Any, attributes: Mapping[str, Any]) -> None:
+    for name, value in attributes.items():
+        if isinstance(value, str):  # of a fixed length: HDF5 is not safe with hostile other ones
+            encoded = storable(value).encode()[:MOST_TEXT].decode(errors="ignore").encode()
+            kind = h5py.string_dtype("utf-8", max(1, len(encoded)))
+            stored.attrs.create(name, encoded, dtype=kind)
+        else:
+            stored.attrs[name] = value
+
+
+def storable(text: str) -> str:
+    """Text as HDF5 can hold it: without NUL and lone surrogates."""
+    return text.encode(errors="replace").decode().replace("\0", "\ufffd")
+
+
+def _image(data: bytes) -> h5py.File:
+    """The HDF5 file that bytes are."""
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(backing_store=False)
+    access.set_file_image(data)
+    return h5py.File(h5f.open(b"image", h5f.ACC_RDONLY, access))
+
+
+@contextlib.contextmanager
+def opened(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.File]:
+    """The HDF5 file that `data` is, every part of it checked; `path` is named in errors.
+
+    Raises DamagedJob for what is no HDF5 file or holds what ours never do: groups, links, data in
+    other files, foreign filters, types other than numbers and text, more data than can be in it.
+    What goes wrong while the caller reads is a DamagedJob, too.
+    """
+    try:
+        with _image(data) as file:
+            for name in file:
+                if problem := _objection(file, name, data):
+                    raise DamagedJob(path, f"is refused: {name} {problem}", remedy)
+            yield file
+    except FOREIGN as error:
+        if isinstance(error, OSError) and error.errno:
+            raise system_error(path, error) from error
+        problem = "is no finished job of compsim: cut short, damaged, or foreign"
+        raise DamagedJob(path, problem, remedy) from error
+
+
+def _texts_are_there(entry: h5d.DatasetID, data: bytes) -> bool:
+    """Whether texts of any length are where a dataset says; HDF5 believes it whatever it says."""
+    offset, count = entry.get_offset(), math.prod(entry.shape)
+    if offset is None or offset + count * TEXT_PLACE.itemsize > len(data):
+        return False
+    places = np.frombuffer(data, TEXT_PLACE, count, offset)
+    heaps = {heap: _items(data, heap) for heap in set(places["heap"].tolist())}
+    return all(heaps[heap].get(item) == length for length, heap, item in places.tolist() if length)
+
+
+def _items(data: bytes, heap: int) -> dict[int, int]:
+    """The sizes of a global heap's items by number; none where they do not fill it exactly."""
+    if heap + HEAP_HEAD.size > len(data):
+        return {}
+    signature, size = HEAP_HEAD.unpack_from(data, heap)
+    at, end = heap + HEAP_HEAD.size, heap + size
+    found: dict[int, int] = {}
+    while signature == HEAP and at + HEAP_ITEM.size <= end <= len(data):
+        number, length = HEAP_ITEM.unpack_from(data, at)
+        if number == 0:  # the free rest
+            return found if at + length == end else {}
+        found[number] = length
+        at += HEAP_ITEM.size + (length + 7) // 8 * 8
+    return found if at == end or end - HEAP_ITEM.size < at < end else {}
+
+
+def _objection(file: h5py.File, name: str, data: bytes) -> str:
+    """What is wrong with an entry of the file that `data` is, or ""."""
+    encoded = name.encode(errors="surrogateescape")
+    if file.id.links.get_info(encoded).type != h5l.TYPE_HARD:
+        return "is a link"
+    entry = h5o.open(file.id, encoded)
+    if not isinstance(entry, h5d.DatasetID):
+        return "is no dataset"
+    how = entry.get_create_plist()
+    if how.get_layout() not in LAYOUTS or how.get_external_count():
+        return "lies in another file"
+    if {how.get_filter(number)[0] for number in range(how.get_nfilters())} - FILTERS:
+        return "needs a foreign filter"
+    dtype = entry.dtype
+    if dtype.kind not in "fiuS" and not h5py.check_string_dtype(dtype):
+        return f"holds {dtype}, neither numbers nor text"
+    if math.prod(entry.shape) * dtype.itemsize > len(data) * MOST_EXPANSION:
+        return "claims more data than the file can hold"
+    if dtype.kind == "O" and not _texts_are_there(entry, data):
+        return "holds texts that are not where it says"
+    return ""
+
+
+def attributes(stored: Any) -> dict[str, Any]:
+    """The attributes that are no business of HDF5's or netCDF's: text and numbers."""
+    names = (n for n in stored.attrs if n not in OF_NETCDF and not n.startswith("_"))
+    return {name: _attribute(stored, name) for name in names}
+
+
+def _attribute(stored: Any, name: str) -> Any:
+    """An attribute. Raises ValueError where HDF5 could read more than its type tells."""
+    found = stored.attrs.get_id(name)
+    dtype = found.dtype
+    plain = dtype.kind in "fiuS"
+    if name == "REFERENCE_LIST":  # a reference and a number
+        plain = bool(dtype.names) and h5py.check_ref_dtype(dtype[0]) and dtype[1].kind in "iu"
+    size = math.prod(found.shape) * dtype.itemsize
+    if not plain or size > stored.file.id.get_filesize():
+        raise ValueError(f"{name}: {dtype}")
+    value = stored.attrs[name]
+    return value.decode() if isinstance(value, bytes) else value
+
+
+def variables(file: h5py.File) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+    """All variables of a file, as `image` takes them."""
+    found, dims = {}, _dimensions(file)
+    for name, stored in file.items():
+        is_text = h5py.check_string_dtype(stored.dtype) and stored.dtype.kind == "O"
+        values = np.asarray(stored.asstr()[()] if is_text else stored[()])
+        if is_text:
+            values = values.astype(object)
+        found[name] = dims[name], values, attributes(stored)
+    return found
+
+
+def _dimensions(file: h5py.File) -> dict[str, tuple[str, ...]]:
+    """The names of the dimensions of each variable, from the coordinates that tell of them."""
+    found = {name: [""] * stored.ndim for name, stored in file.items()}
+    for name, stored in file.items():
+        if "CLASS" in stored.attrs and _attribute(stored, "CLASS") == "DIMENSION_SCALE":
+            found[name] = [name]
+        if "REFERENCE_LIST" not in stored.attrs:
+            continue
+        for variable, number in _attribute(stored, "REFERENCE_LIST"):
+            found[file[variable].name.removeprefix("/")][number] = name
+    if any("" in names for names in found.values()):
+        raise ValueError("a dimension has no name")
+    return {name: tuple(names) for name, names in found.items()}

@@ -1,0 +1,275 @@
+"""The store: a folder of finished jobs and of the studies they belong to.
+
+    <folder>/rows/<number>-<digest>.h5   how many jobs ended, and their numbers: `segments`
+    <folder>/jobs/<key>-<digest>.h5      one job with its time series, where kept: `jobfiles`
+    <folder>/studies/<name>.json         one study: axes, keys of its jobs in C order: `manifest`
+    <folder>/shards/<shard>/{rows,jobs}  the same of a run that is one of several
+
+A job is stored when it has a row and, if the row tells of time series, their file. Every file
+appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
+no index: what is stored is read from the rows. `compressor.store.writer` writes them.
+"""
+
+import os
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from compressor.cases.case import Case
+from compressor.metrics import HORIZON
+from compressor.outcome import Outcome, coordinates
+from compressor.reasons import Reason
+from compressor.store.files import (
+    Folder,
+    StoreError,
+    StoreWarning,
+    discard_leftovers,
+    system_error,
+)
+from compressor.store.hdf5 import DamagedJob
+from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
+from compressor.store.series_file import KEY, read_series, read_values, write_dataset, write_series
+from compressor.store.studies import StoredAxis, StoredStudy, points, read_studies, write_study
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "DamagedJob",
+    "Folder",
+    "JobStatus",
+    "StoreError",
+    "Stored",
+    "StoredAxis",
+    "StoredStudy",
+    "discard_leftovers",
+    "finished_keys",
+    "job_status",
+    "open_study",
+    "points",
+    "read_job",
+    "read_series",
+    "read_store",
+    "read_studies",
+    "read_values",
+    "write_dataset",
+    "write_series",
+    "write_study",
+]
+
+# reasons that leave no time series
+BROKEN = {Reason.INTERNAL_ERROR, Reason.WORKER_DIED, Reason.OUT_OF_MEMORY, Reason.INVALID_INPUT}
+ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
+
+
+@dataclass(frozen=True)
+class JobStatus:
+    """How a stored job ended, and what is kept of it."""
+
+    key: str
+    status: str  # ok | failed
+    reason: str  # a stable name; empty when ok
+    detail: str
+    samples: int  # of the time series; 0 where only metrics are kept
+    precision: str  # of the time series: double | single
+    numbers: np.void  # dtype schema.ROW
+
+    @property
+    def bars(self) -> bool:
+        """Whether metrics have error bars."""
+        return not np.isnan(self.numbers["peak_acceleration_error"])
+
+    def serves(self, case: Case) -> bool:
+        """Whether a case needs no new run.
+
+        The one place that knows of what a case may ask for without it being in its key.
+        """
+        if self.reason == Reason.BUDGET_SECONDS:
+            return False  # a machine with more time to spare may do it
+        if self.reason in BROKEN:
+            return True
+        if case.wants_bars and self.status == "ok" and not self.bars:
+            return False
+        if case.solve.horizon and self.status == "ok" and np.isnan(self.numbers[HORIZON]):
+            return False
+        if case.output.keep == "metrics":
+            return True
+        return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
+
+
+class Stored:
+    """What a folder held when it was read: `rows`, and the segments that are `damaged`."""
+
+    def __init__(self, folder: Path, segments: Sequence[Segment], damaged: Sequence[DamagedJob]):
+        self.folder, self.segments, self.damaged = folder, segments, damaged
+        self.rows = Rows.of(segments, _usable)
+
+    def warned(self) -> "Stored":
+        """The same, after warnings of the damage: its readers go on without some jobs."""
+        for damage in self.damaged:
+            text = f"{damage}: its jobs count as missing"
+            warnings.warn(text, StoreWarning, stacklevel=3)
+        return self
+
+    def keys(self) -> set[str]:
+        """The keys of all stored jobs, failed ones included."""
+        return {key.decode() for key in self.rows.columns["key"]}
+
+    def position(self, key: str) -> int | None:
+        """Where a job stands in `rows`; None where it is not stored."""
+        position = int(self.rows.find([key])[0])
+        return position if position >= 0 else None
+
+    def physics_key(self, key: str) -> str:
+        """What a stored job simulates, by its hash."""
+        return bytes(self.rows.columns["physics_key"][self.position(key)]).decode()
+
+    def status(self, key: str) -> JobStatus | None:
+        """How a stored job ended; None where it is not stored."""
+        position = self.position(key)
+        return None if position is None else self.status_at(position)
+
+    def status_at(self, position: int) -> JobStatus:
+        """How the job at a position of `rows` ended."""
+        rows = self.rows
+        words = {name: str(values[position]) for name, values in rows.words.items()}
+        return JobStatus(
+            rows.columns["key"][position].decode(),
+            words["status"],
+            words["reason"],
+            rows.detail(position) if words["status"] != "ok" else "",
+            int(rows.columns["samples"][position]),
+            words["precision"],
+            rows.numbers[position],
+        )
+
+    def outcome(self, position: int) -> Outcome:
+        """The outcome of the job at a position of `rows`."""
+        words = {name: str(values[position]) for name, values in self.rows.words.items()}
+        attributes = self.rows.attributes(position)
+        return Outcome(words["status"], words["reason"], self.rows.numbers[position], attributes)
+
+    def job(self, key: str) -> "xr.Dataset":
+        """A stored job's Dataset. Raises StoreError where there is none, or a damaged one."""
+        if not KEY.fullmatch(key):
+            raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
+        position = self.position(key)
+        if position is None:
+            raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
+        path = self.rows.path(position)
+        if path is not None:
+            return read_series(path)
+        import xarray as xr
+
+        found = self.outcome(position)
+        return xr.Dataset(found.variables(), coordinates(), found.attributes)
+
+    def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Some variables of a stored job's time series."""
+        position = self.position(key)
+        path = None if position is None else self.rows.path(position)
+        return {} if path is None else read_values(path, names)
+
+
+def _usable(segment: Segment) -> np.ndarray:
+    """Which rows of a segment count: not those whose time series are gone."""
+    columns = segment.columns
+    kept = columns["samples"] > 0
+    if not kept.any():
+        return ~kept
+    names = np.array(_names(segment.place / "jobs"), "S")
+    wanted = np.char.add(np.char.add(np.char.add(columns["key"], b"-"), columns["digest"]), b".h5")
+    return ~kept | np.isin(wanted, names)
+
+
+def _names(folder: Path) -> list[str]:
+    """The files of a folder that may not be there."""
+    try:
+        return os.listdir(folder)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise system_error(folder, error) from error
+
+
+def places(folder: Folder) -> list[Path]:
+    """The folders that hold `rows` and `jobs`: the store's own, and its shards'."""
+    shards = sorted(_names(Path(folder) / "shards"))
+    return [Path(folder), *(Path(folder) / "shards" / name for name in shards)]
+
+
+def segment_paths(place: Path) -> list[Path]:
+    """The segments of one place, in the order of their numbers."""
+    return [place / "rows" / n for n in sorted(_names(place / "rows")) if NAME.fullmatch(n)]
+
+
+def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
+    """What a folder holds. Damage that is `bearable` is kept in `damaged`, other is raised."""
+    folder = Path(os.path.abspath(folder))
+    for _ in range(ATTEMPTS):
+        segments, damaged = [], []
+        try:
+            for path in (path for place in places(folder) for path in segment_paths(place)):
+                try:
+                    segments.append(read_segment(path))
+                except bearable as error:
+                    damaged.append(error)
+        except FileNotFoundError:
+            continue  # merged with others meanwhile
+        except OSError as error:
+            raise system_error(folder, error) from error
+        return Stored(folder, segments, damaged)
+    raise StoreError(folder, "changes faster than it can be read", "try again")
+
+
+def read_job(folder: Folder, key: str) -> "xr.Dataset":
+    """A stored job's Dataset (`Stored.job`); who reads many jobs keeps a `Stored`."""
+    return read_store(folder).job(key)
+
+
+def job_status(folder: Folder, key: str) -> JobStatus | None:
+    """How a stored job ended (`Stored.status`); None where it is not stored."""
+    return read_store(folder).status(key)
+
+
+def finished_keys(folder: Folder) -> set[str]:
+    """The keys of all stored jobs, failed ones included."""
+    return read_store(folder).keys()
+
+
+def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
+    """A study as one Dataset, labelled by its axes; series are read when they are used.
+
+    One study (that of `name`, or the only one) has its axes as dimensions: the last part of each
+    swept key, such as `clearance_mm`, in the case file's unit; a swept `joint` is called `fault`.
+    Several studies, and one that is no grid (zip, samples, exclude, blocks), have a `job` dimension
+    with coordinates `study`, `fault`, `load` and each swept key. `key` names every job (see
+    `read_job`), `status` is ok, failed or missing, and metrics are nan where a job did not reach
+    its end.
+
+    Series have the dimension `time`. If the jobs have different output grids (a swept speed),
+    they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.
+    """
+    from compressor.store.dataset import (  # loads xarray: half a second
+        grid,
+        labelled,
+        table_of_jobs,
+    )
+
+    folder = os.path.abspath(folder)
+    studies = read_studies(folder)
+    if name is not None:
+        known = ", ".join(study.name for study in studies)
+        studies = [study for study in studies if study.name == name]
+        if not studies:
+            raise StoreError(folder, f"holds no study {name!r}", f"it holds {known}")
+    stored = read_store(folder).warned()
+    is_grid = len(studies) == 1 and studies[0].is_grid
+    layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
+    dataset = labelled(layout, stored.rows, stored.job, stored.values)
+    dataset.attrs = {"folder": folder, "studies": [study.name for study in studies]}
+    return dataset

@@ -1,0 +1,134 @@
+"""Files with the time series of one job: netCDF-4 that xarray, h5py and ncdump read.
+
+    <folder>/jobs/<key>-<digest>.h5    everything of one job, the numbers of its row included
+
+The digest of the file's bytes is in its name and in the job's row, and compared whenever the file
+is read. A job that is run again gets a new name, so that its old result stays whole until the new
+row is on disk.
+"""
+
+import errno
+import re
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from compressor.cases.case import Output
+from compressor.outcome import NUMBERS, SeriesFile, Table
+from compressor.store import hdf5
+from compressor.store.files import StoreError, publish, system_error
+from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+KEY = re.compile(r"[0-9a-f]{20}")
+NAME = re.compile(r"([0-9a-f]{20})-([0-9a-f]{20})\.h5")
+ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
+
+
+def series_path(place: Path, key: str, checksum: str) -> Path:
+    """Where a job's time series stand; `place` is the folder that holds `jobs`."""
+    if not KEY.fullmatch(key):
+        raise StoreError(place, f"{key!r} is no job's key", "a key is 20 hexadecimal digits")
+    return place / "jobs" / f"{key}-{checksum}.h5"
+
+
+def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> SeriesFile:
+    """Store a job's Dataset, or what it is made of, durably."""
+    file, data = series_file(dataset, output)
+    store_series(place, dataset.attrs["key"], file, data)
+    return file
+
+
+def series_file(dataset: "Table | xr.Dataset", output: Output) -> tuple[SeriesFile, bytes]:
+    """The file that a job's Dataset makes, and its bytes."""
+    data, times = series_image(dataset, output), dataset.variables["time"].values
+    return SeriesFile(times.size, float(times[-1]), output.precision, digest(data)), data
+
+
+def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
+    """Put the bytes of a job's file in their place, durably."""
+    publish(series_path(place, key, file.digest), data)
+
+
+def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:
+    """A job's Dataset as the bytes of its file."""
+    series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
+    rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
+    return image_of(dataset, rounded, series if output.compress else ())
+
+
+def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
+    """Store a Dataset that is no job as netCDF-4, durably."""
+    publish(path, image_of(dataset))
+    return path
+
+
+def image_of(
+    dataset: "Table | xr.Dataset", rounded: Collection[str] = (), deflated: Collection[str] = ()
+) -> bytes:
+    """A Dataset as the bytes of a file; `rounded` variables in single precision."""
+    variables = {
+        str(name): (
+            tuple(map(str, item.dims)),
+            item.values.astype("f4") if name in rounded else item.values,
+            item.attrs,
+        )
+        for name, item in dataset.variables.items()
+    }
+    attributes = {str(name): value for name, value in dataset.attrs.items()}
+    return hdf5.image(variables, attributes, deflated)
+
+
+def intact(path: Path) -> bool:
+    """Whether a file is there, and its bytes, as far as the disk gives them, as written.
+
+    Raises StoreError where it may not be read.
+    """
+    named = NAME.fullmatch(path.name)
+    try:
+        return named is not None and digest(path.read_bytes()) == named[2]
+    except OSError as error:
+        if error.errno in (errno.ENOENT, errno.EIO):
+            return False
+        raise system_error(path, error) from error
+
+
+def read_bytes(path: Path) -> bytes:
+    """The bytes of a job's file, compared with their digest. Raises DamagedJob."""
+    named = NAME.fullmatch(path.name)
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise StoreError(path, "is not there any more", "run its study again") from error
+    except OSError as error:
+        raise system_error(path, error) from error
+    if named is None or digest(data) != named[2]:
+        raise DamagedJob(path, "is damaged: its bytes are not those that were written", REMEDY)
+    return data
+
+
+def read_series(path: Path) -> "xr.Dataset":
+    """A job's Dataset, from a file. Raises DamagedJob."""
+    import xarray as xr
+
+    with opened(read_bytes(path), path) as file:
+        attributes = hdf5.attributes(file)
+        if attributes["key"] != path.name[:20]:
+            raise ValueError
+        dataset = xr.Dataset(hdf5.variables(file), attrs=attributes)
+        for name, (dims, _, _) in NUMBERS.items():
+            if name in dataset and (dataset[name].dims, dataset[name].dtype.kind) != (dims, "f"):
+                raise ValueError
+        if not {"status", "reason", "time"} <= set(dataset.variables):
+            raise ValueError
+        return dataset
+
+
+def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Some variables of a job's file by name, without those that it does not have."""
+    with opened(read_bytes(path), path) as file:
+        return {name: file[name][()] for name in names if name in file}

@@ -1,0 +1,107 @@
+"""What a store can be asked: how its studies stand, and what is known of one job.
+
+Reads studies and rows only, never a file with time series, so that 100,000 jobs answer at once.
+Jobs whose row is damaged count as missing, with a StoreWarning.
+"""
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from compressor.outcome import NUMBERS
+from compressor.store.files import Folder, StoreError
+from compressor.store.reader import Stored, read_store
+from compressor.store.studies import Again, StoredStudy, owners, read_studies
+
+MOST_LIKE = 5  # keys that an ambiguous beginning of one is answered with
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How the jobs of one study stand; `reasons`: failed ones by reason, most frequent first."""
+
+    study: str
+    case_file: str
+    jobs: int
+    ok: int
+    failed: int
+    missing: int
+    reasons: dict[str, int]
+    again: Again
+
+
+@dataclass(frozen=True)
+class JobReport:
+    """What is known of one job; numbers and attributes are empty where it is missing."""
+
+    key: str
+    status: str  # ok | failed | missing
+    reason: str
+    detail: str
+    file: str  # with its time series; "" where none are kept
+    studies: dict[str, dict[str, Any]]  # name -> swept values
+    again: tuple[Again, ...]  # of the studies
+    numbers: dict[str, Any]  # SI; a joint's or an axis's in lists
+    attributes: dict[str, Any]
+
+
+def standings(folder: Folder) -> list[Standing]:
+    """How each study of a folder stands. Raises StoreError where there is none."""
+    rows = read_store(folder).warned().rows
+    found = []
+    for study in read_studies(folder):
+        positions = rows.find(study.keys)
+        stored = positions[positions >= 0]
+        good = rows.words["status"][stored] == "ok"
+        reasons = Counter(rows.words["reason"][stored][~good].tolist())
+        ok, failed = int(good.sum()), int((~good).sum())
+        missing = study.jobs - ok - failed
+        found.append(
+            Standing(
+                study.name, study.case_file, study.jobs, ok, failed, missing,
+                dict(reasons.most_common()), study.again,
+            )
+        )  # fmt: skip
+    return found
+
+
+def report_job(folder: Folder, beginning: str) -> JobReport:
+    """What is known of the job whose key begins so.
+
+    Raises StoreError where no job's key does, or several do.
+    """
+    store, studies = read_store(folder).warned(), read_studies(folder)
+    key = whole_key(folder, beginning, store, studies)
+    position = store.position(key)
+    mine = owners(studies, [key])[key]
+    again = tuple(study.again for study in studies if study.name in mine)
+    if position is None:
+        return JobReport(key, "missing", "", "", "", mine, again, {}, {})
+    end, path = store.status_at(position), store.rows.path(position)
+    numbers = {name: np.asarray(end.numbers[name]).tolist() for name in NUMBERS}
+    attributes = {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in store.rows.attributes(position).items()
+    }
+    file = "" if path is None else os.fspath(path)
+    return JobReport(
+        key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes
+    )
+
+
+def whole_key(folder: Folder, beginning: str, store: Stored, studies: Sequence[StoredStudy]) -> str:
+    """The one key, of a stored or a planned job, that begins so; StoreError where that is none."""
+    known = store.keys().union(*(study.keys for study in studies))
+    like = sorted(key for key in known if key.startswith(beginning))
+    if len(like) == 1:
+        return like[0]
+    if not like:
+        remedy = "compsim run and open_study name jobs by their keys"
+        raise StoreError(folder, f"no job's key begins with {beginning!r}", remedy)
+    some = ", ".join(like[:MOST_LIKE]) + (", …" if len(like) > MOST_LIKE else "")
+    problem = f"{len(like)} jobs' keys begin with {beginning!r}: {some}"
+    raise StoreError(folder, problem, "give more of the key")

@@ -1,0 +1,83 @@
+"""Compare every file of a store with its digest, and name the jobs that damage costs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from compressor.store.files import Folder, StoreError
+from compressor.store.hdf5 import DamagedJob
+from compressor.store.reader import read_store
+from compressor.store.rows import Cut, Rows
+from compressor.store.studies import Again, StoredStudy, owners, read_study, study_paths
+
+
+@dataclass(frozen=True)
+class LostJob:
+    """A job whose result is damaged, and the studies that it belongs to, with its swept values."""
+
+    key: str
+    studies: dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A file of a store that is not what was written, and the jobs that are lost with it.
+
+    A run of `again` computes the jobs anew; `remedy` is what else is to be done, or "".
+    """
+
+    path: Path
+    problem: str
+    keys: tuple[str, ...]
+    remedy: str = ""
+    jobs: tuple[LostJob, ...] = ()
+    again: tuple[Again, ...] = ()
+
+
+def verify(
+    folder: Folder, progress: Callable[[int, int], None] = lambda done, total: None
+) -> list[Damage]:
+    """All damage to a store: to segments, files of time series and studies.
+
+    `progress` is told how many files of time series were read, of how many. Raises StoreError for
+    a folder that cannot be read.
+    """
+    stored = read_store(folder, DamagedJob)
+    if not (stored.segments or stored.damaged or study_paths(folder)):
+        raise StoreError(folder, "holds no study", "choose the folder of a sweep")
+    found: list[Damage] = []
+    studies: list[StoredStudy] = []
+    for path in study_paths(folder):
+        try:
+            studies.append(read_study(path))
+        except StoreError as error:
+            found.append(Damage(path, error.problem, (), "run its case file again"))
+    rows = Rows.of(stored.segments)
+    keys = [key.decode() for key in rows.columns["key"]]
+    absent = {key for study in studies for key in study.keys}.difference(keys)
+    for damage in stored.damaged:
+        inside = damage.possible_keys() if isinstance(damage, Cut) else set()
+        lost = absent & {key.decode() for key in inside} or absent
+        remedy = "" if isinstance(damage, Cut) else damage.remedy
+        found.append(Damage(Path(damage.path), damage.problem, tuple(sorted(lost)), remedy))
+    for position, key in enumerate(keys):
+        if not rows.intact(position):
+            place = rows.path(position)
+            assert place is not None
+            problem = "is damaged" if place.exists() else "is missing"
+            found.append(Damage(place, problem, (key,)))
+        progress(position + 1, len(rows))
+    return _owned(found, studies)
+
+
+def _owned(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:
+    """Damage with the studies of its jobs."""
+    belong = owners(studies, (key for damage in found for key in damage.keys))
+    owned = []
+    for damage in found:
+        jobs = tuple(LostJob(key, belong[key]) for key in damage.keys)
+        names = {name for job in jobs for name in job.studies}
+        again = tuple(study.again for study in studies if study.name in names)
+        owned.append(replace(damage, jobs=jobs, again=again))
+    return owned

@@ -1,0 +1,217 @@
+"""Write rows into a store: one writer at a time, and what it has acknowledged stays.
+
+Outcomes collect in memory and go to disk as one segment when there are many, or a second after the
+last one. Small segments are merged now and then: the merged one is published first, those that it
+replaces are removed after.
+"""
+
+import contextlib
+import fcntl
+import math
+import os
+import re
+import socket
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+
+from compressor.outcome import Outcome
+from compressor.store.files import Folder, StoreError, make_folder, publish, refusals, system_error
+from compressor.store.reader import discard_leftovers, places, read_store, segment_paths
+from compressor.store.rows import Rows, encode, merge, of_outcomes, read_segment, segment_name
+from compressor.store.series_file import NAME as JOB_NAME
+
+MOST_ROWS = 4096  # in a segment that is written at once; one with fewer is small
+MOST_AGE = 1.0  # s between two writings, if they are small
+MOST_SMALL = 32  # small segments before they are merged
+FEW_SMALL = 8  # that may stay when the writer ends
+PATIENCE = 1.0  # s for which a lock's holder may leave its file empty
+SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}")
+LOCK_NAME = "writer.lock"
+
+
+class Writer:
+    """The one writer of a store, or of a shard of it; a context manager.
+
+    What is added is acknowledged by its key, from `add`, `flush_if_due` or `flush`, once it is on
+    disk; leaving the context writes the rest, also when an exception ends it. `place` is where
+    files of time series belong, `found` what the store held at the start.
+
+    Raises StoreError: at entry where another process writes there (unless `wait`), later where the
+    disk refuses.
+    """
+
+    def __init__(self, folder: Folder, shard: str = "", wait: bool = False, command: str = ""):
+        self.folder = Path(os.path.abspath(folder))
+        self.place = self.folder
+        if shard:
+            if not SHARD.fullmatch(shard):
+                raise StoreError(folder, f"{shard!r} is no shard's name", "use A-Z a-z 0-9 . _ -")
+            self.place = self.folder / "shards" / shard
+        self.wait, self.command = wait, command
+        self.pending: dict[str, Outcome] = {}
+        self.flushed = -math.inf  # monotonic time of the last writing
+        self.small: dict[Path, int] = {}  # segments below MOST_ROWS -> their rows
+
+    def __enter__(self) -> "Writer":
+        self.lock = _locked(self.place / LOCK_NAME, self.wait, self.command)
+        try:
+            discard_leftovers(self.place)
+            self.found = read_store(self.folder)
+            self.number = max(map(_number, self._all_paths()), default=0)
+            with refusals(self.place):
+                damaged = self._damaged(self.place)
+                if damaged:
+                    _set_aside(damaged)
+                else:
+                    self._discard_unheard_of()
+                if self.place == self.folder:
+                    self._mend_idle_shards()
+            mine = (s for s in self.found.segments if s.place == self.place)
+            self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
+        except BaseException:
+            _release(self.lock)
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            with contextlib.suppress(StoreError) if kind else contextlib.nullcontext():
+                self.flush()
+                if not kind and len(self.small) > FEW_SMALL:
+                    self._merge_small()
+        finally:
+            _release(self.lock)
+
+    def add(self, outcome: Outcome) -> list[str]:
+        """Take an outcome in, with a file of time series that is stored already."""
+        self.pending[outcome.key] = outcome
+        return self.flush_if_due()
+
+    def flush_if_due(self) -> list[str]:
+        """Write what waits, but not more than once a second; call it often. Keys now on disk."""
+        due = time.monotonic() - self.flushed >= MOST_AGE or len(self.pending) >= MOST_ROWS
+        return self.flush() if due else []
+
+    def flush(self) -> list[str]:
+        """Write all that waits. Keys now on disk."""
+        if not self.pending:
+            return []
+        keys = list(self.pending)
+        segment = of_outcomes(self.pending.values(), self.number + 1)
+        path = self._publish(encode(segment))
+        if len(segment) < MOST_ROWS:
+            self.small[path] = len(segment)
+        self.pending, self.flushed = {}, time.monotonic()
+        if len(self.small) >= MOST_SMALL:
+            self._merge_small()
+        return keys
+
+    def _publish(self, data: bytes) -> Path:
+        path = self.place / "rows" / segment_name(self.number + 1, data)
+        publish(path, data)
+        self.number += 1
+        return path
+
+    def _merge_small(self) -> None:
+        """Merge the small segments, about MOST_ROWS rows to one."""
+        batch: list[Path] = []
+        for path in sorted(self.small):
+            batch.append(path)
+            if sum(self.small[one] for one in batch) >= MOST_ROWS:
+                self._merge(batch)
+                batch = []
+        self._merge(batch)
+
+    def _merge(self, paths: list[Path]) -> None:
+        if len(paths) < 2:
+            return
+        with refusals(self.place):
+            segment = merge([read_segment(path) for path in paths])
+            merged = self._publish(encode(segment))
+            for path in paths:
+                path.unlink()
+                del self.small[path]
+        if len(segment) < MOST_ROWS:
+            self.small[merged] = len(segment)
+
+    def _all_paths(self) -> list[Path]:
+        return [path for place in places(self.folder) for path in segment_paths(place)]
+
+    def _damaged(self, place: Path) -> list[Path]:
+        """The segments of a place that were damaged when this writer began."""
+        paths = [Path(damage.path) for damage in self.found.damaged]
+        return [path for path in paths if path.parent.parent == place]
+
+    def _mend_idle_shards(self) -> None:
+        """Set damage of shards aside where nobody writes; others do it when they next begin."""
+        for place in places(self.folder)[1:]:
+            damaged = self._damaged(place)
+            if damaged:
+                with contextlib.suppress(StoreError):  # another process writes there
+                    lock = _locked(place / LOCK_NAME, False, self.command)
+                    _set_aside(damaged)
+                    os.close(lock)
+
+    def _discard_unheard_of(self) -> None:
+        """Remove time series that no row tells of: replaced, or never acknowledged."""
+        columns = Rows.of([s for s in self.found.segments if s.place == self.place]).columns
+        known = {*zip(columns["key"].tolist(), columns["digest"].tolist(), strict=True)}
+        for path in (self.place / "jobs").glob("*.h5"):
+            name = JOB_NAME.fullmatch(path.name)
+            if name and (name[1].encode(), name[2].encode()) not in known:
+                path.unlink()
+
+
+def _set_aside(paths: Iterable[Path]) -> None:
+    """Rename damaged segments, so that nobody reads them again; their jobs count as missing."""
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError):
+            os.rename(path, f"{path}.damaged")
+
+
+def _number(path: Path) -> int:
+    """The number of a segment, from its name."""
+    return int(path.name.partition("-")[0])
+
+
+def _holder(descriptor: int) -> str:
+    """Who holds a lock, from its file; who took it just now is about to say so."""
+    deadline = time.monotonic() + PATIENCE
+    while not (text := os.pread(descriptor, 1000, 0)) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return text.decode(errors="replace").strip() or "another process"
+
+
+def _locked(path: Path, wait: bool, command: str) -> int:
+    """Take a lock for this process, for as long as the descriptor stays open."""
+    make_folder(path.parent)
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError as error:
+            holder = _holder(descriptor)
+            os.close(descriptor)
+            remedy = "wait for it to end, or choose another folder"
+            raise StoreError(path, f"the store is in use by {holder}", remedy) from error
+        os.ftruncate(descriptor, 0)
+        os.write(
+            descriptor, f"process {os.getpid()} on {socket.gethostname()}: {command}\n".encode()
+        )
+    except OSError as error:
+        raise system_error(path, error) from error
+    return descriptor
+
+
+def _release(descriptor: int) -> None:
+    """Give a lock back, and take our name off it first: the next holder is not us."""
+    with contextlib.suppress(OSError):
+        os.ftruncate(descriptor, 0)
+    os.close(descriptor)

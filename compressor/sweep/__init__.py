@@ -1,0 +1,1 @@
+"""Run the jobs that are missing."""

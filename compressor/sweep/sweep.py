@@ -1,0 +1,330 @@
+"""Run the jobs of studies that the store does not hold yet, in worker processes.
+
+Workers (`compressor.workers`, or those of a `compressor.cluster`) store the time series that are
+kept and send home the outcomes; this process alone writes the rows that make them stored
+(`compressor.store.writer`). A run that fails, breaks, or takes its worker with it, is a result with
+a named reason.
+"""
+
+import threading
+import time
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from compressor.cases.case import Case
+from compressor.cases.study import Study, shard
+from compressor.outcome import Outcome, without_run
+from compressor.reasons import Reason
+from compressor.store.reader import Folder, Stored, StoreError, points, write_series, write_study
+from compressor.store.series_file import series_file
+from compressor.store.studies import given
+from compressor.store.writer import Writer
+from compressor.workers import Done, Input, Lost, rest, run_batches
+
+Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
+
+GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
+PATIENCE = 2.0  # s of compiling before a remark on it
+COMPILING = "compiling the equations (once per machine, under a minute)"
+
+
+class Backend(Protocol):
+    """Where jobs run: runs cases whose time series belong in a place, yields how each one ended.
+
+    `remark` is told what takes its time, `pulse` called several times a second. An exception that
+    is thrown in ends the jobs, and is raised again after the results that had arrived.
+    """
+
+    def __call__(
+        self,
+        place: Path,
+        cases: Sequence[Case],
+        remark: Callable[[str], None],
+        pulse: Callable[[], object],
+    ) -> Generator[Done | Lost, None, None]: ...
+
+
+class Carried(NamedTuple):
+    """An outcome, and the bytes of the file with its time series, which is still to be stored."""
+
+    outcome: Outcome
+    data: bytes
+
+
+class End(NamedTuple):
+    """How a job ended."""
+
+    status: str
+    reason: str
+    detail: str
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A failed job as one study sees it."""
+
+    study: str
+    coordinates: dict[str, Any]  # swept key -> value
+    key: str
+    reason: str
+    detail: str
+
+
+@dataclass(frozen=True)
+class Count:
+    """How many of a study's selected jobs ended well."""
+
+    study: str
+    jobs: int
+    failed: int
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a sweep did; `total`, `done_before` and `run_now` count a shared job once."""
+
+    total: int
+    done_before: int
+    run_now: int
+    counts: tuple[Count, ...]
+    failed: tuple[Failure, ...]
+    seconds: float
+
+
+def silent(done: int, total: int, remark: str) -> None:
+    """Progress that nobody watches."""
+
+
+def sweep(
+    studies: Sequence[Study],
+    folder: Folder,
+    workers: int = 2,
+    progress: Progress = silent,
+    command: str = "",
+    rerun_failed: bool = False,
+    part: tuple[int, int] | None = None,
+    wait: bool = False,
+    backend: Backend | None = None,
+) -> Summary:
+    """Run what is missing of some studies and store it in a folder; failed jobs only on request.
+
+    backend: by default, `workers` processes of this machine;
+    part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
+    wait: until another run that writes there has ended.
+
+    Raises StoreError, and WorkersFailed; whatever ends a sweep early, finished jobs are stored and
+    the same call goes on.
+    """
+    began = time.monotonic()
+    folder = Path(folder).absolute()
+    name = ""
+    if part is not None:
+        studies, name = [shard(study, *part) for study in studies], f"{part[0]}-of-{part[1]}"
+    cases = wanted(studies)
+    with Writer(folder, name, wait, command) as writer:
+        ends = stored(writer.found, cases)
+        if rerun_failed:
+            ends = {key: end for key, end in ends.items() if end.status == "ok"}
+        missing = [case for key, case in cases.items() if key not in ends]
+        for study in studies:
+            write_study(folder, study, command)
+        if missing:
+            for damage in writer.found.damaged:
+                progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
+            run_missing(writer, missing, backend or local(workers), ends, progress)
+    counts, failed = endings(studies, ends)
+    seconds = time.monotonic() - began
+    return Summary(len(cases), len(cases) - len(missing), len(missing), counts, failed, seconds)
+
+
+def run_missing(
+    writer: Writer,
+    missing: Sequence[Case],
+    backend: Backend,
+    ends: dict[str, End],
+    progress: Progress,
+) -> None:
+    """Run and store cases; `ends` gains how each ended, `progress` is told of what is on disk."""
+    done, total = len(ends), len(ends) + len(missing)
+
+    def tell(acknowledged: Sequence[str]) -> None:
+        nonlocal done
+        if acknowledged:
+            done += len(acknowledged)
+            progress(done, total, "")
+
+    def keep(end: Done | Lost) -> None:
+        outcome = settled(end)
+        ends[outcome.key] = End(outcome.status, outcome.reason, outcome.detail)
+        tell(writer.add(outcome))
+
+    progress(done, total, "")
+    running = backend(
+        writer.place,
+        missing,
+        lambda remark: progress(done, total, remark),
+        lambda: tell(writer.flush_if_due()),
+    )
+    try:
+        for end in running:
+            keep(end)
+    except BaseException as error:
+        for end in rest(running, error):  # which raises it again
+            keep(end)
+    finally:
+        running.close()
+        tell(writer.flush())
+
+
+def local(workers: int) -> Backend:
+    """Worker processes of this machine."""
+
+    def run(
+        place: Path,
+        cases: Sequence[Case],
+        remark: Callable[[str], None],
+        pulse: Callable[[], object],
+    ) -> Generator[Done | Lost, None, None]:
+        warm_up(cases, remark)
+        work, jobs = partial(run_job, place), as_jobs(cases)
+        return run_batches(work, jobs, workers, total=len(cases), grace=GRACE, pulse=pulse)
+
+    return run
+
+
+def as_jobs(cases: Sequence[Case]) -> Iterator[Input]:
+    """Cases as workers take them."""
+    return ((case, case, case.solve.timeout_s) for case in cases)
+
+
+def wanted(studies: Sequence[Study]) -> dict[str, Case]:
+    """Each selected job once, by key; where studies share one, a case that serves them all."""
+    cases: dict[str, Case] = {}
+    for study in studies:
+        for number in study.selected:
+            key, case = study.keys[number], study.cases[number]
+            cases[key] = serving_both(cases[key], case) if key in cases else case
+    return cases
+
+
+def serving_both(first: Case, second: Case) -> Case:
+    """A case with all that two cases of one key ask for beside it."""
+    keeping = [case.output for case in (first, second) if case.output.keep == "series"]
+    output = first.output
+    if keeping:
+        precision = max("single", *(o.precision for o in keeping), key=("single", "double").index)
+        compress = all(o.compress for o in keeping)
+        output = replace(output, keep="series", precision=precision, compress=compress)
+    solve = replace(
+        first.solve,
+        error_bars=first.solve.error_bars or second.solve.error_bars,
+        horizon=first.solve.horizon or second.solve.horizon,
+        timeout_s=max(first.solve.timeout_s, second.solve.timeout_s),
+    )
+    return replace(first, output=output, solve=solve)
+
+
+def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
+    """How the jobs ended that need no new run: stored ones that serve, with intact files.
+
+    A case whose job is to be run again goes on keeping the time series that its job has, as exact
+    as they are.
+    """
+    found = {}
+    positions = store.rows.find(list(cases)).tolist()
+    for (key, case), position in zip(list(cases.items()), positions, strict=True):
+        if position >= 0:
+            end = store.status_at(position)
+            if end.serves(case) and store.rows.intact(position):
+                found[key] = End(end.status, end.reason, end.detail)
+            elif end.samples and (case.output.keep == "metrics" or end.precision == "double"):
+                output = replace(case.output, keep="series", precision=end.precision)
+                cases[key] = replace(case, output=output)
+    return found
+
+
+def endings(
+    studies: Sequence[Study], ends: dict[str, End]
+) -> tuple[tuple[Count, ...], tuple[Failure, ...]]:
+    """How the selected jobs of each study ended, and every one that failed."""
+    counts, failures = [], []
+    for study in studies:
+        selected = {*study.selected}
+        failed = [
+            Failure(study.name, given(point), key, ends[key].reason, ends[key].detail)
+            for number, point in enumerate(points(study))
+            if number in selected and ends[key := study.keys[number]].status != "ok"
+        ]
+        counts.append(Count(study.name, len(selected), len(failed)))
+        failures += failed
+    return tuple(counts), tuple(failures)
+
+
+def warm_up(cases: Sequence[Case], remark: Callable[[str], None], horizon: bool = False) -> None:
+    """Load what the cases need, and compile the equations, before any worker has to.
+
+    horizon: whether twins are needed though no case asks for its horizon.
+    """
+    from compressor.solve.simulate import measure  # needs numba: only where something is simulated
+
+    timer = threading.Timer(PATIENCE, remark, [COMPILING])
+    timer.daemon = True
+    timer.start()
+    began = time.monotonic()
+    try:
+        solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
+        measure(Case.from_values({"solve": solve}))
+        hows: list[dict[str, object]] = [
+            {"method": method} for method in sorted({"auto"} | {c.solve.method for c in cases})
+        ]
+        if horizon or any(case.solve.horizon for case in cases):
+            hows.append({"horizon": True})
+        for how in hows:
+            values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | how}
+            measure(Case.from_values(values))
+    finally:
+        timer.cancel()
+        timer.join()  # workers are forked from one thread
+    seconds = time.monotonic() - began
+    if seconds > PATIENCE:
+        remark(f"compiled in {seconds:.0f} s")
+
+
+def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
+    """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
+
+    Without a place, what is to be stored comes back. A StoreError is returned: it ends the sweep,
+    while an exception is a failure of the job.
+    """
+    from compressor.solve import (
+        simulate as simulation,  # needs numba: only where something is simulated
+    )
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
+        if case.output.keep == "metrics":
+            return simulation.measure(case)
+        found, dataset = simulation.observe(case)
+    if found.reason == Reason.INVALID_INPUT:
+        return found
+    if place is None:
+        file, data = series_file(dataset, case.output)
+        return Carried(replace(found, series=file), data)
+    try:
+        return replace(found, series=write_series(place, dataset, case.output))
+    except StoreError as error:
+        return error
+
+
+def settled(end: Done | Lost) -> Outcome:
+    """The outcome of a job, also of one that raised an exception or lost its worker."""
+    if isinstance(end, Done):
+        if isinstance(end.result, StoreError):
+            raise end.result
+        return end.result
+    more = {"traceback": end.traceback} if end.traceback else {}
+    return without_run(end.id, end.reason, end.detail, **more)
