@@ -9,20 +9,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from compressor.cases.case import Case
-    from compressor.cases.load import load_cases
-    from compressor.solve.simulate import simulate
-    from compressor.store.reader import open_study
+    from compressor.cases import Case, load_cases
+    from compressor.solve import simulate
+    from compressor.store import open_study
 
 __version__ = "0.1.0"
 __all__ = ["Case", "load_cases", "open_study", "simulate"]
 
-HOMES = {
-    "Case": "cases.case",
-    "load_cases": "cases.load",
-    "simulate": "solve.simulate",
-    "open_study": "store.reader",
-}
+HOMES = {"Case": "cases", "load_cases": "cases", "simulate": "solve", "open_study": "store"}
 
 
 def __getattr__(name: str) -> Any:

@@ -20,13 +20,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from compressor.cases.case import Case
+from compressor.cases import Case
 from compressor.outcome import Outcome
 from compressor.reasons import Reason
 from compressor.remote import REMEDY, Batch, Broken, Unfit, do_batch, passport
-from compressor.store.files import StoreError, publish
-from compressor.store.series_file import store_series
-from compressor.sweep.sweep import GRACE, Carried, as_jobs, run_job, warm_up
+from compressor.store import StoreError, publish, store_series
+from compressor.sweep import GRACE, Carried, as_jobs, run_job, warm_up
 from compressor.workers import AGAIN, MEMORY, MOST_BATCH, TICK, Done, Input, Lost
 
 EXTRA = "--backend dask needs dask.distributed: pip install 'compsim[dask]'"

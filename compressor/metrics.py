@@ -4,8 +4,7 @@ The one table of results, as `compressor.cases` has one of parameters; needs no 
 case files that name a metric are read at once.
 """
 
-from compressor.cases.parameter import JOINTS
-
+JOINTS = ("big_end", "small_end")
 AXES = ("x", "y")
 SIZES = {"joint": len(JOINTS), "axis": len(AXES)}
 

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import compressor
-from compressor.cases.parameter import JOINTS
-from compressor.metrics import AXES, ERRORS, LEDGER, METRICS, NUMBERS, SIZES
+from compressor.metrics import AXES, ERRORS, JOINTS, LEDGER, METRICS, NUMBERS, SIZES
 
 if TYPE_CHECKING:
-    from compressor.cases.case import Case
+    from compressor.cases import Case
 
 __all__ = ["AXES", "ERRORS", "LEDGER", "METRICS", "NUMBERS", "ROW", "SIZES", "Outcome"]
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import compressor
-from compressor.cases.case import MODEL_VERSION
+from compressor.cases import MODEL_VERSION
 from compressor.process import MEMORY_SHARE, THREADS, cores, ending, memory_share
 from compressor.worker import end_with
 from compressor.workers import GRACE, Input, run_batches

@@ -11,9 +11,12 @@ import pytest
 from compressor.analysis.claims import paper_cases
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.outcome import NUMBERS, ROW, Outcome
+from compressor.metrics import NUMBERS
+from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
-from compressor.store.reader import finished_keys, read_store, write_series, write_study
+from compressor.store.reader import finished_keys, read_store
+from compressor.store.series_file import write_series
+from compressor.store.studies import write_study
 from compressor.store.writer import Writer
 
 hypothesis.settings.register_profile("untimed", deadline=None)  # other work shares the machine

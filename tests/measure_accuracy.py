@@ -21,7 +21,7 @@ from random_cases import SEED, random_cases
 
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
-from compressor.outcome import METRICS
+from compressor.metrics import METRICS
 from compressor.solve.simulate import measure, simulate
 
 RTOLS = [10.0**-k for k in range(3, 10)]

@@ -16,7 +16,7 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
-from compressor.cases.parameter import JOINTS
+from compressor.metrics import JOINTS
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.simulate import simulate
 

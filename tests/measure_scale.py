@@ -21,7 +21,7 @@ from measure_throughput import many
 
 from compressor.cases.load import load_studies
 from compressor.store.studies import read_studies
-from compressor.sweep import sweep
+from compressor.sweep.sweep import sweep
 
 JOBS = 100_000
 PYTHON = {"open_study": "import compressor; compressor.open_study('results').load()"}

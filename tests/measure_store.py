@@ -21,10 +21,9 @@ from pathlib import Path
 import numpy as np
 from measure_accuracy import provenance
 
-from compressor import open_study
 from compressor.cases.case import Case, Output
 from compressor.solve.simulate import measure, simulate
-from compressor.store.reader import read_store
+from compressor.store.reader import open_study, read_store
 from compressor.store.series_file import read_series, series_path, write_series
 from compressor.store.studies import StoredAxis, StoredStudy, encode
 from compressor.store.verify import verify

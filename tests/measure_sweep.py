@@ -24,8 +24,7 @@ from measure_accuracy import provenance
 from measure_store import timed
 from measure_throughput import WORKERS, many
 
-from compressor import open_study
-from compressor.store.reader import read_store
+from compressor.store.reader import open_study, read_store
 
 JOBS = 100_000
 KILLS = 3

@@ -8,12 +8,13 @@ from random_cases import random_cases
 from compressor.cases.accuracy import ACCURACY, TIGHTEST, first_rung
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.outcome import ERRORS, METRICS
-from compressor.solve import simulate as simulation
+from compressor.metrics import ERRORS, METRICS
 from compressor.solve.error_bars import LARGE, OWN, PEAKS, SHARES, Witness, bars, unmet
 from compressor.solve.parting import LOOKS, parted
 from compressor.solve.simulate import measure, simulate
-from compressor.store.reader import job_status, open_study, read_studies, write_study
+from compressor.solve.simulate import simulate as simulation
+from compressor.store.reader import job_status, open_study
+from compressor.store.studies import read_studies, write_study
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 BOTH = {"joint": "both", "clearance_mm": 0.2}

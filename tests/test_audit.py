@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.outcome import METRICS
-from compressor.solve import simulate as simulation
+from compressor.metrics import METRICS
 from compressor.solve.energy_audit import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
+from compressor.solve.simulate import simulate as simulation
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}

@@ -18,7 +18,7 @@ from compressor.measure.work_precision import (
 from compressor.report.figures.style import render
 from compressor.report.figures.work_precision import draw_work_precision
 from compressor.solve.simulate import simulate
-from compressor.store.reader import write_dataset
+from compressor.store.series_file import write_dataset
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 METHODS = ("auto", "RODAS", "LSODA")

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compressor.cases.case import ACCURACY, Case, table
-from compressor.cases.parameter import JOINTS, CaseError, Problem, shown, to_si
+from compressor.cases.accuracy import ACCURACY
+from compressor.cases.case import Case, table
+from compressor.cases.parameter import CaseError, Problem, shown, to_si
+from compressor.metrics import JOINTS
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
 EXACT_GAS = {"switching": "exact"}

@@ -14,9 +14,8 @@ from pathlib import Path
 import pytest
 from compsim import cli, plan
 
-from compressor import load_cases
 from compressor.analysis.claims import paper_cases
-from compressor.cases.load import MAX_JOBS
+from compressor.cases.load import MAX_JOBS, load_cases
 from compressor.store import reader as store
 from compressor.store.writer import Writer
 
@@ -436,7 +435,7 @@ def test_explain_of_an_effect_that_failed():
 def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     import xarray as xr
 
-    from compressor.measure import work_precision as bench
+    from compressor.measure.work_precision import work_precision as bench
 
     few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
     monkeypatch.setattr(bench.work_precision, "__defaults__",

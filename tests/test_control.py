@@ -186,7 +186,7 @@ def test_a_look_without_suspicion_takes_one_back():
 
 def test_calm_steps_bring_the_explicit_pair_back_and_rest_ever_longer():
     """The longer, the more stays in a row have cost more than they saved."""
-    price = (4 + rosenbrock.STAGES + 0.2 * 16) / (STAGES - 1)
+    price = (4 + rosenbrock.STIFF_STAGES + 0.2 * 16) / (STAGES - 1)
     calm, busy = (stiff_work([-f * price * BOUNDARY / H, -2.0, -1.0, 1.0]) for f in (0.9, 1.1))
     w, z = walker(h=H), np.zeros(4 + FLOWS)
     pauses = []

@@ -12,14 +12,14 @@ import xarray as xr
 from compsim import cli
 from conftest import keep
 
-from compressor import open_study
 from compressor.cases.load import load_studies
-from compressor.outcome import METRICS, SIZES
+from compressor.metrics import METRICS, SIZES
 from compressor.solve.simulate import simulate
-from compressor.store import export as module
 from compressor.store.export import ExportError, export
+from compressor.store.export import export as module
 from compressor.store.files import StoreError
-from compressor.store.reader import read_job, write_study
+from compressor.store.reader import open_study, read_job
+from compressor.store.studies import write_study
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 GRID = {

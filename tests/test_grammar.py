@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.sampling import design
+from compressor.cases.study import points
 from compressor.solve.simulate import simulate
 from compressor.store import reader as store
-from compressor.store.studies import points
 
 ONE = "joint: big_end\n"
 SHORT = "solve: {duration_rev: 0.25, settle_rev: 0, accuracy: draft, output_step_deg: 0.9}\n"

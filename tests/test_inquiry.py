@@ -8,7 +8,7 @@ import pytest
 from compsim import cli
 
 from compressor.cases.load import load_studies
-from compressor.store.reader import StoreError
+from compressor.store.files import StoreError
 from compressor.store.status import report_job, standings
 from compressor.sweep.sweep import sweep
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import reference
 
-from compressor.cases.case import ACCURACY, METHODS, Case
+from compressor.cases.accuracy import ACCURACY
+from compressor.cases.case import METHODS, Case
 from compressor.physics.record import FREEDOMS
 from compressor.solve.integrate import CHUNK, COMPILED, absolute_tolerances, cut
 from compressor.solve.si_record import record, scene
@@ -73,7 +74,7 @@ def test_energy_residual_of_every_method(method, joint):
 def test_the_audit_sees_a_lost_flow(monkeypatch):
     """Without the damping loss in the ledger the energy no longer balances."""
     from compressor.physics.observe import derivative_with_flows
-    from compressor.solve import integrate
+    from compressor.solve.integrate import integrate
 
     def lossless(t, z, phase, p, out):
         derivative_with_flows(t, z, phase, p, out)

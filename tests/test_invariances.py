@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.outcome import METRICS
+from compressor.metrics import METRICS
 from compressor.physics.motion import derivative, start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS, derive

@@ -9,9 +9,9 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics.kinematics import (
     angle_at,
+    exact_motion,
     ideal,
     ideal_after,
-    motion,
     series_motion,
     small_angle,
 )
@@ -24,7 +24,7 @@ R, L, OMEGA = 0.12, 0.6, 500 * math.pi / 30
     ("degrees", "x", "a"), [(0, 0.72, -394.784), (180, 0.48, 263.189), (360, 0.72, -394.784)]
 )
 def test_dead_centres(degrees, x, a):
-    found = motion(math.radians(degrees), R, L, OMEGA)
+    found = exact_motion(math.radians(degrees), R, L, OMEGA)
     assert found[0] == pytest.approx(x, abs=1e-15)
     assert found[1] == pytest.approx(0.0, abs=1e-12)
     assert found[2] == pytest.approx(a, abs=5e-4)
@@ -32,15 +32,15 @@ def test_dead_centres(degrees, x, a):
 
 def test_top_speed():
     theta = np.linspace(0, 2 * math.pi, 100001)
-    assert np.abs(motion(theta, R, L, OMEGA)[1]).max() == pytest.approx(6.408, abs=5e-4)
+    assert np.abs(exact_motion(theta, R, L, OMEGA)[1]).max() == pytest.approx(6.408, abs=5e-4)
 
 
 def test_rates_are_derivatives():
     theta = np.linspace(0.1, 6.2, 50)
     h = 1e-5
     for order in (0, 1):
-        ahead, behind = (motion(theta + s * h, R, L, OMEGA)[order] for s in (1, -1))
-        expected = motion(theta, R, L, OMEGA)[order + 1]
+        ahead, behind = (exact_motion(theta + s * h, R, L, OMEGA)[order] for s in (1, -1))
+        expected = exact_motion(theta, R, L, OMEGA)[order + 1]
         assert (ahead - behind) / (2 * h / OMEGA) == pytest.approx(expected, rel=1e-7, abs=1e-5)
 
 
@@ -48,7 +48,7 @@ def test_compiled_equals_array_form():
     p = record(Case())
     times = np.linspace(0, 0.48, 97)
     rows = np.array([ideal(t, p) for t in times])
-    expected = np.transpose(motion(p.omega * times, R, L, p.omega))
+    expected = np.transpose(exact_motion(p.omega * times, R, L, p.omega))
     assert rows[:, 6:] == pytest.approx(expected, rel=1e-13, abs=1e-11)
     assert rows[:, 2] == pytest.approx(R / L * np.sin(p.omega * times), abs=1e-15)
     assert rows[:, 2] ** 2 + rows[:, 3] ** 2 == pytest.approx(1.0, abs=1e-15)
@@ -94,14 +94,14 @@ def test_rod_spin_and_its_rate_are_derivatives():
 
 
 def test_series_is_off_by_more_than_the_smallest_clearance():
-    exact, series = (form(math.pi / 2, R, L, OMEGA)[0] for form in (motion, series_motion))
+    exact, series = (form(math.pi / 2, R, L, OMEGA)[0] for form in (exact_motion, series_motion))
     assert (series - exact) * 1e3 == pytest.approx(0.122, abs=5e-4)
 
 
 @pytest.mark.parametrize("degrees", [0, 38.886, 84.2608, 90, 179.9])
 def test_angle_at_inverts_the_motion(degrees):
     theta = math.radians(degrees)
-    assert angle_at(motion(theta, R, L, OMEGA)[0], R, L) == pytest.approx(theta, abs=1e-7)
+    assert angle_at(exact_motion(theta, R, L, OMEGA)[0], R, L) == pytest.approx(theta, abs=1e-7)
 
 
 @pytest.mark.parametrize("x", [0.47, 0.73])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.physics.kinematics import motion
+from compressor.physics.kinematics import exact_motion
 from compressor.physics.loads import piston_force, sample_segments, segments
 from compressor.solve.si_record import record
 
@@ -15,7 +15,7 @@ GAS, SPRING = {"load": "typical"}, {"load": "design"}
 
 
 def ideal_force(p, degrees, phase):
-    x, v, _ = motion(math.radians(degrees), p.crank_radius, p.rod_length, p.omega)
+    x, v, _ = exact_motion(math.radians(degrees), p.crank_radius, p.rod_length, p.omega)
     return piston_force(phase, float(x), float(v), 0.0, 0.0, p)
 
 
@@ -98,7 +98,7 @@ def test_segments_cover_the_run_in_order():
 @pytest.mark.parametrize("stroke_mm", [60, 90, 200])
 def test_a_follower_of_any_stroke_dwells_for_it_each_way(stroke_mm):
     p = record(Case.from_values({"spring": {"stroke_mm": stroke_mm, "damping_N_s_per_mm": 0}}))
-    x = [motion(a, p.crank_radius, p.rod_length, p.omega)[0] for a in (0, *p.corners)]
+    x = [exact_motion(a, p.crank_radius, p.rod_length, p.omega)[0] for a in (0, *p.corners)]
     assert (x[0] - x[1], x[3] - x[2]) == pytest.approx((p.spring_stroke, p.spring_stroke))
     for phase, corner in enumerate([*np.degrees(p.corners), 360]):
         before, after = ideal_force(p, corner, phase), ideal_force(p, corner, (phase + 1) % 4)

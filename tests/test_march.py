@@ -15,8 +15,8 @@ from compressor.physics.record import FREEDOMS
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import Mode
 from compressor.physics.tally import new_tally
-from compressor.solve import integrate as integration
 from compressor.solve.integrate import Request, integrate, natural_sizes
+from compressor.solve.integrate import integrate as integration
 from compressor.solve.si_record import offsets, record, scene
 
 PULSES = {"load": "typical", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}

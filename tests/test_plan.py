@@ -12,8 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case, table
-from compressor.cases.load import Axis, CaseFileError, load_cases, load_studies, to_yaml
+from compressor.cases.load import CaseFileError, load_cases, load_studies, to_yaml
 from compressor.cases.parameter import parameter_table
+from compressor.cases.study import Axis
 from compressor.cases.yaml_reader import MAX_BYTES, resolved
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"

@@ -17,9 +17,9 @@ from compressor.cases.load import load_cases
 from compressor.reasons import Reason
 from compressor.report import page, report
 from compressor.report.report import find_paper_runs, paper_candidates, write_report
-from compressor.store.files import StoreWarning
-from compressor.store.reader import StoreError, finished_keys, read_job, read_store, read_studies
-from compressor.store.studies import encode
+from compressor.store.files import StoreError, StoreWarning
+from compressor.store.reader import finished_keys, read_job, read_store
+from compressor.store.studies import encode, read_studies
 
 SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
 DRAFT = ["solve.accuracy=draft"]

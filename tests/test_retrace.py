@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import METHODS, Case
-from compressor.solve import integrate as integration
+from compressor.solve.integrate import integrate as integration
 from compressor.solve.last_steps import LAST
 from compressor.solve.simulate import STATE_NAMES, measure, simulate
 

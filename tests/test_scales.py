@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
-from compressor.cases.parameter import JOINTS
+from compressor.metrics import JOINTS
 from compressor.physics.step_control import BOUNDARY
 from compressor.solve.scales import (
     STABILITY,

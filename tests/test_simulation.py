@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case, Machine, Output, PerJoint, Solve
-from compressor.outcome import NUMBERS
+from compressor.metrics import NUMBERS
 from compressor.solve.simulate import SERIES, measure, simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}

@@ -17,7 +17,7 @@ from conftest import keep
 
 from compressor.cases.case import Case, Output, table
 from compressor.cases.load import load_studies
-from compressor.outcome import METRICS
+from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
 from compressor.store import dataset as labels
 from compressor.store import hdf5

@@ -26,7 +26,7 @@ from compressor.report.figures.outcomes import draw_outcomes, outcomes
 from compressor.report.figures.style import render
 from compressor.solve.error_bars import bars
 from compressor.solve.simulate import solve
-from compressor.store.reader import StoreError
+from compressor.store.files import StoreError
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
 COUNT, SEED = 100, 1

@@ -19,12 +19,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.outcome import NUMBERS, ROW, Outcome, SeriesFile
+from compressor.metrics import NUMBERS
+from compressor.outcome import ROW, Outcome, SeriesFile
 from compressor.solve.simulate import simulate
 from compressor.store import hdf5, writer
 from compressor.store import reader as store
 from compressor.store import rows as segments
-from compressor.store import series_file as jobfiles
+from compressor.store.series_file import series_file as jobfiles
 from compressor.store.studies import StoredAxis, StoredStudy, encode
 from compressor.store.verify import verify
 from compressor.store.writer import Writer

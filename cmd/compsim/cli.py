@@ -40,7 +40,7 @@ from compsim.screen import (
 )
 
 if TYPE_CHECKING:
-    from compressor.sweep.sweep import Backend, Failure, Summary
+    from compressor.sweep import Backend, Failure, Summary
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_FAILURES = 20  # listed one by one
@@ -129,14 +129,14 @@ def run(
     from compressor.process import cores, one_thread_each
 
     one_thread_each()  # before numpy loads
-    from compressor.cases.load import load_studies
+    from compressor.cases import load_studies
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
     if only and not quiet:
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     caution(studies)
-    from compressor.sweep.sweep import sweep
+    from compressor.sweep import sweep
 
     screen = Screen(quiet)
     try:
@@ -185,7 +185,7 @@ def cluster(scheduler: str | None) -> contextlib.AbstractContextManager["Backend
 @click.pass_context
 def report(context: click.Context, results: str, output: str) -> int:
     """Draw figures and tables of stored studies; prints the path of the page."""
-    from compressor.report.report import write_report
+    from compressor.report import write_report
 
     click.echo(write_report(results, output, context.obj))
     return DONE
@@ -227,7 +227,7 @@ def report_failures(failures: Sequence["Failure"]) -> None:
     """List failed jobs, and what to do about each kind of failure."""
     if not failures:
         return
-    from compressor.cases.yaml_reader import printable
+    from compressor.cases import printable
     from compressor.reasons import remedy
 
     say(f"{plural(len({failure.key for failure in failures}))} failed:")

@@ -10,8 +10,8 @@ import click
 from compsim.screen import DONE, SOME_FAILED, caution, limit, plural, say, setting
 
 if TYPE_CHECKING:
-    from compressor.measure.explain import Advice, Explanation
-    from compressor.solve.scales import JointScales
+    from compressor.measure import Advice, Explanation
+    from compressor.solve import JointScales
 
 INDENT = 12  # columns of a heading
 
@@ -31,11 +31,11 @@ def explain(
     Runs the first job of each case file, and again without each feature that it pays for. Exit
     code 3 where such a job fails.
     """
-    from compressor.cases.load import load_studies
+    from compressor.cases import load_studies
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs)
     caution(studies)
-    from compressor.measure.explain import explain as explained
+    from compressor.measure import explain as explained
 
     found = []
     for study in studies:

@@ -13,7 +13,7 @@ from compsim.screen import DONE, STORE, Screen, plural, say
 from compsim.status import results
 
 if TYPE_CHECKING:
-    from compressor.store.export import Exported
+    from compressor.store import Exported
 
 
 @click.command()
@@ -43,7 +43,7 @@ def export(
     or the beginning of it, a table of samples. Without either, all studies. Several studies go into
     one FILE together, or into a FOLDER with a file each.
     """
-    from compressor.store.export import export as write
+    from compressor.store import export as write
 
     screen = Screen(quiet, "files")
     try:

@@ -44,12 +44,12 @@ def plan(
 
     Times one job of each study and of each set of worn joints; stores nothing.
     """
-    from compressor.cases.load import load_studies
+    from compressor.cases import load_studies
     from compressor.process import cores
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
     caution(studies)
-    from compressor.sweep.plan import forecast
+    from compressor.sweep import forecast
 
     found = forecast(studies, output, jobs or cores(), first, say)
     if as_json:

@@ -15,7 +15,7 @@ def schema() -> int:
     `compsim schema > compsim.schema.json`, in files with the first line
     `# yaml-language-server: $schema=compsim.schema.json`.
     """
-    from compressor.cases.json_schema import case_schema
+    from compressor.cases import case_schema
 
     click.echo(json.dumps(case_schema(), indent=1))
     return DONE

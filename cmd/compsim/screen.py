@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from compressor.cases.study import Study
-    from compressor.store.studies import Again
+    from compressor.cases import Study
+    from compressor.store import Again
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 MOST_CAUTIONS = 5  # told of one case file
@@ -110,7 +110,7 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
 
 def caution(studies: "Sequence[Study]") -> None:
     """Say once what is odd about case files, in a few lines however many jobs they have."""
-    from compressor.solve.cautions import cautions
+    from compressor.solve import cautions
 
     for study in studies:
         found = cautions(study)

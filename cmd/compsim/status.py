@@ -11,7 +11,7 @@ import click
 from compsim.screen import DONE, plural, run_commands, say
 
 if TYPE_CHECKING:
-    from compressor.store.status import JobReport
+    from compressor.store import JobReport
 
 results = click.option("-i", "--input", "folder", default="results", show_default=True,
                        help="Folder of results.")  # fmt: skip
@@ -24,7 +24,7 @@ as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON
 def status(folder: str, as_json: bool) -> int:
     """Tell how many jobs of each stored study are done, failed or missing, and why they failed."""
     from compressor.reasons import remedy
-    from compressor.store.status import standings
+    from compressor.store import standings
 
     found = standings(folder)
     if as_json:
@@ -52,9 +52,9 @@ def show(job: str, folder: str, as_json: bool) -> int:
     error bars, in SI, and what it was run with. Of one that stopped, where, in which state, driven
     by which number of it, and its last steps.
     """
-    from compressor.cases.yaml_reader import printable
+    from compressor.cases import printable
     from compressor.reasons import remedy
-    from compressor.store.status import report_job
+    from compressor.store import report_job
 
     found = report_job(folder, job)
     if as_json:

@@ -44,10 +44,9 @@ def stress(
     if scene is not None:
         click.echo("\n".join(repeated(scene, seed)))
         return DONE
-    from compressor.measure.stress import FILE, campaign
-    from compressor.report.figures.outcomes import draw_outcomes
-    from compressor.report.figures.style import render
-    from compressor.store.files import make_folder, publish
+    from compressor.measure import FILE, campaign
+    from compressor.report import draw_outcomes, render
+    from compressor.store import make_folder, publish
 
     make_folder(Path(output))
     screen = Screen(quiet, "scenes")
@@ -69,8 +68,7 @@ def stress(
 
 def repeated(number: int, seed: int) -> Iterator[str]:
     """A scene as a case file, and below it, as comments, how it ends."""
-    from compressor.measure.extremes import values
-    from compressor.measure.stress import FULL, run_scene
+    from compressor.measure import FULL, run_scene, values
 
     drawn = values(number, seed)
     yield from (f"{key}: {json.dumps(value)}" for key, value in drawn.items())
@@ -81,7 +79,7 @@ def repeated(number: int, seed: int) -> Iterator[str]:
 
 def summary(study: "xr.Dataset") -> Iterator[str]:
     """Shares, the worst scenes with the command that repeats each, and the slowest one."""
-    from compressor.measure.stress import counts, slowest, worst
+    from compressor.measure import counts, slowest, worst
 
     for kind, ends in counts(study).items():
         total = sum(ends.values())

@@ -12,7 +12,7 @@ from compsim.screen import DONE, Screen, say, setting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from compressor.cases.case import Case
+    from compressor.cases import Case
 
 
 @click.command()
@@ -40,20 +40,19 @@ def tradeoff(
     the effects of the features go to stdout.
     """
     cases = chosen(configs, overrides)
-    from compressor.measure import features as modelling
-    from compressor.measure import work_precision as bench
-    from compressor.store.files import make_folder
-    from compressor.store.reader import write_dataset
+    from compressor.measure import trade as feature_trade
+    from compressor.measure import work_precision
+    from compressor.store import make_folder, write_dataset
 
     folder = Path(output)
     make_folder(folder)  # minutes before it is needed
     screen = Screen(quiet, "points", alike=False)
     try:
-        study = bench.work_precision(cases, repeats=repeats, budget=budget, progress=screen)
+        study = work_precision(cases, repeats=repeats, budget=budget, progress=screen)
         write_study(folder, study)
         screen.end()
         screen = Screen(quiet, "changes of the model", alike=False)
-        trade = modelling.trade(cases, progress=screen)
+        trade = feature_trade(cases, progress=screen)
     finally:
         screen.end()
     write_dataset(folder / "modelling.nc", trade)
@@ -67,10 +66,8 @@ def tradeoff(
 
 def write_study(folder: Path, study: "xr.Dataset") -> None:
     """Store a study of methods and draw it."""
-    from compressor.report.figures.style import render
-    from compressor.report.figures.work_precision import draw_work_precision
-    from compressor.store.files import publish
-    from compressor.store.reader import write_dataset
+    from compressor.report import draw_work_precision, render
+    from compressor.store import publish, write_dataset
 
     write_dataset(folder / "tradeoff.nc", study)
     drawing = draw_work_precision(study)
@@ -80,11 +77,10 @@ def write_study(folder: Path, study: "xr.Dataset") -> None:
 
 def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, Case]":
     """The cases to be studied, by label; each needs a joint with clearance."""
-    from compressor.cases.load import load_studies
-    from compressor.measure.work_precision import default_cases
-    from compressor.physics.record import Scene
-    from compressor.solve.si_record import scene
-    from compressor.store.studies import points
+    from compressor.cases import load_studies, points
+    from compressor.measure import default_cases
+    from compressor.physics import Scene
+    from compressor.solve import scene
 
     if not configs:
         if overrides:
@@ -110,7 +106,7 @@ def plain(value: object) -> str:
 
 def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
     """The fastest method for each decade of error, and the paper's numerics."""
-    from compressor.measure.work_precision import fastest
+    from compressor.measure import fastest
 
     width = max(len(name) for name in study["scene"].values)
     yield f"{'scene':<{width}}  {'error below':>11}  {'method':<7} {'rtol':>7}  {'ms':>7}"
@@ -130,7 +126,7 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
 
 def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
     """What each change of the model does; changes that do not apply to a scene are left out."""
-    from compressor.measure.features import SERIES
+    from compressor.measure import SERIES
 
     scenes = max(len(name) for name in trade["scene"].values)
     names = max(len(name) for name in trade["change"].values)

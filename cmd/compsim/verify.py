@@ -9,7 +9,7 @@ from compsim.screen import DONE, STORE, plural, run_commands, say
 from compsim.status import as_json, results
 
 if TYPE_CHECKING:
-    from compressor.store.verify import Damage
+    from compressor.store import Damage
 
 
 @click.command()
@@ -21,7 +21,7 @@ def verify(folder: str, as_json: bool) -> int:
     Damaged files are listed with the jobs that are lost with them, by study and swept values, and
     with the command that computes them again.
     """
-    from compressor.store.verify import verify as compare
+    from compressor.store import verify as compare
 
     damages = compare(folder)
     if as_json:

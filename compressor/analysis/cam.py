@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compressor.physics.kinematics import motion
-from compressor.physics.loads import gas_corners
+from compressor.physics import exact_motion, gas_corners
 
 # Table 1 of the paper
 BASE_RADIUS = 0.200
@@ -21,7 +20,7 @@ ALLOWED_PRESSURE_ANGLE = math.radians(30)  # the usual limit of a translating fo
 def cam_profile(p, angles):
     """Follower displacement s (m) over cam angles (rad, any shape) of the closed cam (Eq. 10)."""
     turned = np.mod(angles, 2 * math.pi)
-    x, _, _ = motion(turned, p.crank_radius, p.rod_length, p.omega)
+    x, _, _ = exact_motion(turned, p.crank_radius, p.rod_length, p.omega)
     rise, bottom, fall = p.corners
     top = p.rod_length + p.crank_radius
     lift = 2 * p.crank_radius - p.spring_stroke
@@ -33,7 +32,7 @@ def cam_profile(p, angles):
 def cam_slope(p, angles):
     """ds/dphi (m/rad) of `cam_profile`: the ideal piston's speed while the follower moves."""
     turned = np.mod(angles, 2 * math.pi)
-    _, v, _ = motion(turned, p.crank_radius, p.rod_length, p.omega)
+    _, v, _ = exact_motion(turned, p.crank_radius, p.rod_length, p.omega)
     rise, bottom, fall = p.corners
     moving = ((turned >= rise) & (turned < bottom)) | (turned >= fall)
     return np.where(moving, -v / p.omega, 0.0)
@@ -52,9 +51,9 @@ def printed_profile(p, angles):
     compression, low dwell at zero.
     """
     turned = np.mod(angles, 2 * math.pi)
-    x, _, _ = motion(turned, p.crank_radius, p.rod_length, p.omega)
+    x, _, _ = exact_motion(turned, p.crank_radius, p.rod_length, p.omega)
     expansion, bottom, compression = printed_corners_of_gas(p)
-    x_expansion, _, _ = motion(expansion, p.crank_radius, p.rod_length, p.omega)
+    x_expansion, _, _ = exact_motion(expansion, p.crank_radius, p.rod_length, p.omega)
     follower = np.where(turned < expansion, 0.0, x_expansion - x)
     height = x_expansion - (p.rod_length - p.crank_radius)
     follower = np.where(turned < bottom, follower, height)
@@ -105,7 +104,7 @@ def comparisons(p):
     expansion, _, compression = printed_corners_of_gas(p)
     bottom, top = p.rod_length - p.crank_radius, p.rod_length + p.crank_radius
     x_rise, x_fall = (
-        motion(a, p.crank_radius, p.rod_length, p.omega)[0] for a in (expansion, compression)
+        exact_motion(a, p.crank_radius, p.rod_length, p.omega)[0] for a in (expansion, compression)
     )
     steepest = np.abs(pressure_angle(p, np.linspace(0, 2 * math.pi, 20001), BASE_RADIUS)).max()
     rows = (

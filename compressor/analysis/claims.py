@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
-from compressor.cases.case import Case
-from compressor.cases.parameter import JOINTS
-from compressor.physics.kinematics import motion
-from compressor.solve.si_record import record
+from compressor.cases import Case
+from compressor.metrics import JOINTS
+from compressor.physics import exact_motion
+from compressor.solve import record
 
 CLEARANCES = (0.1, 0.2, 0.3)
 FAULTS = ("big_end", "small_end", "both")
@@ -66,7 +66,7 @@ def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Displacement, velocity and acceleration (SI) of the run's ideal twin on its own grid."""
     case = case_of(run)
     lengths = case.machine.crank_radius_mm / 1000, case.machine.rod_length_mm / 1000
-    return motion(run["crank_angle"].values, *lengths, case.omega)
+    return exact_motion(run["crank_angle"].values, *lengths, case.omega)
 
 
 def case_of(run: xr.Dataset) -> Case:

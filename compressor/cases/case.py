@@ -16,15 +16,8 @@ from typing import Any
 
 from compressor.cases.accuracy import ACCURACY, Targets, checked_targets, first_rung
 from compressor.cases.conflicts import conflicts
-from compressor.cases.parameter import (
-    JOINTS,
-    CaseError,
-    Parameter,
-    Problem,
-    choice,
-    parameter,
-    shown,
-)
+from compressor.cases.parameter import CaseError, Parameter, Problem, choice, parameter, shown
+from compressor.metrics import JOINTS
 
 MODEL_VERSION = "1"  # of the equations and the meaning of what is stored; part of a job's identity
 

@@ -16,8 +16,9 @@ from typing import Any
 
 from compressor.cases.case import table
 from compressor.cases.keys import suggestion
-from compressor.cases.parameter import JOINTS, Parameter, shown
+from compressor.cases.parameter import Parameter, shown
 from compressor.cases.yaml_reader import REAL, cut, resolved
+from compressor.metrics import JOINTS
 
 MAX_LENGTH = 1000  # characters
 MAX_DEPTH = 50  # of parentheses and `not`

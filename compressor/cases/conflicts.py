@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from compressor.cases.parameter import IMPLAUSIBLE, JOINTS, Problem
+from compressor.cases.parameter import IMPLAUSIBLE, Problem
+from compressor.metrics import JOINTS
 
 if TYPE_CHECKING:
     from compressor.cases.case import Case

@@ -11,10 +11,10 @@ from compressor.cases.accuracy import TARGET
 from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED, UNSWEPT
 from compressor.cases.case import GROUPS, table
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.parameter import JOINTS, NAME, Parameter
+from compressor.cases.parameter import NAME, Parameter
 from compressor.cases.sampling import KINDS as SAMPLED
 from compressor.cases.swept import FORMS, row_kind
-from compressor.metrics import METRICS
+from compressor.metrics import JOINTS, METRICS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}

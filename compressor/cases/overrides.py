@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import Leaves, leaves
-from compressor.cases.parameter import JOINTS
 from compressor.cases.yaml_reader import FileProblem, Node, Place, cut, read_text
+from compressor.metrics import JOINTS
 
 
 def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[str, Leaves]:

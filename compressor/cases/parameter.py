@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-JOINTS = ("big_end", "small_end")
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 

@@ -2,9 +2,9 @@
 
 import bisect
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, overload
+from typing import Any, Protocol, overload
 
 from compressor.cases import blocks
 from compressor.cases.case import Case
@@ -111,3 +111,32 @@ def value_of(case: Case, key: str) -> Any:
     for part in key.split("."):
         value = getattr(value, part, None)
     return value
+
+
+class Jobs(Protocol):
+    """What a study tells of its jobs, whether read from a case file or from a store."""
+
+    @property
+    def axes(self) -> Sequence[Any]: ...
+    @property
+    def is_grid(self) -> bool: ...
+    @property
+    def jobs(self) -> int: ...
+
+
+def points(study: Jobs) -> Iterator[dict[str, Any]]:
+    """The swept values of each job by dotted key, in the order of the jobs."""
+    keys = [axis.key for axis in study.axes]
+    columns = [axis.values for axis in study.axes]
+    rows: Iterable[tuple[Any, ...]]
+    if study.is_grid:
+        rows = itertools.product(*columns)
+    else:
+        rows = (tuple(column[n] for column in columns) for n in range(study.jobs))
+    for values in rows:
+        yield dict(zip(keys, values, strict=True))
+
+
+def given(point: dict[str, Any]) -> dict[str, Any]:
+    """The swept values that a job has, without those of other blocks."""
+    return {key: value for key, value in point.items() if value is not None}

@@ -12,9 +12,9 @@ from difflib import get_close_matches
 from fractions import Fraction
 
 from compressor.cases.case import table
-from compressor.cases.parameter import JOINTS
 from compressor.cases.sampling import KINDS as SAMPLED
 from compressor.cases.yaml_reader import FileProblem, Node
+from compressor.metrics import JOINTS
 
 # word -> what stands in its brackets
 FORMS = {

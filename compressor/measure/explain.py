@@ -12,16 +12,19 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.cases.accuracy import ACCURACY
-from compressor.cases.case import Case
-from compressor.cases.study import Study
+from compressor.cases import ACCURACY, Case, Study, given, points
 from compressor.measure.features import FEATURES, Effect, Feature, compare
 from compressor.measure.work_precision import SLOW, complete, faulty
-from compressor.physics.record import FREEDOMS, Scene
-from compressor.solve.scales import JointScales, expected_seconds, expected_steps, joint_scales
-from compressor.solve.si_record import scene
-from compressor.solve.simulate import STATE_NAMES, simulate
-from compressor.store.studies import given, points
+from compressor.physics import FREEDOMS, Scene
+from compressor.solve import (
+    STATE_NAMES,
+    JointScales,
+    expected_seconds,
+    expected_steps,
+    joint_scales,
+    scene,
+    simulate,
+)
 
 SCENES = {
     Scene.IDEAL: "ideal joints",

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from compressor.cases.case import Case
-from compressor.cases.parameter import JOINTS
-from compressor.cases.sampling import design
+from compressor.cases import Case, design
+from compressor.metrics import JOINTS
 
 # name: (unit, whole range, supported range, log-uniform)
 SPANS: dict[str, tuple[str, tuple[float, float], tuple[float, float] | None, bool]] = {

@@ -14,9 +14,7 @@ import numpy as np
 import xarray as xr
 
 import compressor
-from compressor.cases.accuracy import ACCURACY
-from compressor.cases.case import Case, Friction, Output
-from compressor.cases.parameter import JOINTS
+from compressor.cases import ACCURACY, Case, Friction, Output
 from compressor.measure.work_precision import (
     Progress,
     complete,
@@ -25,8 +23,9 @@ from compressor.measure.work_precision import (
     solved,
     stored_values,
 )
-from compressor.physics.kinematics import motion, series_motion
-from compressor.solve.simulate import simulate
+from compressor.metrics import JOINTS
+from compressor.physics import exact_motion, series_motion
+from compressor.solve import simulate
 
 GRAVITY = 9.81  # m/s2
 SMALL_CLEARANCE = 0.001  # mm, in the joint that was ideal
@@ -200,7 +199,7 @@ def series_kinematics(case: Case) -> tuple[Effect, float]:
     machine = case.machine
     lengths = machine.crank_radius_mm / 1000, machine.rod_length_mm / 1000
     theta = np.linspace(0, 2 * np.pi, 3601)
-    x, _, a = motion(theta, *lengths, case.omega)
+    x, _, a = exact_motion(theta, *lengths, case.omega)
     series_x, _, series_a = series_motion(theta, *lengths, case.omega)
     peak = np.abs(series_a).max() / np.abs(a).max() - 1
     apart = np.linalg.norm(series_a - a) / np.linalg.norm(a)

@@ -26,13 +26,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.cases.case import Case
+from compressor.cases import Case
 from compressor.metrics import METRICS
-from compressor.solve.energy_audit import energy_residual
-from compressor.solve.error_bars import Metrics
-from compressor.solve.horizon import predictability_horizon
-from compressor.solve.parting import parted
-from compressor.solve.simulate import Solution, attempt, solve
+from compressor.solve import (
+    Metrics,
+    Solution,
+    attempt,
+    energy_residual,
+    parted,
+    predictability_horizon,
+    solve,
+)
 
 FACTOR = 10.0  # times its bar: an error beyond it was not told of
 EXPECTED, MOST_EXPECTED = 1e3, 0.05  # times rtol: the relative error that nobody is surprised by

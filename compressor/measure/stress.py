@@ -17,15 +17,12 @@ import numpy as np
 import xarray as xr
 
 import compressor
-from compressor.cases.case import MODEL_VERSION, Case
-from compressor.cases.parameter import CaseError
+from compressor.cases import MODEL_VERSION, Case, CaseError
 from compressor.measure import extremes
 from compressor.measure.extremes import Budget
 from compressor.reasons import Reason
-from compressor.store.files import Folder, StoreError
-from compressor.store.hdf5 import attributes, opened, variables
-from compressor.store.series_file import write_dataset
-from compressor.sweep.sweep import Progress, warm_up
+from compressor.store import Folder, StoreError, attributes, opened, variables, write_dataset
+from compressor.sweep import Progress, warm_up
 from compressor.workers import Done, Lost, run_batches
 
 FILE = "stress.nc"

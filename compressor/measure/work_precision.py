@@ -14,15 +14,12 @@ import numpy as np
 import xarray as xr
 
 import compressor
-from compressor.analysis.claims import FAULTS, label, paper_cases, settled
-from compressor.cases.accuracy import ACCURACY
-from compressor.cases.case import Case, Output
-from compressor.cases.parameter import JOINTS
-from compressor.physics.record import Scene
+from compressor.analysis import FAULTS, label, paper_cases, settled
+from compressor.cases import ACCURACY, Case, Output
+from compressor.metrics import JOINTS
+from compressor.physics import Scene
 from compressor.reasons import Reason
-from compressor.solve.integrate import LOCAL
-from compressor.solve.si_record import scene
-from compressor.solve.simulate import simulate
+from compressor.solve import LOCAL, scene, simulate
 
 METHODS = ("auto", "DOPRI5", "RODAS", "DOP853", "RK45", "LSODA", "Radau", "BDF")
 # those behind the words of `accuracy`, and some between

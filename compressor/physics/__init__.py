@@ -1,1 +1,34 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
+
+from compressor.physics.kinematics import exact_motion, series_motion
+from compressor.physics.loads import (
+    cam_corners,
+    gas_corners,
+    printed_corners,
+    sample_segments,
+    segments,
+)
+from compressor.physics.march import WALKER, Status, Work, march, new_walker, new_work
+from compressor.physics.motion import start
+from compressor.physics.observe import (
+    COLUMNS,
+    NORMAL,
+    Column,
+    derivative_with_flows,
+    observe,
+    observe_all,
+)
+from compressor.physics.record import FREEDOMS, Law, Load, Scene, derive, new_record
+from compressor.physics.rosenbrock import STIFF_STAGES
+from compressor.physics.runge_kutta import FLOWS, STAGES, E, Pair
+from compressor.physics.step_control import Mode
+from compressor.physics.tally import (
+    TALLY,
+    add_flows,
+    lobatto,
+    new_tally,
+    shares_apart,
+    tally_energy,
+    tally_step,
+)
+from compressor.physics.twin import march_twins, new_rows

@@ -83,7 +83,7 @@ def ideal_after(base, span, p):
     return ideal_at(base[0] * cosine - base[1] * sine, base[1] * cosine + base[0] * sine, p)
 
 
-def motion(theta, crank_radius, rod_length, omega):
+def exact_motion(theta, crank_radius, rod_length, omega):
     """Exact piston displacement (m), velocity (m/s) and acceleration (m/s^2) over theta (rad).
 
     Arrays of theta's shape. The displacement counts from the crank centre (Eq. 1 counts from the

@@ -153,7 +153,7 @@ def attempt(w, base, h, z, work, atol, size, phase, p):
     """Take a step of length h by the walker's present method; returns its error norm."""
     if w.stiff:
         u = work.k[1:]
-        w.evaluations += size.size + 1 + rosenbrock.STAGES
+        w.evaluations += size.size + 1 + rosenbrock.STIFF_STAGES
         if not rosenbrock_step(
             w.t, h, z, work.k[0], size, phase, p, work.column, work.new, u, work.jacobian
         ):

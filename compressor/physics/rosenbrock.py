@@ -13,17 +13,17 @@ from compressor.physics._jit import jit
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS
 
-STAGES = 6
+STIFF_STAGES = 6
 GAMMA = 0.25
 # increments a_ij, couplings c_ij / h, nodes and the weights of df/dt
-A = np.zeros((STAGES, STAGES))
+A = np.zeros((STIFF_STAGES, STIFF_STAGES))
 A[1, :1] = 1.544
 A[2, :2] = 0.9466785280815826, 0.2557011698983284
 A[3, :3] = 3.314825187068521, 2.896124015972201, 0.9986419139977817
 A[4, :4] = 1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950
 A[5, :4] = A[4, :4]
 A[5, 4] = 1.0
-COUPLING = np.zeros((STAGES, STAGES))
+COUPLING = np.zeros((STIFF_STAGES, STIFF_STAGES))
 COUPLING[1, :1] = -5.6688
 COUPLING[2, :2] = -2.430093356833875, -0.2063599157091915
 COUPLING[3, :3] = -0.1073529058151375, -9.594562251023355, -20.47028614809616
@@ -127,7 +127,7 @@ def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
         matrix[i, i] += 1.0 / (h * GAMMA)
     if not factorize(matrix, pivots):
         return False
-    for stage in range(STAGES):
+    for stage in range(STIFF_STAGES):
         for i in range(z.size):
             total = z[i]
             for j in range(stage):
@@ -148,7 +148,7 @@ def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
                 u[stage, i] += jacobian[i, j] * u[stage, j]
             u[stage, i] *= h * GAMMA
     for i in range(z.size):
-        new[i] += u[STAGES - 1, i]
+        new[i] += u[STIFF_STAGES - 1, i]
     return True
 
 
@@ -183,7 +183,7 @@ def error_norm(z, new, u, rtol, atol):
     n = z.size - FLOWS
     total = 0.0
     for i in range(n):
-        total += (u[STAGES - 1, i] / (atol[i] + rtol * max(abs(z[i]), abs(new[i])))) ** 2
+        total += (u[STIFF_STAGES - 1, i] / (atol[i] + rtol * max(abs(z[i]), abs(new[i])))) ** 2
     return math.sqrt(total / n)
 
 
@@ -193,7 +193,7 @@ def extend(z, new, u, dense):
     for i in range(dense.shape[1]):
         first = 0.0
         second = 0.0
-        for j in range(STAGES):
+        for j in range(STIFF_STAGES):
             first += DENSE[0, j] * u[j, i]
             second += DENSE[1, j] * u[j, i]
         dense[0, i] = z[i]

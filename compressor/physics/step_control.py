@@ -95,7 +95,7 @@ def stiff_rate(w, h, z, work, size):
     n = size.size
     if w.stiff:
         for i in range(n):
-            work.y[i] = work.k[rosenbrock.STAGES, i] + 1e-3 * size[i]
+            work.y[i] = work.k[rosenbrock.STIFF_STAGES, i] + 1e-3 * size[i]
         return spectral_radius(work.jacobian, size, work.y, work.column[:n])
     above = 0.0
     below = 0.0
@@ -125,7 +125,7 @@ def choose_method(w, h, z, work, size):
         return
     reach = h * stiff_rate(w, h, z, work, size) / BOUNDARY
     if w.stiff:
-        price = (size.size + rosenbrock.STAGES + 0.2 * size.size**2) / (STAGES - 1)
+        price = (size.size + rosenbrock.STIFF_STAGES + 0.2 * size.size**2) / (STAGES - 1)
         w.calm = w.calm + 1 if reach < price else 0
         w.gain += reach - price
         if w.calm >= CALM_STEPS:

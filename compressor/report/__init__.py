@@ -1,1 +1,6 @@
 """A store -> figures and a page."""
+
+from compressor.report.figures.outcomes import draw_outcomes
+from compressor.report.figures.style import render
+from compressor.report.figures.work_precision import draw_work_precision
+from compressor.report.report import write_report

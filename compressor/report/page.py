@@ -20,11 +20,10 @@ import numpy as np
 import xarray as xr
 
 import compressor
-from compressor.analysis.claims import SPOKEN, Claim
-from compressor.cases.case import MODEL_VERSION
+from compressor.analysis import SPOKEN, Claim
+from compressor.cases import MODEL_VERSION
 from compressor.report.figures.sweep_metric import Measure, measures
-from compressor.store.files import Folder
-from compressor.store.studies import StoredStudy
+from compressor.store import Folder, StoredStudy
 
 LIBRARIES = ("numpy", "scipy", "numba", "xarray", "h5py", "matplotlib")
 MOST_ROWS = 500

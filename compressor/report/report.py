@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from compressor.analysis.cam import comparisons
-from compressor.analysis.claims import CLEARANCES, FAULTS, SPOKEN, claims, label, paper_cases
-from compressor.cases.case import Case
+from compressor.analysis import CLEARANCES, FAULTS, SPOKEN, claims, comparisons, label, paper_cases
+from compressor.cases import Case
 from compressor.metrics import HORIZON
 from compressor.reasons import remedy as remedy_of
 from compressor.report.figures import FIGURES, Drawing
@@ -45,10 +44,18 @@ from compressor.report.page import (
     study_table,
     table,
 )
-from compressor.solve.si_record import record
-from compressor.store.files import Folder, StoreWarning, publish
-from compressor.store.reader import DamagedJob, Stored, open_study, read_store
-from compressor.store.studies import StoredStudy, read_studies
+from compressor.solve import record
+from compressor.store import (
+    DamagedJob,
+    Folder,
+    Stored,
+    StoredStudy,
+    StoreWarning,
+    open_study,
+    publish,
+    read_store,
+    read_studies,
+)
 
 MOST_DETAILS = 20
 

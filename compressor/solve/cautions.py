@@ -10,9 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from compressor.cases.case import Case
-from compressor.cases.parameter import IMPLAUSIBLE
-from compressor.cases.study import Study
+from compressor.cases import IMPLAUSIBLE, Case, Study
 from compressor.solve.scales import JointScales, expected_seconds, expected_steps, scales
 
 # key -> values that nobody means in the key's unit, and the unit that they may be in

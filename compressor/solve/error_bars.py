@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.cases.accuracy import Targets
+from compressor.cases import Targets
 
 Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
 

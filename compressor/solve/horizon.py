@@ -14,14 +14,19 @@ import time
 
 import numpy as np
 
-from compressor.cases.case import Case
-from compressor.physics.loads import segments
-from compressor.physics.march import Status, new_work
-from compressor.physics.motion import start
-from compressor.physics.record import FREEDOMS, Scene
-from compressor.physics.runge_kutta import FLOWS
-from compressor.physics.tally import new_tally
-from compressor.physics.twin import march_twins, new_rows
+from compressor.cases import Case
+from compressor.physics import (
+    FLOWS,
+    FREEDOMS,
+    Scene,
+    Status,
+    march_twins,
+    new_rows,
+    new_tally,
+    new_work,
+    segments,
+    start,
+)
 from compressor.solve.integrate import (
     CHUNK,
     Request,

@@ -15,23 +15,28 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases.parameter import IMPLAUSIBLE
-from compressor.physics.loads import sample_segments, segments
-from compressor.physics.march import Status, march, new_walker, new_work
-from compressor.physics.observe import (
+from compressor.cases import IMPLAUSIBLE
+from compressor.physics import (
     COLUMNS,
+    FLOWS,
+    FREEDOMS,
     NORMAL,
+    Load,
+    Mode,
+    Pair,
+    Scene,
+    Status,
+    add_flows,
     derivative_with_flows,
+    lobatto,
+    march,
+    new_tally,
+    new_walker,
+    new_work,
     observe,
     observe_all,
-)
-from compressor.physics.record import FREEDOMS, Load, Scene
-from compressor.physics.runge_kutta import FLOWS, Pair
-from compressor.physics.step_control import Mode
-from compressor.physics.tally import (
-    add_flows,
-    lobatto,
-    new_tally,
+    sample_segments,
+    segments,
     shares_apart,
     tally_energy,
     tally_step,

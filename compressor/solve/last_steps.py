@@ -11,11 +11,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics import rosenbrock
-from compressor.physics.march import WALKER, Work, new_work
-from compressor.physics.observe import derivative_with_flows
-from compressor.physics.runge_kutta import FLOWS, STAGES, E, Pair
-from compressor.physics.tally import TALLY
+from compressor.physics import (
+    FLOWS,
+    STAGES,
+    STIFF_STAGES,
+    TALLY,
+    WALKER,
+    E,
+    Pair,
+    Work,
+    derivative_with_flows,
+    new_work,
+)
 
 LAST = 16  # attempts that are looked at
 NONE = -1  # in place of a number of the state
@@ -147,7 +154,7 @@ def scaled_error(
     """Estimated error of each number of the motion over its tolerance, (n,)."""
     n = now.z.size - FLOWS
     if now.walker.stiff:
-        error = then.work.k[rosenbrock.STAGES, :n]
+        error = then.work.k[STIFF_STAGES, :n]
     else:
         stages = np.vstack((now.work.k[:1], then.work.k[1:STAGES]))
         error = step * (E[now.walker.pair] @ stages)[:n]

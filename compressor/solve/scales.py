@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from compressor.cases.materials import contact_stiffness
-from compressor.cases.parameter import JOINTS, to_si
+from compressor.cases import contact_stiffness, to_si
+from compressor.metrics import JOINTS
 
 if TYPE_CHECKING:
-    from compressor.cases.case import Case
+    from compressor.cases import Case
 
 STABILITY = 3.25  # of an explicit step times the fastest rate (physics.control.BOUNDARY)
 # Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.

@@ -7,10 +7,18 @@ import math
 
 import numpy as np
 
-from compressor.cases.case import Case
-from compressor.cases.parameter import JOINTS, to_si
-from compressor.physics.loads import cam_corners, gas_corners, printed_corners
-from compressor.physics.record import Law, Load, Scene, derive, new_record
+from compressor.cases import Case, to_si
+from compressor.metrics import JOINTS
+from compressor.physics import (
+    Law,
+    Load,
+    Scene,
+    cam_corners,
+    derive,
+    gas_corners,
+    new_record,
+    printed_corners,
+)
 from compressor.solve.scales import stiffness_of
 
 LOADS = {"none": Load.NONE, "typical": Load.TYPICAL, "design": Load.DESIGN}

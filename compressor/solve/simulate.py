@@ -13,23 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import compressor
-from compressor.cases.accuracy import LOOSEST, TIGHTEST
-from compressor.cases.case import MODEL_VERSION, Case
-from compressor.cases.parameter import CaseError
-from compressor.metrics import HORIZON
-from compressor.outcome import (
-    ROW,
-    SIZES,
-    Outcome,
-    Table,
-    Variable,
-    coordinates,
-    without_run,
-)
-from compressor.physics.motion import start
-from compressor.physics.observe import COLUMNS, Column, observe_all
-from compressor.physics.record import FREEDOMS, Scene
-from compressor.physics.runge_kutta import FLOWS
+from compressor.cases import LOOSEST, MODEL_VERSION, TIGHTEST, Case, CaseError
+from compressor.metrics import HORIZON, SIZES
+from compressor.outcome import ROW, Outcome, Table, Variable, coordinates, without_run
+from compressor.physics import COLUMNS, FLOWS, FREEDOMS, Column, Scene, observe_all, start
 from compressor.reasons import Reason
 from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
 from compressor.solve.error_bars import Metrics, Witness, bars, unmet

@@ -1,1 +1,17 @@
 """Outcomes on disk, and back."""
+
+from compressor.store.export import Exported, export
+from compressor.store.files import Folder, StoreError, StoreWarning, make_folder, publish
+from compressor.store.hdf5 import DamagedJob, attributes, opened, variables
+from compressor.store.reader import Stored, open_study, read_store
+from compressor.store.series_file import (
+    series_file,
+    series_image,
+    store_series,
+    write_dataset,
+    write_series,
+)
+from compressor.store.status import JobReport, report_job, standings
+from compressor.store.studies import Again, StoredStudy, read_studies, write_study
+from compressor.store.verify import Damage, verify
+from compressor.store.writer import Writer

@@ -13,13 +13,14 @@ import xarray as xr
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from compressor.cases.case import table
-from compressor.outcome import NUMBERS, coordinates
+from compressor.cases import points, table
+from compressor.metrics import NUMBERS
+from compressor.outcome import coordinates
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.rows import Rows
-from compressor.store.studies import StoredStudy, points
+from compressor.store.studies import StoredStudy
 
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
 UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")

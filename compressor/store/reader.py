@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases.case import Case
+from compressor.cases import Case
 from compressor.metrics import HORIZON
 from compressor.outcome import Outcome, coordinates
 from compressor.reasons import Reason
@@ -27,39 +27,15 @@ from compressor.store.files import (
     Folder,
     StoreError,
     StoreWarning,
-    discard_leftovers,
     system_error,
 )
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
-from compressor.store.series_file import KEY, read_series, read_values, write_dataset, write_series
-from compressor.store.studies import StoredAxis, StoredStudy, points, read_studies, write_study
+from compressor.store.series_file import KEY, read_series, read_values
+from compressor.store.studies import read_studies
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "DamagedJob",
-    "Folder",
-    "JobStatus",
-    "StoreError",
-    "Stored",
-    "StoredAxis",
-    "StoredStudy",
-    "discard_leftovers",
-    "finished_keys",
-    "job_status",
-    "open_study",
-    "points",
-    "read_job",
-    "read_series",
-    "read_store",
-    "read_studies",
-    "read_values",
-    "write_dataset",
-    "write_series",
-    "write_study",
-]
 
 # reasons that leave no time series
 BROKEN = {Reason.INTERNAL_ERROR, Reason.WORKER_DIED, Reason.OUT_OF_MEMORY, Reason.INVALID_INPUT}

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from compressor.outcome import NUMBERS, ROW, Outcome, SeriesFile, coordinates
+from compressor.metrics import NUMBERS
+from compressor.outcome import ROW, Outcome, SeriesFile, coordinates
 from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
 from compressor.store.series_file import intact, series_path
 

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases.case import Output
-from compressor.outcome import NUMBERS, SeriesFile, Table
+from compressor.cases import Output
+from compressor.metrics import NUMBERS
+from compressor.outcome import SeriesFile, Table
 from compressor.store import hdf5
 from compressor.store.files import StoreError, publish, system_error
 from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.outcome import NUMBERS
+from compressor.metrics import NUMBERS
 from compressor.store.files import Folder, StoreError
 from compressor.store.reader import Stored, read_store
 from compressor.store.studies import Again, StoredStudy, owners, read_studies

@@ -3,27 +3,22 @@
 import argparse
 import contextlib
 import datetime
-import itertools
 import json
 import math
 import os
 import re
 import shlex
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import compressor
-from compressor.cases.case import MODEL_VERSION, table
-from compressor.cases.parameter import JOINTS
+from compressor.cases import MODEL_VERSION, Study, given, points, table
+from compressor.metrics import JOINTS
 from compressor.store.files import Folder, StoreError, publish, refusals, system_error
 from compressor.store.hdf5 import digest
-
-if TYPE_CHECKING:
-    from compressor.cases.study import Study
-
 
 JOB_KEY = re.compile(r"[0-9a-f]{20}")
 
@@ -74,24 +69,6 @@ class Again(NamedTuple):
     case_file: str
     overrides: tuple[str, ...]
     jobs: int
-
-
-def points(study: "Study | StoredStudy") -> Iterator[dict[str, Any]]:
-    """The swept values of each job by dotted key, in the order of the jobs."""
-    keys = [axis.key for axis in study.axes]
-    columns = [axis.values for axis in study.axes]
-    rows: Iterable[tuple[Any, ...]]
-    if study.is_grid:
-        rows = itertools.product(*columns)
-    else:
-        rows = (tuple(column[n] for column in columns) for n in range(study.jobs))
-    for values in rows:
-        yield dict(zip(keys, values, strict=True))
-
-
-def given(point: dict[str, Any]) -> dict[str, Any]:
-    """The swept values that a job has, without those of other blocks."""
-    return {key: value for key, value in point.items() if value is not None}
 
 
 def owners(

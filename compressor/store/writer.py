@@ -17,8 +17,16 @@ from pathlib import Path
 from types import TracebackType
 
 from compressor.outcome import Outcome
-from compressor.store.files import Folder, StoreError, make_folder, publish, refusals, system_error
-from compressor.store.reader import discard_leftovers, places, read_store, segment_paths
+from compressor.store.files import (
+    Folder,
+    StoreError,
+    discard_leftovers,
+    make_folder,
+    publish,
+    refusals,
+    system_error,
+)
+from compressor.store.reader import places, read_store, segment_paths
 from compressor.store.rows import Rows, encode, merge, of_outcomes, read_segment, segment_name
 from compressor.store.series_file import NAME as JOB_NAME
 

@@ -9,11 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from compressor.cases.case import Case
-from compressor.cases.study import Study
-from compressor.store.reader import Folder, points, read_store
-from compressor.store.series_file import series_image
-from compressor.store.studies import given
+from compressor.cases import Case, Study, given, points
+from compressor.store import Folder, read_store, series_image
 from compressor.sweep.sweep import stored, wanted, warm_up
 
 ROW_BYTES = 341  # of one job in a file of rows, measured by `make store-bench`
@@ -119,15 +116,13 @@ def cost(cases: Sequence[Case]) -> tuple[float, int]:
 
 def measured(case: Case) -> tuple[float, float]:
     """A job's seconds for a revolution, and its file's bytes for a sample."""
-    from compressor.solve import (
-        simulate as simulation,  # needs numba: only where something is simulated
-    )
+    from compressor.solve import measure, observe  # needs numba: only where something is simulated
 
     began = time.perf_counter()
     size = 0
     if case.output.keep == "metrics":
-        simulation.measure(case)
+        measure(case)
     else:
-        size = len(series_image(simulation.observe(case)[1], case.output))
+        size = len(series_image(observe(case)[1], case.output))
     seconds = time.perf_counter() - began
     return seconds / (case.duration / case.turn), size / (case.steps + 1)

@@ -15,14 +15,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from compressor.cases.case import Case
-from compressor.cases.study import Study, shard
+from compressor.cases import Case, Study, given, points, shard
 from compressor.outcome import Outcome, without_run
 from compressor.reasons import Reason
-from compressor.store.reader import Folder, Stored, StoreError, points, write_series, write_study
-from compressor.store.series_file import series_file
-from compressor.store.studies import given
-from compressor.store.writer import Writer
+from compressor.store import (
+    Folder,
+    Stored,
+    StoreError,
+    Writer,
+    series_file,
+    write_series,
+    write_study,
+)
 from compressor.workers import Done, Input, Lost, rest, run_batches
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
@@ -269,7 +273,7 @@ def warm_up(cases: Sequence[Case], remark: Callable[[str], None], horizon: bool 
 
     horizon: whether twins are needed though no case asks for its horizon.
     """
-    from compressor.solve.simulate import measure  # needs numba: only where something is simulated
+    from compressor.solve import measure  # needs numba: only where something is simulated
 
     timer = threading.Timer(PATIENCE, remark, [COMPILING])
     timer.daemon = True
@@ -300,15 +304,13 @@ def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
     Without a place, what is to be stored comes back. A StoreError is returned: it ends the sweep,
     while an exception is a failure of the job.
     """
-    from compressor.solve import (
-        simulate as simulation,  # needs numba: only where something is simulated
-    )
+    from compressor.solve import measure, observe  # needs numba: only where something is simulated
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
         if case.output.keep == "metrics":
-            return simulation.measure(case)
-        found, dataset = simulation.observe(case)
+            return measure(case)
+        found, dataset = observe(case)
     if found.reason == Reason.INVALID_INPUT:
         return found
     if place is None:

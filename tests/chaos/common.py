@@ -19,12 +19,12 @@ from typing import Any, NamedTuple
 import click.utils
 from compsim import cli
 
-from compressor import open_study
 from compressor.cases.load import load_studies
+from compressor.store.reader import open_study
 from compressor.store.status import standings
 from compressor.store.verify import verify
 from compressor.sweep import plan as forecast
-from compressor.sweep import sweep
+from compressor.sweep.sweep import sweep
 
 SECONDS = 60.0  # in which a trial must end; what hangs takes for ever
 SOLVE = {"duration_rev": 0.02, "settle_rev": 0, "output_step_deg": 0.72, "accuracy": "draft",

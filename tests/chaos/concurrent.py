@@ -18,7 +18,8 @@ from chaos.tally import Tally
 from compressor.cases.load import load_studies
 from compressor.cases.study import shard
 from compressor.store import writer
-from compressor.store.reader import read_store, read_studies
+from compressor.store.reader import read_store
+from compressor.store.studies import read_studies
 from compressor.sweep.sweep import stored, wanted
 
 WHAT = "two to four runs on one store at once"

@@ -24,11 +24,10 @@ from chaos.common import (
     fresh,
 )
 from chaos.tally import Tally
-from compressor import open_study
 from compressor.report import report
 from compressor.store import writer
 from compressor.store.files import StoreError, StoreWarning
-from compressor.store.reader import read_store
+from compressor.store.reader import open_study, read_store
 
 READERS = ("status", "status --json", "show", "show --json", "report")
 PROVENANCE = re.compile(r"<dl>.*?</dl>", re.DOTALL)  # when a page was written, of what

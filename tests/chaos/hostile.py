@@ -38,7 +38,7 @@ from compressor.store import hdf5
 from compressor.store.reader import read_store
 from compressor.store.rows import decode, encode, segment_name
 from compressor.store.studies import read_study
-from compressor.sweep import sweep
+from compressor.sweep.sweep import sweep
 
 ROOT = Path(__file__).parent.parent.parent
 SECONDS = 2.0  # of processor time that a command may take

@@ -7,7 +7,7 @@ from functools import partial
 import xarray as xr
 from matplotlib.figure import Figure as Drawing
 
-from compressor.analysis.claims import CLEARANCES, label
+from compressor.analysis import CLEARANCES, label
 from compressor.report.figures.forces import draw_contact_force, draw_piston_force
 from compressor.report.figures.machine import draw_cam, draw_pressure_volume
 from compressor.report.figures.relation import draw_relation

@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MultipleLocator
 from numpy.lib.stride_tricks import sliding_window_view
 
-from compressor.analysis.claims import CLEARANCES, label, settled
+from compressor.analysis import CLEARANCES, label, settled
 from compressor.report.figures.style import BY_CLEARANCE, BY_LOAD, IDEAL, Line
 
 Runs = Mapping[str, xr.Dataset]

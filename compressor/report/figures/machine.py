@@ -11,18 +11,19 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
 
-from compressor.analysis.cam import (
+from compressor.analysis import (
     BASE_RADIUS,
     cam_profile,
+    case_of,
     contour,
     printed_corners_of_gas,
     printed_profile,
+    settled,
 )
-from compressor.analysis.claims import case_of, settled
-from compressor.physics.loads import sample_segments, segments
+from compressor.physics import sample_segments, segments
 from compressor.report.figures.curves import Runs
 from compressor.report.figures.style import BLUE, GOLD, GREY, RED, Line, sheet, styled
-from compressor.solve.si_record import record
+from compressor.solve import record
 
 PHASES = ("expansion", "suction", "compression", "discharge")
 CLOSED = Line(BLUE, "-", 1.8, 2.3)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from compressor.measure.extremes import SPANS
+from compressor.measure import SPANS
 from compressor.reasons import Reason
 from compressor.report.figures.style import (
     BLACK,

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from compressor.analysis.claims import CLEARANCES, force_relation, label, settled
+from compressor.analysis import CLEARANCES, force_relation, label, settled
 from compressor.report.figures.curves import KILONEWTON, Runs
 from compressor.report.figures.forces import contact_force
 from compressor.report.figures.style import BLACK, BY_CLEARANCE, sheet, styled

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from compressor.cases.parameter import JOINTS
+from compressor.metrics import JOINTS
 from compressor.report.figures.style import (
     BLUE,
     CYCLE,

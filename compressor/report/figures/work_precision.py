@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from compressor.cases.accuracy import ACCURACY
+from compressor.cases import ACCURACY
 from compressor.report.figures.style import (
     BLACK,
     BLUE,
