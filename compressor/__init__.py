@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from compressor.cases import Case, load_cases
-    from compressor.solve import simulate
+    from compressor.solve.simulate import simulate
     from compressor.store import open_study
 
 __version__ = "0.1.0"
