@@ -2,7 +2,8 @@
 
 The public calls: `load_cases(path, ...)` reads case files, `simulate(case)` runs one case,
 `open_study(folder)` opens what a sweep stored. They are imported when first used, since the
-command line must answer `--help` at once.
+command line must answer `--help` at once. `CompsimError` is the base of all errors that were
+foreseen, `CompsimWarning` that of all warnings.
 """
 
 from importlib import import_module
@@ -14,9 +15,23 @@ if TYPE_CHECKING:
     from compressor.store import open_study
 
 __version__ = "0.1.0"
-__all__ = ["Case", "load_cases", "open_study", "simulate"]
+__all__ = ["Case", "CompsimError", "CompsimWarning", "load_cases", "open_study", "simulate"]
 
 HOMES = {"Case": "cases", "load_cases": "cases", "simulate": "solve", "open_study": "store"}
+
+
+class CompsimError(Exception):
+    """An error that was foreseen: its text says what is wrong and what to do about it.
+
+    exit_code: what the command line ends with; prefix: what it prints before the text.
+    """
+
+    exit_code = 1
+    prefix = "compsim: "
+
+
+class CompsimWarning(UserWarning):
+    """What was asked for and is not there; the program goes on without it."""
 
 
 def __getattr__(name: str) -> Any:

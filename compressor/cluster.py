@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from compressor import CompsimError
 from compressor.cases import Case
 from compressor.outcome import Outcome
 from compressor.reasons import Reason
@@ -42,8 +43,10 @@ WAITING = "the cluster has no workers: waiting for the first"
 WARM: set[tuple[str, bool]] = set()  # methods, and horizons, that this process has loaded
 
 
-class ClusterError(Exception):
+class ClusterError(CompsimError):
     """A cluster that cannot be used: which, why, and what to do about it."""
+
+    exit_code = 2
 
 
 class Cluster:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from compressor import CompsimError
 from compressor.process import (
     Job,
     Worker,
@@ -42,7 +43,7 @@ BARREN = 10  # workers in a row that may die without any job beginning or ending
 AGAIN = "also when it ran again alone"
 
 
-class WorkersFailed(Exception):
+class WorkersFailed(CompsimError):
     """Worker processes cannot be started, or die before they begin a job."""
 
 

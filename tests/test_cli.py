@@ -309,15 +309,15 @@ def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
 
 @pytest.fixture
 def reporter(monkeypatch):
-    """Stands in for compressor.report.report, which draws for seconds."""
+    """Stands in for compressor.report, which draws for seconds."""
 
     def write_report(results, report, command):
         store.read_studies(results)
         return Path(report, command)
 
-    module = types.ModuleType("compressor.report.report")
+    module = types.ModuleType("compressor.report")
     module.write_report = write_report
-    monkeypatch.setitem(sys.modules, "compressor.report.report", module)
+    monkeypatch.setitem(sys.modules, "compressor.report", module)
 
 
 def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
@@ -338,7 +338,7 @@ def break_simulation(monkeypatch):
     def broken(*arguments, **options):
         raise ZeroDivisionError("no reason")
 
-    monkeypatch.setattr("compressor.cases.load.load_studies", broken)
+    monkeypatch.setattr("compressor.cases.load_studies", broken)
 
 
 def test_the_unforeseen_is_one_line_and_a_file(case_file, capsys, monkeypatch):
@@ -503,7 +503,7 @@ def test_exit_codes_of_signals(number, code, case_file, capsys, monkeypatch):
     number = signal.Signals[f"SIG{number}"]
     before = signal.getsignal(number)
     monkeypatch.setattr(  # to this thread: another one may be slow to hand it over
-        "compressor.cases.load.load_studies", lambda *_, **__: signal.raise_signal(number)
+        "compressor.cases.load_studies", lambda *_, **__: signal.raise_signal(number)
     )
     assert cli.main(["run", case_file("one.yaml")]) == code
     assert capsys.readouterr().err == f"interrupted by {number.name}\n"

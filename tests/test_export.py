@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -16,7 +17,6 @@ from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, SIZES
 from compressor.solve.simulate import simulate
 from compressor.store.export import ExportError, export
-from compressor.store.export import export as module
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job
 from compressor.store.studies import write_study
@@ -116,7 +116,7 @@ def test_ncdump_reads_an_export(results, tmp_path):
 
 @pytest.mark.parametrize("name", ["grid", "list"])
 def test_series_read_back_to_the_bit(results, name, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "BLOCK", 7)
+    monkeypatch.setattr(sys.modules["compressor.store.export"], "BLOCK", 7)
     (key, *_) = (k for k in open_study(results, name).key.values.flat if stored(results, k))
     for suffix in ("csv", "nc"):
         export(results, [key[:12]], tmp_path / f"job.{suffix}")

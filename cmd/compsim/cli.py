@@ -24,8 +24,6 @@ from compsim.screen import (
     DONE,
     INTERNAL,
     SOME_FAILED,
-    STORE,
-    USAGE,
     Screen,
     caution,
     configs_argument,
@@ -45,16 +43,6 @@ if TYPE_CHECKING:
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_FAILURES = 20  # listed one by one
 AGAIN = 0.02  # s until a dropped signal is sent again
-
-# error -> what stands before its text, and the exit code
-FORESEEN = {
-    "CaseFileError": ("", USAGE),
-    "ExportError": ("compsim: ", USAGE),
-    "ClusterError": ("compsim: ", USAGE),
-    "StoreError": ("compsim: ", STORE),
-    "WorkersFailed": ("compsim: ", INTERNAL),
-    "ReferenceFailed": ("compsim: ", SOME_FAILED),
-}
 
 
 class Interrupted(BaseException):
@@ -285,7 +273,7 @@ def warnings_told() -> Iterator[None]:
     show, told = warnings.showwarning, set()
 
     def say_it(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
-        if category.__name__ != "StoreWarning":  # by name: its module is heavy
+        if not issubclass(category, compressor.CompsimWarning):
             show(message, category, *where, **more)
         elif str(message) not in told:
             told.add(str(message))
@@ -315,11 +303,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def told(error: Exception) -> int:
     """Say what went wrong and return the exit code; only what nobody foresaw has a traceback."""
-    for family in type(error).__mro__:  # by name: their modules are heavy
-        if family.__name__ in FORESEEN:
-            prefix, code = FORESEEN[family.__name__]
-            say(f"{prefix}{error}")
-            return code
+    if isinstance(error, compressor.CompsimError):
+        say(f"{error.prefix}{error}")
+        return error.exit_code
     lines = traceback.format_exception(error)
     if os.environ.get("COMPSIM_DEBUG"):
         say("".join(lines), end="")

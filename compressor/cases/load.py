@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from compressor import CompsimError
 from compressor.cases import blocks
 from compressor.cases.case import Case, table
 from compressor.cases.conditions import NoComparison, Test, comparison
@@ -31,8 +32,11 @@ MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 
-class CaseFileError(ValueError):
+class CaseFileError(CompsimError, ValueError):
     """Case files that cannot be read; `problems` lists everything wrong, each with its place."""
+
+    exit_code = 2
+    prefix = ""  # each line begins with the file that it is about
 
     def __init__(self, problems: Sequence[FileProblem]):
         self.problems = sorted(set(problems))

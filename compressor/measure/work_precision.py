@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 import compressor
+from compressor import CompsimError
 from compressor.analysis import FAULTS, label, paper_cases, settled
 from compressor.cases import ACCURACY, Case, Output
 from compressor.metrics import JOINTS
@@ -45,8 +46,10 @@ Progress = Callable[[int, int, str], None]
 Point = tuple[int, int, int]  # scene, method, tolerance
 
 
-class ReferenceFailed(Exception):
+class ReferenceFailed(CompsimError):
     """A case whose reference run does not reach its end, so that nothing can be judged."""
+
+    exit_code = 3
 
 
 def default_cases() -> dict[str, Case]:

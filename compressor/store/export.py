@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import compressor
+from compressor import CompsimError
 from compressor.store.files import Folder, StoreError, publish, publishing
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import Stored, read_store
@@ -36,8 +37,10 @@ HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
 Progress = Callable[[int, int, str], None]  # files written, files in all, a remark or ""
 
 
-class ExportError(ValueError):
+class ExportError(CompsimError):
     """What cannot be exported to where it was asked for."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True)

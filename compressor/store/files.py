@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from compressor import CompsimError, CompsimWarning
+
 Folder = str | os.PathLike[str]
 
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
@@ -32,8 +34,10 @@ REMEDIES = {
 }
 
 
-class StoreError(Exception):
+class StoreError(CompsimError):
     """What is wrong with the store: at which path, and what to do about it."""
+
+    exit_code = 5
 
     def __init__(self, path: Folder, problem: str, remedy: str):
         self.path, self.problem, self.remedy = os.fspath(path), problem, remedy
@@ -43,7 +47,7 @@ class StoreError(Exception):
         return f"{self.path}: {self.problem}; {self.remedy}"
 
 
-class StoreWarning(UserWarning):
+class StoreWarning(CompsimWarning):
     """What a store lacks that was asked for; who reads it goes on without."""
 
 
