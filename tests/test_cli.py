@@ -12,11 +12,13 @@ import types
 from pathlib import Path
 
 import pytest
-from compsim import cli, plan
+from compsim import cli, plan, run
+from compsim.screen import Screen, duration
 
 from compressor.analysis.claims import paper_cases
 from compressor.cases.load import MAX_JOBS, load_cases
 from compressor.store import reader as store
+from compressor.store.studies import read_studies
 from compressor.store.writer import Writer
 
 CONFIGS = Path(__file__).parent.parent / "configs"
@@ -97,7 +99,7 @@ def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
     assert "3 jobs run in" in err
     assert err.endswith("next: compsim report -i 'out dir'\n")
     assert "\r" not in err
-    manifest = store.read_studies("out dir")[0]
+    manifest = read_studies("out dir")[0]
     assert manifest.command == "compsim run two.yaml one.yaml -j 1 -o 'out dir'"
 
 
@@ -120,9 +122,7 @@ def test_set_changes_every_case_file(case_file):
     case_file("a.yaml", load="none")
     case_file("b.yaml", load="design")
     assert cli.main(["run", "a.yaml", "b.yaml", "-j", "1", "--set", "load=[none, typical]"]) == 0
-    assert [study.axes[0].values for study in store.read_studies("results")] == [
-        ("none", "typical")
-    ] * 2
+    assert [study.axes[0].values for study in read_studies("results")] == [("none", "typical")] * 2
     assert len(store.finished_keys("results")) == 2
 
 
@@ -294,7 +294,7 @@ def test_many_failures_are_counted(case_file, capsys):
               machine={"rod_mass_kg": rods})  # fmt: skip
     assert cli.main(["run", "all.yaml", "-j", "1"]) == 3
     err = capsys.readouterr().err
-    assert err.count("more than 5 steps") == cli.MOST_FAILURES
+    assert err.count("more than 5 steps") == run.MOST_FAILURES
     assert "and 5 more" in err
     assert "budget_steps (25)" in err
 
@@ -312,7 +312,7 @@ def reporter(monkeypatch):
     """Stands in for compressor.report, which draws for seconds."""
 
     def write_report(results, report, command):
-        store.read_studies(results)
+        read_studies(results)
         return Path(report, command)
 
     module = types.ModuleType("compressor.report")
@@ -362,7 +362,7 @@ def test_the_unforeseen_is_shown_for_debugging(case_file, capsys, monkeypatch):
 
 def test_a_terminal_gets_one_line_that_is_rewritten(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    screen = cli.Screen(quiet=False)
+    screen = Screen(quiet=False)
     for event in [(2, 11, ""), (3, 11, ""), (11, 11, "")]:
         screen(*event)
     screen.end()
@@ -375,7 +375,7 @@ def test_a_terminal_gets_one_line_that_is_rewritten(capsys, monkeypatch):
 
 def test_a_remark_stays_above_the_line_that_is_rewritten(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    screen = cli.Screen(quiet=False)
+    screen = Screen(quiet=False)
     for event in [(0, 11, ""), (0, 11, "compiled in 43 s"), (1, 11, "")]:
         screen(*event)
     err = capsys.readouterr().err
@@ -387,7 +387,7 @@ def test_a_remark_stays_above_the_line_that_is_rewritten(capsys, monkeypatch):
     [(0.04, "0.0 s"), (9.9, "9.9 s"), (99, "99 s"), (101, "2 min"), (7200, "2 h 00 min")],
 )
 def test_durations(seconds, text):
-    assert cli.duration(seconds) == text
+    assert duration(seconds) == text
 
 
 # ---- explain and tradeoff -----------------------------------------------------------------------
@@ -435,11 +435,11 @@ def test_explain_of_an_effect_that_failed():
 def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     import xarray as xr
 
-    from compressor.measure.work_precision import work_precision as bench
+    from compressor.measure.work_precision import work_precision
 
     few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
-    monkeypatch.setattr(bench.work_precision, "__defaults__",
-                        (*few.values(), *bench.work_precision.__defaults__[2:]))  # fmt: skip
+    defaults = (*few.values(), *work_precision.__defaults__[2:])
+    monkeypatch.setattr(work_precision, "__defaults__", defaults)
     case_file("a.yaml", joint=["big_end", "both"], clearance_mm=0.2)
     assert cli.main(["tradeoff", "a.yaml", "-o", "out dir", "--repeats", "1"]) == 0
     out, err = capsys.readouterr()

@@ -17,12 +17,22 @@ from conftest import keep
 
 from compressor.cases.case import Case, Output, table
 from compressor.cases.load import load_studies
+from compressor.cases.study import points
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
 from compressor.store import dataset as labels
 from compressor.store import hdf5
 from compressor.store import reader as store
-from compressor.store.series_file import series_image, series_path
+from compressor.store.files import StoreError, discard_leftovers
+from compressor.store.hdf5 import DamagedJob
+from compressor.store.series_file import (
+    read_series,
+    read_values,
+    series_image,
+    series_path,
+    write_series,
+)
+from compressor.store.studies import read_studies, write_study
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 
@@ -38,7 +48,7 @@ def study(name, solve=SHORT, **values):
 def fill(folder, *studies, skip=()):
     """Store studies and all their jobs, but for the jobs at some positions."""
     for one in studies:
-        store.write_study(folder, one, "by hand")
+        write_study(folder, one, "by hand")
         keep(folder, *(simulate(c) for n, c in enumerate(one.cases) if n not in skip))
 
 
@@ -95,7 +105,7 @@ def test_ncdump_reads_a_job_and_a_segment(values, job, tmp_path):
         pytest.skip("ncdump is not installed (Debian: netcdf-bin)")
     kept = job
     if "time" in job.dims:
-        store.write_series(tmp_path, kept, Output(**values))
+        write_series(tmp_path, kept, Output(**values))
         name = file_of(tmp_path, job)
         dump = ["ncdump", "-v", "acceleration", str(name)]
         text = subprocess.run(dump, capture_output=True, text=True, check=True).stdout
@@ -130,8 +140,8 @@ def test_ten_lines_of_h5py_read_a_job(ideal, tmp_path):
 
 @pytest.mark.parametrize("compress", [False, True])
 def test_single_precision_rounds_series_alone(compress, ideal, tmp_path):
-    double = store.write_series(tmp_path / "double", ideal, Output())
-    single = store.write_series(tmp_path, ideal, Output(precision="single", compress=compress))
+    double = write_series(tmp_path / "double", ideal, Output())
+    single = write_series(tmp_path, ideal, Output(precision="single", compress=compress))
     path = series_path(tmp_path, ideal.attrs["key"], single.digest)
     full = series_path(tmp_path / "double", ideal.attrs["key"], double.digest)
     back = xr.open_dataset(path, engine="h5netcdf")
@@ -178,12 +188,12 @@ def test_what_is_not_stored_is_no_job(tmp_path):
     key = Case().key
     assert store.job_status(tmp_path, key) is None
     assert store.finished_keys(tmp_path) == set()
-    with pytest.raises(store.StoreError, match="is not stored; run its study first"):
+    with pytest.raises(StoreError, match="is not stored; run its study first"):
         store.read_job(tmp_path, key)
 
 
 def test_a_job_without_row_or_without_file_is_not_stored(ideal, tmp_path):
-    store.write_series(tmp_path, ideal, Output())
+    write_series(tmp_path, ideal, Output())
     assert store.finished_keys(tmp_path) == set()
     keep(tmp_path, ideal)
     assert store.finished_keys(tmp_path) == {ideal.attrs["key"]}
@@ -193,10 +203,10 @@ def test_a_job_without_row_or_without_file_is_not_stored(ideal, tmp_path):
 
 @pytest.mark.parametrize("key", ["../../etc/passwd", "", "0" * 19, "0" * 21, "G" * 20])
 def test_a_key_cannot_lead_out_of_the_store(key, ideal, tmp_path):
-    with pytest.raises(store.StoreError, match="key is 20 hexadecimal digits"):
+    with pytest.raises(StoreError, match="key is 20 hexadecimal digits"):
         store.read_job(tmp_path, key)
-    with pytest.raises(store.StoreError, match="key is 20 hexadecimal digits"):
-        store.write_series(tmp_path, ideal.assign_attrs(key=key), Output())
+    with pytest.raises(StoreError, match="key is 20 hexadecimal digits"):
+        write_series(tmp_path, ideal.assign_attrs(key=key), Output())
 
 
 SERVING = [  # output of what is stored, its reason, output of the case, serves
@@ -262,7 +272,7 @@ FOREIGN = {
 def changed(dataset, change):
     """The bytes of a job's file after a change to what it holds."""
     with tempfile.TemporaryDirectory() as folder:
-        kept = store.write_series(Path(folder), dataset, Output())
+        kept = write_series(Path(folder), dataset, Output())
         path = series_path(Path(folder), dataset.attrs["key"], kept.digest)
         with h5py.File(path, "a") as file:
             change(file)
@@ -282,8 +292,8 @@ def planted(folder, dataset, data):
 @pytest.mark.parametrize("change", list(FOREIGN))
 def test_what_a_file_must_not_hold_is_refused(change, ideal, tmp_path):
     path = planted(tmp_path, ideal, changed(ideal, FOREIGN[change]))
-    for read in (store.read_series, lambda path: store.read_values(path, ["acceleration"])):
-        with pytest.raises(store.DamagedJob, match=r"is refused: x .*; run its study again"):
+    for read in (read_series, lambda path: read_values(path, ["acceleration"])):
+        with pytest.raises(DamagedJob, match=r"is refused: x .*; run its study again"):
             read(path)
 
 
@@ -299,8 +309,8 @@ def test_a_text_that_is_not_where_it_says_is_refused(shift, value, ideal, tmp_pa
         heap = int.from_bytes(data[start + 4 : start + 12], "little")
     at = start + shift if shift >= 0 else heap + 24
     data[at : at + 4] = value.to_bytes(4, "little")
-    with pytest.raises(store.DamagedJob, match="holds texts that are not where it says"):
-        store.read_series(planted(tmp_path, ideal, bytes(data)))
+    with pytest.raises(DamagedJob, match="holds texts that are not where it says"):
+        read_series(planted(tmp_path, ideal, bytes(data)))
 
 
 SCHEMA = {
@@ -318,15 +328,15 @@ SCHEMA = {
 @pytest.mark.parametrize("change", list(SCHEMA))
 def test_a_file_that_is_no_job_is_refused(change, ideal, tmp_path):
     path = planted(tmp_path, ideal, changed(ideal, SCHEMA[change]))
-    with pytest.raises(store.DamagedJob, match="is no finished job of compsim"):
-        store.read_series(path)
+    with pytest.raises(DamagedJob, match="is no finished job of compsim"):
+        read_series(path)
 
 
 @pytest.mark.parametrize("data", [b"", b"not a job", b"\x89HDF\r\n\x1a\n", b"\x80\x04."])
 def test_what_is_no_hdf5_is_refused(data, ideal, tmp_path):
     path = planted(tmp_path, ideal, data)
-    with pytest.raises(store.DamagedJob, match="is no finished job of compsim"):
-        store.read_series(path)
+    with pytest.raises(DamagedJob, match="is no finished job of compsim"):
+        read_series(path)
 
 
 # ---- durability ---------------------------------------------------------------------------------
@@ -338,7 +348,7 @@ def test_old_leftovers_are_removed_and_young_ones_kept(ideal, tmp_path):
     for path in (old, young):
         path.touch()
     os.utime(old, (0, 0))
-    store.discard_leftovers(tmp_path)
+    discard_leftovers(tmp_path)
     assert (old.exists(), young.exists()) == (False, True)
     assert store.finished_keys(tmp_path)
 
@@ -374,7 +384,7 @@ def test_file_system_errors_have_a_remedy(call, number, remedy, ideal, tmp_path,
 
     keep(tmp_path, ideal)
     monkeypatch.setattr(os, call, refuse)
-    with pytest.raises(store.StoreError) as error:
+    with pytest.raises(StoreError) as error:
         keep(tmp_path, ideal.assign_attrs(detail="new"))
     monkeypatch.undo()
     assert os.strerror(number) in str(error.value)
@@ -385,7 +395,7 @@ def test_file_system_errors_have_a_remedy(call, number, remedy, ideal, tmp_path,
 
 def test_a_file_where_a_folder_is_needed(ideal, tmp_path):
     (tmp_path / "results").write_text("mine")
-    with pytest.raises(store.StoreError, match="is a file, where a folder is needed"):
+    with pytest.raises(StoreError, match="is a file, where a folder is needed"):
         keep(tmp_path / "results", ideal)
 
 
@@ -394,34 +404,34 @@ def test_a_file_where_a_folder_is_needed(ideal, tmp_path):
 
 def test_a_study_is_stored_and_found(tmp_path):
     one = study("speeds", machine={"speed_rpm": [300, 500]}, load=["design", "none"])
-    store.write_study(tmp_path, one, "compsim run speeds.yaml")
-    (found,) = store.read_studies(tmp_path)
+    write_study(tmp_path, one, "compsim run speeds.yaml")
+    (found,) = read_studies(tmp_path)
     assert (found.name, found.command) == ("speeds", "compsim run speeds.yaml")
     assert found.keys == tuple(case.key for case in one.cases)
     assert [(axis.key, axis.values, axis.units) for axis in found.axes] == [
         ("machine.speed_rpm", (300, 500), "rpm"),
         ("load", ("design", "none"), ""),
     ]
-    assert list(store.points(found))[1] == {"machine.speed_rpm": 300, "load": "none"}
+    assert list(points(found))[1] == {"machine.speed_rpm": 300, "load": "none"}
 
 
 def test_storing_a_study_again_leaves_its_file_alone(tmp_path):
     pairs = [["steel", "steel"], ["steel", "copper"]]
     one = study("pairs", contact={"materials": pairs})
-    store.write_study(tmp_path, one, "first")
+    write_study(tmp_path, one, "first")
     before = (tmp_path / "studies/pairs.json").stat().st_mtime_ns
-    store.write_study(tmp_path, one, "second")
+    write_study(tmp_path, one, "second")
     assert (tmp_path / "studies/pairs.json").stat().st_mtime_ns == before
-    store.write_study(tmp_path, study("pairs", contact={"materials": pairs[:1]}), "third")
-    assert store.read_studies(tmp_path)[0].command == "third"
+    write_study(tmp_path, study("pairs", contact={"materials": pairs[:1]}), "third")
+    assert read_studies(tmp_path)[0].command == "third"
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[1]", '{"axes": [], "keys": []}', "\xff"])
 def test_a_damaged_study_is_named_with_a_remedy(text, tmp_path):
-    store.write_study(tmp_path, study("one"))
+    write_study(tmp_path, study("one"))
     (tmp_path / "studies/one.json").write_text(text, encoding="latin-1")
-    with pytest.raises(store.StoreError, match=r"one\.json.*delete it and run its case file again"):
-        store.read_studies(tmp_path)
+    with pytest.raises(StoreError, match=r"one\.json.*delete it and run its case file again"):
+        read_studies(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -437,18 +447,18 @@ def test_a_damaged_study_is_named_with_a_remedy(text, tmp_path):
     ids=str,
 )  # fmt: skip
 def test_a_study_that_nobody_wrote_is_refused(change, tmp_path):
-    store.write_study(tmp_path, study("one"))
+    write_study(tmp_path, study("one"))
     path = tmp_path / "studies/one.json"
     plain = json.loads(path.read_text()) | change
     del plain["digest"]
     head = json.dumps(plain, indent=1).removesuffix("\n}").encode()
     path.write_bytes(head + f',\n "digest": "{hdf5.digest(head)}"\n}}\n'.encode())
-    with pytest.raises(store.StoreError, match=r"one\.json.*delete it and run its case file again"):
-        store.read_studies(tmp_path)
+    with pytest.raises(StoreError, match=r"one\.json.*delete it and run its case file again"):
+        read_studies(tmp_path)
 
 
 def test_an_empty_folder_says_what_to_do(tmp_path):
-    with pytest.raises(store.StoreError, match="compsim run CONFIG"):
+    with pytest.raises(StoreError, match="compsim run CONFIG"):
         store.open_study(tmp_path / "results")
 
 
@@ -562,7 +572,7 @@ def test_several_studies_have_jobs_with_coordinates(grid, tmp_path):
     assert found.clearance_mm.values[:2].tolist() == [0.1, 0.1]
     assert found.acceleration.dims == ("job", "time")
     assert store.open_study(tmp_path, "grid").key.shape == (2, 2)
-    with pytest.raises(store.StoreError, match=r"'gird'.*it holds faults, grid"):
+    with pytest.raises(StoreError, match=r"'gird'.*it holds faults, grid"):
         store.open_study(tmp_path, "gird")
 
 
@@ -588,7 +598,7 @@ def test_failed_jobs_have_a_reason_and_no_metrics(tmp_path):
 
 
 def test_a_study_without_any_job_is_all_missing(tmp_path):
-    store.write_study(tmp_path, study("planned", clearance_mm=[0.1, 0.2], joint=["both"]))
+    write_study(tmp_path, study("planned", clearance_mm=[0.1, 0.2], joint=["both"]))
     found = store.open_study(tmp_path)
     assert found.status.values.tolist() == [["missing"], ["missing"]]
     assert found.clearance_mm.attrs["units"] == "mm"

@@ -13,6 +13,7 @@ import compressor.sweep.sweep
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
+from compressor.store.files import StoreError
 from compressor.store.verify import verify
 from compressor.sweep.sweep import COMPILING, Failure, sweep, wanted
 
@@ -255,14 +256,14 @@ def test_compiling_that_takes_long_is_told(studies, tmp_path, monkeypatch):
 def test_a_job_that_cannot_be_stored_ends_the_sweep(workers, studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/jobs").symlink_to("nowhere")
-    with pytest.raises(store.StoreError, match=r"out/jobs: is a file, where a folder is needed"):
+    with pytest.raises(StoreError, match=r"out/jobs: is a file, where a folder is needed"):
         sweep(studies(one={"load": ["none", "design"]}), tmp_path / "out", workers)
 
 
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/rows").write_text("in the way")
-    with pytest.raises(store.StoreError, match="Not a directory; choose another folder"):
+    with pytest.raises(StoreError, match="Not a directory; choose another folder"):
         sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
 
 

@@ -25,7 +25,8 @@ from compressor.solve.simulate import simulate
 from compressor.store import hdf5, writer
 from compressor.store import reader as store
 from compressor.store import rows as segments
-from compressor.store.series_file import series_file as jobfiles
+from compressor.store.files import StoreError
+from compressor.store.series_file import intact, read_values, write_series
 from compressor.store.studies import StoredAxis, StoredStudy, encode
 from compressor.store.verify import verify
 from compressor.store.writer import Writer
@@ -203,7 +204,7 @@ def test_readers_merge_shards(tmp_path):
     jobs = [simulate(case) for case in short_cases()]
     for number, (name, job) in enumerate(zip(("", "1-of-2", "2-of-2"), jobs, strict=True)):
         with Writer(tmp_path, shard=name) as open_writer:
-            series = store.write_series(open_writer.place, job, short_cases()[number].output)
+            series = write_series(open_writer.place, job, short_cases()[number].output)
             attributes = dict(job.attrs)
             open_writer.add(Outcome("ok", "", np.zeros(1, ROW)[0], attributes, series))
     found = store.read_store(tmp_path)
@@ -225,15 +226,13 @@ def short_cases():
 
 @pytest.mark.parametrize("name", ["../up", "a/b", ".hidden", "x" * 65])
 def test_a_shard_stays_in_its_folder(name, tmp_path):
-    with pytest.raises(store.StoreError, match="is no shard's name"):
+    with pytest.raises(StoreError, match="is no shard's name"):
         Writer(tmp_path, shard=name)
 
 
 def test_one_writer_at_a_time(tmp_path):
     with Writer(tmp_path, command="the first"):
-        with pytest.raises(
-            store.StoreError, match=rf"process {os.getpid()} on .*: the first; wait"
-        ):
+        with pytest.raises(StoreError, match=rf"process {os.getpid()} on .*: the first; wait"):
             Writer(tmp_path).__enter__()
         put(tmp_path, outcome(1), shard="a")  # has a lock of its own
     put(tmp_path, outcome(2))
@@ -249,12 +248,12 @@ def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
         fcntl.flock(lock, fcntl.LOCK_EX)
         named = threading.Timer(0.3, lambda: os.write(lock.fileno(), b"the second"))
         named.start()
-        with pytest.raises(store.StoreError, match="in use by the second; wait"):
+        with pytest.raises(StoreError, match="in use by the second; wait"):
             Writer(tmp_path).__enter__()
         named.join()
         monkeypatch.setattr(writer, "PATIENCE", 0.0)
         lock.truncate(0)
-        with pytest.raises(store.StoreError, match="in use by another process; wait"):
+        with pytest.raises(StoreError, match="in use by another process; wait"):
             Writer(tmp_path).__enter__()
 
 
@@ -315,10 +314,10 @@ def test_a_crash_before_the_row_leaves_the_old_result(tmp_path):
     case = short_cases()[0]
     job = simulate(case)
     with Writer(tmp_path) as open_writer:
-        series = store.write_series(tmp_path, job, case.output)
+        series = write_series(tmp_path, job, case.output)
         kept = Outcome("ok", "", np.zeros(1, ROW)[0], dict(job.attrs), series)
         open_writer.add(kept)
-    store.write_series(tmp_path, job.assign_attrs(detail="again"), case.output)  # then: SIGKILL
+    write_series(tmp_path, job.assign_attrs(detail="again"), case.output)  # then: SIGKILL
     assert len(list(tmp_path.glob("jobs/*.h5"))) == 2
     xr.testing.assert_identical(store.read_job(tmp_path, case.key), job)
     with Writer(tmp_path):
@@ -335,7 +334,7 @@ def test_a_full_disk_is_an_error_with_a_name_and_rows_wait(tmp_path, monkeypatch
     real = os.fsync
     with Writer(tmp_path) as open_writer:
         monkeypatch.setattr(os, "fsync", full)
-        with pytest.raises(store.StoreError, match="No space left on device; free some space"):
+        with pytest.raises(StoreError, match="No space left on device; free some space"):
             open_writer.add(outcome(2))
         monkeypatch.setattr(os, "fsync", real)
         assert open_writer.flush() == [key(2)]
@@ -386,7 +385,7 @@ def test_every_flipped_bit_of_a_job_or_study_is_found(tmp_path):
     case = short_cases()[1]
     job = simulate(case)
     with Writer(tmp_path) as open_writer:
-        series = store.write_series(tmp_path, job, case.output)
+        series = write_series(tmp_path, job, case.output)
         open_writer.add(Outcome("ok", "", np.zeros(1, ROW)[0], dict(job.attrs), series))
     plan(tmp_path, count=1)
     for pattern, keys, step in (("jobs/*.h5", (case.key,), 151), ("studies/*.json", (), 3)):
@@ -528,7 +527,7 @@ def test_what_a_disk_refuses_a_writer_has_a_name(name, tmp_path, monkeypatch):
         monkeypatch.setattr(writer, "read_segment", refused)
     else:
         monkeypatch.setattr(owner, name, refused)
-    with pytest.raises(store.StoreError, match="Input/output error; check the disk"):
+    with pytest.raises(StoreError, match="Input/output error; check the disk"):
         put(tmp_path, outcome(1))
     monkeypatch.undo()
     put(tmp_path, outcome(1))
@@ -538,14 +537,14 @@ def test_what_a_disk_refuses_a_writer_has_a_name(name, tmp_path, monkeypatch):
 def test_a_job_that_may_not_be_read_is_not_damaged(tmp_path, monkeypatch):
     path = tmp_path / f"{key(1)}-{hdf5.digest(b'job')}.h5"
     path.write_bytes(b"job")
-    assert jobfiles.intact(path)
+    assert intact(path)
     for number, raised in ((errno.EIO, False), (errno.ENOENT, False), (errno.EACCES, True)):
 
         def refused(self, number=number):
             raise OSError(number, os.strerror(number), str(self))
 
         monkeypatch.setattr(Path, "read_bytes", refused)
-        with pytest.raises(store.StoreError, match=path.name):
-            jobfiles.read_values(path, ["time"])
-        with pytest.raises(store.StoreError) if raised else contextlib.nullcontext():
-            assert not jobfiles.intact(path)
+        with pytest.raises(StoreError, match=path.name):
+            read_values(path, ["time"])
+        with pytest.raises(StoreError) if raised else contextlib.nullcontext():
+            assert not intact(path)

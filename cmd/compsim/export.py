@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.plan import size
-from compsim.screen import DONE, STORE, Screen, plural, say
-from compsim.status import results
+from compsim.screen import DONE, STORE, Screen, plural, results, say, size
 
 if TYPE_CHECKING:
     from compressor.store import Exported

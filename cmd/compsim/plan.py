@@ -17,6 +17,7 @@ from compsim.screen import (
     plural,
     say,
     setting,
+    size,
 )  # fmt: skip
 
 
@@ -66,12 +67,3 @@ def plan(
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
         click.echo(f"next: {job.study}{point}")
     return DONE
-
-
-def size(count: float) -> str:
-    """Bytes as people say them."""
-    for unit in ("B", "kB", "MB"):
-        if count < 999.5:
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:.4g} GB"

@@ -132,3 +132,17 @@ def duration(seconds: float) -> str:
 def plural(jobs: int) -> str:
     """A number of jobs in words."""
     return f"{jobs} job" + ("s" if jobs != 1 else "")
+
+
+results = click.option("-i", "--input", "folder", default="results", show_default=True,
+                       help="Folder of results.")  # fmt: skip
+as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON.")
+
+
+def size(count: float) -> str:
+    """Bytes as people say them."""
+    for unit in ("B", "kB", "MB"):
+        if count < 999.5:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.4g} GB"

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compsim.screen import DONE, STORE, plural, run_commands, say
-from compsim.status import as_json, results
+from compsim.screen import DONE, STORE, as_json, plural, results, run_commands, say
 
 if TYPE_CHECKING:
     from compressor.store import Damage

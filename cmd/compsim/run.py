@@ -1,0 +1,177 @@
+"""`compsim run`: simulate what case files ask for, and store it."""
+
+import contextlib
+import os
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    caution,
+    configs_argument,
+    duration,
+    jobs_option,
+    limit,
+    only_option,
+    output_option,
+    plural,
+    say,
+    setting,
+)
+
+if TYPE_CHECKING:
+    from compressor.sweep import Backend, Failure, Summary
+
+MOST_FAILURES = 20  # listed one by one
+
+
+class Part(click.ParamType):
+    """I/N with 1 <= I <= N."""
+
+    name = "I/N"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+        """(I, N), or a usage error."""
+        number, _, of = str(value).partition("/")
+        if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
+            self.fail(f"{value!r} is no I/N with 1 <= I <= N, such as 2/8", param, ctx)
+        return int(number), int(of)
+
+
+@click.command()
+@configs_argument
+@output_option
+@jobs_option("Worker processes.")
+@setting
+@only_option
+@limit
+@click.option("--rerun", type=click.Choice(["failed"]), help="Run failed jobs again, too.")
+@click.option("--shard", "part", type=Part(), metavar="I/N",
+              help="Run part I of N: for machines that share the folder.")  # fmt: skip
+@click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
+              show_default=True, help="Where jobs run: here, or on a dask cluster.")  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS",
+              help="Of the dask cluster, such as tcp://host:8786.")  # fmt: skip
+@click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
+@click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
+@click.pass_context
+def run(
+    context: click.Context,
+    configs: tuple[str, ...],
+    output: str,
+    jobs: int | None,
+    overrides: tuple[str, ...],
+    only: str,
+    max_jobs: int,
+    rerun: str | None,
+    part: tuple[int, int] | None,
+    backend: str,
+    scheduler: str | None,
+    wait: bool,
+    quiet: bool,
+) -> int:
+    """Simulate what case files ask for, and store it.
+
+    Jobs that are stored already are not run again, so a run that was interrupted goes on where it
+    ended. A summary line for each study goes to stdout.
+    """
+    check_backend(backend, scheduler, jobs)
+    from compressor.process import cores, one_thread_each
+
+    one_thread_each()  # before numpy loads
+    from compressor.cases import load_studies
+
+    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
+    if only and not quiet:
+        selected = sum(len(study.selected) for study in studies)
+        say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
+    caution(studies)
+    from compressor.sweep import sweep
+
+    screen = Screen(quiet)
+    try:
+        with cluster(scheduler) as elsewhere:
+            summary = sweep(
+                studies, output, jobs or cores(), screen, context.obj, rerun == "failed", part,
+                wait, elsewhere,
+            )  # fmt: skip
+    except BaseException:
+        screen.end()
+        if screen.total:
+            say(f"{screen.done} of {screen.total} jobs are stored in {output}; "
+                "the same command goes on from there")  # fmt: skip
+        raise
+    screen.end()
+    report_run(summary, output, quiet)
+    return SOME_FAILED if summary.failed else DONE
+
+
+def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
+    """Usage errors of options that do not go together."""
+    if backend == "dask" and not scheduler:
+        raise click.UsageError(
+            "--backend dask needs --scheduler ADDRESS, such as tcp://host:8786: "
+            "what `dask scheduler` prints when it starts"
+        )
+    if backend == "dask" and jobs:
+        raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
+    if backend == "local" and scheduler:
+        raise click.UsageError("--scheduler goes with --backend dask")
+
+
+def cluster(scheduler: str | None) -> contextlib.AbstractContextManager["Backend | None"]:
+    """The cluster of a scheduler; none where jobs run here."""
+    if scheduler is None:
+        return contextlib.nullcontext()
+    from compressor.cluster import Cluster
+
+    return Cluster(scheduler)
+
+
+def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
+    """Say what a run did, what failed and what to do next."""
+    width = max(len(count.study) for count in summary.counts)
+    for count in summary.counts:
+        where = os.path.join(folder, "studies", f"{count.study}.json")
+        good = count.jobs - count.failed
+        click.echo(
+            f"{count.study:<{width}}  {plural(count.jobs):>9}  {good:>4} ok  "
+            f"{count.failed:>4} failed  {where}"
+        )
+    if not quiet:
+        if not summary.run_now:
+            say(f"nothing to do: all {plural(summary.total)} are stored in {folder}")
+        else:
+            again = f", {summary.done_before} were stored before" if summary.done_before else ""
+            say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
+    report_failures(summary.failed)
+    if not quiet:
+        say(f"next: compsim report -i {shlex.quote(folder)}")
+
+
+def report_failures(failures: Sequence["Failure"]) -> None:
+    """List failed jobs, and what to do about each kind of failure."""
+    if not failures:
+        return
+    from compressor.cases import printable
+    from compressor.reasons import remedy
+
+    say(f"{plural(len({failure.key for failure in failures}))} failed:")
+    for failure in failures[:MOST_FAILURES]:
+        point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
+        say(
+            f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}\n"
+            f"    job {failure.key}"
+        )
+    if len(failures) > MOST_FAILURES:
+        say(f"  and {len(failures) - MOST_FAILURES} more")
+    say("what to do:")
+    for reason, number in Counter(failure.reason for failure in failures).items():
+        say(f"  {reason} ({number}): {remedy(reason)}")
+    say("A changed case file runs as a new job; --rerun failed runs failed ones again unchanged.")

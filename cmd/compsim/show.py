@@ -1,0 +1,131 @@
+"""`compsim show`: what is known of one job."""
+
+import dataclasses
+import json
+import math
+import os
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from compsim.screen import DONE, as_json, results, run_commands, say
+
+if TYPE_CHECKING:
+    from compressor.store import JobReport
+
+
+@click.command()
+@click.argument("job")
+@results
+@as_json
+def show(job: str, folder: str, as_json: bool) -> int:
+    """Tell what is known of a job, named by its key or the beginning of it.
+
+    Which studies it belongs to and where in them, how it ended and why, its numbers with their
+    error bars, in SI, and what it was run with. Of one that stopped, where, in which state, driven
+    by which number of it, and its last steps.
+    """
+    from compressor.cases import printable
+    from compressor.reasons import remedy
+    from compressor.store import report_job
+
+    found = report_job(folder, job)
+    if as_json:
+        click.echo(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
+        return DONE
+    click.echo(f"job {found.key}: {printable(ending(found))}")
+    for study, point in found.studies.items():
+        values = "".join(f" {key}={value}" for key, value in point.items())
+        click.echo(f"  in {study}{printable(values)}")
+    if found.status == "failed":
+        click.echo(f"  what to do: {remedy(found.reason)}")
+    for line in (*stop(found), *numbers(found), *cautions(found), *facts(found)):
+        click.echo(f"  {printable(line)}")
+    if found.status == "missing":
+        for command in run_commands(found.again, folder):
+            say(f"next: {command}")
+    return DONE
+
+
+def ending(found: "JobReport") -> str:
+    """How a job ended, in a line."""
+    if found.status == "missing":
+        return "not run yet"
+    return "ok" if found.status == "ok" else f"failed: {found.reason}: {found.detail}"
+
+
+def stop(found: "JobReport") -> list[str]:
+    """Where a job's run stopped, and how its last steps went, a line each; none that ended."""
+    told = found.attributes
+    if "stop_history_words" not in told:
+        return []
+    angle = math.degrees(told["stop_crank_angle"]) % 360
+    lines = [f"{'stopped':<28} at {told['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"]
+    if told["stop_dominant"]:
+        lines.append(f"{'driven by':<28} {told['stop_dominant']}")
+    names = told["stop_state_names"].split("; ")
+    for name, value in zip(names, told["stop_state"], strict=False):
+        lines.append(f"{name:<28} {value:.6g}")
+    steps = zip(
+        *(told[f"stop_history_{name}"] for name in ("time", "step", "error")),
+        told["stop_history_words"].split("; "),
+        strict=False,
+    )
+    for time, step, error, words in steps:
+        known = "" if math.isnan(error) else f", error {error:.3g} of the tolerance"
+        lines.append(f"{'step':<28} {time:.12g} s + {step:.4g} s, {words}{known}")
+    return lines
+
+
+def numbers(found: "JobReport") -> list[str]:
+    """A job's numbers, a line each, with what is known of their errors."""
+    from compressor.metrics import ERRORS, HORIZON, NUMBERS
+
+    lines = []
+    for name, value in found.numbers.items():
+        if name in ERRORS or (name == HORIZON and blank(value)):
+            continue
+        unit = "" if NUMBERS[name][1] == "1" else NUMBERS[name][1]
+        error = found.numbers.get(f"{name}_error")
+        known = "" if error is None or blank(error) else f" ± {plain(error)}"
+        lines.append(f"{name:<28} {plain(value)}{known} {unit}".rstrip())
+    return lines
+
+
+def cautions(found: "JobReport") -> list[str]:
+    """What is to be said of numbers that no error bar can be claimed of."""
+    from compressor.metrics import HORIZON
+
+    if not math.isfinite(found.numbers.get(HORIZON, math.nan)):
+        return []
+    return ["the metrics go beyond the horizon: statistics may be trusted, single peaks may not"]
+
+
+def facts(found: "JobReport") -> list[str]:
+    """What a job was run with, a line each."""
+    shown = ("method", "rtol", "case", "program", "libraries")
+    lines = [f"{name:<28} {found.attributes[name]}" for name in shown if name in found.attributes]
+    return [*lines, f"{'file':<28} {os.path.relpath(found.file)}"] if found.file else lines
+
+
+def sayable(value: Any) -> Any:
+    """A value as JSON can say it: null for nan, "inf" for an unknown error."""
+    if isinstance(value, dict):
+        return {key: sayable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [*map(sayable, value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value
+
+
+def plain(value: Any) -> str:
+    """A number, or numbers of joints and axes, to six digits."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(plain, value))}]"
+    return f"{value:.6g}"
+
+
+def blank(value: Any) -> bool:
+    """Whether all numbers are nan."""
+    return all(map(blank, value)) if isinstance(value, list) else math.isnan(value)
