@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements readme clean
+.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -84,10 +84,10 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(BIN)/python tests/measure_mutants.py tests/results/mutants.json
 
-measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers readme  ## all of these (25 minutes)
+measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers pages  ## all of these (25 minutes)
 
-readme: install  ## write the README's generated tables
-	$(BIN)/python tests/readme_tables.py README.md
+pages: install  ## write the generated tables of the README pages
+	$(BIN)/python tests/page_tables.py
 
 clean:  ## remove results, report, tradeoff, stress and caches; .venv stays
 	rm -rf results report tradeoff stress .pytest_cache .mypy_cache .ruff_cache .hypothesis

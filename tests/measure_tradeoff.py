@@ -2,7 +2,7 @@
 
 Runs the command on the paper's three faults at 0.2 mm and writes a small JSON file and, beside it,
 the figure. The file's fingerprint is the work of a few fixed runs, which hardly depends on the
-machine: tests/test_readme.py counts it again and says when the measurement is stale.
+machine: tests/test_pages.py counts it again and says when the measurement is stale.
 """
 
 import json

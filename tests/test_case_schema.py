@@ -6,7 +6,7 @@ import jsonschema
 import pytest
 from compsim import cli
 from conftest import CONFIGS
-from test_readme import blocks
+from test_pages import blocks
 
 from compressor.cases.case import table
 from compressor.cases.json_schema import case_schema

@@ -15,7 +15,7 @@ from measure_chaotic import (
     distance,
     scene_row,
 )
-from readme_tables import kept
+from page_tables import kept
 
 from compressor.solve.simulate import simulate
 

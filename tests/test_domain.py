@@ -1,7 +1,7 @@
 """Warnings before a run: what is odd, told once, and nothing about what is not."""
 
+import page_tables
 import pytest
-import readme_tables
 from compsim import cli
 from test_layers import ROOT
 
@@ -118,7 +118,7 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
     assert told[-1] == f"{path}: and 2 more warnings"
 
 
-def test_the_readme_s_examples_that_are_plain_are_told_nothing(tmp_path):
-    text = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_pages_examples_that_are_plain_are_told_nothing(tmp_path):
+    text = (page_tables.ROOT / "README.md").read_text(encoding="utf-8")
     example = text.split("```yaml\n# bearing-wear.yaml\n")[1].split("```")[0]
     assert cautions(study(tmp_path, example)) == []

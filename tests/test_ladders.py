@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from measure_ladders import AUDIT, TOLERANCES, figures, limit, slopes
-from readme_tables import RESULTS, kept
+from page_tables import RESULTS, kept
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import measure

@@ -10,7 +10,7 @@ import planted_bugs
 import pytest
 from equivalent_mutants import EQUIVALENT
 from mutation import Mutant, drawn, mutants_of, planted
-from readme_tables import kept
+from page_tables import kept
 
 SAMPLE = ("K a hundredth too large", "the cam does not close", "friction's velocity in mm/s")
 

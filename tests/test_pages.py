@@ -1,4 +1,8 @@
-"""What the README says is executed or compared."""
+"""What the README pages say is executed or compared.
+
+Commands in `console` blocks run in one folder, page by page in the order of PAGES; `yaml` blocks
+are files named in their first line; `python` blocks run there; `bash` blocks are not run.
+"""
 
 import json
 import re
@@ -6,8 +10,8 @@ import shlex
 import subprocess
 import sys
 
+import page_tables
 import pytest
-import readme_tables
 from measure_tradeoff import fingerprint
 
 import compressor
@@ -15,38 +19,72 @@ from compressor.cases.json_schema import case_schema
 from compressor.cases.load import MAX_JOBS, load_studies
 from compressor.cases.swept import FORMS
 
-README = (readme_tables.ROOT / "README.md").read_text(encoding="utf-8")
-MAKEFILE = (readme_tables.ROOT / "Makefile").read_text(encoding="utf-8")
+ROOT = page_tables.ROOT
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+PAGES = {
+    page: (ROOT / page).read_text(encoding="utf-8")
+    for page in (
+        "README.md", "configs/README.md", "compressor/solve/README.md",
+        "compressor/store/README.md", "compressor/sweep/README.md",
+        "compressor/physics/README.md", "compressor/README.md", "tests/README.md",
+        "tests/results/README.md",
+    )
+}  # fmt: skip
+TEXT = "\n".join(PAGES.values())
 QUICK = ["--set", "solve.duration_rev=0.25", "--set", "solve.settle_rev=0"]
 
 
 def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, re.DOTALL)
 
 
-@pytest.mark.parametrize("name", readme_tables.TABLES)
-def test_generated_tables_are_current(name):
-    written = readme_tables.block(name).search(README)
-    assert written, f"no block for {name}"
-    assert written[2] == readme_tables.TABLES[name](), "stale: run make readme"
+@pytest.mark.parametrize(
+    ("page", "name"), [(page, name) for page, found in page_tables.PAGES.items() for name in found]
+)
+def test_generated_tables_are_current(page, name):
+    written = page_tables.block(name).search(PAGES[page])
+    assert written, f"{page} has no block for {name}"
+    assert written[2] == page_tables.PAGES[page][name](), "stale: run make pages"
+
+
+def test_pages_are_known():
+    tracked = subprocess.run(
+        ["git", "ls-files", "*README.md"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert {*tracked.stdout.split()} == {*PAGES}
+
+
+def test_the_readme_is_short():
+    assert PAGES["README.md"].count("\n") <= 200
+
+
+def anchors(page):
+    """The anchors of a page's headings, as GitHub makes them."""
+    heads = re.findall(r"^#+ (.*)$", PAGES[page], re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", PAGES[page]):
+        path, _, anchor = target.partition("#")
+        place = (ROOT / page).parent / path if path else ROOT / page
+        assert place.exists(), target
+        if anchor:
+            found = place / "README.md" if place.is_dir() else place
+            assert anchor in anchors(str(found.resolve().relative_to(ROOT))), target
 
 
 def test_the_trade_was_measured_with_these_numerics():
     """The work of a few fixed runs: as measured, but for what another machine's rounding does."""
-    kept, now = readme_tables.kept("tradeoff.json")["fingerprint"], fingerprint()
-    assert now["rtol"] == kept["rtol"], "stale: run make tradeoff and make readme"
+    kept, now = page_tables.kept("tradeoff.json")["fingerprint"], fingerprint()
+    assert now["rtol"] == kept["rtol"], "stale: run make tradeoff and make pages"
     assert now["evaluations"] == pytest.approx(kept["evaluations"], rel=0.01), (
-        "stale: the numerics have changed; run make tradeoff and make readme"
+        "stale: the numerics have changed; run make tradeoff and make pages"
     )
 
 
-def test_figures_of_the_readme_exist():
-    figures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README)
-    assert figures
-    assert all((readme_tables.ROOT / figure).exists() for figure in figures)
-
-
-@pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:`|^)make ([a-z-]+)", README, re.M))))
+@pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:`|^)make ([a-z-]+)", TEXT, re.M))))
 def test_make_verbs_exist(verb):
     assert re.search(rf"^{verb}:", MAKEFILE, re.MULTILINE), f"make {verb}"
 
@@ -85,7 +123,7 @@ def test_case_files_have_the_jobs_that_they_say(tmp_path):
     assert sorted((value - 300) // 60 for value in latin.axes[1].values) == [*range(10)]
 
 
-PLANS = re.findall(r"^compsim (plan .*?)  +# (\d+) jobs", README, re.MULTILINE)
+PLANS = re.findall(r"^compsim (plan .*?)  +# (\d+) jobs", TEXT, re.MULTILINE)
 
 
 @pytest.mark.parametrize(("command", "jobs"), PLANS)
@@ -114,10 +152,10 @@ def test_every_feature_of_the_grammar_has_an_example():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder as the README's reader would have it: its case file, and our configs."""
-    place = tmp_path_factory.mktemp("readme")
+    """A folder as a reader of the pages would have it: their case files, and our configs."""
+    place = tmp_path_factory.mktemp("pages")
     write_case_files(place)
-    (place / "configs").symlink_to(readme_tables.ROOT / "configs")
+    (place / "configs").symlink_to(page_tables.ROOT / "configs")
     for command in (line for text in blocks("console") for line in text.splitlines()):
         if not command.startswith("compsim "):
             continue
@@ -147,9 +185,9 @@ def test_console_commands_work(folder):
 @pytest.mark.slow
 def test_python_example_works(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    (text,) = blocks("python")
     names = {}
-    exec(text, names)
+    for text in blocks("python"):
+        exec(text, names)
     assert names["a"].attrs["units"] == "m/s2"
     assert names["run"].attrs["complete"] == 1
     assert "clearance_mm" in capsys.readouterr().out
