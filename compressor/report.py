@@ -7,19 +7,16 @@ report which is interrupted leaves the one before as it was.
 import contextlib
 import math
 import re
-import shlex
 import sys
-import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import CLEARANCES, FAULTS, SPOKEN, claims, label, paper_cases
+from compressor.analysis import SPOKEN, claims, paper_cases
 from compressor.case import Case
-from compressor.durable import Folder, StoreWarning, publish
+from compressor.durable import Folder, publish
 from compressor.figures import FIGURES, Drawing
 from compressor.figures.style import render
 from compressor.figures.sweep_metric import MEASURES, Measure, draw_metrics, measures, swept
@@ -44,11 +41,12 @@ from compressor.page import (
     study_table,
     table,
 )
+from compressor.paper_runs import PaperRuns, case_files, find_paper_runs, run_command
 from compressor.physics.cam import comparisons
 from compressor.quantities import HORIZON
 from compressor.reasons import remedy as remedy_of
 from compressor.record import record
-from compressor.store import DamagedJob, Stored, open_study, read_store
+from compressor.store import Stored, open_study, read_store
 
 MOST_DETAILS = 20
 
@@ -78,15 +76,6 @@ BEYOND = (
     "Of {jobs} of the jobs the run is longer than their predictability_horizon: single peaks may "
     "differ between two correct solutions, no error bar is claimed, and statistics alone hold."
 )
-
-
-@dataclass(frozen=True)
-class PaperRuns:
-    """The stored runs of the paper's cases by label; `usable` ones are whole and have series."""
-
-    stored: dict[str, xr.Dataset]
-    usable: dict[str, xr.Dataset]
-    absent: dict[str, str]  # label -> why it is not usable
 
 
 def write_report(results: Folder, report: Folder, command: str = "") -> Path:
@@ -132,51 +121,6 @@ def remove_stale(report: Path, drawn: set[str]) -> None:
 
 
 # ---- the paper's cases ------------------------------------------------------------------------
-
-
-def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns:
-    """The runs with the physics of the paper's cases; of several, the most exact."""
-    labels = {case.physics_key: name for name, case in paper_cases().items()}
-    found: dict[str, xr.Dataset] = {}
-    damaged = set()
-    for key in paper_candidates(stored, studies, labels):
-        name = labels[stored.physics_key(key)]
-        try:
-            run = stored.job(key)
-        except DamagedJob as error:
-            warnings.warn(str(error), StoreWarning, stacklevel=2)
-            damaged.add(name)
-            continue
-        if name not in found or rank(run) > rank(found[name]):
-            found[name] = run
-    usable = {name: run for name, run in found.items() if rank(run)[:2] == (True, True)}
-    absent = {n: why_absent(found.get(n), n in damaged) for n in labels.values() if n not in usable}
-    return PaperRuns({n: found[n] for n in labels.values() if n in found}, usable, absent)
-
-
-def paper_candidates(
-    stored: Stored, studies: Sequence[StoredStudy], physics: Collection[str]
-) -> list[str]:
-    """The keys of the studies' stored jobs that simulate some physics, in the studies' order."""
-    keys = list(dict.fromkeys(key for study in studies for key in study.keys))
-    positions = stored.rows.find(keys)
-    wanted = np.array([*physics], "S")
-    same = np.isin(stored.rows.columns["physics_key"], wanted)
-    return [key for key, at in zip(keys, positions, strict=True) if at >= 0 and same[at]]
-
-
-def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
-    """What makes a run better than another of the same physics."""
-    return str(run["status"].item()) == "ok", "time" in run.dims, -run.attrs.get("rtol", math.inf)
-
-
-def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
-    """Why a case of the paper cannot be drawn."""
-    if run is None:
-        return "its file is damaged" if damaged else "not stored"
-    if str(run["status"].item()) != "ok":
-        return f"failed: {run['reason'].item()}"
-    return "stored without its time series"
 
 
 def draw_paper(paper: PaperRuns) -> list[Plate]:
@@ -323,23 +267,14 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     ]
     if not items:
         return
-    files, command = remedy(paper.absent, results)
+    files = case_files(paper.absent)
     advice = (
         "These case files and this command give what is missing. A case that failed is run again "
         "only when its file is deleted or its settings change."
     )
-    parts = [element("p", advice), *(element("pre", text) for text in files)]
-    body = joined([listing(items), *parts, element("pre", command)])
+    parts = [
+        element("p", advice),
+        *(element("pre", f"# {name}\n{text}") for name, text in files.items()),
+    ]
+    body = joined([listing(items), *parts, element("pre", run_command(files, results))])
     yield Section("missing", "Figures that could not be drawn", body)
-
-
-def remedy(absent: Mapping[str, str], results: Folder) -> tuple[list[str], str]:
-    """The case files that give some of the paper's cases, and the command that runs them."""
-    files = {f"{load}.yaml": f"load: {load}" for load in ("typical", "design") if load in absent}
-    for fault in FAULTS:
-        sizes = [f"{c:g}" for c in CLEARANCES if label(fault, c) in absent]
-        if sizes:
-            text = f"joint: {fault}\nclearance_mm: [{', '.join(sizes)}]"
-            files[f"{fault.replace('_', '-')}.yaml"] = text
-    command = f"compsim run {' '.join(files)} -o {shlex.quote(str(results))}"
-    return [f"# {name}\n{text}" for name, text in files.items()], command

@@ -88,6 +88,7 @@ FLOORS = [
     "figures.outcomes",
     "figures",
     "page",
+    "paper_runs",
     "report",
 ]
 DOORS = {

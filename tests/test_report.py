@@ -16,9 +16,10 @@ from compressor.analysis import paper_cases
 from compressor.case import Case
 from compressor.durable import StoreWarning
 from compressor.manifest import encode
+from compressor.paper_runs import find_paper_runs, paper_candidates
 from compressor.plan import load_cases
 from compressor.reasons import Reason
-from compressor.report import find_paper_runs, paper_candidates, write_report
+from compressor.report import write_report
 from compressor.store import StoreError, finished_keys, read_job, read_store, read_studies
 
 SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
