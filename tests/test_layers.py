@@ -87,8 +87,12 @@ FLOORS = [
     "figures.ladders",
     "figures.outcomes",
     "figures",
+    "tables",
     "page",
+    "provenance",
     "paper_runs",
+    "paper_sections",
+    "study_section",
     "report",
 ]
 DOORS = {
@@ -99,6 +103,7 @@ DOORS = {
     "distributed": {"cluster"},
     "h5py": {"hdf5"},
     "matplotlib": {"figures"},
+    "jinja2": {"page"},
     "click": set(),
 }
 

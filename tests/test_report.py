@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from conftest import CONFIGS, keep, store
 
-from compressor import page, report
+from compressor import report, study_section, tables
 from compressor.analysis import paper_cases
 from compressor.case import Case
 from compressor.durable import StoreWarning
@@ -349,7 +349,7 @@ def test_failed_jobs_are_highlighted_and_everything_is_escaped(own, tmp_path):
 
 
 def test_long_tables_are_cut_and_say_so(own, tmp_path, monkeypatch):
-    monkeypatch.setattr(page, "MOST_ROWS", 3)
+    monkeypatch.setattr(study_section, "MOST_ROWS", 3)
     write_report(own, tmp_path / "out")
     found = read(tmp_path / "out")
     assert "The first 3 of 4 jobs" in found.text
@@ -422,16 +422,7 @@ def test_a_report_that_cannot_be_written_is_an_error(own, tmp_path):
      (-394.784, "-394.8"), (2.5e9, "2.50e+09"), (float("inf"), "inf")],
 )  # fmt: skip
 def test_numbers(value, shown):
-    assert page.number(value) == shown
-
-
-def test_elements_escape_text_and_attributes():
-    made = page.element("p", EVIL, title='a"b', class_="c", aria_label="d")
-    assert made == (
-        "<p title=\"a&quot;b\" class=\"c\" aria-label=\"d\">"
-        "&lt;script&gt;alert(&#x27;1&#x27;)&lt;/script&gt;&amp;amp;</p>"
-    )  # fmt: skip
-    assert page.element("b", made) == f"<b>{made}</b>"
+    assert tables.number(value) == shown
 
 
 def test_configs_are_the_papers_cases():
