@@ -12,7 +12,6 @@ from compressor.analysis.claims import (
     CLEARANCES,
     FAULTS,
     SPOKEN,
-    Claim,
     case_of,
     claims,
     force_relation,

@@ -5,95 +5,32 @@ report which is interrupted leaves the one before as it was.
 """
 
 import contextlib
-import math
-import re
-import shlex
 import sys
-import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-import xarray as xr
-
-from compressor.analysis import CLEARANCES, FAULTS, SPOKEN, claims, comparisons, label, paper_cases
-from compressor.cases import Case
-from compressor.metrics import HORIZON
-from compressor.reasons import remedy as remedy_of
 from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures.style import render
-from compressor.report.figures.sweep_metric import MEASURES, Measure, draw_metrics, measures, swept
-from compressor.report.page import (
-    Html,
-    Plate,
-    Section,
-    axes,
-    claims_table,
-    columns,
-    document,
-    element,
-    figure,
-    joined,
-    listing,
-    numbers,
-    outcome,
-    plain,
-    provenance,
-    row,
-    study_table,
-    table,
-)
-from compressor.solve import record
+from compressor.report.figures.sweep_metric import draw_metrics, measures, swept
+from compressor.report.page import Plate, Section, document
+from compressor.report.paper_runs import PaperRuns, find_paper_runs
+from compressor.report.paper_sections import missing_sections, paper_sections
+from compressor.report.provenance import provenance_section
+from compressor.report.study_section import file_name, study_section
 from compressor.store import (
-    DamagedJob,
     Folder,
     Stored,
     StoredStudy,
-    StoreWarning,
     open_study,
     publish,
     read_store,
     read_studies,
 )
 
-MOST_DETAILS = 20
-
-TITLE = "Reciprocating compressor with joint clearance"
-LEAD = (
-    "A report of compsim on simulated crank mechanisms: the figures of Xiao et al. 2021, Dynamic "
-    "Analysis for a Reciprocating Compressor System with Clearance Fault, drawn again from stored "
-    "runs; what the runs say of the paper's claims; and the table of every study. Curves show the "
-    "revolutions after the first, which is start-up; crank angles count from top dead centre."
-)
 SWEEP = (
     "A line for each combination of the other axes or, where they are many, a light line for each "
     "and their median; a study that is no grid has a point for each job. A cross: a job failed "
     "here; a circle: a job was not run."
 )
-ASSUMPTIONS = (
-    "The masses are ours, since the paper prints none: rod 4.7 kg (a steel bar of 600 × 40 × "
-    "25 mm), crosshead with piston rod and piston 14 kg. They decide peaks and trends: a claim "
-    "that fails here is a result for these masses.",
-    "The clearance is radial: bearing radius less journal radius.",
-    "The cam of the design load is a reconstruction: as printed it does not close (Figure 4).",
-    "Claim (1) holds by construction: with ideal joints and a prescribed crank, no load can "
-    "change the motion.",
-)
-
-BEYOND = (
-    "Of {jobs} of the jobs the run is longer than their predictability_horizon: single peaks may "
-    "differ between two correct solutions, no error bar is claimed, and statistics alone hold."
-)
-
-
-@dataclass(frozen=True)
-class PaperRuns:
-    """The stored runs of the paper's cases by label; `usable` ones are whole and have series."""
-
-    stored: dict[str, xr.Dataset]
-    usable: dict[str, xr.Dataset]
-    absent: dict[str, str]  # label -> why it is not usable
 
 
 def write_report(results: Folder, report: Folder, command: str = "") -> Path:
@@ -115,19 +52,30 @@ def compose(results: Folder, command: str) -> tuple[list[Plate], str]:
     """All figures of a report, drawn, and its page."""
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
-    plates = draw_paper(paper)
-    of_paper = [*paper_sections(paper, plates)]
+    of_paper = draw_paper(paper)
     shown = {run.attrs["key"] for run in paper.stored.values()}
-    told = [study_section(stored, s) for s in studies if not shown.issuperset(s.keys)]
-    of_studies = [section for section, _ in told]
+    drawn = [drawn_study(stored, s) for s in studies if not shown.issuperset(s.keys)]
+    about_paper = [*paper_sections(paper, of_paper)]
+    about_studies = [section for section, _ in drawn]
     sections = [
-        Section("assumptions", "What to keep in mind", listing(ASSUMPTIONS)),
-        *(of_paper + of_studies if plates else of_studies + of_paper),
+        Section("assumptions", "What to keep in mind", "assumptions.html"),
+        *(about_paper + about_studies if of_paper else about_studies + about_paper),
         *missing_sections(paper, results),
-        provenance(studies, results, command),
+        provenance_section(studies, results, command),
     ]
-    plates += [plate for _, drawn in told for plate in drawn]
-    return plates, document(TITLE, LEAD, sections)
+    plates = of_paper + [plate for _, more in drawn for plate in more]
+    return plates, document(sections)
+
+
+def drawn_study(stored: Stored, study: StoredStudy) -> tuple[Section, list[Plate]]:
+    """A user's own study: its section, and each metric against each swept axis, drawn."""
+    with open_study(stored.folder, study.name) as data:
+        plates = [
+            draw(file_name("sweep", study.name, axis), f"{study.name}: metrics against {axis}",
+                 SWEEP, draw_metrics(data, axis))
+            for axis in (swept(data) if measures(data) else [])
+        ]  # fmt: skip
+        return study_section(stored, study, data, plates), plates
 
 
 def remove_stale(report: Path, drawn: set[str]) -> None:
@@ -136,54 +84,6 @@ def remove_stale(report: Path, drawn: set[str]) -> None:
         for kind in ("png", "svg"):
             with contextlib.suppress(OSError):
                 (report / f"{name}.{kind}").unlink()
-
-
-# ---- the paper's cases ------------------------------------------------------------------------
-
-
-def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns:
-    """The runs with the physics of the paper's cases; of several, the most exact."""
-    labels = {case.physics_key: name for name, case in paper_cases().items()}
-    found: dict[str, xr.Dataset] = {}
-    damaged = set()
-    for key in paper_candidates(stored, studies, labels):
-        name = labels[stored.physics_key(key)]
-        try:
-            run = stored.job(key)
-        except DamagedJob as error:
-            warnings.warn(str(error), StoreWarning, stacklevel=2)
-            damaged.add(name)
-            continue
-        if name not in found or rank(run) > rank(found[name]):
-            found[name] = run
-    usable = {name: run for name, run in found.items() if rank(run)[:2] == (True, True)}
-    absent = {n: why_absent(found.get(n), n in damaged) for n in labels.values() if n not in usable}
-    return PaperRuns({n: found[n] for n in labels.values() if n in found}, usable, absent)
-
-
-def paper_candidates(
-    stored: Stored, studies: Sequence[StoredStudy], physics: Collection[str]
-) -> list[str]:
-    """The keys of the studies' stored jobs that simulate some physics, in the studies' order."""
-    keys = list(dict.fromkeys(key for study in studies for key in study.keys))
-    positions = stored.rows.find(keys)
-    wanted = np.array([*physics], "S")
-    same = np.isin(stored.rows.columns["physics_key"], wanted)
-    return [key for key, at in zip(keys, positions, strict=True) if at >= 0 and same[at]]
-
-
-def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
-    """What makes a run better than another of the same physics."""
-    return str(run["status"].item()) == "ok", "time" in run.dims, -run.attrs.get("rtol", math.inf)
-
-
-def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
-    """Why a case of the paper cannot be drawn."""
-    if run is None:
-        return "its file is damaged" if damaged else "not stored"
-    if str(run["status"].item()) != "ok":
-        return f"failed: {run['reason'].item()}"
-    return "stored without its time series"
 
 
 def draw_paper(paper: PaperRuns) -> list[Plate]:
@@ -201,152 +101,3 @@ def draw(name: str, heading: str, caption: str, drawing: Drawing) -> Plate:
     with contextlib.suppress(OSError):
         print(f"drawing {heading}", file=sys.stderr, flush=True)
     return Plate(name, heading, caption, render(drawing, "png"), render(drawing, "svg"))
-
-
-# ---- sections ---------------------------------------------------------------------------------
-
-
-def paper_sections(paper: PaperRuns, plates: Sequence[Plate]) -> Iterator[Section]:
-    """What there is of the paper: figures, cases, claims."""
-    if plates:
-        links = (
-            element("a", plate.heading.partition(":")[0], href=f"#{plate.name}") for plate in plates
-        )
-        body = joined([element("p", joined(links, " · ")), *map(figure, plates)])
-        yield Section("figures", "The paper's figures", body)
-    if paper.stored:
-        yield Section("cases", "The paper's cases", paper_table(paper))
-        yield Section("claims", "The paper's claims", claims_body(paper.usable))
-        yield Section("printed", "Spring and cam: what is printed, what follows", printed_table())
-
-
-def printed_table() -> Html:
-    """The paper's numbers of the design load beside those that follow from its equations."""
-    rows = [
-        row([f"{c.quantity} ({c.unit})", math.nan if c.printed is None else c.printed, c.follows,
-             c.source])
-        for c in comparisons(record(Case()))
-    ]  # fmt: skip
-    words = "Simulated is the closed cam with Table 1's spring. A dash: the paper gives no number."
-    head = ["quantity", "printed", "follows", "from"]
-    return joined([element("p", words), table(head, rows)])
-
-
-def claims_body(runs: Mapping[str, xr.Dataset]) -> Html:
-    """The table of claims, and how it is meant."""
-    words = (
-        "Each claim is measured against a threshold that was written down before the first "
-        "comparison. One whose cases are not all stored is not measured."
-    )
-    return joined([element("p", words), claims_table(claims(runs))])
-
-
-def paper_table(paper: PaperRuns) -> Html:
-    """A row for each of the paper's cases, stored or not."""
-    known = [measures(run) for run in paper.stored.values()]
-    groups = columns(m for m in MEASURES if any(m in some for some in known))
-    head = ["case", "status", *groups, "energy residual", "rtol", "job"]
-    rows = []
-    for name in paper_cases():
-        run = paper.stored.get(name)
-        if run is None:
-            rows.append(row([spoken(name), "not stored", *[""] * (len(head) - 2)], "missing"))
-            continue
-        status = str(run["status"].item())
-        metrics = [numbers([value_of(m, run) for m in group]) for group in groups.values()]
-        residual = float(run.get("energy_residual", math.nan))
-        tolerance = plain(run.attrs.get("rtol", ""))
-        trust = [residual, tolerance, element("code", run.attrs["key"])]
-        end = outcome(status, run["reason"].item())
-        rows.append(row([spoken(name), end, *metrics, *trust], status))
-    words = (
-        "Metrics are taken over the dense solution after the first revolution. Energy residual: "
-        "the worst imbalance of energy, relative to what the contacts lose. A dash: nothing to "
-        "tell, such as contact in an ideal joint."
-    )
-    return joined([element("p", words), table(head, rows)])
-
-
-def value_of(measure: Measure, run: xr.Dataset) -> float:
-    """A measure of one run; nan where it has none."""
-    return float(measure.of(run)) if measure.variable in run else math.nan
-
-
-def spoken(name: str) -> str:
-    """A label of `paper_cases` in words."""
-    fault, _, clearance = name.partition(" ")
-    return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
-
-
-def study_section(stored: Stored, study: StoredStudy) -> tuple[Section, list[Plate]]:
-    """A user's own study: its table, its failures, and each metric against each swept axis."""
-    with open_study(stored.folder, study.name) as data:
-        body = [
-            element("p", joined(["Case file ", element("code", study.case_file), "."], "")),
-            failures(stored, data),
-            study_table(data),
-        ]
-        plates = []
-        for axis in swept(data) if measures(data) else []:
-            name = re.sub(r"[^A-Za-z0-9._-]", "_", f"sweep-{study.name}-{axis}")
-            heading = f"{study.name}: metrics against {axis}"
-            caption = SWEEP
-            plates.append(draw(name, heading, caption, draw_metrics(data, axis)))
-    anchor = re.sub(r"[^A-Za-z0-9._-]", "_", f"study-{study.name}")
-    body += map(figure, plates)
-    return Section(anchor, f"Study {study.name}", joined(body)), plates
-
-
-def failures(stored: Stored, data: xr.Dataset) -> Html:
-    """How many jobs of a study failed or are missing, and what is known of the failures."""
-    status = data["status"].values.ravel()
-    failed, missing = np.flatnonzero(status == "failed"), int((status == "missing").sum())
-    counts = f"{status.size} jobs: {status.size - len(failed) - missing} ok, {len(failed)} failed"
-    body = [element("p", counts + (f", {missing} not run." if missing else "."))]
-    if HORIZON in data and (chaotic := int(np.isfinite(data[HORIZON].values).sum())):
-        body.append(element("p", BEYOND.format(jobs=chaotic)))
-    items = []
-    for place in failed[:MOST_DETAILS]:
-        job = stored.status(str(data["key"].values.flat[place]))
-        point = [f"{name} {plain(values[place])}" for name, values in axes(data).items()]
-        items.append(f"{', '.join(point)}: {outcome(job.reason, job.detail) if job else 'gone'}")
-    reasons = dict.fromkeys(data["reason"].values.ravel()[failed])
-    advice = listing(f"{reason}: {remedy_of(reason)}" for reason in reasons)
-    if len(failed) > MOST_DETAILS:
-        items.append(f"and {len(failed) - MOST_DETAILS} more")
-    return joined([*body, listing(items), "What to do:", advice] if items else body)
-
-
-def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
-    """The figures that could not be drawn, what they lack, and how to get it."""
-    lacking = {
-        f"Figure {item.number}, {item.title}": [name for name in item.needs if name in paper.absent]
-        for item in FIGURES
-    }
-    items = [
-        f"{title}: " + "; ".join(f"{spoken(name)} ({paper.absent[name]})" for name in names)
-        for title, names in lacking.items()
-        if names
-    ]
-    if not items:
-        return
-    files, command = remedy(paper.absent, results)
-    advice = (
-        "These case files and this command give what is missing. A case that failed is run again "
-        "only when its file is deleted or its settings change."
-    )
-    parts = [element("p", advice), *(element("pre", text) for text in files)]
-    body = joined([listing(items), *parts, element("pre", command)])
-    yield Section("missing", "Figures that could not be drawn", body)
-
-
-def remedy(absent: Mapping[str, str], results: Folder) -> tuple[list[str], str]:
-    """The case files that give some of the paper's cases, and the command that runs them."""
-    files = {f"{load}.yaml": f"load: {load}" for load in ("typical", "design") if load in absent}
-    for fault in FAULTS:
-        sizes = [f"{c:g}" for c in CLEARANCES if label(fault, c) in absent]
-        if sizes:
-            text = f"joint: {fault}\nclearance_mm: [{', '.join(sizes)}]"
-            files[f"{fault.replace('_', '-')}.yaml"] = text
-    command = f"compsim run {' '.join(files)} -o {shlex.quote(str(results))}"
-    return [f"# {name}\n{text}" for name, text in files.items()], command
