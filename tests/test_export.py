@@ -16,7 +16,7 @@ from conftest import keep
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, SIZES
 from compressor.solve.simulate import simulate
-from compressor.store.export import ExportError, export
+from compressor.store.export import ExportError, ExportOptions, export
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job
 from compressor.store.studies import write_study
@@ -178,7 +178,7 @@ def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_p
     key = open_study(results, "list").key.values[0]
     names = [key if name == "KEY" else name for name in names]
     with pytest.raises(ExportError, match=message):
-        export(results, names, tmp_path / file, **more)
+        export(results, names, tmp_path / file, ExportOptions(**more))
     assert not any(tmp_path.iterdir())
 
 
@@ -216,6 +216,6 @@ def test_a_disk_that_fills_up_leaves_no_part(results, tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(StoreError, match="No space left"):
-        export(results, [], tmp_path / "all.csv", force=True)
+        export(results, [], tmp_path / "all.csv", ExportOptions(force=True))
     assert [path.name for path in tmp_path.iterdir()] == ["all.csv"]
     assert (tmp_path / "all.csv").read_text() == "old"

@@ -41,11 +41,12 @@ def export(
     or the beginning of it, a table of samples. Without either, all studies. Several studies go into
     one FILE together, or into a FOLDER with a file each.
     """
+    from compressor.store import ExportOptions
     from compressor.store import export as write
 
     screen = Screen(quiet, "files")
     try:
-        found, damaged = write(folder, names, output, form, series, force, screen)
+        found, damaged = write(folder, names, output, ExportOptions(form, series, force), screen)
     finally:
         screen.end()
     if as_json:

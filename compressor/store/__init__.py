@@ -1,6 +1,6 @@
 """Outcomes on disk, and back."""
 
-from compressor.store.export import Exported, export
+from compressor.store.export import Exported, ExportOptions, export
 from compressor.store.files import Folder, StoreError, StoreWarning, make_folder, publish
 from compressor.store.hdf5 import DamagedJob, attributes, opened, variables
 from compressor.store.reader import Stored, open_study, read_store

@@ -44,6 +44,19 @@ class ExportError(CompsimError):
 
 
 @dataclass(frozen=True)
+class ExportOptions:
+    """How to export.
+
+    form: of the files in a folder, netcdf (the default) or csv; series: also the time series of
+    every job of the studies, in a folder beside each; force: replace what is there.
+    """
+
+    form: str | None = None
+    series: bool = False
+    force: bool = False
+
+
+@dataclass(frozen=True)
 class Exported:
     """A file that was written."""
 
@@ -68,16 +81,13 @@ def export(
     folder: Folder,
     names: Sequence[str],
     output: Folder,
-    form: str | None = None,
-    series: bool = False,
-    force: bool = False,
+    options: ExportOptions | None = None,
     progress: Progress = lambda done, total, remark: None,
 ) -> tuple[list[Exported], list[DamagedJob]]:
     """Write what `names` name, studies and jobs by the beginning of their keys, else all studies.
 
     output: a file, .nc or .csv, for the studies together as one table, or for one job; or a folder,
-    in which each gets a file in `form`, netcdf (the default) or csv. series: also the time series
-    of every job of the studies, in a folder beside each. force: replace what is there.
+    in which each gets a file.
 
     Returns what was written, and damage that was met, which costs the jobs in it alone. Raises
     ExportError before anything is written, StoreError where the store or the disk gives way.
@@ -85,12 +95,13 @@ def export(
     stored, known = read_store(folder), read_studies(folder)
     studies, keys = _named(folder, names, stored, known)
     target = Path(output)
-    form, is_file = _form(target, form)
+    options = options or ExportOptions()
+    form, is_file = _form(target, options.form)
     if is_file:
-        tasks = [_one_file(target, studies, keys, series)]
+        tasks = [_one_file(target, studies, keys, options.series)]
     else:
-        tasks = [*_files(target, SUFFIXES[form], stored, studies, keys, series)]
-    if not force:
+        tasks = [*_files(target, SUFFIXES[form], stored, studies, keys, options.series)]
+    if not options.force:
         _refuse_existing(tasks)
     found, damaged = [], list(stored.damaged)
     for number, task in enumerate(tasks):

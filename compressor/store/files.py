@@ -6,6 +6,7 @@ What the file system refuses is a StoreError, which says where and what to do ab
 import contextlib
 import errno
 import os
+import re
 import time
 import uuid
 from collections.abc import Iterator
@@ -15,6 +16,9 @@ from typing import BinaryIO
 from compressor import CompsimError, CompsimWarning
 
 Folder = str | os.PathLike[str]
+
+HEX20 = "[0-9a-f]{20}"  # a job's key, and the digest of a file's bytes
+KEY = re.compile(HEX20)
 
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
 

@@ -23,15 +23,10 @@ from compressor.cases import Case
 from compressor.metrics import HORIZON
 from compressor.outcome import Outcome, coordinates
 from compressor.reasons import Reason
-from compressor.store.files import (
-    Folder,
-    StoreError,
-    StoreWarning,
-    system_error,
-)
+from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
-from compressor.store.series_file import KEY, read_series, read_values
+from compressor.store.series_file import read_series, read_values
 from compressor.store.studies import read_studies
 
 if TYPE_CHECKING:

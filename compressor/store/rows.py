@@ -20,18 +20,19 @@ import numpy as np
 
 from compressor.metrics import NUMBERS
 from compressor.outcome import ROW, Outcome, SeriesFile, coordinates
+from compressor.store.files import HEX20
 from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
 from compressor.store.series_file import intact, series_path
 
-NAME = re.compile(r"([0-9]{9})-([0-9a-f]{20})\.h5")
-KEY_BYTES = re.compile(rb"[0-9a-f]{20,}")
+NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
+DIGITS = re.compile(rb"[0-9a-f]{20,}")  # in which keys may stand
 REMEDY = "move it away, then run its studies again"
 WORDS = {  # columns -> what their texts look like
-    "key": re.compile(rb"[0-9a-f]{20}"),
+    "key": re.compile(HEX20.encode()),
     "status": re.compile(rb"ok|failed"),
     "reason": re.compile(rb"[a-z_]*"),
     "precision": re.compile(rb"(single|double)?"),
-    "digest": re.compile(rb"([0-9a-f]{20})?"),
+    "digest": re.compile(f"({HEX20})?".encode()),
 }
 FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
 MOST_LINE = 1 << 20  # bytes that are known of one job, on average over a segment
@@ -216,7 +217,7 @@ class Cut(DamagedJob):
         """What may have been the keys of its jobs: every 20 hexadecimal digits in a row."""
         return {
             run[0][start : start + 20]
-            for run in KEY_BYTES.finditer(self.data)
+            for run in DIGITS.finditer(self.data)
             for start in range(len(run[0]) - 19)
         }
 

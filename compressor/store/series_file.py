@@ -19,14 +19,13 @@ from compressor.cases import Output
 from compressor.metrics import NUMBERS
 from compressor.outcome import SeriesFile, Table
 from compressor.store import hdf5
-from compressor.store.files import StoreError, publish, system_error
+from compressor.store.files import HEX20, KEY, StoreError, publish, system_error
 from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened
 
 if TYPE_CHECKING:
     import xarray as xr
 
-KEY = re.compile(r"[0-9a-f]{20}")
-NAME = re.compile(r"([0-9a-f]{20})-([0-9a-f]{20})\.h5")
+NAME = re.compile(rf"({HEX20})-({HEX20})\.h5")
 ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
 
 

@@ -6,7 +6,6 @@ import datetime
 import json
 import math
 import os
-import re
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -17,10 +16,8 @@ from typing import Any, NamedTuple
 import compressor
 from compressor.cases import MODEL_VERSION, Study, given, points, table
 from compressor.metrics import JOINTS
-from compressor.store.files import Folder, StoreError, publish, refusals, system_error
+from compressor.store.files import KEY, Folder, StoreError, publish, refusals, system_error
 from compressor.store.hdf5 import digest
-
-JOB_KEY = re.compile(r"[0-9a-f]{20}")
 
 
 @dataclass(frozen=True)
@@ -166,7 +163,7 @@ def _is_sound(study: StoredStudy, path: Path) -> bool:
         study.name == path.stem
         and not table()["name"].check(study.name)
         and all(isinstance(text, str) for text in (*texts, *study.versions))
-        and all(JOB_KEY.fullmatch(key) for key in study.keys)
+        and all(KEY.fullmatch(key) for key in study.keys)
         and isinstance(study.fixed, dict)
         and len({axis.key for axis in study.axes} & swept) == len(study.axes)
         and all(axis.units.isprintable() for axis in study.axes)
