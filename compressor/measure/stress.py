@@ -157,10 +157,12 @@ def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset
     for name, phrase in TEXTS.items():
         texts = np.array([row.get(name, "") for row in rows], object)
         found[name] = "scene", texts, {"long_name": phrase}
-    spans = {name: (unit, "where the scene lies") for name, (unit, *_) in extremes.SPANS.items()}
-    for name, (unit, phrase) in (spans | NUMBERS).items():
+    of_numbers = {
+        name: {"units": unit, "long_name": phrase} for name, (unit, phrase) in NUMBERS.items()
+    }
+    for name, attrs in (drawn_ranges() | of_numbers).items():
         values = np.array([row.get(name, math.nan) for row in rows], float)
-        found[name] = "scene", values, {"units": unit, "long_name": phrase}
+        found[name] = "scene", values, attrs
     inside = np.array([int(extremes.supported(number)) for number in numbers])
     phrase = "1: drawn inside the range that is documented as supported"
     found["supported"] = "scene", inside, {"units": "1", "long_name": phrase}
@@ -172,6 +174,24 @@ def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset
         "program": f"compsim {compressor.__version__}",
     }
     return xr.Dataset(found, coordinates, attrs)
+
+
+def drawn_ranges() -> dict[str, dict[str, Any]]:
+    """The attributes of each drawn parameter: its unit, the ranges that it is drawn from.
+
+    `range` is that of all scenes, `supported_range` that of the supported half; `logarithmic`: 1
+    where it is drawn evenly in its logarithm.
+    """
+    return {
+        name: {
+            "units": unit,
+            "long_name": "where the scene lies",
+            "range": list(whole),
+            "supported_range": list(narrow or whole),
+            "logarithmic": int(log),
+        }
+        for name, (unit, whole, narrow, log) in extremes.SPANS.items()
+    }
 
 
 def settings(budget: Budget) -> str:

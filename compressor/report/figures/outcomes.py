@@ -1,6 +1,7 @@
 """How extreme scenes ended: a map of outcomes over the planes of their parameters."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -9,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from compressor.measure import SPANS
 from compressor.reasons import Reason
 from compressor.report.figures.style import (
     BLACK,
@@ -55,11 +55,11 @@ def draw_outcomes(study: xr.Dataset) -> Figure:
             panel.plot(x[some], y[some], marker, color=color, markersize=size, zorder=height,
                        markeredgewidth=0.8 if marker == "x" else 0.0)  # fmt: skip
         for scale, parameter in ((panel.set_xscale, first), (panel.set_yscale, second)):
-            scale("log" if span(parameter)[3] else "linear")
-        panel.set_xlabel(worded(first))
-        panel.set_ylabel(worded(second))
+            scale("log" if drawn(study, parameter)["logarithmic"] else "linear")
+        panel.set_xlabel(worded(study, first))
+        panel.set_ylabel(worded(study, second))
         panel.margins(0.03)
-        frame(panel, first, second)
+        frame(panel, drawn(study, first), drawn(study, second))
     present = [name for name in LOOKS if (ends == name).any()]
     legend_above(figure, [handle(name, int((ends == name).sum())) for name in present])
     return figure
@@ -82,23 +82,22 @@ def coordinate(study: xr.Dataset, name: str) -> np.ndarray:
     return np.where(values > 0, values, UNDAMPED) if name == "damping" else values
 
 
-def span(name: str) -> tuple:
-    """A parameter's row of `SPANS`."""
-    return SPANS["clearance_big_end" if name == "clearance" else name]
+def drawn(study: xr.Dataset, name: str) -> Mapping[str, Any]:
+    """How a parameter was drawn: the attributes of its variable in a campaign."""
+    return study["clearance_big_end" if name == "clearance" else name].attrs
 
 
-def worded(name: str) -> str:
+def worded(study: xr.Dataset, name: str) -> str:
     """A parameter's name and unit on an axis."""
-    unit = {"damping": "times the paper's"}.get(name, span(name)[0])
+    unit = {"damping": "times the paper's"}.get(name, drawn(study, name)["units"])
     return name.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
 
 
-def frame(panel: Axes, first: str, second: str) -> None:
+def frame(panel: Axes, first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
     """A rectangle around the supported range, where a plane has one."""
-    (_, whole_x, narrow_x, _), (_, whole_y, narrow_y, _) = span(first), span(second)
-    if not (narrow_x or narrow_y):
+    if all(list(one["range"]) == list(one["supported_range"]) for one in (first, second)):
         return
-    (left, right), (low, high) = narrow_x or whole_x, narrow_y or whole_y
+    (left, right), (low, high) = first["supported_range"], second["supported_range"]
     panel.add_patch(Rectangle((left, low), right - left, high - low, fill=False, zorder=3,
                               edgecolor=BLACK, linewidth=1.0))  # fmt: skip
 
