@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compressor.cases.case import table
 from compressor.cases.conditions import MAX_DEPTH, MAX_LENGTH, NoComparison, comparison
+from compressor.cases.table import table
 
 JOB = {
     "clearance_mm": 0.2,

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.cases.sampling import design
 from compressor.cases.study import points
+from compressor.cases.swept import design
 from compressor.solve.simulate import simulate
 from compressor.store import reader as store
+from compressor.store.studies import write_study
 
 ONE = "joint: big_end\n"
 SHORT = "solve: {duration_rev: 0.25, settle_rev: 0, accuracy: draft, output_step_deg: 0.9}\n"
@@ -377,7 +378,7 @@ def test_only_some_jobs_are_selected_and_all_are_in_the_study(plan):
 def test_a_study_that_is_no_grid_has_a_job_dimension(plan, tmp_path):
     second = "{contact: {materials: [steel, copper]}, machine: {rod_centre_mm: 200}}"
     study = plan(SHORT + f"blocks:\n  - {{load: [none, design]}}\n  - {second}\n")
-    store.write_study(tmp_path, study, "by hand")
+    write_study(tmp_path, study, "by hand")
     keep(tmp_path, *(simulate(case) for case in study.cases[:2]))
     (stored,) = store.read_studies(tmp_path)
     assert list(points(stored)) == list(points(study))
@@ -397,7 +398,7 @@ def test_only_a_grid_is_stored_as_one(plan, tmp_path):
     for text, is_grid in [("load: [none, design]\n", True), ("load: [none]\nexclude: []\n", True),
                           ("load: [none, design]\nexclude: load == none\n", False)]:  # fmt: skip
         study = plan(text)
-        store.write_study(tmp_path, study)
+        write_study(tmp_path, study)
         (stored,) = store.read_studies(tmp_path)
         assert (stored.is_grid, stored.jobs) == (is_grid, len(study.cases))
         assert ("is_grid" in (tmp_path / "studies/case.json").read_text()) == (not is_grid)

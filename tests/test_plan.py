@@ -11,10 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compressor.cases.case import Case, table
+from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_cases, load_studies, to_yaml
 from compressor.cases.parameter import parameter_table
 from compressor.cases.study import Axis
+from compressor.cases.table import table
 from compressor.cases.yaml_reader import MAX_BYTES, resolved
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
@@ -508,7 +509,7 @@ def near(row):
     if row.kind == "integer":
         return st.integers(1, 10**12)
     if not row.default:
-        return st.floats(0, 1, exclude_min=row.above)
+        return st.floats(0, 0.5, exclude_min=row.above)
     return st.floats(0.95 * row.default, 1.05 * row.default)
 
 

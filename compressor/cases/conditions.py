@@ -14,11 +14,11 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from compressor.cases.case import table
 from compressor.cases.keys import suggestion
 from compressor.cases.parameter import Parameter, shown
-from compressor.cases.yaml_reader import REAL, cut, resolved
-from compressor.metrics import JOINTS
+from compressor.cases.shorthands import row_of
+from compressor.cases.swept import is_number
+from compressor.cases.yaml_reader import REAL, resolved, shortened
 
 MAX_LENGTH = 1000  # characters
 MAX_DEPTH = 50  # of parentheses and `not`
@@ -61,7 +61,9 @@ class _Parser:
 
     def refuse(self, message: str) -> None:
         rest = self.text[self.at :]
-        where = f"at character {self.at + 1}, {shown(cut(rest, 20))}" if rest else "at the end"
+        where = (
+            f"at character {self.at + 1}, {shown(shortened(rest, 20))}" if rest else "at the end"
+        )
         raise NoComparison(f"{message} ({where})")
 
     def advance(self) -> str:
@@ -107,7 +109,7 @@ class _Parser:
         key = self.advance()
         if self.token not in SIGNS:
             self.refuse(f"needs one of {' '.join(SIGNS)} after {key}")
-        numeric = row.kind in ("number", "integer")
+        numeric = is_number(row)
         if not numeric and self.token not in ("==", "!="):
             self.refuse(f"{key} is a word: compare it by == or !=")
         sign = self.advance()
@@ -127,7 +129,7 @@ class _Parser:
         key = self.token
         if not key or not (key[0].isalpha() or key[0] == "_") or key in JOINING:
             self.refuse("needs a key, such as clearance_mm")
-        row = table().get(f"clearance_mm.{JOINTS[0]}" if key == "clearance_mm" else key)
+        row = row_of(key)
         if row is None:
             self.refuse(f"unknown key {shown(key)}{suggestion(key, '')}")
         elif row.kind in ("materials", "text"):

@@ -18,14 +18,15 @@ from typing import Any
 
 from compressor import CompsimError
 from compressor.cases import blocks
-from compressor.cases.case import Case, table
+from compressor.cases.case import Case
 from compressor.cases.conditions import NoComparison, Test, comparison
-from compressor.cases.keys import Leaves, leaves
-from compressor.cases.overrides import merged, overridden, read_overrides
+from compressor.cases.keys import Leaves, leaves, merged, overridden, read_overrides
 from compressor.cases.parameter import CaseError, Problem
-from compressor.cases.study import Axis, Cases, Study, value_of
+from compressor.cases.shorthands import value_of
+from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.swept import counted
-from compressor.cases.yaml_reader import FileProblem, Node, Place, cut, read_file, resolved
+from compressor.cases.table import table
+from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, resolved, shortened
 
 MAX_JOBS = 10_000
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
@@ -85,7 +86,7 @@ def load_studies(
     studies = [_study(draft, max_jobs, test) for draft in drafts]
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
-        problems.append(FileProblem(Place(f"--only {cut(only)}"), "", "selects no job"))
+        problems.append(FileProblem(Place(f"--only {shortened(only)}"), "", "selects no job"))
     if problems:
         raise CaseFileError(problems)
     return studies
@@ -96,7 +97,7 @@ def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
     try:
         return comparison(text)
     except NoComparison as error:
-        problems.append(FileProblem(Place(f"--only {cut(text)}"), "", str(error)))
+        problems.append(FileProblem(Place(f"--only {shortened(text)}"), "", str(error)))
         return None
 
 
@@ -213,7 +214,7 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
     keys = max(largest.factors, key=lambda keys: largest.size(keys[0]))
     told = [" x ".join(f"{name} ({counted(n)})" for name, n in one.items()) for one in sizes]
     message = (
-        f"{counted(total)} jobs are more than {max_jobs}: {cut(' + '.join(told), 300)}; "
+        f"{counted(total)} jobs are more than {max_jobs}: {shortened(' + '.join(told), 300)}; "
         "ask for fewer, or raise --max-jobs"
     )
     place = largest.sweeps[keys[0]].node.place
