@@ -1,6 +1,7 @@
 """The case: what makes it the same job, what it fills in, and what it refuses."""
 
 import copy
+import json
 import pickle
 
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.parameter import CaseError, Problem, shown, to_si
-from compressor.cases.table import table
+from compressor.cases.table import Machine, table
 from compressor.metrics import JOINTS
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
@@ -324,6 +325,20 @@ def test_the_table_says_which_values_make_another_job(key):
     other = base | (values or {name: other_value(key)})
     same = Case.from_values(other).key == Case.from_values(base).key
     assert same is not table()[key].identity
+
+
+def test_a_case_tells_what_is_stored_of_it():
+    case = Case.from_values(BIG_END | {"name": "some"})
+    said = case.attributes()
+    assert (said["name"], said["key"], said["physics_key"]) == ("some", case.key, case.physics_key)
+    assert Case.from_attribute(said["case"]) == case
+
+
+def test_a_case_without_keys_tells_its_values():
+    case = Case(machine=Machine(speed_rpm=0.0))
+    said = case.attributes()
+    assert (said["key"], said["physics_key"]) == ("", "")
+    assert json.loads(said["case"])["machine"]["speed_rpm"] == 0
 
 
 def test_the_defaults_are_valid():

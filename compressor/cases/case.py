@@ -1,5 +1,6 @@
 """The case: one fully resolved simulation, its identity, and the numbers that follow from it."""
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Mapping
@@ -126,6 +127,17 @@ class Case(Settings):
     def key(self) -> str:
         """The job's identity: a hash of the resolved physics and solve settings and the model."""
         return _digest(self._identity(with_solver=True))
+
+    def attributes(self) -> dict[str, Any]:
+        """What a stored outcome says of its case: `name`, `case` (JSON), `key`, `physics_key`.
+
+        The keys of a case with values that none can be made of, such as a speed of 0, are "".
+        """
+        found = {"name": self.name, "case": json.dumps(self.values(), sort_keys=True)}
+        keys = {"key": "", "physics_key": ""}
+        with contextlib.suppress(ArithmeticError, TypeError, ValueError):
+            keys = {"key": self.key, "physics_key": self.physics_key}
+        return found | keys
 
     def _identity(self, with_solver: bool) -> dict[str, Any]:
         values = self.values()
