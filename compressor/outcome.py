@@ -4,19 +4,15 @@ So that results are read without loading either; the numbers' names and units ar
 `compressor.metrics`.
 """
 
-import contextlib
-import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import compressor
 from compressor.metrics import AXES, ERRORS, JOINTS, LEDGER, METRICS, NUMBERS, SIZES
-
-if TYPE_CHECKING:
-    from compressor.cases import Case
 
 __all__ = ["AXES", "ERRORS", "LEDGER", "METRICS", "NUMBERS", "ROW", "SIZES", "Outcome"]
 
@@ -72,18 +68,14 @@ class Outcome:
         return named
 
 
-def without_run(case: "Case", reason: str, detail: str, **more: Any) -> Outcome:
-    """The outcome of a case of which no run can tell; `more`: attributes.
+def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more: Any) -> Outcome:
+    """The outcome of a job of which no run can tell.
 
-    The keys of a case with values that none can be made of, such as a speed of 0, are "".
+    `attributes`: what is to be said of its case (`Case.attributes`); `more`: other attributes.
     """
-    attributes: dict[str, Any] = {"key": "", "physics_key": "", "name": case.name}
-    attributes["case"] = json.dumps(case.values(), sort_keys=True)
-    with contextlib.suppress(ArithmeticError, TypeError, ValueError):
-        attributes |= {"key": case.key, "physics_key": case.physics_key}
     program = f"compsim {compressor.__version__}"
-    attributes |= {"complete": 0, "program": program, "detail": detail} | more
-    return Outcome("failed", str(reason), np.full(1, math.nan, ROW)[0], attributes)
+    said = {**attributes, "complete": 0, "program": program, "detail": detail} | more
+    return Outcome("failed", str(reason), np.full(1, math.nan, ROW)[0], said)
 
 
 class Variable(NamedTuple):

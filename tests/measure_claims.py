@@ -13,7 +13,7 @@ from joblib import Parallel, delayed
 from measure_accuracy import provenance
 
 from compressor.analysis.claims import RULES, claims, held_share, paper_cases
-from compressor.cases.case import Solve
+from compressor.cases.table import Solve
 from compressor.solve.simulate import simulate
 
 ROD_KG = (2.0, 4.7, 8.0)

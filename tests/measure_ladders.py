@@ -16,7 +16,8 @@ import xarray as xr
 from measure_accuracy import provenance
 
 from compressor.analysis.claims import FAULTS
-from compressor.cases.case import Case, Contact
+from compressor.cases.case import Case
+from compressor.cases.table import Contact
 from compressor.measure.work_precision import (
     REFERENCES,
     default_cases,

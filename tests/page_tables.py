@@ -4,8 +4,8 @@ import json
 import re
 from pathlib import Path
 
-from compressor.cases.case import table
 from compressor.cases.parameter import parameter_table
+from compressor.cases.table import table
 from compressor.reasons import reason_table
 
 ROOT = Path(__file__).parent.parent

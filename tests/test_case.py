@@ -1,6 +1,7 @@
 """The case: what makes it the same job, what it fills in, and what it refuses."""
 
 import copy
+import json
 import pickle
 
 import pytest
@@ -8,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compressor.cases.accuracy import ACCURACY
-from compressor.cases.case import Case, table
+from compressor.cases.case import Case
 from compressor.cases.parameter import CaseError, Problem, shown, to_si
+from compressor.cases.table import Machine, table
 from compressor.metrics import JOINTS
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
@@ -281,6 +283,62 @@ def test_keys_stay_as_they_are_stored(values, key, physics):
     """A key changes only with the model's version: stores hold results under it."""
     case = Case.from_values(values)
     assert (case.key, case.physics_key) == (key, physics)
+
+
+OTHER = {  # valid values beside the defaults, which cannot be scaled
+    "name": "other",
+    "joint": "big_end",
+    "load": "none",
+    "gas.switching": "exact",
+    "gas.back_pressure_MPa": 0.1,
+    "machine.gravity_m_per_s2": 9.81,
+    "machine.rod_centre_mm": 200.0,
+    "machine.rod_inertia_kg_m2": 0.1,
+    "contact.materials": ["steel", "copper"],
+    "solve.accuracy": "fine",
+    "solve.duration_rev": 5,
+    "solve.duration_s": 0.6,
+    "solve.output_step_deg": 0.6,
+    "solve.output_step_s": 2e-4,
+    "solve.rtol": 1e-9,
+    "solve.method": "BDF",
+    "output.keep": "metrics",
+    "output.precision": "single",
+}
+CLEARANCES = {"big_end": 0.1, "small_end": 0.1}
+
+
+def other_value(key):
+    row = table()[key]
+    if key in OTHER:
+        return OTHER[key]
+    if row.kind == "boolean":
+        return not row.default
+    return 0.9 * row.default if row.default else 0.01
+
+
+@pytest.mark.parametrize("key", sorted(table().keys() - {"contact.law"}))  # there is one law
+def test_the_table_says_which_values_make_another_job(key):
+    base = {"joint": "both", "clearance_mm": CLEARANCES}
+    group, _, name = key.rpartition(".")
+    values = {group: base.get(group, {}) | {name: other_value(key)}} if group else {}
+    other = base | (values or {name: other_value(key)})
+    same = Case.from_values(other).key == Case.from_values(base).key
+    assert same is not table()[key].identity
+
+
+def test_a_case_tells_what_is_stored_of_it():
+    case = Case.from_values(BIG_END | {"name": "some"})
+    said = case.attributes()
+    assert (said["name"], said["key"], said["physics_key"]) == ("some", case.key, case.physics_key)
+    assert Case.from_attribute(said["case"]) == case
+
+
+def test_a_case_without_keys_tells_its_values():
+    case = Case(machine=Machine(speed_rpm=0.0))
+    said = case.attributes()
+    assert (said["key"], said["physics_key"]) == ("", "")
+    assert json.loads(said["case"])["machine"]["speed_rpm"] == 0
 
 
 def test_the_defaults_are_valid():

@@ -8,9 +8,9 @@ from compsim import cli
 from conftest import CONFIGS
 from test_pages import blocks
 
-from compressor.cases.case import table
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import CaseFileError, load_studies
+from compressor.cases.table import table
 from compressor.cases.yaml_reader import Place, read_text
 
 SCHEMA = jsonschema.Draft202012Validator(case_schema())

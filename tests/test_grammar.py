@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.cases.sampling import design
 from compressor.cases.study import points
+from compressor.cases.swept import design
 from compressor.solve.simulate import simulate
 from compressor.store import reader as store
 from compressor.store.studies import read_studies, write_study
@@ -173,7 +173,8 @@ def test_many_blocks_are_refused_too(plan):
     assert message == "case.yaml:1:9: blocks: 11 blocks are more jobs than 10; raise --max-jobs"
 
 
-def test_cases_are_made_when_they_are_asked_for(plan, monkeypatch):
+def test_cases_of_a_very_large_study_are_built_when_they_are_asked_for(plan, monkeypatch):
+    monkeypatch.setattr("compressor.cases.load.MAX_KEPT", 99)
     study = plan(ONE + "clearance_mm: {linspace: [0.1, 1, 100]}\n")
     made, real = [], Case.from_values
     monkeypatch.setattr(Case, "from_values", lambda values: made.append(values) or real(values))

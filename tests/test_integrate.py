@@ -7,7 +7,8 @@ import pytest
 import reference
 
 from compressor.cases.accuracy import ACCURACY
-from compressor.cases.case import METHODS, Case
+from compressor.cases.case import Case
+from compressor.cases.table import METHODS
 from compressor.physics.record import FREEDOMS
 from compressor.solve.integrate import CHUNK, COMPILED, absolute_tolerances, cut
 from compressor.solve.si_record import record, scene
@@ -62,6 +63,10 @@ def test_other_loads_against_the_reference(load):
 
 
 @pytest.mark.compiled
+def test_every_compiled_method_is_in_the_table():
+    assert [name for name in METHODS if name in COMPILED] == [*COMPILED]
+
+
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "auto"])
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_energy_residual_of_every_method(method, joint):

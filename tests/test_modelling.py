@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor.cases.case import Case, Friction
+from compressor.cases.case import Case
+from compressor.cases.table import Friction
 from compressor.measure.features import (
     FEATURES,
     GRID,

@@ -11,10 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compressor.cases.case import Case, table
+from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_cases, load_studies, to_yaml
 from compressor.cases.parameter import parameter_table
 from compressor.cases.study import Axis
+from compressor.cases.table import table
 from compressor.cases.yaml_reader import MAX_BYTES, resolved
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
@@ -174,6 +175,15 @@ def test_jobs_beyond_counting_are_refused_at_once(write):
     text = "".join(f"{group}:\n" + "".join(lines) for group, lines in groups.items())
     (message,) = mistakes(write(text))
     assert f"{500 ** len(keys)} jobs are more than 10000" in message
+
+
+def test_each_case_is_built_once(write, monkeypatch):
+    built, build = [], Case.from_values
+    monkeypatch.setattr(Case, "from_values", lambda values: built.append(values) or build(values))
+    (study,) = load_studies(write("load: [none, design]\n"))
+    assert [case.load for case in [*study.cases, *study.cases]] == ["none", "design"] * 2
+    assert [case.key for case in study.cases] == [*study.keys]
+    assert len(built) == 2
 
 
 # Mistakes
@@ -508,7 +518,7 @@ def near(row):
     if row.kind == "integer":
         return st.integers(1, 10**12)
     if not row.default:
-        return st.floats(0, 1, exclude_min=row.above)
+        return st.floats(0, 0.5, exclude_min=row.above)
     return st.floats(0.95 * row.default, 1.05 * row.default)
 
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from compressor.cases.case import METHODS, Case
+from compressor.cases.case import Case
+from compressor.cases.table import METHODS
 from compressor.solve.integrate import integrate as integration
 from compressor.solve.last_steps import LAST
 from compressor.solve.simulate import STATE_NAMES, measure, simulate

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor.cases.case import Case, Machine, Output, PerJoint, Solve
+from compressor.cases.case import Case
+from compressor.cases.table import Machine, Output, PerJoint, Solve
 from compressor.metrics import NUMBERS
 from compressor.solve.simulate import SERIES, measure, simulate
 

@@ -15,9 +15,10 @@ import pytest
 import xarray as xr
 from conftest import keep
 
-from compressor.cases.case import Case, Output, table
+from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.study import points
+from compressor.cases.table import Output, table
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
 from compressor.store import dataset as labels

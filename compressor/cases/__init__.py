@@ -1,11 +1,13 @@
 """A YAML text -> checked cases and studies."""
 
 from compressor.cases.accuracy import ACCURACY, LOOSEST, TIGHTEST, Targets
-from compressor.cases.case import MODEL_VERSION, Case, Friction, Output, table
+from compressor.cases.case import MODEL_VERSION, Case
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import contact_stiffness
 from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
-from compressor.cases.sampling import design
+from compressor.cases.shorthands import row_of, value_in
 from compressor.cases.study import Study, given, points, shard
+from compressor.cases.swept import design
+from compressor.cases.table import METHODS, Friction, Output, table
 from compressor.cases.yaml_reader import printable

@@ -10,27 +10,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from compressor.cases.case import checked, table
+from compressor.cases.checked import checked
 from compressor.cases.conditions import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.keys import SWEEP, Leaves, suggestion
+from compressor.cases.keys import SWEEP, Leaves, covers, suggestion
 from compressor.cases.parameter import Problem, shown
-from compressor.cases.sampling import KINDS as SAMPLED
-from compressor.cases.sampling import design
-from compressor.cases.swept import Sweep, is_swept, sweep_of
+from compressor.cases.shorthands import row_of, single, stands_for
+from compressor.cases.swept import SAMPLED, Sweep, design, is_swept, sweep_of
+from compressor.cases.table import OF_JOINTS, outside_identity, table
 from compressor.cases.yaml_reader import FileProblem, Node
 
 MAX_EXCLUSIONS = 20
 MAX_SEED = 2**63
-UNSWEPT = (  # no part of a job's identity
-    "name",
-    "solve.error_bars",
-    "solve.horizon",
-    "solve.timeout_s",
-    "output.keep",
-    "output.precision",
-    "output.compress",
-)
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 Row = tuple[Node, ...]
 
@@ -52,7 +43,9 @@ class Block:
             number, place = divmod(number, len(rows))
             found.update(zip(keys, rows[place], strict=True))
         if "joint" in self.swept and found["joint"].value == "none":
-            return {key: n for key, n in found.items() if not key.startswith("clearance_mm")}
+            gone = [key for key in found if any(covers(group, key) for group in OF_JOINTS)]
+            for key in gone:
+                del found[key]
         return found
 
     @property
@@ -149,7 +142,7 @@ def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
         if not is_swept(key, node):
             if good := check(key, node, problems):
                 found.fixed[key] = good
-        elif key in UNSWEPT:
+        elif key in outside_identity():
             found.refuse(node, key, "cannot be swept: it does not change what a job computes")
         elif sweep := sweep_of(key, node, problems):
             found.sweeps[key] = sweep
@@ -168,11 +161,12 @@ def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
     if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
         return None
     found: list[Problem] = []
-    row = "clearance_mm.big_end" if key == "clearance_mm" else key
-    value = checked(row, node.plain(), found)
+    row = row_of(key)
+    assert row  # an unknown key was told when it was read
+    value = checked(row.key, node.plain(), found)
     parts = node.value if isinstance(node.value, dict) else {}
     for problem in found:
-        part = parts.get(problem.key.removeprefix(f"{row}."))
+        part = parts.get(problem.key.removeprefix(f"{row.key}."))
         place, about = (part.place, problem.key) if part else (node.place, key)
         problems.append(FileProblem(place, about, problem.message))
     return None if found else replace(node, value=value)
@@ -264,11 +258,10 @@ def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
         group = key.partition(".")[0]
         if key in chosen:
             return chosen[key].value
-        if key == "clearance_mm":
-            sizes = {n.value for k, n in chosen.items() if k.startswith("clearance_mm.")}
-            return sizes.pop() if len(sizes) == 1 else None
+        if parts := stands_for(key):
+            return single(chosen[part].value for part in parts if part in chosen)
         if RIVALS.get(key) in chosen or (key != group and group in chosen):
-            return chosen[group].value if group == "clearance_mm" else None
+            return chosen[group].value if key in stands_for(group) else None
         return table()[key].default
 
     return value
@@ -277,8 +270,8 @@ def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
 def columns(blocks: Sequence[Block]) -> list[str]:
     """The keys by which the jobs of blocks differ: swept in one, or not the same in all."""
     found = dict.fromkeys(key for block in blocks for key in block.swept)
-    given = dict.fromkeys(key for block in blocks for key in block.fixed if key not in UNSWEPT)
-    for key in given:
+    fixed = dict.fromkeys(key for block in blocks for key in block.fixed)
+    for key in [key for key in fixed if key not in outside_identity()]:
         if len({block.fixed[key].value if key in block.fixed else None for block in blocks}) > 1:
             found[key] = None
     return list(found)

@@ -1,136 +1,193 @@
 """Which jobs are meant: comparisons of keys with values, joined by `and`, `or` and `not`.
 
-    either  := both ("or" both)*
-    both    := term ("and" term)*
-    term    := "not" term | "(" either ")" | key sign value
-    sign    := "==" | "!=" | "<" | "<=" | ">" | ">="
+    clearance_mm >= 0.2 and not (load == none or machine.speed_rpm < 300)
 
-A grammar of its own, so that nothing in a text is ever run. Numbers are compared by size, words
-only with `==` and `!=`. A key that a job has no value for differs from every value.
+Python's parser reads a text into a tree; only the nodes named here may be in it, and nothing is
+ever run. Values mean what they mean in a case file: `true` is a boolean and `none` a word. Numbers
+are compared by size, words only with `==` and `!=`. A key that a job has no value for differs from
+every value.
 """
 
+import ast
+import itertools
 import operator
 import re
+import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
-from compressor.cases.case import table
 from compressor.cases.keys import suggestion
 from compressor.cases.parameter import Parameter, shown
-from compressor.cases.yaml_reader import REAL, cut, resolved
-from compressor.metrics import JOINTS
+from compressor.cases.shorthands import row_of
+from compressor.cases.swept import is_number
+from compressor.cases.yaml_reader import resolved, shortened
 
 MAX_LENGTH = 1000  # characters
-MAX_DEPTH = 50  # of parentheses and `not`
-TOKEN = re.compile(rf"[<>=!]=|[<>()]|[A-Za-z_][A-Za-z0-9_.]*|{REAL.pattern}")
-SIGNS: dict[str, Callable[[Any, Any], bool]] = {
-    "==": operator.eq,
-    "!=": operator.ne,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
+MAX_DEPTH = 50  # of parentheses, and of `not`
+# what Python would read as more than a comparison: a lone =, a comment, a string, letters like ours
+BARRED = re.compile(r"(?<![<>=!])=(?!=)|[^\w\s.()<>=!+-]", re.ASCII)
+LEADING_ZEROS = re.compile(r"(?<![\w.])0+(?=\d)")  # which Python's numbers cannot have
+TOKEN = re.compile(r"[<>=!]=|[\w.]+|\S")
+SIGNS: dict[type[ast.cmpop], tuple[str, Callable[[Any, Any], bool]]] = {
+    ast.Eq: ("==", operator.eq),
+    ast.NotEq: ("!=", operator.ne),
+    ast.Lt: ("<", operator.lt),
+    ast.LtE: ("<=", operator.le),
+    ast.Gt: (">", operator.gt),
+    ast.GtE: (">=", operator.ge),
 }
-JOINING = ("and", "or", "not")
+WRITTEN = tuple(sign for sign, _ in SIGNS.values())
+NEEDS_KEY = "needs a key, such as clearance_mm"
+UNREADABLE = "cannot be read"
+NEEDS_SIGN = f"needs one of {' '.join(WRITTEN)} after "
+NEEDS_JOIN = "needs `and` or `or` before this"
 
 Value = Callable[[str], Any]  # a key -> a job's value, or None
 Test = Callable[[Value], bool]
 
 
 class NoComparison(ValueError):
-    """A text that does not follow the grammar."""
+    """A text that is no comparison."""
 
 
 def comparison(text: str) -> Test:
     """The test that a text means. Raises NoComparison, which tells where and why."""
     if len(text) > MAX_LENGTH:
         raise NoComparison(f"is longer than {MAX_LENGTH} characters")
-    parser = _Parser(text)
-    test = parser.either(0)
-    if parser.token:
-        parser.refuse("needs `and` or `or` before this")
-    return test
+    reader = _Reader(text)
+    return reader.test(reader.tree(), 0)
 
 
-class _Parser:
-    """Reads a text token by token; `token` is the next one, "" at the end, and stands at `at`."""
+class _Reader:
+    """Turns the tree of a text into a test.
+
+    `code` is what Python's parser gets: the text from its first word, with spaces for other white
+    space and for leading zeros, so that places in it are `indent` before those in the text.
+    """
 
     def __init__(self, text: str):
-        self.text, self.token, self.at, self.end = text, "", 0, 0
-        self.advance()
+        self.text, self.indent = text, len(text) - len(text.lstrip())
+        spaced = re.sub(r"\s", " ", text.lstrip())
+        self.code = LEADING_ZEROS.sub(lambda zeros: " " * len(zeros[0]), spaced)
 
-    def refuse(self, message: str) -> None:
-        rest = self.text[self.at :]
-        where = f"at character {self.at + 1}, {shown(cut(rest, 20))}" if rest else "at the end"
-        raise NoComparison(f"{message} ({where})")
+    def refuse(self, at: int, message: str) -> NoReturn:
+        """Raise NoComparison about what stands at a place of the code."""
+        rest = self.text[self.indent + at :].lstrip()
+        where = f"character {len(self.text) - len(rest) + 1}, {shown(shortened(rest, 20))}"
+        raise NoComparison(f"{message} (at {where if rest else 'the end'})")
 
-    def advance(self) -> str:
-        """Go on to the next token; gives the one that is left behind."""
-        old = self.token
-        self.at = len(self.text) - len(self.text[self.end :].lstrip())
-        found = TOKEN.match(self.text, self.at)
-        if not found and self.at < len(self.text):
-            hint = "write == for equal" if self.text[self.at] == "=" else "cannot be read"
-            self.refuse(hint)
-        self.token, self.end = (found[0], found.end()) if found else ("", self.at)
-        return old
+    def tree(self) -> ast.expr:
+        """The tree of the code; it may still hold what is no comparison."""
+        if barred := BARRED.search(self.code):
+            self.refuse(barred.start(), "write == for equal" if barred[0] == "=" else UNREADABLE)
+        depths = itertools.accumulate((c == "(") - (c == ")") for c in self.code)
+        if deep := [at for at, depth in enumerate(depths) if depth > MAX_DEPTH]:
+            self.refuse(deep[0], f"is nested deeper than {MAX_DEPTH} levels")
+        try:
+            with warnings.catch_warnings():  # of `1or`, which Python may refuse one day
+                warnings.simplefilter("ignore")
+                tree = ast.parse(self.code, mode="eval").body
+        except SyntaxError as error:
+            self.refuse(*_misfit(self.code, error))
+        except (RecursionError, MemoryError):
+            self.refuse(0, "is nested too deeply")
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call):  # a parenthesis after a whole comparison
+                self.refuse(self.beyond(node.func), NEEDS_JOIN)
+        return tree
 
-    def either(self, depth: int) -> Test:
-        return self.joined("or", any, lambda: self.joined("and", all, lambda: self.term(depth)))
+    def beyond(self, node: ast.expr) -> int:
+        """Where the code goes on after a node and the parentheses around it."""
+        end = node.end_col_offset or 0
+        return len(self.code) - len(self.code[end:].lstrip(" )"))
 
-    def joined(self, word: str, join: Callable[..., bool], part: Callable[[], Test]) -> Test:
-        tests = [part()]
-        while self.token == word:
-            self.advance()
-            tests.append(part())
-        return tests[0] if len(tests) == 1 else lambda value: join(test(value) for test in tests)
+    def written(self, node: ast.expr) -> str:
+        """A key, a word or a number as it is written; "" for anything else."""
+        if not isinstance(node, ast.Name | ast.Attribute | ast.Constant):
+            return ""
+        return self.code[node.col_offset : node.end_col_offset].replace(" ", "")
 
-    def term(self, depth: int) -> Test:
+    def test(self, node: ast.expr, depth: int) -> Test:
+        """The test that a node means."""
         if depth > MAX_DEPTH:
-            self.refuse(f"is nested deeper than {MAX_DEPTH} levels")
-        if self.token == "not":
-            self.advance()
-            inner = self.term(depth + 1)
+            self.refuse(node.col_offset, f"is nested deeper than {MAX_DEPTH} levels")
+        if isinstance(node, ast.BoolOp):
+            join = all if isinstance(node.op, ast.And) else any
+            tests = [self.test(part, depth) for part in node.values]
+            return lambda value: join(test(value) for test in tests)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            inner = self.test(node.operand, depth + 1)
             return lambda value: not inner(value)
-        if self.token != "(":
-            return self.compared()
-        self.advance()
-        inner = self.either(depth + 1)
-        if self.token != ")":
-            self.refuse("needs a closing parenthesis")
-        self.advance()
-        return inner
+        return self.compared(node)
 
-    def compared(self) -> Test:
-        """One comparison of a key with a value."""
-        row = self.row()
-        key = self.advance()
-        if self.token not in SIGNS:
-            self.refuse(f"needs one of {' '.join(SIGNS)} after {key}")
-        numeric = row.kind in ("number", "integer")
-        if not numeric and self.token not in ("==", "!="):
-            self.refuse(f"{key} is a word: compare it by == or !=")
-        sign = self.advance()
-        wanted = resolved(self.token)
-        if not self.token or self.token in (*SIGNS, *JOINING, "(", ")"):
-            self.refuse(f"needs a value after {sign}")
-        if not (isinstance(wanted, int | float) if numeric else not row.check(wanted)):
-            self.refuse(f"{key} needs {'a number' if numeric else row.range}")
-        self.advance()
+    def compared(self, node: ast.expr) -> Test:
+        """The test of one comparison of a key with a value."""
+        left = node.left if isinstance(node, ast.Compare) else node
+        while isinstance(left, ast.BinOp):
+            left = left.left
+        key, row = self.key(left)
+        after = self.beyond(left)
+        if not isinstance(node, ast.Compare) or left is not node.left:
+            self.refuse(after, NEEDS_SIGN + key)
+        if type(node.ops[0]) not in SIGNS:
+            self.refuse(after, NEEDS_SIGN + key)
+        sign, compare = SIGNS[type(node.ops[0])]
+        numeric = is_number(row)
+        if not numeric and sign not in ("==", "!="):
+            self.refuse(after, f"{key} is a word: compare it by == or !=")
+        right = node.comparators[0]
+        wanted = self.value(right)
+        if not (type(wanted) in (int, float) if numeric else not row.check(wanted)):
+            self.refuse(right.col_offset, f"{key} needs {'a number' if numeric else row.range}")
+        if len(node.ops) > 1:
+            self.refuse(self.beyond(right), NEEDS_JOIN)
         missing = sign == "!="
-        return lambda value: (
-            missing if (found := value(key)) is None else SIGNS[sign](found, wanted)
-        )
+        return lambda value: missing if (found := value(key)) is None else compare(found, wanted)
 
-    def row(self) -> Parameter:
-        """The row of the key that comes next."""
-        key = self.token
-        if not key or not (key[0].isalpha() or key[0] == "_") or key in JOINING:
-            self.refuse("needs a key, such as clearance_mm")
-        row = table().get(f"clearance_mm.{JOINTS[0]}" if key == "clearance_mm" else key)
+    def key(self, node: ast.expr) -> tuple[str, Parameter]:
+        """A key that can be compared, and the row that its values keep."""
+        key = self.written(node)
+        if not key or isinstance(node, ast.Constant):
+            self.refuse(node.col_offset, NEEDS_KEY)
+        row = row_of(key)
         if row is None:
-            self.refuse(f"unknown key {shown(key)}{suggestion(key, '')}")
-        elif row.kind in ("materials", "text"):
-            self.refuse(f"{key} cannot be compared")
-        assert row
-        return row
+            self.refuse(node.col_offset, f"unknown key {shown(key)}{suggestion(key, '')}")
+        if row.kind in ("materials", "text"):
+            self.refuse(node.col_offset, f"{key} cannot be compared")
+        return key, row
+
+    def value(self, node: ast.expr) -> Any:
+        """What a number or a word means in a case file; None for anything else."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+            sign = "-" if isinstance(node.op, ast.USub) else "+"
+            return resolved(sign + self.written(node.operand))
+        return resolved(self.written(node))
+
+
+def _misfit(code: str, error: SyntaxError) -> tuple[int, str]:
+    """Where a code cannot be read and why: words that cannot be neighbours, or Python's error."""
+    earlier, before = "", ""
+    ends, opened = False, 0  # ends: whether a comparison may end with `before`
+    for token in TOKEN.finditer(code):
+        word, at = token[0], token.start()
+        needs_more = word in ("(", "not", "+", "-")
+        named = word not in ("and", "or", "not") and (word[0].isalnum() or word[0] in "_.")
+        if ends and (named or word in ("(", "not")):
+            return at, NEEDS_JOIN if earlier in WRITTEN or before == ")" else NEEDS_SIGN + before
+        if not (ends or named or needs_more):
+            return at, _missing(before)
+        opened += (word == "(") - (word == ")")
+        if opened < 0:
+            return at, "has no opening parenthesis for this"
+        earlier, before, ends = before, word, named or word == ")"
+    if not ends:
+        return len(code), _missing(before)
+    if opened:
+        return len(code), "needs a closing parenthesis"
+    unit = ": write numbers without their unit" if "literal" in error.msg else ""
+    return error.offset - 1 if error.offset else len(code), UNREADABLE + unit
+
+
+def _missing(before: str) -> str:
+    """What is missing after a word of a code, "" at its beginning."""
+    return f"needs a value after {before}" if before in (*WRITTEN, "+", "-") else NEEDS_KEY

@@ -2,13 +2,10 @@
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
+from compressor.cases.table import Settings, table
 from compressor.metrics import JOINTS
-
-if TYPE_CHECKING:
-    from compressor.cases.case import Case
 
 # One key, and the other whose place it takes; a case gives one of the two.
 IN_PLACE_OF = (
@@ -19,8 +16,9 @@ IN_PLACE_OF = (
 )
 
 
-def conflicts(case: "Case", given: frozenset[str]) -> Iterator[Problem]:
-    """Everything in a case that does not fit together; `given` holds the keys set by hand."""
+def conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Everything in a case that does not fit together; `given`: the dotted keys set by hand."""
+    yield from _inertia_conflicts(case)
     yield from _geometry_conflicts(case)
     yield from _clearance_conflicts(case, given)
     yield from _choice_conflicts(given)
@@ -35,7 +33,15 @@ def conflicts(case: "Case", given: frozenset[str]) -> Iterator[Problem]:
         )
 
 
-def _geometry_conflicts(case: "Case") -> Iterator[Problem]:
+def _inertia_conflicts(case: Settings) -> Iterator[Problem]:
+    """A default inertia may leave the range that a given one must keep."""
+    key = "machine.rod_inertia_kg_m2"
+    message = table()[key].check(case.machine.rod_inertia_kg_m2)
+    if message:
+        yield Problem(key, f"m L^2 / 12 of the rod: {message}")
+
+
+def _geometry_conflicts(case: Settings) -> Iterator[Problem]:
     machine, play = case.machine, _play(case)
     if machine.crank_radius_mm + play >= machine.rod_length_mm:
         loose = f" and {play:g} mm of clearance" if play else ""
@@ -48,12 +54,12 @@ def _geometry_conflicts(case: "Case") -> Iterator[Problem]:
         yield Problem("machine.rod_centre_mm", "the mass centre lies beyond the rod's small end")
 
 
-def _clearance_conflicts(case: "Case", given: frozenset[str]) -> Iterator[Problem]:
+def _clearance_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     pin = case.machine.pin_radius_mm
-    for joint in JOINTS:
+    keys = {joint: f"clearance_mm.{joint}" for joint in JOINTS}
+    for joint, key in keys.items():
         clearance = getattr(case.clearance_mm, joint)
-        key = f"clearance_mm.{joint}"
-        if case.joint in (joint, "both") and not given & {key, "clearance_mm"}:
+        if case.joint in (joint, "both") and key not in given:
             yield Problem(key, f"is needed with joint: {case.joint}")
         if clearance > pin:
             yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm")
@@ -64,7 +70,7 @@ def _clearance_conflicts(case: "Case", given: frozenset[str]) -> Iterator[Proble
                 f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
                 f"more than a tenth of the pin radius; lower it, or raise {key}",
             )
-    if case.joint == "none" and any(key.startswith("clearance_mm") for key in given):
+    if case.joint == "none" and given & {*keys.values()}:
         yield Problem("clearance_mm", "has no joint to be at; set joint, or leave it out")
 
 
@@ -74,7 +80,7 @@ def _choice_conflicts(given: frozenset[str]) -> Iterator[Problem]:
             yield Problem(one, f"stands in place of {other}: give one of the two")
 
 
-def _load_conflicts(case: "Case") -> Iterator[Problem]:
+def _load_conflicts(case: Settings) -> Iterator[Problem]:
     machine, gas = case.machine, case.gas
     if case.load == "design" and case.spring.stroke_mm >= 2 * machine.crank_radius_mm:
         yield Problem(
@@ -101,7 +107,7 @@ def _load_conflicts(case: "Case") -> Iterator[Problem]:
                 "the gas left at the head never expands to the suction pressure; "
                 "lower it, or the pressure ratio",
             )
-    elif _gas_geometry(case) != _gas_geometry(type(case)()):
+    elif _gas_geometry(case) != _gas_geometry(Settings()):
         yield Problem(
             "gas.switching",
             "the printed corners hold for the paper's geometry and pressures only; "
@@ -109,12 +115,12 @@ def _load_conflicts(case: "Case") -> Iterator[Problem]:
         )
 
 
-def _play(case: "Case") -> float:
+def _play(case: Settings) -> float:
     """How much farther than ideal joints those with clearance let the crosshead go (mm)."""
     return case.clearance_mm.big_end + case.clearance_mm.small_end
 
 
-def _gas_geometry(case: "Case") -> tuple[float, ...]:
+def _gas_geometry(case: Settings) -> tuple[float, ...]:
     """What decides where the gas cycle's corners lie."""
     gas, machine = case.gas, case.machine
     return (
@@ -127,7 +133,7 @@ def _gas_geometry(case: "Case") -> tuple[float, ...]:
     )
 
 
-def _time_conflicts(case: "Case") -> Iterator[Problem]:
+def _time_conflicts(case: Settings) -> Iterator[Problem]:
     solve = case.solve
     span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
     step_key = "solve.output_step_s" if solve.output_step_s is not None else "solve.output_step_deg"

@@ -8,13 +8,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from compressor.cases.accuracy import TARGET
-from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED, UNSWEPT
-from compressor.cases.case import GROUPS, table
+from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, Parameter
-from compressor.cases.sampling import KINDS as SAMPLED
-from compressor.cases.swept import FORMS, row_kind
-from compressor.metrics import JOINTS, METRICS
+from compressor.cases.shorthands import SHORTHANDS, row_of
+from compressor.cases.swept import FORMS, SAMPLED, is_number
+from compressor.cases.table import GROUPS, outside_identity, table
+from compressor.metrics import METRICS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
@@ -49,16 +49,15 @@ def _group(name: str) -> Schema:
     mapping = _mapping({row.key.removeprefix(f"{name}."): _value(row) for row in rows})
     rivals = [pair for pair in IN_PLACE_OF if pair[0].startswith(f"{name}.")]
     if rivals:
-        short = ([key.removeprefix(f"{name}.") for key in pair] for pair in rivals)
-        mapping["allOf"] = [{"not": {"required": pair}} for pair in short]
+        inner = ([key.removeprefix(f"{name}.") for key in pair] for pair in rivals)
+        mapping["allOf"] = [{"not": {"required": pair}} for pair in inner]
     about = (GROUPS[name].__doc__ or "").partition("\n")[0]
     if name == "friction":
         return {"description": about, "anyOf": [{"const": False}, mapping]}
-    if name == "clearance_mm":
-        both = _value(table()[f"{name}.{JOINTS[0]}"])
-        return {"description": "radial clearance, of both joints or each", "anyOf": [
-            *both["anyOf"], mapping
-        ]}  # fmt: skip
+    row = row_of(name)
+    if row:
+        short = _value(row)["anyOf"]
+        return {"description": SHORTHANDS[name].phrase, "anyOf": [*short, mapping]}
     return {"description": about, **mapping}
 
 
@@ -69,10 +68,10 @@ def _value(row: Parameter) -> Schema:
     found: Schema = {"description": f"{about} ({row.source})"}
     if row.default is not None and row.kind != "text":
         found["default"] = row.default
-    if row.key in UNSWEPT:
+    if not row.identity:
         return found | one
     listed = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
-    made = [{"$ref": "#/$defs/made"}] if row_kind(row.key) in ("number", "integer") else []
+    made = [{"$ref": "#/$defs/made"}] if is_number(row) else []
     return found | {"anyOf": [one, listed, *made]}
 
 
@@ -125,6 +124,6 @@ def _sweeps() -> Schema:
 
 
 def _sweepable() -> Iterable[str]:
-    """The keys that can be swept; a clearance also for both joints."""
-    yield "clearance_mm"
-    yield from (key for key in table() if key not in UNSWEPT)
+    """The keys that can be swept, shorthands among them."""
+    yield from SHORTHANDS
+    yield from (key for key in table() if key not in outside_identity())

@@ -1,14 +1,19 @@
-"""A case file's tree of values -> leaves by dotted key; an unknown key is told what was meant."""
+"""Values by dotted key: of a case file's tree, of `key=value` texts, of blocks, one over another.
+
+An unknown key is told what was probably meant.
+"""
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from compressor.cases.case import GROUPS, Case, table
+from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import shown
+from compressor.cases.shorthands import SHORTHANDS, stands_for
 from compressor.cases.swept import FORMS
-from compressor.cases.yaml_reader import FileProblem, Node, Place
+from compressor.cases.table import GROUPS, OF_JOINTS, Settings, table
+from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shortened
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
 # keys of a case file that are no part of a case: how values are swept together
@@ -40,7 +45,7 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
         elif name == "friction" and node.value is not False:
             message = f"needs false or a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
-        elif (name in GROUPS or name == "sample") and name not in ("friction", "clearance_mm"):
+        elif (name in GROUPS or name == "sample") and name not in ("friction", *SHORTHANDS):
             message = f"needs a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
         else:
@@ -50,7 +55,7 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
 
 def _is_sweep(name: str, node: Node) -> bool:
     """Whether a group's mapping sweeps a value that stands for the whole group."""
-    few = name == "clearance_mm" and len(node.value) <= 2
+    few = name in SHORTHANDS and len(node.value) <= 2  # a word of FORMS, and `log`
     return few and any(get_close_matches(word, FORMS, n=1) for word in node.value)
 
 
@@ -68,7 +73,7 @@ def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tupl
 def _allowed(group: str) -> list[str]:
     if group == "sample":
         return [*SAMPLE]
-    names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Case)]
+    names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
     return names if group else [*names, *SWEEP]
 
 
@@ -107,3 +112,58 @@ def _stem(name: str) -> str:
             unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")
             return name.removesuffix(f"_{unit}")
     return name
+
+
+def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[str, Leaves]:
+    """The leaves of each `key=value` of the command line, by its key."""
+    found: dict[str, Leaves] = {}
+    for text in texts:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        place = Place(f"--set {shortened(text)}")
+        if not key or not equals:
+            message = "needs the form key=value, such as joint=both"
+            problems.append(FileProblem(place, "", message))
+        elif any(covers(key, other) or covers(other, key) for other in found):
+            problems.append(FileProblem(place, key, "is set twice"))
+        elif node := read_text(value, place, problems):
+            group, dot, inner = key.partition(".")
+            node = Node({inner: node}, place, place) if dot else node
+            found[key] = leaves(Node({group: node}, place, place), problems)
+    return found
+
+
+def overridden(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
+    """A file's leaves with every override in place of the leaves at or under its key."""
+    new = {key: node for change in overrides.values() for key, node in change.values.items()}
+    places = {key: place for change in overrides.values() for key, place in change.places.items()}
+    gone = [*overrides]
+    for one, other in IN_PLACE_OF:
+        gone += [other] * (one in new) + [one] * (other in new)
+    if "joint" in new and new["joint"].value == "none":
+        gone += OF_JOINTS
+    kept = {
+        key: node
+        for outer, value in file.values.items()
+        for key, node in _opened(outer, value, new).items()
+        if key in new or not any(covers(other, key) for other in gone)
+    }
+    return Leaves(kept | new, places | file.places)
+
+
+def merged(file: Leaves, block: Leaves) -> Leaves:
+    """A file's leaves with every leaf of one of its blocks in place of the file's."""
+    changes = {key: Leaves({key: node}, {}) for key, node in block.values.items()}
+    found = overridden(file, changes)
+    return Leaves(found.values, file.places | block.places)
+
+
+def _opened(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
+    """A value that stands for a whole group, split up if an override sets a part of the group."""
+    if not any(other.startswith(f"{key}.") for other in new):
+        return {key: node}
+    return dict.fromkeys(stands_for(key), node)
+
+
+def covers(outer: str, key: str) -> bool:
+    """Whether a key is another one, or in the group that the other names."""
+    return f"{key}.".startswith(f"{outer}.")

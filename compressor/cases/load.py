@@ -3,7 +3,7 @@
 A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
 and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
 before any is made; every combination is then built once, which finds the values that do not fit
-each other.
+each other. A very large study does not keep its cases: each is built again when it is asked for.
 """
 
 import itertools
@@ -14,20 +14,22 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from compressor import CompsimError
 from compressor.cases import blocks
-from compressor.cases.case import Case, table
+from compressor.cases.case import Case
 from compressor.cases.conditions import NoComparison, Test, comparison
-from compressor.cases.keys import Leaves, leaves
-from compressor.cases.overrides import merged, overridden, read_overrides
+from compressor.cases.keys import Leaves, leaves, merged, overridden, read_overrides
 from compressor.cases.parameter import CaseError, Problem
-from compressor.cases.study import Axis, Cases, Study, value_of
+from compressor.cases.shorthands import value_of
+from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.swept import counted
-from compressor.cases.yaml_reader import FileProblem, Node, Place, cut, read_file, resolved
+from compressor.cases.table import table
+from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, resolved, shortened
 
 MAX_JOBS = 10_000
+MAX_KEPT = 100_000  # cases of a study that stay in memory, each 1 kB
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
@@ -55,6 +57,14 @@ class _Draft:
     leaves: Leaves
     changes: Mapping[str, Leaves]
     problems: list[FileProblem]
+
+
+class _Built(NamedTuple):
+    """The cases of a study where they are kept, the key of each, and its values of some keys."""
+
+    cases: list[Case]
+    keys: list[str]
+    rows: list[tuple[Any, ...]]
 
 
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
@@ -85,7 +95,7 @@ def load_studies(
     studies = [_study(draft, max_jobs, test) for draft in drafts]
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
-        problems.append(FileProblem(Place(f"--only {cut(only)}"), "", "selects no job"))
+        problems.append(FileProblem(Place(f"--only {shortened(only)}"), "", "selects no job"))
     if problems:
         raise CaseFileError(problems)
     return studies
@@ -96,7 +106,7 @@ def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
     try:
         return comparison(text)
     except NoComparison as error:
-        problems.append(FileProblem(Place(f"--only {cut(text)}"), "", str(error)))
+        problems.append(FileProblem(Place(f"--only {shortened(text)}"), "", str(error)))
         return None
 
 
@@ -152,16 +162,17 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
         _refuse_idle_sample(drafts, draft)
     is_grid = len(found) == 1 and found[0].is_grid
     keys = [] if is_grid else blocks.columns(found)
-    jobs, table = _checked_cases(draft, cases, keys)
+    built = _build(draft, cases, keys)
     if is_grid:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
-        found_columns = zip(*table, strict=True)
+        found_columns = zip(*built.rows, strict=True)
         axes = [Axis(key, column) for key, column in zip(keys, found_columns, strict=False)]
     if draft.problems:
-        cases = Cases(draft.name, ())
+        return Study(draft.name, draft.path, tuple(axes), (), tuple(built.keys), is_grid)
     selected = range(len(cases)) if only is None else cases.where(only)
-    return Study(draft.name, draft.path, tuple(axes), cases, tuple(jobs), is_grid, selected)
+    kept = tuple(built.cases) if len(cases) <= MAX_KEPT else cases
+    return Study(draft.name, draft.path, tuple(axes), kept, tuple(built.keys), is_grid, selected)
 
 
 def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
@@ -213,7 +224,7 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
     keys = max(largest.factors, key=lambda keys: largest.size(keys[0]))
     told = [" x ".join(f"{name} ({counted(n)})" for name, n in one.items()) for one in sizes]
     message = (
-        f"{counted(total)} jobs are more than {max_jobs}: {cut(' + '.join(told), 300)}; "
+        f"{counted(total)} jobs are more than {max_jobs}: {shortened(' + '.join(told), 300)}; "
         "ask for fewer, or raise --max-jobs"
     )
     place = largest.sweeps[keys[0]].node.place
@@ -221,29 +232,29 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
     return False
 
 
-def _checked_cases(
-    draft: _Draft, cases: Cases, keys: Sequence[str]
-) -> tuple[list[str], list[tuple[Any, ...]]]:
-    """The job's key of each case, and its values of some keys of the file.
+def _build(draft: _Draft, cases: Cases, keys: Sequence[str]) -> _Built:
+    """What every case of a study is, keyed and with its values of some keys of the file.
 
     Conflicts in any combination are problems of the draft.
     """
     found: dict[Problem, FileProblem] = {}
-    jobs, rows = [], []
+    built = _Built([], [], [])
     for block, chosen in cases.combinations():
         try:
             case = cases.case(chosen)
         except CaseError as error:
             for problem in error.problems:
                 found.setdefault(problem, _located(problem, chosen, block, draft.path))
-        else:
-            jobs.append(case.key)
-            rows.append(tuple(value_of(case, key) for key in keys))
+            continue
+        if len(cases) <= MAX_KEPT:
+            built.cases.append(case)
+        built.keys.append(case.key)
+        built.rows.append(tuple(value_of(case, key) for key in keys))
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         draft.problems.append(FileProblem(Place(draft.path), "", message))
-    return jobs, rows
+    return built
 
 
 def _located(

@@ -1,6 +1,6 @@
 """One row of the table of parameters, and what a value of it must satisfy.
 
-`compressor.cases.case` builds the whole table from these; units are those of the case file, and
+`compressor.cases.table` builds the whole table from these; units are those of the case file, and
 `to_si` turns a value into SI.
 """
 
@@ -86,6 +86,7 @@ class Parameter:
     kind: str  # number | integer | boolean | choice | text | materials | accuracy
     choices: tuple[str, ...] = ()
     optional: bool = False
+    identity: bool = True  # whether it is part of a job's identity
 
     @property
     def range(self) -> str:
@@ -147,31 +148,23 @@ def _is_finite(value: float) -> bool:
 
 
 def parameter(
-    default: Any,
-    unit: str,
-    span: tuple[float, float],
-    source: str,
-    phrase: str,
-    *,
-    above: bool = False,
-    optional: bool = False,
-    kind: str = "number",
+    default: Any, unit: str, span: tuple[float, float], source: str, phrase: str, **more: Any
 ) -> Any:
-    """A dataclass field that is also a row of the table; `above`: the lower bound is excluded."""
-    row = {"unit": unit, "low": span[0], "high": span[1], "above": above, "source": source}
-    row |= {"phrase": phrase, "kind": kind, "choices": (), "optional": optional}
-    return field(default=default, metadata=row)
+    """A dataclass field that is also a row of the table; `more`: other fields of `Parameter`."""
+    row = {"unit": unit, "low": span[0], "high": span[1], "above": False, "source": source}
+    row |= {"phrase": phrase, "kind": "number"}
+    return field(default=default, metadata=row | more)
 
 
 def choice(default: Any, choices: tuple[str, ...], source: str, phrase: str, **more: Any) -> Any:
-    """A field whose value is one of a few words."""
+    """A field whose value is one of a few words, or of another `kind` that is given."""
     row = {"unit": "", "low": 0.0, "high": 0.0, "above": False, "source": source}
-    row |= {"phrase": phrase, "kind": "choice", "choices": choices, "optional": False} | more
-    return field(default=default, metadata=row)
+    row |= {"phrase": phrase, "kind": "choice", "choices": choices}
+    return field(default=default, metadata=row | more)
 
 
 def parameter_table(rows: Iterable[Parameter]) -> str:
-    """The table of parameters in Markdown; `compressor.cases.case.table` has the rows."""
+    """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
     lines = ["| key | unit | default | range | source | what it is |", "|---|---|---|---|---|---|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)

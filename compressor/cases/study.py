@@ -100,19 +100,6 @@ def nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
     return values
 
 
-def value_of(case: Case, key: str) -> Any:
-    """A case's value of a dotted key; None where it has none, or no single one."""
-    if key == "friction":
-        return case.friction is not None
-    if key == "clearance_mm":
-        sizes = {size for size in vars(case.clearance_mm).values() if size > 0}
-        return sizes.pop() if len(sizes) == 1 else None
-    value: Any = case
-    for part in key.split("."):
-        value = getattr(value, part, None)
-    return value
-
-
 class Jobs(Protocol):
     """What a study tells of its jobs, whether read from a case file or from a store."""
 

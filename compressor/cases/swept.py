@@ -1,4 +1,4 @@
-"""How one key is swept: a list, or a mapping such as `{linspace: [0.1, 0.3, 5]}`.
+"""How keys are swept: by a list, a mapping such as `{linspace: [0.1, 0.3, 5]}`, or a design.
 
 How many values there are is known before any is made. Numbers are taken as the decimal fractions
 that they are written as, so that `{range: [0.1, 0.5, 0.1]}` has 0.3, and equal values are
@@ -6,16 +6,17 @@ one job in whatever study.
 """
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
 
-from compressor.cases.case import table
-from compressor.cases.sampling import KINDS as SAMPLED
+from compressor.cases.parameter import Parameter
+from compressor.cases.shorthands import row_of
 from compressor.cases.yaml_reader import FileProblem, Node
-from compressor.metrics import JOINTS
 
+SAMPLED = ("random", "lhs", "sobol")  # designs of samples, which draw several keys together
 # word -> what stands in its brackets
 FORMS = {
     "linspace": "[first, last, count]",
@@ -75,7 +76,7 @@ def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> Sweep | None:
         refuse(f"needs a value, a list of values or a mapping with one of {' '.join(FORMS)}{hint}")
     elif log and (words[0] not in SAMPLED or not isinstance(log.value, bool)):
         refuse(f"log is true or false, and for {' '.join(SAMPLED)} alone", log)
-    elif row_kind(key) not in ("number", "integer"):
+    elif not is_number(row_of(key)):
         refuse(f"is no number, so that {words[0]} cannot sweep it: give a list")
     else:
         numbers = _numbers(words[0], node.value[words[0]], refuse)
@@ -84,13 +85,9 @@ def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> Sweep | None:
     return None
 
 
-def row_kind(key: str) -> str:
-    """The kind of a key's values."""
-    return table()[_row(key)].kind
-
-
-def _row(key: str) -> str:
-    return f"clearance_mm.{JOINTS[0]}" if key == "clearance_mm" else key
+def is_number(row: Parameter | None) -> bool:
+    """Whether a row of the table is one of numbers."""
+    return row is not None and row.kind in ("number", "integer")
 
 
 def _numbers(word: str, node: Node, refuse: Callable[..., None]) -> list[Fraction]:
@@ -129,7 +126,8 @@ def _ranged(
         count = (last - first) // more[0] + 1
         last = first + (count - 1) * more[0]
     if not message:
-        bad = (table()[_row(key)].check(float(end)) for end in (first, last))
+        row = row_of(key)
+        bad = (row.check(float(end)) for end in (first, last) if row)
         message = next(filter(None, bad), "")
     if message:
         refuse(message, node.value[word])
@@ -171,3 +169,22 @@ def rounded(value: float) -> float:
 def counted(count: int) -> str:
     """A number of jobs as it is told, however large."""
     return str(count) if count < 10**100 else f"over 10^{int(count.bit_length() * 0.30103) - 1}"
+
+
+def design(kind: str, count: int, keys: int, seed: int) -> list[list[float]]:
+    """Points of a sampling design: `count` of `keys` coordinates in [0, 1).
+
+    The same seed gives the same points. `random` is uniform, `lhs` a Latin hypercube, `sobol`
+    Sobol's sequence, scrambled, whose balance is best where `count` is a power of two.
+    """
+    import numpy as np
+
+    generator = np.random.default_rng(seed)
+    if kind == "random":
+        return generator.random((count, keys)).tolist()
+    from scipy.stats import qmc  # takes half a second
+
+    sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[kind](keys, seed=generator)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="The balance properties of Sobol")
+        return sampler.random(count).tolist()

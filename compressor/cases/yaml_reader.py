@@ -50,7 +50,7 @@ class FileProblem:
     message: str
 
     def __str__(self) -> str:
-        parts = (str(self.place), cut(printable(self.key)), printable(self.message))
+        parts = (str(self.place), shortened(printable(self.key)), printable(self.message))
         return ": ".join(part for part in parts if part)
 
 
@@ -80,7 +80,7 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def cut(text: str, most: int = 60) -> str:
+def shortened(text: str, most: int = 60) -> str:
     """Text of at most `most` characters."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
@@ -119,7 +119,9 @@ def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | No
     except yaml.MarkedYAMLError as error:
         place = builder.place(error.problem_mark or error.context_mark)
         hint = "; indent with spaces, not tabs" if "'\\t'" in str(error.problem) else ""
-        problems.append(FileProblem(place, "", f"is no YAML: {cut(str(error.problem), 120)}{hint}"))
+        problems.append(
+            FileProblem(place, "", f"is no YAML: {shortened(str(error.problem), 120)}{hint}")
+        )
     except yaml.reader.ReaderError as error:
         problems.append(_forbidden(text, error.position, start))
     except (ValueError, OverflowError):  # PyYAML on "\UFFFFFFFF" or %YAML 1.999...

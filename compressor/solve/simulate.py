@@ -1,7 +1,6 @@
 """Case -> Dataset: the only place where numbers get names, units and attributes."""
 
 import itertools
-import json
 import math
 import time
 from collections.abc import Sequence
@@ -113,7 +112,7 @@ def measure(case: Case) -> Outcome:
 
 def refused(case: Case) -> Outcome:
     """The outcome of a case that no case file could ask for."""
-    return without_run(case, Reason.INVALID_INPUT, str(CaseError([*case.problems])))
+    return without_run(case.attributes(), Reason.INVALID_INPUT, str(CaseError([*case.problems])))
 
 
 def solve(case: Case) -> Solution:
@@ -344,10 +343,7 @@ def attributes(case: Case, found: Solution) -> dict[str, object]:
     trajectory = found.trajectory
     attrs: dict[str, object] = {
         "Conventions": "SI units; forces act on the rod; the frame of the README",
-        "name": case.name,
-        "case": json.dumps(case.values(), sort_keys=True),
-        "key": case.key,
-        "physics_key": case.physics_key,
+        **case.attributes(),
         "complete": 0 if trajectory.reason else 1,
         "settle": case.settle,
         "rtol": found.rtol,

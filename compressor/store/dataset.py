@@ -13,7 +13,7 @@ import xarray as xr
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from compressor.cases import points, table
+from compressor.cases import points, table, value_in
 from compressor.metrics import NUMBERS
 from compressor.outcome import coordinates
 from compressor.reasons import Reason
@@ -87,20 +87,9 @@ def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
 
 
 def _value(study: StoredStudy, point: Mapping[str, Any], key: str, missing: Any) -> Any:
-    """The value of a key in one job of a study."""
-    value = point[key] if key in point else _fixed_value(study.fixed, key, missing)
+    """The value of a key in one job of a study; `missing` where it has no single one."""
+    value = point[key] if key in point else value_in(study.fixed, key)
     return missing if value is None else value
-
-
-def _fixed_value(fixed: Mapping[str, Any], key: str, missing: Any) -> Any:
-    """The value of a key that a study does not sweep; `missing` where it has no single one."""
-    value: Any = fixed
-    for part in key.split("."):
-        value = value.get(part, missing) if isinstance(value, Mapping) else missing
-    if key == "clearance_mm" and isinstance(value, Mapping):
-        sizes = {size for size in value.values() if size > 0}
-        return sizes.pop() if len(sizes) == 1 else missing
-    return missing if isinstance(value, Mapping) else value
 
 
 def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:

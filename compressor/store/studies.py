@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import compressor
-from compressor.cases import MODEL_VERSION, Study, given, points, table
-from compressor.metrics import JOINTS
+from compressor.cases import MODEL_VERSION, Study, given, points, row_of, table
 from compressor.store.files import KEY, Folder, StoreError, publish, refusals, system_error
 from compressor.store.hdf5 import digest
 
@@ -186,7 +185,6 @@ def _frozen(values: Sequence[Any]) -> tuple[Any, ...]:
 
 
 def _unit(key: str) -> str:
-    """The unit of a swept key, "" for words; `clearance_mm` stands for both its joints."""
-    row = table().get(key) or table().get(f"{key}.{JOINTS[0]}")
-    numeric = row and row.kind in ("number", "integer")
-    return (row.unit or "1") if row and numeric else ""
+    """The unit of a swept key, "" for words."""
+    row = row_of(key)
+    return (row.unit or "1") if row and row.kind in ("number", "integer") else ""

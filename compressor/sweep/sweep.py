@@ -329,4 +329,4 @@ def settled(end: Done | Lost) -> Outcome:
             raise end.result
         return end.result
     more = {"traceback": end.traceback} if end.traceback else {}
-    return without_run(end.id, end.reason, end.detail, **more)
+    return without_run(end.id.attributes(), end.reason, end.detail, **more)

@@ -1,0 +1,78 @@
+"""Values checked against the table of parameters: one value, one group, or a key at the top."""
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from typing import Any
+
+from compressor.cases.accuracy import checked_targets
+from compressor.cases.parameter import Problem, shown
+from compressor.cases.table import GROUPS, table
+
+
+def checked(key: str, value: Any, problems: list[Problem]) -> Any:
+    """A value as its dataclass holds it; what is wrong with it joins `problems`."""
+    row = table()[key]
+    if value is None and row.optional:
+        return row.default
+    if row.kind == "accuracy" and isinstance(value, Mapping):
+        return checked_targets(key, value, problems)
+    message = row.check(value)
+    if message:
+        problems.append(Problem(key, message))
+        return value
+    if row.kind == "number":
+        return float(value) + 0.0  # no -0.0: equal cases have one key
+    if row.kind == "integer":
+        return int(value)
+    return tuple(value) if row.kind == "materials" else value
+
+
+def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
+    """The dataclass, scalar or None that stands for a key at the top of a case file.
+
+    What is wrong with its value joins `problems`.
+    """
+    if key in GROUPS:
+        if key == "friction" and value is False:
+            return None
+        if not isinstance(value, Mapping):
+            problems.append(Problem(key, f"needs a mapping of keys, not {shown(value)}"))
+            return None
+        try:
+            found, wrong = _shared_group(key, tuple((n, v, type(v)) for n, v in value.items()))
+        except TypeError:  # a list or a mapping is in it
+            found, wrong = _group(key, value.items())
+        problems += wrong
+        return found
+    if key not in table():
+        problems.append(Problem(key, "unknown key"))
+        return None
+    return checked(key, value, problems)
+
+
+@lru_cache(maxsize=256)
+def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[Any, list[Problem]]:
+    """A group from its values, and what is wrong; jobs of a sweep share those they have alike.
+
+    Types are part of the values, since 1, 1.0 and true are equal.
+    """
+    return _group(key, [(name, value) for name, value, _ in items])
+
+
+def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Problem]]:
+    problems: list[Problem] = []
+    known = {item.name for item in dataclasses.fields(GROUPS[key])}
+    values = dict(items)
+    problems += [Problem(f"{key}.{name}", "unknown key") for name in values if name not in known]
+    good = {n: checked(f"{key}.{n}", v, problems) for n, v in values.items() if n in known}
+    return GROUPS[key](**good), problems
+
+
+def keys_given(values: Mapping[str, Any]) -> Iterator[str]:
+    """The dotted keys that are set in nested values."""
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from (f"{key}.{name}" for name, item in value.items() if item is not None)
+        else:
+            yield key
