@@ -21,6 +21,7 @@ from compressor.writer import Writer
 
 CONFIGS = Path(__file__).parent.parent / "configs"
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+PATIENCE = 120  # s, until something happens that takes a second on an idle machine
 HEAVY = ("numpy", "xarray", "scipy", "numba", "h5py", "joblib", "matplotlib", "yaml")
 
 
@@ -522,15 +523,16 @@ def started(folder, jobs):
         [*command, "run", "many.yaml"],
         cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
-    deadline = time.monotonic() + 60
-    while not store.finished_keys(folder / "results") and time.monotonic() < deadline:
+    deadline = time.monotonic() + PATIENCE
+    while not store.finished_keys(folder / "results"):
         assert process.poll() is None
+        assert time.monotonic() < deadline
         time.sleep(0.05)
     return process
 
 
-def group_is_gone(group, seconds):
-    deadline = time.monotonic() + seconds
+def group_is_gone(group):
+    deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         try:
             os.killpg(group, 0)
@@ -550,7 +552,7 @@ def test_a_signal_that_hits_a_destructor_is_not_lost(number, capsys):
 
     def work():
         Closing()
-        until = time.monotonic() + 30
+        until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
             time.sleep(0.01)
 
@@ -579,14 +581,14 @@ def test_other_dropped_exceptions_are_told_as_ever(monkeypatch):
     ],
 )
 def test_a_run_that_is_told_to_end(send, number, code, tmp_path):
-    process = started(tmp_path, 40)
+    process = started(tmp_path, 400)
     send(process.pid, number)
-    err = process.communicate(timeout=10)[1]
+    err = process.communicate(timeout=PATIENCE)[1]
     assert process.returncode == code
-    assert group_is_gone(process.pid, 5)
+    assert group_is_gone(process.pid)
     kept = store.finished_keys(tmp_path / "results")
-    assert 0 < len(kept) < 40
+    assert 0 < len(kept) < 400
     assert {store.job_status(tmp_path / "results", key).status for key in kept} == {"ok"}
     if code > 0:
-        goes_on = "of 40 jobs are stored in results; the same command goes on from there"
+        goes_on = "of 400 jobs are stored in results; the same command goes on from there"
         assert re.fullmatch(rf"\d+ {goes_on}\ninterrupted by {number.name}\n", err)
