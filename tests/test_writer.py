@@ -272,7 +272,7 @@ def test_a_second_writer_can_wait(tmp_path):
         with pytest.raises(subprocess.TimeoutExpired):
             second.wait(0.5)
         first.add(outcome(1))
-    assert second.communicate(timeout=120) == ("has it\n", None)
+    assert second.communicate(timeout=600) == ("has it\n", None)
 
 
 # ---- crashes ------------------------------------------------------------------------------------
