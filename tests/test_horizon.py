@@ -24,6 +24,8 @@ from compressor.simulation import measure, simulate
 from compressor.store import read_store
 from compressor.sweep import serving_both
 
+pytestmark = pytest.mark.xdist_group("twins")  # which take long to compile
+
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
 CHAOTIC = {
     "joint": "big_end",

@@ -12,6 +12,8 @@ from compressor.physics.parameters import FREEDOMS
 from compressor.record import record, scene
 from compressor.simulation import measure, simulate
 
+pytestmark = pytest.mark.xdist_group("reference")  # which takes long to derive
+
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
 
 

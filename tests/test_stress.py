@@ -28,6 +28,8 @@ from compressor.simulation import solve
 from compressor.store import StoreError
 from compressor.stress import FILE, campaign, counts, dataset, slowest, worst
 
+pytestmark = pytest.mark.xdist_group("twins")  # which take long to compile
+
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
 COUNT, SEED = 100, 1
 
