@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/installed
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -26,7 +26,11 @@ figures: install  ## draw the report again from the stored results
 	$(BIN)/compsim report
 
 test: install  ## run the whole test suite
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+test-bare:  ## run it on a fresh clone with nothing but Python, make, git, sh and coreutils
+	@place=$$(mktemp -d) && trap 'rm -rf "$$place"' EXIT && git clone --quiet . "$$place/compsim" \
+	  && $(PYTHON) tests/bare.py $(MAKE) -C "$$place/compsim" test
 
 test-pure: install  ## run the physics tests on the same source with the JIT off
 	COMPSIM_JIT=0 $(BIN)/python -m pytest -n 2 -m 'not slow and not compiled' tests/test_kinematics.py \

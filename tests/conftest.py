@@ -2,6 +2,8 @@
 
 import fcntl
 import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import hypothesis
@@ -40,6 +42,18 @@ def once(tmp_path_factory):
         return base / name
 
     return made
+
+
+@pytest.fixture
+def ncdump():
+    """Calls ncdump and returns what it prints; the test is skipped where that is not installed."""
+    if not shutil.which("ncdump"):
+        pytest.skip("ncdump is not installed (Debian: netcdf-bin)")
+    return lambda *words: (
+        subprocess.run(
+            ["ncdump", *map(str, words)], capture_output=True, text=True, check=True
+        ).stdout
+    )
 
 
 def keep(folder, *datasets):

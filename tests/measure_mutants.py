@@ -13,13 +13,13 @@ import argparse
 import json
 import multiprocessing
 import os
-import re
 import resource
 import shutil
 import signal
 import sys
 import tempfile
 import time
+import traceback
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -59,57 +59,96 @@ class Copy:
                 shutil.copy2(source, target)
 
     def attempt(self, mutant, jit, modules):
-        """The first test of some modules that fails, "" if none does."""
+        """The first test of some modules that fails, "" if none does; raises CannotBeLoaded."""
+        files = [f"tests/test_{name}.py" for name in modules]
         if not mutant:
-            return self.run(jit, modules, "machine-code")
+            return first_failure(self.folder, files, jit, "machine-code")
         path = self.folder / mutant.file
         whole, stamp = path.read_bytes(), path.stat()
         try:
             write(path, mutant.source(self.folder))
             physics = mutant.file.startswith(PHYSICS)
-            return self.run(jit, modules, "other-code" if physics else "machine-code")
+            cache = "other-code" if physics else "machine-code"
+            return first_failure(self.folder, files, jit, cache)
         finally:  # numba's cache goes by the time of the sources
             write(path, whole)
             os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
 
-    def run(self, jit, modules, cache):
-        """Run the tests of some modules in a fork; machine code is kept in the folder `cache`."""
-        for made in (self.folder / "other-code", self.folder / ".hypothesis"):
-            shutil.rmtree(made, ignore_errors=True)
-        report = self.folder / "report.txt"
-        child = os.fork()
-        if not child:
-            try:
-                self.become(report, jit, cache)
-                call = ["-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider"]
-                call += ["--hypothesis-seed=0", "-m", JIT if jit else NO_JIT]
-                os._exit(pytest.main(call + [f"tests/test_{name}.py" for name in modules]))
-            finally:
-                os._exit(99)
-        _, status = os.waitpid(child, 0)
-        if os.WIFSIGNALED(status):
-            number = os.WTERMSIG(status)
-            patience = number in (signal.SIGXCPU, signal.SIGKILL)
-            return "no end" if patience else f"ended by signal {number}"
-        failed = re.search(
-            r"^(?:FAILED|ERROR) tests/(.+?)(?: - |$)", report.read_text(), re.MULTILINE
-        )
-        if not failed and status:
-            return "cannot be loaded"
-        return failed[1] if failed else ""
 
-    def become(self, report, jit, cache):
-        """Make of this process one that tests the copy, and writes what it says to a file."""
-        resource.setrlimit(resource.RLIMIT_CPU, (PATIENCE[jit], PATIENCE[jit]))
-        out = os.open(report, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-        os.dup2(out, 1)
-        os.dup2(out, 2)
-        os.chdir(self.folder)
-        kept = [path for path in sys.path if not Path(path or ".").resolve().is_relative_to(ROOT)
-                or ".venv" in path]  # fmt: skip
-        sys.path[:] = [str(self.folder), str(self.folder / "cmd"), *kept]
-        os.environ["COMPSIM_JIT"] = str(int(jit))
-        numba.config.CACHE_DIR = str(self.folder / cache)
+class CannotBeLoaded(Exception):
+    """No test ran: nothing can be said of the mutant."""
+
+
+class Notes:
+    """A plugin of pytest that notes at once which tests begin and which fail."""
+
+    def __init__(self, path):
+        self.file = open(path, "w", buffering=1, encoding="utf-8")
+
+    def pytest_runtest_logstart(self, nodeid):
+        self.file.write(f"began {nodeid}\n")
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed:
+            self.file.write(f"failed {report.nodeid}\n")
+
+
+def first_failure(folder, files, jit, cache):
+    """The first failing test of some files of a folder, "" if none fails; raises CannotBeLoaded.
+
+    They run in a fork; machine code is kept in the folder `cache`.
+    """
+    for made in (folder / "other-code", folder / ".hypothesis"):
+        shutil.rmtree(made, ignore_errors=True)
+    notes, output = folder / "notes.txt", folder / "output.txt"
+    notes.write_text("")
+    child = os.fork()
+    if not child:
+        code = 99
+        try:
+            become(folder, output, jit, cache)
+            call = ["-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider"]
+            call += ["--hypothesis-seed=0", "-m", JIT if jit else NO_JIT]
+            code = pytest.main(call + files, plugins=[Notes(notes)])
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return verdict(notes.read_text("utf-8").splitlines(), code, output)
+
+
+def verdict(notes, code, output):
+    """The test that failed or was never done, by a fork's notes and exit code; "" if none.
+
+    Raises CannotBeLoaded, with the end of the fork's output, where no test ran.
+    """
+    told = [(what, test.removeprefix("tests/")) for what, test in (n.split(" ", 1) for n in notes)]
+    for what, test in told:
+        if what == "failed":
+            return test
+    if not told or code > 0:
+        raise CannotBeLoaded(f"{output.read_text('utf-8')[-1000:]}exit code {code}")
+    if code < 0:
+        endless = -code in (signal.SIGXCPU, signal.SIGKILL)
+        return f"{told[-1][1]}: {'no end' if endless else f'ended by signal {-code}'}"
+    return ""
+
+
+def become(folder, output, jit, cache):
+    """Make of this process one that tests a copy, and writes what it says to a file."""
+    resource.setrlimit(resource.RLIMIT_CPU, (PATIENCE[jit], PATIENCE[jit]))
+    out = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(out, 1)
+    os.dup2(out, 2)
+    os.chdir(folder)
+    kept = [path for path in sys.path if not Path(path or ".").resolve().is_relative_to(ROOT)
+            or ".venv" in path]  # fmt: skip
+    sys.path[:] = [str(folder), str(folder / "cmd"), *kept]
+    os.environ["COMPSIM_JIT"] = str(int(jit))
+    numba.config.CACHE_DIR = str(folder / cache)
 
 
 def write(path, source):
@@ -138,17 +177,28 @@ def in_turn(modules, mutant):
 def try_mutant(mutant, tree, pure, compiled):
     """What became of a mutant: its row of the kept measurement."""
     began = time.monotonic()
-    row = {"kind": mutant.kind, "mutant": mutant.identity, "jit": False}
-    row["caught_by"] = tree.attempt(mutant, False, in_turn(pure, mutant)) if pure else ""
+    row = {"kind": mutant.kind, "mutant": mutant.identity, "jit": False, "caught_by": ""}
     reason = EQUIVALENT.get(mutant.identity)
     if reason:
         row["equivalent"] = reason
-    elif compiled and not row["caught_by"]:
-        row["jit"] = True
-        row["caught_by"] = tree.attempt(mutant, True, in_turn(compiled, mutant))
-    outcome = row["caught_by"] or (f"equivalent: {reason}" if reason else "ESCAPED")
-    tell(began, f"{mutant.identity}\n        {outcome}")
+    try:
+        if pure:
+            row["caught_by"] = tree.attempt(mutant, False, in_turn(pure, mutant))
+        if compiled and not reason and not row["caught_by"]:
+            row["jit"] = True
+            row["caught_by"] = tree.attempt(mutant, True, in_turn(compiled, mutant))
+    except CannotBeLoaded as error:
+        row["cannot_be_loaded"] = str(error)
+    tell(began, f"{mutant.identity}\n        {outcome(row)}")
     return row
+
+
+def outcome(row):
+    """What became of a mutant, in words."""
+    if "cannot_be_loaded" in row:
+        return f"CANNOT BE LOADED: {row['cannot_be_loaded']}"
+    return row["caught_by"] or (f"equivalent: {row['equivalent']}" if "equivalent" in row
+                                else "ESCAPED")  # fmt: skip
 
 
 def tell(began, what):
@@ -177,7 +227,7 @@ def tried(mutant):
 def campaign(mutants, jobs, pure=PURE, compiled=COMPILED):
     """Rows of mutants, `jobs` at a time, tried on modules of tests with the JIT off, then on.
 
-    Raises BrokenProcessPool where the sources without a mutant fail.
+    Raises BrokenProcessPool where the sources without a mutant fail or cannot be loaded.
     """
     fork = multiprocessing.get_context("fork")
     with (
@@ -211,11 +261,22 @@ def main(target, jobs, only, pure, compiled):
     if only != [""]:
         kept |= earlier(target, rows, everyone)
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    escaped = sum(not row["caught_by"] and "equivalent" not in row for row in rows)
-    print(f"{len(rows)} mutants in {minutes} minutes, {escaped} escaped")
+    sys.exit(judge(rows, minutes) or 0)
+
+
+def judge(rows, minutes):
+    """Tell how many mutants were caught; what is wrong with the campaign itself, "" if nothing."""
+    unloaded = [row["mutant"] for row in rows if "cannot_be_loaded" in row]
     wrong = [row["mutant"] for row in rows if "equivalent" in row and row["caught_by"]]
-    if wrong:
-        sys.exit(f"said to change nothing, but caught: {wrong}")
+    caught = sum(bool(row["caught_by"]) for row in rows)
+    same = sum("equivalent" in row for row in rows)
+    print(
+        f"{len(rows)} mutants in {minutes} minutes: {caught} caught, {same} change nothing, "
+        f"{len(unloaded)} cannot be loaded"
+    )
+    problems = [f"no test ran, since they cannot be loaded: {unloaded}"] if unloaded else []
+    problems += [f"said to change nothing, but caught: {wrong}"] if wrong else []
+    return "\n".join(problems)
 
 
 if __name__ == "__main__":

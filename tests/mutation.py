@@ -16,6 +16,8 @@ ROOT = Path(__file__).parent.parent
 PHYSICS = "compressor/physics"
 LEFT_OUT = {"__init__.py", "_jit.py"}  # no equations in them
 SEED = 2021
+# mutants that are not drawn, since no test can run on them: by identity, with the reason
+UNLOADABLE = {"rosenbrock.py, module: 3 -> 4 (2)": "a row of the tableau gets a number too few"}
 
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
              ast.Pow: ast.Mult, ast.And: ast.Or, ast.Or: ast.And}  # fmt: skip
@@ -186,6 +188,7 @@ def drawn(count, root=ROOT, seed=SEED):
         for path in sorted((root / PHYSICS).glob("*.py"))
         if path.name not in LEFT_OUT
         for number, mutant in mutants_of(path, root)
+        if mutant.identity not in UNLOADABLE
     ]
     taken, used = [], set()
     for kind in KINDS:

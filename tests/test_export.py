@@ -3,7 +3,7 @@
 import csv
 import json
 import os
-import subprocess
+import shutil
 import sys
 
 import h5py
@@ -105,13 +105,11 @@ def test_studies_together_have_a_dimension_of_jobs(results, tmp_path):
     assert [row["key"] for row in table(tmp_path / "all.csv")] == study.key.values.tolist()
 
 
-def test_ncdump_reads_an_export(results, tmp_path):
+def test_ncdump_reads_an_export(results, ncdump, tmp_path):
     export(results, [], tmp_path / "all.nc")
-    done = subprocess.run(
-        ["ncdump", "-h", tmp_path / "all.nc"], capture_output=True, text=True, check=True
-    )
-    assert "job = 6" in done.stdout
-    assert 'peak_acceleration:coordinates = "key study' in done.stdout
+    header = ncdump("-h", tmp_path / "all.nc")
+    assert "job = 6" in header
+    assert 'peak_acceleration:coordinates = "key study' in header
 
 
 @pytest.mark.parametrize("name", ["grid", "list"])
@@ -196,7 +194,7 @@ def test_what_is_not_there_is_named(results, tmp_path, capsys):
 
 def test_damaged_series_are_left_out_and_told(results, tmp_path, capsys):
     copy = tmp_path / "results"
-    subprocess.run(["cp", "-r", results, copy], check=True)
+    shutil.copytree(results, copy)
     (hurt, *others) = sorted((copy / "jobs").iterdir())
     data = bytearray(hurt.read_bytes())
     data[len(data) // 2] ^= 1

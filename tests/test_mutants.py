@@ -2,6 +2,7 @@
 
 import ast
 import json
+import os
 import subprocess
 import sys
 
@@ -9,9 +10,12 @@ import mutation
 import planted_bugs
 import pytest
 from equivalent_mutants import EQUIVALENT
-from mutation import Mutant, drawn, mutants_of, planted
+from measure_mutants import judge
+from mutation import UNLOADABLE, Mutant, drawn, mutants_of, planted
 from page_tables import kept
 
+# the least environment: nothing says that output is not to be buffered
+BARE = {"PATH": os.defpath, "PYTHONPATH": str(mutation.ROOT / "tests")}
 SAMPLE = ("K a hundredth too large", "the cam does not close", "friction's velocity in mm/s")
 
 
@@ -82,7 +86,9 @@ def test_what_was_measured_reaches_the_aims():
     others = [row for row in rows if row["kind"] != "planted" and "equivalent" not in row]
     assert len(planted_rows) == 30
     assert len(rows) == 90
+    assert not any("cannot_be_loaded" in row for row in rows)
     assert not any(row["caught_by"] for row in rows if "equivalent" in row)
+    assert all("::" in row["caught_by"] for row in rows if row["caught_by"])
     assert sum(bool(row["caught_by"]) for row in planted_rows) >= 29
     assert sum(bool(row["caught_by"]) for row in others) >= 0.9 * len(others)
 
@@ -92,9 +98,74 @@ def test_a_few_planted_bugs_are_caught(tmp_path):
     target = tmp_path / "mutants.json"
     call = [sys.executable, "tests/measure_mutants.py", str(target), "--jobs", "1", "--compiled"]
     call += ["--pure", "contact", "loads", "--only", *SAMPLE]
-    done = subprocess.run(call, cwd=mutation.ROOT, capture_output=True, text=True)
+    done = subprocess.run(call, cwd=mutation.ROOT, env=BARE, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     caught = [row["caught_by"] for row in json.loads(target.read_text())["mutants"]]
     assert [test.partition("::")[0] for test in caught] == [
         "test_contact.py", "test_loads.py", "test_contact.py"
     ]  # fmt: skip
+
+
+TINY = {
+    "passes": "def test_one(): pass",
+    "fails": "def test_one(): pass\ndef test_two(): assert 1 == 2\ndef test_three(): assert 0",
+    "its_fixture_fails": "import pytest\n@pytest.fixture\ndef made(): 1 / 0\n"
+                         "def test_one(made): pass",
+    "dies": "import os\ndef test_one(): pass\ndef test_two(): os.abort()",
+    "never_ends": "import resource\ndef test_one():\n"
+                  "    resource.setrlimit(resource.RLIMIT_CPU, (1, 2))\n    while True: pass",
+    "cannot_be_imported": "1 / 0\ndef test_one(): pass",
+    "holds_no_test": "",
+}  # fmt: skip
+PROBE = """
+import json, pathlib, sys
+from measure_mutants import CannotBeLoaded, first_failure
+for name in sys.argv[1:]:
+    try:
+        found = first_failure(pathlib.Path.cwd(), [f"tests/test_{name}.py"], False, "cache")
+    except CannotBeLoaded as error:
+        found = ["cannot be loaded", str(error)]
+    print(json.dumps(found))
+"""
+
+
+def test_a_bug_is_caught_only_where_a_test_ran_and_failed(tmp_path):
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "pyproject.toml").write_text(
+        "[tool.pytest.ini_options]\nmarkers=['slow','compiled']"
+    )
+    for name, text in TINY.items():
+        (tmp_path / "tests" / f"test_{name}.py").write_text(text)
+    call = [sys.executable, "-c", PROBE, *TINY]
+    done = subprocess.run(call, cwd=tmp_path, env=BARE, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    lines = map(json.loads, done.stdout.splitlines())
+    found = dict(zip(TINY, lines, strict=True))
+    assert found.pop("cannot_be_imported")[0] == found.pop("holds_no_test")[0] == "cannot be loaded"
+    assert found == {
+        "passes": "",
+        "fails": "test_fails.py::test_two",
+        "its_fixture_fails": "test_its_fixture_fails.py::test_one",
+        "dies": "test_dies.py::test_two: ended by signal 6",
+        "never_ends": "test_never_ends.py::test_one: no end",
+    }
+
+
+def test_a_mutant_that_cannot_be_loaded_fails_the_campaign(capsys):
+    caught = {"mutant": "a", "caught_by": "test_a.py::test_a"}
+    escaped, broken = ({"mutant": name, "caught_by": ""} for name in "bc")
+    assert judge([caught, escaped], 1.0) == ""
+    assert "2 mutants in 1.0 minutes: 1 caught" in capsys.readouterr().out
+    problem = judge([caught, broken | {"cannot_be_loaded": "NameError"}], 1.0)
+    assert problem == "no test ran, since they cannot be loaded: ['c']"
+    assert "2 mutants in 1.0 minutes: 1 caught" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("identity", UNLOADABLE)
+def test_mutants_that_are_not_drawn_cannot_be_loaded(identity):
+    paths = (mutation.ROOT / mutation.PHYSICS).glob("*.py")
+    (mutant,) = (m for path in paths for _, m in mutants_of(path) if m.identity == identity)
+    module = mutant.file.removesuffix(".py").replace("/", ".")
+    exec(compile(original(mutant), mutant.file, "exec"), {"__name__": module})
+    with pytest.raises(ValueError, match="broadcast"):
+        exec(compile(mutant.source(), mutant.file, "exec"), {"__name__": module})

@@ -40,27 +40,27 @@ def test_agreement_would_show_a_wrong_lever_arm(exact, monkeypatch):
 
 @pytest.mark.parametrize("scene", mechanism.SCENES)
 def test_exudyn_agrees(exact, scene):
-    pytest.importorskip("exudyn")
+    pytest.importorskip("exudyn", reason="exudyn is not installed (make peers)")
     found = multibody.acceleration(scene, rtol=1e-9, duration=SHORT)
     assert mechanism.error(found, exact[scene]) < 1e-4
 
 
 def test_exudyn_agrees_with_fixed_steps(exact):
-    pytest.importorskip("exudyn")
+    pytest.importorskip("exudyn", reason="exudyn is not installed (make peers)")
     found = multibody.acceleration("both", step=2e-6, duration=SHORT)
     assert mechanism.error(found, exact["both"]) < 2e-3
 
 
 @pytest.mark.parametrize("scene", mechanism.SCENES)
 def test_cvode_agrees(exact, scene):
-    pytest.importorskip("sksundae")
+    pytest.importorskip("sksundae", reason="sksundae is not installed (make peers)")
     found = notebook.acceleration(notebook.by_cvode, scene, 1e-9, SHORT)
     assert mechanism.error(found, exact[scene]) < 1e-4
 
 
 @pytest.mark.parametrize("scene", mechanism.SCENES)
 def test_numbalsoda_agrees(exact, scene):
-    pytest.importorskip("numbalsoda")
+    pytest.importorskip("numbalsoda", reason="numbalsoda is not installed (make peers)")
     found = soda.acceleration(scene, 1e-9, SHORT)
     assert mechanism.error(found, exact[scene]) < 1e-4
 

@@ -427,9 +427,9 @@ def hostile(unit: str, before: str = "", after: str = "") -> str:
 )
 def test_a_hostile_file_is_refused_soon(write, text, end):
     path = write(text)
-    start = time.perf_counter()
+    start = time.process_time()
     assert mistakes(path)[-1].endswith(end)
-    assert time.perf_counter() - start < 30  # about 2 s on one slow core
+    assert time.process_time() - start < 30  # about 2 s on one slow core
 
 
 def test_an_alias_bomb_does_not_unfold(write):
@@ -537,7 +537,10 @@ CASES = st.fixed_dictionaries(
     {"name": st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", fullmatch=True)},
     optional={
         "load": st.sampled_from(["design", "typical", "none"]),
-        "initial_offset_mm": group("initial_offset_mm"),
+        # together less than the tenth of a pin radius that a journal may be shifted at most
+        "initial_offset_mm": group("initial_offset_mm").map(
+            lambda offsets: {key: 0.6 * mm for key, mm in offsets.items()}
+        ),
         "machine": group("machine"),
         "gas": group("gas", "switching").map(lambda gas: gas | {"switching": "exact"}),
         "spring": group("spring"),

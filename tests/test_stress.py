@@ -28,6 +28,8 @@ from compressor.solve.error_bars import bars
 from compressor.solve.simulate import solve
 from compressor.store.files import StoreError
 
+pytestmark = pytest.mark.xdist_group("twins")  # which take long to compile
+
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
 COUNT, SEED = 100, 1
 

@@ -260,6 +260,7 @@ def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
 WAITING = """
     import sys
     from compressor.store.writer import Writer
+    print("asks", flush=True)
     with Writer(sys.argv[1], wait=True):
         print("has it")
 """
@@ -269,10 +270,12 @@ def test_a_second_writer_can_wait(tmp_path):
     with Writer(tmp_path) as first:
         call = [sys.executable, "-c", textwrap.dedent(WAITING), str(tmp_path)]
         second = subprocess.Popen(call, stdout=subprocess.PIPE, text=True)
+        assert second.stdout is not None
+        assert second.stdout.readline() == "asks\n"
         with pytest.raises(subprocess.TimeoutExpired):
-            second.wait(2)
+            second.wait(0.5)
         first.add(outcome(1))
-    assert second.communicate(timeout=20) == ("has it\n", None)
+    assert second.communicate(timeout=600) == ("has it\n", None)
 
 
 # ---- crashes ------------------------------------------------------------------------------------
@@ -298,8 +301,9 @@ def test_what_was_acknowledged_survives_sigkill(tmp_path):
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
         driver = subprocess.Popen(call, stdout=subprocess.PIPE, text=True, env=environment)
         assert driver.stdout is not None
-        acknowledged.add(int(driver.stdout.readline()))
-        time.sleep(wait.uniform(0, 0.3))
+        for _ in range(wait.integers(11, 40)):
+            acknowledged.add(int(driver.stdout.readline()))
+        time.sleep(wait.uniform(0, 0.05))
         driver.send_signal(signal.SIGKILL)
         rest = driver.communicate()[0].splitlines(keepends=True)
         acknowledged |= {int(line) for line in rest if line.endswith("\n")}

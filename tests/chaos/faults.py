@@ -358,9 +358,13 @@ def mount(*words: str) -> None:
     subprocess.run(["mount", *words], check=True, capture_output=True)
 
 
-def may_mount() -> bool:
-    """Whether this process may mount file systems."""
-    return os.geteuid() == 0 and shutil.which("mount") is not None
+def may_mount(folder: Path) -> bool:
+    """Whether file systems can be mounted: by this process, with the programs that are there."""
+    try:
+        with fresh(folder, "able") as place, mounted(place, "size=64k"):
+            return True
+    except (OSError, subprocess.CalledProcessError):
+        return False
 
 
 @contextlib.contextmanager
@@ -388,7 +392,7 @@ def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
                 for error in KINDS.get(kind) or [OTHERS[kind][number % len(OTHERS[kind])]]
             ]
     planned += [partial(tried.file_size, limit) for limit in FILE_BYTES]
-    if may_mount():
+    if may_mount(folder):
         options = [f"size={n}" for n in TMPFS_BYTES]
         options += [f"size=64m,nr_inodes={n}" for n in TMPFS_FILES]
         planned += [partial(tried.small_tmpfs, option) for option in options]
