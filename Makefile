@@ -1,7 +1,10 @@
 # compsim: the verbs of the house. Everything happens in .venv, made here when it is missing.
 PYTHON ?= python3
 BIN := .venv/bin
+CAMPAIGN := PYTHONPATH=tests $(BIN)/python tests/campaigns
 STAMP := .venv/installed
+PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
+  runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
 .PHONY: help install run figures test test-bare test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements pages clean
 
@@ -33,9 +36,7 @@ test-bare:  ## run it on a fresh clone with nothing but Python, make, git, sh an
 	  && $(PYTHON) tests/bare.py $(MAKE) -C "$$place/compsim" test
 
 test-pure: install  ## run the physics tests on the same source with the JIT off
-	COMPSIM_JIT=0 $(BIN)/python -m pytest -n 2 -m 'not slow and not compiled' tests/test_kinematics.py \
-	  tests/test_loads.py tests/test_contact.py tests/test_cam.py tests/test_motion.py \
-	  tests/test_observe.py tests/test_tally.py tests/test_runge_kutta.py tests/test_rosenbrock.py
+	COMPSIM_JIT=0 $(BIN)/python -m pytest -n 2 -m 'not slow and not compiled' $(PURE)
 
 check: install  ## ruff (format and lint) and mypy
 	$(BIN)/ruff format --check .
@@ -47,46 +48,46 @@ format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff check --fix .
 
 accuracy: install  ## measure the errors behind accuracy and error bars (about three minutes)
-	$(BIN)/python tests/measure_accuracy.py tests/results/accuracy.json
+	$(CAMPAIGN)/measure_accuracy.py tests/results/accuracy.json
 
 claims: install  ## measure the paper's claims over a range of masses (seconds)
-	$(BIN)/python tests/measure_claims.py tests/results/claims.json
+	$(CAMPAIGN)/measure_claims.py tests/results/claims.json
 
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
-	$(BIN)/python tests/measure_store.py tests/results/store.json
+	$(CAMPAIGN)/measure_store.py tests/results/store.json
 
 scale: install  ## measure 100,000 jobs beside their physics: time and memory (a minute)
-	$(BIN)/python tests/measure_scale.py tests/results/scale.json
+	$(CAMPAIGN)/measure_scale.py tests/results/scale.json
 
 throughput: install  ## measure starting up, and 10,000 jobs without time series (a minute)
-	$(BIN)/python tests/measure_throughput.py tests/results/throughput.json
+	$(CAMPAIGN)/measure_throughput.py tests/results/throughput.json
 
 sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (ten minutes)
-	$(BIN)/python tests/measure_sweep.py tests/results/sweep.json
+	$(CAMPAIGN)/measure_sweep.py tests/results/sweep.json
 
 peers: install  ## time other tools and ours in turn on one problem (about three minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
 	  || echo "going on without numbalsoda: it needs a Fortran compiler"
-	$(BIN)/python tests/measure_peers.py tests/results/peers.json
+	$(CAMPAIGN)/measure_peers.py tests/results/peers.json
 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
-	$(BIN)/python tests/measure_tradeoff.py tests/results/tradeoff.json
+	$(CAMPAIGN)/measure_tradeoff.py tests/results/tradeoff.json
 
 ladders: install  ## measure error against tolerance, and the limit of no clearance (a minute)
-	$(BIN)/python tests/measure_ladders.py tests/results/ladders.json
+	$(CAMPAIGN)/measure_ladders.py tests/results/ladders.json
 
 chaotic: install  ## compare two chaotic scenes' statistics by two integrators (a minute)
-	$(BIN)/python tests/measure_chaotic.py tests/results/chaotic.json
+	$(CAMPAIGN)/measure_chaotic.py tests/results/chaotic.json
 
 stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
-	$(BIN)/python tests/measure_stress.py tests/results/stress.json
+	$(CAMPAIGN)/measure_stress.py tests/results/stress.json
 
 chaos: install  ## inject faults, thousands, and count what did not survive (an hour)
-	$(BIN)/python tests/measure_chaos.py tests/results/chaos.json
+	$(CAMPAIGN)/measure_chaos.py tests/results/chaos.json
 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
-	$(BIN)/python tests/measure_mutants.py tests/results/mutants.json
+	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
 measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers pages  ## all of these (25 minutes)
 

@@ -18,7 +18,7 @@ class Tier:
     """What a word stands for: a relative tolerance, and the error of acceleration it promises.
 
     `promise` is a relative L2 error, `peak` that of the greatest acceleration; the nine paper
-    cases keep them, and at least 95 % of the random cases of tests/random_cases.py.
+    cases keep them, and at least 95 % of the random cases of tests/campaigns/random_cases.py.
     """
 
     rtol: float

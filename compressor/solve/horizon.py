@@ -6,7 +6,7 @@ depends on the course of the motion has none; statistics still have a meaning. T
 which must be small beside the shift that is followed. Looser ones were measured to mislead: at
 4e-6, explicit steps at the edge of stability part twins of a regular motion within a third of a
 revolution; at 1e-11 one horizon of five was off by a third. At 1e-12 horizons agree with those at
-1e-13, and with those of two separate runs, to a few thousandths (tests/test_horizon.py).
+1e-13, and with those of two separate runs, to a few thousandths (tests/solve/test_horizon.py).
 """
 
 import math

@@ -36,9 +36,9 @@ from planted_bugs import bugs
 COPIED = ("compressor", "cmd", "tests", "configs", "pyproject.toml", "README.md", "Makefile")
 DRAWN = 60
 # the order in which tests are tried, but for a file's own, which come first
-PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "control",
+PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "step_control",
         "runge_kutta", "rosenbrock", "case", "integrate", "motion", "march")  # fmt: skip
-COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulation", "accuracy",
+COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accuracy",
             "horizon")  # fmt: skip
 TESTED_IN = {"twin": "horizon"}  # where not in the module of the same name
 NO_JIT, JIT = "not slow and not compiled", "not slow"
@@ -60,7 +60,9 @@ class Copy:
 
     def attempt(self, mutant, jit, modules):
         """The first test of some modules that fails, "" if none does; raises CannotBeLoaded."""
-        files = [f"tests/test_{name}.py" for name in modules]
+        files = [
+            str(path) for name in modules for path in self.folder.glob(f"tests/*/test_{name}.py")
+        ]
         if not mutant:
             return first_failure(self.folder, files, jit, "machine-code")
         path = self.folder / mutant.file

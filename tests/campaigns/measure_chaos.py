@@ -1,6 +1,6 @@
-"""Inject faults, many of each kind, and count what did not survive: the campaigns of tests/chaos.
+"""Inject faults, many of each kind, and count what did not survive: the campaigns of chaos/.
 
-    python tests/measure_chaos.py [--sample] [--only NAME]... OUT.json        (make chaos)
+    python tests/campaigns/measure_chaos.py [--sample] [--only NAME]... OUT.json        (make chaos)
 
 Each campaign's result takes its place in the file as soon as it ends; the others stay, so that
 campaigns can be repeated one by one. Exit code 1 if anything failed. The power cuts need root.
@@ -18,7 +18,7 @@ from measure_accuracy import provenance
 
 SEED = 1
 FAST = Path("/dev/shm")  # in memory, where there is one: what is tried is not the disk
-CAMPAIGNS = {  # name: (module of tests/chaos, trials, trials of a sample)
+CAMPAIGNS = {  # name: (module of chaos/, trials, trials of a sample)
     "kill": ("kill", 300, 5),
     "power": ("power", 100, 2),
     "faults": ("faults", 10_000, 12),
@@ -49,7 +49,7 @@ def main(target, names, sample):
     failed = 0
     for name in names:
         print(f"{name} ...", file=sys.stderr, flush=True)
-        made = provenance(f"make chaos, or python tests/measure_chaos.py --only {name}")
+        made = provenance(f"make chaos, or python tests/campaigns/measure_chaos.py --only {name}")
         found = {**run(name, sample), "sample": sample, "seed": SEED, **made}
         others = kept(target)["campaigns"] | {name: found}
         ordered = {n: others[n] for n in CAMPAIGNS if n in others}

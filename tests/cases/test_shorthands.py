@@ -17,7 +17,7 @@ from compressor.cases.shorthands import (
 )
 from compressor.cases.table import GROUPS, table
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 BOTH = {"big_end": 0.1, "small_end": 0.1}
 
 

@@ -1,6 +1,6 @@
 """Measure a sweep of 100,000 jobs that is killed at random three times and resumed.
 
-    python tests/measure_sweep.py tests/results/sweep.json [jobs]      (make sweep-bench)
+    python tests/campaigns/measure_sweep.py tests/results/sweep.json [jobs]  (make sweep-bench)
 
 The sweep runs through the real command on two workers, once undisturbed and once killed (SIGKILL of
 the parent alone, or with its workers) and resumed; both stores must hold the same, to the bit,

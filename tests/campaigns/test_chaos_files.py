@@ -1,11 +1,11 @@
 """A sample of the campaigns on files: refused calls, damage, hostile files, power cuts."""
 
 import json
-from pathlib import Path
 
 import measure_chaos
 import pytest
 from chaos import common, faults, hostile
+from page_tables import kept
 
 
 @pytest.mark.slow
@@ -62,14 +62,13 @@ def test_a_partial_driver_keeps_the_other_campaigns(tmp_path, monkeypatch):
     found = {"what": "w", "trials": 2, "failed": 1, "counts": {}, "seconds": 0.1, "failures": ["x"]}
     monkeypatch.setattr(measure_chaos, "run", lambda name, sample: found)
     assert measure_chaos.main(target, ["flips"], False) == 1
-    kept = json.loads(target.read_text())["campaigns"]
-    assert kept["power"] == {"trials": 7}
-    assert (kept["flips"]["trials"], kept["flips"]["failures"]) == (2, ["x"])
-    assert list(kept) == ["power", "flips"]
+    written = json.loads(target.read_text())["campaigns"]
+    assert written["power"] == {"trials": 7}
+    assert (written["flips"]["trials"], written["flips"]["failures"]) == (2, ["x"])
+    assert list(written) == ["power", "flips"]
 
 
 def test_every_campaign_of_the_file_is_a_full_one():
-    kept = json.loads((Path(__file__).parent / "results" / "chaos.json").read_text("utf-8"))
-    for name, found in kept["campaigns"].items():
+    for name, found in kept("chaos.json")["campaigns"].items():
         assert not found["sample"], name
         assert found["trials"] > 0, name

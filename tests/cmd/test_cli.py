@@ -22,7 +22,7 @@ from compressor.store import reader as store
 from compressor.store.studies import read_studies
 from compressor.store.writer import Writer
 
-CONFIGS = Path(__file__).parent.parent / "configs"
+CONFIGS = Path(__file__).parents[2] / "configs"
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 PATIENCE = 600  # s, until something happens: it may take a second, or the kernel is compiled
 HEAVY = ("numpy", "xarray", "scipy", "numba", "h5py", "joblib", "matplotlib", "yaml")

@@ -20,7 +20,7 @@ from compressor.report.study_section import StudyContent
 from compressor.report.tables import Cell, Row, Table
 from compressor.store.studies import StoredStudy
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 HOME = Path(page.__file__).parent
 MODULES = ("page", "tables", "provenance", "paper_runs", "paper_sections", "study_section",
            "report")  # fmt: skip

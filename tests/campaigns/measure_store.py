@@ -1,6 +1,6 @@
 """Measure the store: rows written a second, the opening of a study, sizes of time series.
 
-    python tests/measure_store.py tests/results/store.json [jobs]        (make store-bench)
+    python tests/campaigns/measure_store.py tests/results/store.json [jobs]  (make store-bench)
 
 Rows are those of a real job under made-up keys, given to a `Writer` as a sweep would; the folder is
 in the working directory, so that its disk is what is measured. The greatest wait is the time from a

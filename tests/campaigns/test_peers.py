@@ -5,8 +5,8 @@ import json
 
 import measure_peers
 import numpy as np
+import page_tables
 import pytest
-import readme_tables
 from measure_peers import Contest, Peer, first_call, loosest
 from peers import mechanism, multibody, notebook, soda
 
@@ -107,7 +107,7 @@ def test_row_of_a_contest_has_medians_and_ratios():
 
 
 def test_kept_contests_are_at_equal_or_better_error():
-    kept = json.loads((readme_tables.RESULTS / "peers.json").read_text(encoding="utf-8"))
+    kept = json.loads((page_tables.RESULTS / "peers.json").read_text(encoding="utf-8"))
     tools = {(row["tool"], row["scene"]) for row in kept["rows"]}
     assert tools == {(p.tool, s) for p in measure_peers.PEERS for s in mechanism.SCENES}
     for row in kept["rows"]:

@@ -15,7 +15,8 @@ from mutation import UNLOADABLE, Mutant, drawn, mutants_of, planted
 from page_tables import kept
 
 # the least environment: nothing says that output is not to be buffered
-BARE = {"PATH": os.defpath, "PYTHONPATH": str(mutation.ROOT / "tests")}
+BARE = {"PATH": os.defpath, "PYTHONPATH": f"{mutation.ROOT}/tests:{mutation.ROOT}/tests/campaigns"}
+SCRIPT = "tests/campaigns/measure_mutants.py"
 SAMPLE = ("K a hundredth too large", "the cam does not close", "friction's velocity in mm/s")
 
 
@@ -96,13 +97,13 @@ def test_what_was_measured_reaches_the_aims():
 @pytest.mark.slow
 def test_a_few_planted_bugs_are_caught(tmp_path):
     target = tmp_path / "mutants.json"
-    call = [sys.executable, "tests/measure_mutants.py", str(target), "--jobs", "1", "--compiled"]
+    call = [sys.executable, SCRIPT, str(target), "--jobs", "1", "--compiled"]
     call += ["--pure", "contact", "loads", "--only", *SAMPLE]
     done = subprocess.run(call, cwd=mutation.ROOT, env=BARE, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     caught = [row["caught_by"] for row in json.loads(target.read_text())["mutants"]]
     assert [test.partition("::")[0] for test in caught] == [
-        "test_contact.py", "test_loads.py", "test_contact.py"
+        "physics/test_contact.py", "physics/test_loads.py", "physics/test_contact.py"
     ]  # fmt: skip
 
 

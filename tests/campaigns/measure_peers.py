@@ -6,7 +6,7 @@ CPU time is the wall time of a core without other work, and says more on a busy 
 is kept too. A call starts from the problem's numbers and
 ends with the crosshead's acceleration on the output grid of 0.1 ms; ours is the whole
 `simulate(case)`, with all its series, metrics and energy balance, the kernel's own seconds beside
-it. Errors are against the reference of tests/reference.py. What is not installed, or fails, is a
+it. Errors are against the reference of reference.py. What is not installed, or fails, is a
 row with its reason.
 """
 

@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PHYSICS = "compressor/physics"
 LEFT_OUT = {"__init__.py", "_jit.py"}  # no equations in them
 SEED = 2021

@@ -2,7 +2,7 @@
 
 Rod 3 kg, reciprocating mass 6 kg, typical load, clearance 0.2 mm, four revolutions at 500 rpm, all
 else as in DESIGN. The equations are Newton's and Lagrange's for absolute coordinates, worked out by
-hand with scalars; nothing comes from the product, and the numbers come from tests/reference.py.
+hand with scalars; nothing comes from the product, and the numbers come from reference.py.
 `register_jitable` leaves a function plain Python for those who call it from Python.
 """
 
@@ -20,7 +20,7 @@ OUTPUT_STEP = 1e-4  # s
 
 
 def params(scene):
-    """The scene's parameters for tests/reference.py."""
+    """The scene's parameters for reference.py."""
     return reference.paper_params("typical", scene, CLEARANCE, **MASSES)
 
 

@@ -1,7 +1,7 @@
 """Measure the errors behind each tolerance, each word of `accuracy` and each error bar.
 
 `make accuracy` writes a small JSON file. The paper's nine fault cases are judged by the independent
-reference of tests/reference.py, 200 random cases by our own run at rtol 1e-12, which SciPy's DOP853
+reference of reference.py, 200 random cases by our own run at rtol 1e-12, which SciPy's DOP853
 confirms on a few of them. Errors of acceleration are relative L2 errors over the whole run, those
 of its peak relative; energy residuals are in units of their bound, 10 rtol a revolution.
 """

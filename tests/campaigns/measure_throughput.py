@@ -1,6 +1,6 @@
 """Measure what a sweep costs beside its physics: starting, and 10,000 jobs without time series.
 
-    python tests/measure_throughput.py tests/results/throughput.json [jobs]    (make throughput)
+    python tests/campaigns/measure_throughput.py tests/results/throughput.json [jobs]
 
 All times are of whole processes, medians of a few in turn. The sweep has no error bars, so that
 the wall times which its jobs store are all of the kernel's work; the pure kernel runs the same
@@ -23,7 +23,7 @@ from compressor.cases.load import load_studies
 from compressor.solve.simulate import measure
 from compressor.store.reader import read_store
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 CONFIGS = sorted(map(str, (ROOT / "configs").glob("*.yaml")))
 ONE_CASE = (
     "compressor.simulate(compressor.Case.from_values({'joint': 'both', 'clearance_mm': 0.1}))"

@@ -1,6 +1,6 @@
 """Measure a sweep of 100,000 jobs, and every command on it: seconds and peak memory (RSS).
 
-    python tests/measure_scale.py tests/results/scale.json [jobs]               (make scale)
+    python tests/campaigns/measure_scale.py tests/results/scale.json [jobs]  (make scale)
 
 The sweep is a real one but for its physics: workers answer every job with the outcome of one, so
 that what is measured is all that a sweep does beside simulating. Each command is a process of its

@@ -40,7 +40,7 @@ from compressor.store.rows import decode, encode, segment_name
 from compressor.store.studies import read_study
 from compressor.sweep.sweep import sweep
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 SECONDS = 2.0  # of processor time that a command may take
 HANG = 20.0  # s on the clock
 MOST_SAMPLES = 20_000  # of a valid case file that is run and not only read
