@@ -12,6 +12,7 @@ import sys
 
 import page_tables
 import pytest
+from compsim.cli import cli
 from measure_tradeoff import fingerprint
 
 import compressor
@@ -87,6 +88,11 @@ def test_the_trade_was_measured_with_these_numerics():
 @pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:`|^)make ([a-z-]+)", TEXT, re.M))))
 def test_make_verbs_exist(verb):
     assert re.search(rf"^{verb}:", MAKEFILE, re.MULTILINE), f"make {verb}"
+
+
+def test_every_verb_of_the_command_line_is_in_the_readme():
+    named = set(re.findall(r"`compsim ([a-z]+)`", PAGES["README.md"]))
+    assert named == set(cli.commands)
 
 
 def expanded(place, word):
