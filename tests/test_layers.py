@@ -22,6 +22,7 @@ FLOORS = [
     "physics.rosenbrock",
     "physics.onset",
     "physics.step_control",
+    "physics.walker",
     "physics.march",
     "physics.twin",
     "cases.parameter",

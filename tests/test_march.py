@@ -8,13 +8,14 @@ import reference
 
 from compressor.cases.case import Case
 from compressor.physics.loads import segments
-from compressor.physics.march import Status, march, new_walker, new_work
+from compressor.physics.march import march
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import Mode
 from compressor.physics.tally import new_tally
+from compressor.physics.walker import Status, new_walker, new_work
 from compressor.solve.integrate import Request, integrate, natural_sizes
 from compressor.solve.integrate import integrate as integration
 from compressor.solve.si_record import offsets, record, scene

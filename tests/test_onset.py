@@ -13,7 +13,7 @@ from compressor.physics._jit import ENABLED
 from compressor.physics.contact import Contact, impact, nearness
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
-from compressor.physics.march import NODES, Status, march, measure_apart, new_walker, new_work
+from compressor.physics.march import march, measure_apart
 from compressor.physics.motion import evaluate, start
 from compressor.physics.observe import (
     COLUMNS,
@@ -39,6 +39,7 @@ from compressor.physics.onset import (
 from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, interpolate, take_step
 from compressor.physics.tally import new_tally
+from compressor.physics.walker import NODES, Status, new_walker, new_work
 from compressor.solve.integrate import COMPILED as METHODS
 from compressor.solve.integrate import CONTACT_STEP, natural_sizes, scales
 from compressor.solve.si_record import offsets, record, scene

@@ -8,7 +8,7 @@ from compressor.physics.loads import (
     sample_segments,
     segments,
 )
-from compressor.physics.march import WALKER, Status, Work, march, new_walker, new_work
+from compressor.physics.march import march
 from compressor.physics.motion import start
 from compressor.physics.observe import (
     COLUMNS,
@@ -32,3 +32,4 @@ from compressor.physics.tally import (
     tally_step,
 )
 from compressor.physics.twin import march_twins, new_rows
+from compressor.physics.walker import WALKER, Status, Work, new_walker, new_work
