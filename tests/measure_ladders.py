@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from measure_accuracy import provenance
 
-from compressor.analysis.claims import FAULTS
+from compressor.analysis.paper_cases import FAULTS
 from compressor.cases.case import Case, Contact
 from compressor.measure.work_precision import (
     REFERENCES,

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from compsim import cli, plan
 
-from compressor.analysis.claims import paper_cases
+from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.load import MAX_JOBS, load_cases
 from compressor.store import reader as store
 from compressor.store.writer import Writer

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from compressor.analysis.claims import paper_cases
+from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED
 from compressor.physics.contact import Contact, impact, nearness
