@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED
-from compressor.physics.contact import Contact, impact, nearness
+from compressor.physics.contact import Contact, nearness
+from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
 from compressor.physics.march import march, measure_apart
@@ -208,7 +209,7 @@ def test_an_ideal_joint_never_touches():
 @pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
 def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     p = parameters()
-    normal, elastic, unclamped = impact(penetration, rate, p.stiffness[1], p)
+    normal, elastic, unclamped = normal_force(penetration, rate, p.stiffness[1], p)
     contact = Contact(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
     assert (nearness(contact, p.stiffness[1], p) > 0) == (normal > 0)
 
@@ -291,7 +292,7 @@ def release(rng, length, joint, t, y, phase, p):
     stiffness = p.stiffness[joint]
 
     def force(speed):
-        return impact(speed * length, -speed, stiffness, p)[2]
+        return normal_force(speed * length, -speed, stiffness, p)[2]
 
     speed = brentq(force, 1e-3, 0.5 * p.full_damping / length)
     y = with_radial_rate(joint, t, y, phase, p, -speed)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import METHODS, Case
+from compressor.physics.record import STATE_NAMES, Scene
 from compressor.solve.integrate import integrate as integration
 from compressor.solve.last_steps import LAST
-from compressor.solve.simulate import STATE_NAMES, measure, simulate
+from compressor.solve.simulate import measure, simulate
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
 SCIPY = [name for name in METHODS if name not in integration.COMPILED]
@@ -84,7 +85,7 @@ def test_what_is_not_finite_is_named():
     gas = {"head_clearance_mm": 0.601, "switching": "exact"}
     solve = {"duration_rev": 1.25, "accuracy": "draft"}
     found = simulate(Case.from_values({**BOTH, "load": "typical", "gas": gas, "solve": solve}))
-    assert found.attrs["stop_dominant"] in STATE_NAMES[8]
+    assert found.attrs["stop_dominant"] in STATE_NAMES[Scene.BOTH]
     assert words(found.attrs)[-1].endswith("refused")
     assert not np.isfinite(found.attrs["stop_history_error"][-1])
 

@@ -1,9 +1,11 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
+from compressor.physics.contact_laws import Law, Power, elastic_and_damping, elastic_form
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.loads import (
     cam_corners,
     gas_corners,
+    greatest_load,
     printed_corners,
     sample_segments,
     segments,
@@ -18,10 +20,10 @@ from compressor.physics.observe import (
     observe,
     observe_all,
 )
-from compressor.physics.record import FREEDOMS, Law, Load, Scene, derive, new_record
+from compressor.physics.record import FREEDOMS, STATE_NAMES, Load, Scene, derive, new_record
 from compressor.physics.rosenbrock import STIFF_STAGES
 from compressor.physics.runge_kutta import FLOWS, STAGES, E, Pair
-from compressor.physics.step_control import Mode
+from compressor.physics.step_control import STABILITY_LIMIT, Mode
 from compressor.physics.tally import (
     TALLY,
     add_flows,

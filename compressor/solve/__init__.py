@@ -8,12 +8,4 @@ from compressor.solve.integrate import LOCAL
 from compressor.solve.parting import parted
 from compressor.solve.scales import JointScales, expected_seconds, expected_steps, joint_scales
 from compressor.solve.si_record import record, scene
-from compressor.solve.simulate import (
-    STATE_NAMES,
-    Solution,
-    attempt,
-    measure,
-    observe,
-    simulate,
-    solve,
-)
+from compressor.solve.simulate import Solution, attempt, measure, observe, simulate, solve

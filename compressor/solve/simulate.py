@@ -16,7 +16,16 @@ import compressor
 from compressor.cases import LOOSEST, MODEL_VERSION, TIGHTEST, Case, CaseError
 from compressor.metrics import HORIZON, SIZES
 from compressor.outcome import ROW, Outcome, Table, Variable, coordinates, without_run
-from compressor.physics import COLUMNS, FLOWS, FREEDOMS, Column, Scene, observe_all, start
+from compressor.physics import (
+    COLUMNS,
+    FLOWS,
+    FREEDOMS,
+    STATE_NAMES,
+    Column,
+    Scene,
+    observe_all,
+    start,
+)
 from compressor.reasons import Reason
 from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
 from compressor.solve.error_bars import Metrics, Witness, bars, unmet
@@ -76,7 +85,7 @@ class Solution:
 
 
 def simulate(case: Case) -> "xr.Dataset":
-    """Simulate one case and return its Dataset (DESIGN 4): series, metrics, status.
+    """Simulate one case and return its Dataset: series, metrics, status.
 
     Dims: time, joint, axis; SI units in the attributes. A run that fails is no exception: its
     `status` is "failed", `reason` says why by a stable name, and its series are nan from where it
@@ -366,7 +375,7 @@ def attributes(case: Case, found: Solution) -> dict[str, object]:
 
 def stop_attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
     """Where a run stopped, in which state, and how its last steps went."""
-    history, names = trajectory.history, STATE_NAMES[trajectory.stop_state.size]
+    history, names = trajectory.history, STATE_NAMES[scene(case)]
     flows = ("energy flow, J",) * FLOWS
     return {
         "stop_time": trajectory.stop_time,
@@ -385,13 +394,3 @@ def stop_attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
 def libraries() -> str:
     """The libraries that results depend on, with their versions."""
     return ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy", "numba"))
-
-
-STATE_NAMES = {
-    0: (),
-    4: ("x deviation, m", "phi deviation, rad", "its rate, m/s", "its rate, rad/s"),
-    8: (
-        "x deviation, m", "X deviation, m", "Y deviation, m", "phi deviation, rad",
-        "x rate, m/s", "X rate, m/s", "Y rate, m/s", "phi rate, rad/s",
-    ),
-}  # fmt: skip
