@@ -60,11 +60,11 @@ BUGS = [
      "- small.friction * small.slip", ""),
     ("the rod's inertia missing in an ideal joint's force", "physics/observe.py",
      "-p.rod_inertia * now.spin_up", "0.0"),
-    ("the march's atol is 1e-6", "integrate.py",
+    ("the march's atol is 1e-6", "solve/marching.py",
      "work, request.rtol * size, size", "work, 0.0 * size + 1e-6, size"),
-    ("SciPy's atol is 1e-6", "integrate.py",
+    ("SciPy's atol is 1e-6", "solve/sizes.py",
      "return rtol * np.concatenate((natural_sizes", "return 1e-6 * np.concatenate((natural_sizes"),
-    ("SciPy's phase is not changed at a corner", "integrate.py",
+    ("SciPy's phase is not changed at a corner", "solve/scipy_driver.py",
      "right_hand_side.phase = int(phase)", "right_hand_side.phase = 0"),
 ]  # fmt: skip
 

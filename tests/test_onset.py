@@ -41,9 +41,10 @@ from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, interpolate, take_step
 from compressor.physics.tally import new_tally
 from compressor.physics.walker import NODES, Status, new_walker, new_work
-from compressor.solve.integrate import COMPILED as METHODS
-from compressor.solve.integrate import CONTACT_STEP, natural_sizes, scales
+from compressor.solve.marching import COMPILED as METHODS
+from compressor.solve.marching import CONTACT_STEP
 from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.sizes import length_and_speed, natural_sizes
 
 H = 1e-3  # s, of the hand-made steps
 CLEARANCE = 2e-4  # m
@@ -348,7 +349,7 @@ def walk(p, y, begin, edges, phases, rtol, watch, times=None, method=METHODS["DO
     mode, pair = method
     times = edges[-1:] if times is None else times
     walker, work, size = new_walker(mode), new_work(y.size), natural_sizes(p)
-    length, speed = scales(p)
+    length, speed = length_and_speed(p)
     walker.pair, walker.rtol, walker.watch, walker.t = pair, rtol, watch, begin
     walker.contact_step, walker.deepest = CONTACT_STEP * length / speed, p.pin_radius
     tally = new_tally()
@@ -389,7 +390,7 @@ def test_no_constructed_pulse_is_stepped_over(pulses, method, rtol):
     assert len(left) <= 0.02 * COUNT
     for pulse in left:
         assert not pulse.clamped
-        assert pulse.depth < 10 * rtol * scales(pulse.p)[0]
+        assert pulse.depth < 10 * rtol * length_and_speed(pulse.p)[0]
         assert passes_by(pulse, rtol, METHODS[method])
 
 

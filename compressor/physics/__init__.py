@@ -9,6 +9,7 @@ from compressor.physics.loads import (
     printed_corners,
     sample_segments,
     segments,
+    static_load,
 )
 from compressor.physics.march import march
 from compressor.physics.motion import start
@@ -27,6 +28,7 @@ from compressor.physics.step_control import STABILITY_LIMIT, Mode
 from compressor.physics.tally import (
     TALLY,
     add_flows,
+    contact_within,
     lobatto,
     new_tally,
     shares_apart,

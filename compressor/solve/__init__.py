@@ -4,8 +4,8 @@ from compressor.solve.cautions import cautions
 from compressor.solve.energy_audit import energy_residual
 from compressor.solve.error_bars import Metrics
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.integrate import LOCAL
 from compressor.solve.parting import parted
 from compressor.solve.scales import JointScales, expected_seconds, expected_steps, joint_scales
+from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.si_record import record, scene
 from compressor.solve.simulate import Solution, attempt, measure, observe, simulate, solve

@@ -7,7 +7,7 @@ distance does not depend on it.
 import numpy as np
 
 from compressor.physics import COLUMNS, Column, observe_all
-from compressor.solve.integrate import Trajectory
+from compressor.solve.request import Trajectory
 
 LOOKS = 64  # from the start to the end of a run
 

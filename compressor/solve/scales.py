@@ -20,7 +20,7 @@ from compressor.physics import (
     elastic_form,
     greatest_load,
 )
-from compressor.solve.integrate import COMPILED
+from compressor.solve.marching import COMPILED
 from compressor.solve.si_record import record, scene
 
 # Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.

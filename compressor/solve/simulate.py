@@ -30,9 +30,10 @@ from compressor.reasons import Reason
 from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
 from compressor.solve.error_bars import Metrics, Witness, bars, unmet
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.integrate import Request, Trajectory, closed_form, integrate
-from compressor.solve.last_steps import NONE
+from compressor.solve.ideal_scene import closed_form
+from compressor.solve.integrate import integrate
 from compressor.solve.parting import looked_at, looking, parted
+from compressor.solve.request import NONE, Request, Trajectory
 from compressor.solve.si_record import offsets, record, scene
 
 if TYPE_CHECKING:
