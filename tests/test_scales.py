@@ -12,9 +12,10 @@ from compressor.cases.materials import contact_stiffness
 from compressor.metrics import JOINTS
 from compressor.physics.contact_laws import Power
 from compressor.physics.step_control import STABILITY_LIMIT
+from compressor.solve.attempts import attempt
 from compressor.solve.scales import contact_scales, expected_seconds, expected_steps, greatest_force
 from compressor.solve.si_record import record, stiffness_of
-from compressor.solve.simulate import attempt, simulate
+from compressor.solve.simulate import simulate
 
 HERTZ = Power(3.36e5 * 1000**1.5, 1.5)
 BOTH = {"joint": "both", "clearance_mm": 0.2}

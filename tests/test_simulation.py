@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compressor import library_versions
 from compressor.cases.case import Case, Machine, Output, PerJoint, Solve
 from compressor.metrics import NUMBERS
 from compressor.solve.simulate import SERIES, measure, simulate
@@ -157,3 +158,10 @@ def test_a_case_made_in_python_of_good_values_runs():
     assert measure(made).numbers["peak_acceleration"] == run(
         joint="big_end", clearance_mm=0.2
     ).peak_acceleration  # fmt: skip
+
+
+def test_a_run_names_the_libraries_it_depends_on(faulty):
+    versions = library_versions("numpy", "numba")
+    assert versions["numpy"] == np.__version__
+    for name, version in versions.items():
+        assert f"{name} {version}" in faulty.attrs["libraries"].split(", ")
