@@ -38,3 +38,10 @@ def __getattr__(name: str) -> Any:
     if name not in HOMES:
         raise AttributeError(f"module 'compressor' has no attribute {name!r}")
     return getattr(import_module(f"compressor.{HOMES[name]}"), name)
+
+
+def library_versions(*names: str) -> dict[str, str]:
+    """The installed version of each distribution by name; raises PackageNotFoundError."""
+    from importlib import metadata
+
+    return {name: metadata.version(name) for name in names}

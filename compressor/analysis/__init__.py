@@ -8,14 +8,6 @@ from compressor.analysis.cam import (
     printed_corners_of_gas,
     printed_profile,
 )
-from compressor.analysis.claims import (
-    CLEARANCES,
-    FAULTS,
-    SPOKEN,
-    case_of,
-    claims,
-    force_relation,
-    label,
-    paper_cases,
-    settled,
-)
+from compressor.analysis.claims import claims
+from compressor.analysis.paper_cases import CLEARANCES, FAULTS, SPOKEN, label, paper_cases
+from compressor.analysis.runs import case_of, force_relation, settled

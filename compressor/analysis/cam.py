@@ -119,7 +119,7 @@ def comparisons(p):
         ("follower's fall, gas corners", "mm", FOLLOWER_STROKE * 1e3, (top - x_fall) * 1e3,
          "Eq. 10"),
         ("follower's stroke, closed cam", "mm", FOLLOWER_STROKE * 1e3,
-         (2 * p.crank_radius - stroke) * 1e3, "DESIGN 2.4"),
+         (2 * p.crank_radius - stroke) * 1e3, "physics/README.md, Loads"),
         ("base radius for a pressure angle of 30 degrees", "mm", BASE_RADIUS * 1e3,
          least_base_radius(p, ALLOWED_PRESSURE_ANGLE) * 1e3, "Eq. 11"),
         ("base radius for a pressure angle of 30 degrees", "mm", BASE_RADIUS * 1e3,

@@ -1,4 +1,4 @@
-"""What the stored runs say: relations, activity of the vibration, and the paper's claims.
+"""The paper's claims, measured on stored runs.
 
 The thresholds of the claims were written before the first comparison and stay as they are: the
 masses are our assumption, so a claim that fails is a result.
@@ -11,82 +11,25 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case
+from compressor.analysis.paper_cases import (
+    CLEARANCES,
+    FAULT_LABELS,
+    FAULTS,
+    SPOKEN,
+    faulty_joints,
+    label,
+)
+from compressor.analysis.runs import (
+    active_share,
+    case_of,
+    force_relation,
+    ideal_motion,
+    load_corners,
+    settled,
+)
 from compressor.metrics import JOINTS
-from compressor.physics import exact_motion
-from compressor.solve import record
-
-CLEARANCES = (0.1, 0.2, 0.3)
-FAULTS = ("big_end", "small_end", "both")
-SPOKEN = {"big_end": "big end", "small_end": "small end", "both": "both joints"}
 
 Runs = Mapping[str, xr.Dataset]
-
-
-def label(fault: str, clearance: float) -> str:
-    """The name of one of the paper's fault cases, such as `big_end 0.2`."""
-    return f"{fault} {clearance:g}"
-
-
-def paper_cases(**machine: float) -> dict[str, Case]:
-    """The paper's eleven cases by label; `machine` overrides keys such as rod_mass_kg."""
-    base: dict = {"machine": machine} if machine else {}
-    cases = {load: Case.from_values({**base, "load": load}) for load in ("typical", "design")}
-    for fault in FAULTS:
-        for clearance in CLEARANCES:
-            values = {**base, "load": "design", "joint": fault, "clearance_mm": clearance}
-            cases[label(fault, clearance)] = Case.from_values(values)
-    return cases
-
-
-def settled(run: xr.Dataset) -> xr.Dataset:
-    """The samples from `settle_rev` on: start-up is not the machine."""
-    return run.isel(time=run["time"].values >= run.attrs["settle"] * (1 - 1e-12))
-
-
-@dataclass(frozen=True)
-class Relation:
-    """Least squares of the horizontal joint force against acceleration: force = slope a + b."""
-
-    slope: float  # kg
-    intercept: float  # N
-    r2: float
-
-
-def force_relation(run: xr.Dataset, joint: str) -> Relation:
-    """`Relation` of a run's settled series at one joint (force on the rod)."""
-    kept = settled(run)
-    a = kept["acceleration"].values
-    force = kept["contact_force"].sel(joint=joint, axis="x").values
-    slope, intercept = np.polyfit(a, force, 1)
-    return Relation(float(slope), float(intercept), float(np.corrcoef(a, force)[0, 1] ** 2))
-
-
-def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Displacement, velocity and acceleration (SI) of the run's ideal twin on its own grid."""
-    case = case_of(run)
-    lengths = case.machine.crank_radius_mm / 1000, case.machine.rod_length_mm / 1000
-    return exact_motion(run["crank_angle"].values, *lengths, case.omega)
-
-
-def case_of(run: xr.Dataset) -> Case:
-    """The case that a stored run belongs to, from its attributes."""
-    return Case.from_attribute(run.attrs["case"])
-
-
-def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = 0.1) -> float:
-    """Share of the settled time in which the machine vibrates.
-
-    It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation
-    from the ideal motion exceeds `level` times the ideal peak acceleration.
-    """
-    kept = settled(run)
-    _, _, ideal = ideal_motion(kept)
-    angle = kept["crank_angle"].values
-    width = max(1, round(np.radians(window_deg) / (angle[1] - angle[0])))
-    square = (kept["acceleration"].values - ideal) ** 2
-    rms = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
-    return float((rms > level * np.abs(ideal).max()).mean())
 
 
 @dataclass(frozen=True)
@@ -113,9 +56,6 @@ class Rule:
     needs: tuple[str, ...]
     judge: Callable[[Runs], Verdict]
     note: str = ""
-
-
-FAULT_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
 
 
 def claims(runs: Runs) -> list[Claim]:
@@ -145,7 +85,7 @@ def same_motion(runs: Runs) -> Verdict:
 def design_force(runs: Runs) -> Verdict:
     """Claim 2: the design load peaks higher, and its corners lie elsewhere."""
     peaks = {load: float(runs[load]["piston_force"].max()) for load in ("design", "typical")}
-    corners = {load: np.degrees(case_corners(runs[load])) for load in peaks}
+    corners = {load: np.degrees(load_corners(runs[load])) for load in peaks}
     apart = np.abs(corners["design"] - corners["typical"])[[0, 2]]
     rows = [(f"peak, {load}", f"{peak:.1f} N") for load, peak in peaks.items()]
     rows += [
@@ -153,11 +93,6 @@ def design_force(runs: Runs) -> Verdict:
         for load, angles in corners.items()
     ]
     return bool(peaks["design"] >= 1.01 * peaks["typical"] and apart.min() >= 1.0), rows
-
-
-def case_corners(run: xr.Dataset) -> np.ndarray:
-    """Crank angles (rad) of a run's load corners."""
-    return np.array(record(case_of(run)).corners)
 
 
 def acceleration_alone(runs: Runs) -> Verdict:
@@ -190,11 +125,6 @@ def growing_peaks(runs: Runs) -> Verdict:
             held = held and grows
             rows.append((f"{SPOKEN[fault]}, {what}", " → ".join(f"{v:.0f}" for v in values)))
     return held, rows
-
-
-def faulty_joints(fault: str) -> tuple[str, ...]:
-    """The joints with clearance of a fault."""
-    return JOINTS if fault == "both" else (fault,)
 
 
 def horizontal_force(runs: Runs) -> Verdict:

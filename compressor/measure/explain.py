@@ -15,13 +15,13 @@ import xarray as xr
 from compressor.cases import ACCURACY, Case, Study, given, points
 from compressor.measure.features import FEATURES, Effect, Feature, compare
 from compressor.measure.work_precision import SLOW, complete, faulty
-from compressor.physics import FREEDOMS, Scene
+from compressor.physics import FREEDOMS, STATE_NAMES, Scene
 from compressor.solve import (
-    STATE_NAMES,
     JointScales,
     expected_seconds,
     expected_steps,
     joint_scales,
+    record,
     scene,
     simulate,
 )
@@ -51,7 +51,7 @@ class Advice:
 
 @dataclass(frozen=True)
 class Explanation:
-    """All that is told of one study: of its first job, measured, and of the sweep."""
+    """What is known of one study: of its first job, measured, and of the sweep."""
 
     study: str
     path: str
@@ -88,19 +88,18 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
     repeats = repeats if seconds < SLOW else 1
     ended = complete(run)
     active, absent = terms(case)
-    freedoms = FREEDOMS[scene(case)]
-    found = tuple(scales(case))
-    steps = expected_steps(case, found)
+    joints = tuple(ideal_scales(case))
+    steps = expected_steps(case, joints)
     return Explanation(
         study=study.name,
         path=study.path,
         jobs=len(study.cases),
         point=given(next(points(study))),
         scene=SCENES[scene(case)],
-        unknowns=STATE_NAMES[2 * freedoms][:freedoms],
+        unknowns=STATE_NAMES[scene(case)][: FREEDOMS[scene(case)]],
         active=active,
         absent=absent,
-        scales=found,
+        scales=joints,
         expected_steps=steps,
         expected_seconds=expected_seconds(case, steps),
         accuracy=asked(case),
@@ -179,11 +178,11 @@ def spoken(case: Case, feature: Feature) -> str:
     return f"{feature.key} = {value}"
 
 
-def scales(case: Case) -> Iterator[JointScales]:
+def ideal_scales(case: Case) -> Iterator[JointScales]:
     """The natural scales of each joint with clearance, under its greatest force when ideal."""
-    ideal = simulate(replace(case, joint="none"))
+    p, ideal = record(case), simulate(replace(case, joint="none"))
     for joint in faulty(case):
-        yield joint_scales(case, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
+        yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
 
 
 def advise(case: Case, repeats: int) -> Iterator[Advice]:

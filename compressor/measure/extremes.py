@@ -15,6 +15,7 @@ from typing import Any
 
 from compressor.cases import Case, design
 from compressor.metrics import JOINTS
+from compressor.physics import Power
 
 # name: (unit, whole range, supported range, log-uniform)
 SPANS: dict[str, tuple[str, tuple[float, float], tuple[float, float] | None, bool]] = {
@@ -66,7 +67,7 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
     exponent = found["exponent"]
     stiffness = found["stiffness"] * FULL_DAMPING ** (1.5 - exponent)
     force = found["reciprocating_mass"] * CRANK * (found["speed"] * math.pi / 30) ** 2
-    depth = ((force + FORCES[load]) / stiffness) ** (1 / exponent)
+    depth = Power(stiffness, exponent).static_depth(force + FORCES[load])
     worn = [one for one in JOINTS if joint in (one, "both")]
     offset: dict[str, float] = {}
     for one in JOINTS:

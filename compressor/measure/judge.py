@@ -1,6 +1,6 @@
-"""Judge a run that says ok: is any number of it wrong, and does the run tell so itself?
+"""Judge a run that says ok: is any number of it wrong, and do its error bars say so?
 
-What a run tells of its error are its error bars; it has passed its energy audit, or it would not
+A run states its error by its error bars; it has passed its energy audit, or it would not
 say ok (`compressor.solve.energy_audit`). A number is wrong in silence where it lies farther from a
 judge's than ten times its bar and than what the tolerance lets one expect: a thousand times rtol,
 but 5 % at most, and of the time without contact 1e-4 of the span at least. The judge is another
@@ -29,20 +29,21 @@ import numpy as np
 from compressor.cases import Case
 from compressor.metrics import METRICS
 from compressor.solve import (
+    COMPILED,
     Metrics,
     Solution,
     attempt,
     energy_residual,
-    parted,
+    journal_distance,
     predictability_horizon,
     solve,
 )
 
-FACTOR = 10.0  # times its bar: an error beyond it was not told of
+FACTOR = 10.0  # times its bar: an error beyond it is silent
 EXPECTED, MOST_EXPECTED = 1e3, 0.05  # times rtol: the relative error that nobody is surprised by
 TIGHTER, TENTH, TIGHTEST = 1e-2, 0.1, 1e-12  # a judge's tolerance, of statistics, the least
 PARTS = 16  # of a span, in which horizons are counted
-SHARES = (PARTS, PARTS // 4, 1)  # parts that are judged where the whole is too much
+LENGTHS = (PARTS, PARTS // 4, 1)  # parts that are judged where the whole is too much
 JUDGED = tuple(name for name in METRICS if name != "impact_count")
 ABSOLUTE = ("contact_loss_fraction",)  # is a share: errors are not relative
 RESOLVED = 1e-4  # of the span: steps tell the time without contact no better
@@ -81,7 +82,7 @@ class Finding:
     `verdict`: ok, failed, silent_wrong or unjudged; `reason`: why a run failed, or no judge could
     tell; `by`: the judges asked, those that did not reach the end in parentheses; `horizon`: parts
     of the span that can be foretold, and `judged` those that were judged by number, of PARTS;
-    `apart`: how far the journals came apart from the judge's (`compressor.solve.parting`).
+    `apart`: how far the journals came apart from the judge's (`compressor.solve.error_bars`).
     """
 
     found: Solution
@@ -117,17 +118,17 @@ def judge(case: Case) -> Finding:
 
 def by_numbers(case: Case, result: Finding) -> None:
     """Judge the numbers up to the horizon, or of as much of it as a judge can do."""
-    for parts in sorted({min(share, result.horizon) for share in SHARES}, reverse=True):
-        claim = cut(case, parts)
+    for parts in sorted({min(share, result.horizon) for share in LENGTHS}, reverse=True):
+        claim = shortened(case, parts)
         found = result.found if parts == PARTS else solve(claim)
         if found.reason:
             result.detail = f"{found.reason} when cut to {parts}/{PARTS} of its span"
             continue
-        verdict, result.worst, other = settled(claim, found, compare, result)
+        verdict, result.worst, other = agreed_verdict(claim, found, compare, result)
         if other is not None:
             result.verdict, result.judged = verdict, parts
             result.reason = "judges_disagree" if verdict == "unjudged" else ""
-            result.apart = parted(found.p, found.looks, other.looks)
+            result.apart = journal_distance(found.p, found.instants, other.instants)
             return
     result.reason = "judges_fail"
 
@@ -138,14 +139,14 @@ def by_statistics(case: Case, result: Finding) -> None:
     There any other tolerance makes another motion: a tenth will do, and even the stiff partner may
     judge itself, if no other reaches the end.
     """
-    verdict, result.beyond, other = settled(case, result.found, compare_statistics, result)
+    verdict, result.beyond, other = agreed_verdict(case, result.found, compare_statistics, result)
     if verdict == "silent_wrong" or not result.horizon:
         result.verdict = verdict
         if verdict == "unjudged":
             result.reason = "judges_fail" if other is None else "judges_disagree"
 
 
-def settled(
+def agreed_verdict(
     claim: Case, found: Solution, measured: Compare, result: Finding
 ) -> tuple[str, Excess, Solution | None]:
     """What the judges of a run say together, by how much, and the run of the one that counts."""
@@ -188,7 +189,7 @@ def tolerance(rtol: float, share: float = TIGHTER) -> float:
 
 def asked(case: Case, method: str, rtol: float, result: Finding) -> Solution | None:
     """A judge's run of a case, if it reaches its end."""
-    seconds = SECONDS if method in ("DOPRI5", "RODAS") else SCIPY_SECONDS
+    seconds = SECONDS if method in COMPILED else SCIPY_SECONDS
     how = replace(
         case.solve, method=method, rtol=rtol, accuracy="standard",
         max_steps=MORE_STEPS * case.solve.max_steps,
@@ -198,14 +199,14 @@ def asked(case: Case, method: str, rtol: float, result: Finding) -> Solution | N
     return None if other.reason else other
 
 
-def cut(case: Case, parts: int) -> Case:
+def shortened(case: Case, parts: int) -> Case:
     """A case over the first parts of its span."""
     whole = case.solve.duration_rev or 0.0
     return replace(case, solve=replace(case.solve, duration_rev=whole * parts / PARTS))
 
 
 def compare(found: Solution, other: Solution) -> Excess:
-    """The metric whose error is farthest beyond what the run tells of it."""
+    """The metric whose error is farthest beyond what the run states."""
     expected = min(EXPECTED * found.rtol, MOST_EXPECTED)
     least = {name: max(expected, RESOLVED if name in ABSOLUTE else 0.0) for name in JUDGED}
     return max(excess(name, found, other, least[name]) for name in JUDGED)

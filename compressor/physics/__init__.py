@@ -1,14 +1,17 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
+from compressor.physics.contact_laws import Law, Power, elastic_and_damping, elastic_form
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.loads import (
     cam_corners,
     gas_corners,
+    greatest_load,
     printed_corners,
     sample_segments,
     segments,
+    static_load,
 )
-from compressor.physics.march import WALKER, Status, Work, march, new_walker, new_work
+from compressor.physics.march import march
 from compressor.physics.motion import start
 from compressor.physics.observe import (
     COLUMNS,
@@ -18,13 +21,14 @@ from compressor.physics.observe import (
     observe,
     observe_all,
 )
-from compressor.physics.record import FREEDOMS, Law, Load, Scene, derive, new_record
+from compressor.physics.record import FREEDOMS, STATE_NAMES, Load, Scene, derive, new_record
 from compressor.physics.rosenbrock import STIFF_STAGES
 from compressor.physics.runge_kutta import FLOWS, STAGES, E, Pair
-from compressor.physics.step_control import Mode
+from compressor.physics.step_control import STABILITY_LIMIT, Mode
 from compressor.physics.tally import (
     TALLY,
     add_flows,
+    contact_within,
     lobatto,
     new_tally,
     shares_apart,
@@ -32,3 +36,4 @@ from compressor.physics.tally import (
     tally_step,
 )
 from compressor.physics.twin import march_twins, new_rows
+from compressor.physics.walker import WALKER, Status, Work, new_walker, new_work

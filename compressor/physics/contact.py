@@ -1,19 +1,13 @@
-"""Contact at a clearance joint: ADAMS's IMPACT, STEP and friction (Eq. 14-16, DESIGN 2.3)."""
+"""Contact at a clearance joint: normal force, friction and the point at which both bodies meet.
+
+physics/README.md, Contact and Friction (Eq. 14-16).
+"""
 
 import math
 from typing import NamedTuple
 
 from compressor.physics._jit import inlined, jit
-
-
-@jit
-def rise(s):
-    """ADAMS's STEP from 0 at s = 0 to 1 at s = 1: a cubic, constant outside."""
-    if s <= 0.0:
-        return 0.0
-    if s >= 1.0:
-        return 1.0
-    return s * s * (3.0 - 2.0 * s)
+from compressor.physics.contact_laws import elastic_and_damping, in_contact, normal_force, rise
 
 
 @jit
@@ -27,28 +21,6 @@ def friction_coefficient(slip, p):
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
-@jit
-def power(base, exponent):
-    """base ** exponent for base >= 0; a square root does for Hertz's 1.5."""
-    if exponent == 1.5:
-        return base * math.sqrt(base)
-    return base**exponent
-
-
-@jit
-def impact(penetration, rate, stiffness, p):
-    """ADAMS's IMPACT at a penetration (m) and its rate (m/s): F_N, elastic part, unclamped (N).
-
-    Elastic: K delta^p; unclamped: with STEP(delta; 0, 0; d_max, C_max) delta' added; F_N is that,
-    but never pulling. All are 0 unless the penetration is positive.
-    """
-    if penetration <= 0.0:
-        return 0.0, 0.0, 0.0
-    elastic = stiffness * power(penetration, p.exponent)
-    unclamped = elastic + p.damping * rise(penetration * p.per_full_damping) * rate
-    return max(0.0, unclamped), elastic, unclamped
-
-
 class Contact(NamedTuple):
     """One joint's contact: SI, forces on the rod."""
 
@@ -60,7 +32,7 @@ class Contact(NamedTuple):
     penetration: float  # delta; negative: a gap
     rate: float  # of the penetration
     slip: float  # v_t
-    elastic: float  # K delta^p
+    elastic: float  # part of it without damping
     unclamped: float  # normal force before the clamp at zero
 
 
@@ -70,7 +42,7 @@ def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
 
     Takes the eccentricity (journal centre minus bore centre, m), its rate (m/s) and both spins
     (rad/s, counter-clockwise). Returns a `Contact`; one contact point serves both bodies, so that
-    angular momentum balances (DESIGN 2.3). Concentric circles exert no force.
+    angular momentum balances. Concentric circles exert no force.
     """
     clearance = p.clearance[joint]
     distance = math.sqrt(ex * ex + ey * ey)
@@ -84,9 +56,9 @@ def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
     bore = p.pin_radius + clearance
     arm = p.pin_radius - penetration
     slip = ey_rate * nx - ex_rate * ny + journal_spin * arm - rod_spin * bore
-    normal, elastic, unclamped = impact(penetration, rate, p.stiffness[joint], p)
+    normal, elastic, unclamped = normal_force(penetration, rate, p.stiffness[joint], p)
     friction = 0.0
-    if p.friction and normal > 0.0:
+    if p.friction and in_contact(normal):
         friction = -friction_coefficient(slip, p) * normal
     fx = normal * nx + friction * ny
     fy = normal * ny - friction * nx
@@ -104,4 +76,4 @@ def nearness(contact, stiffness, p):
     if contact.penetration <= 0.0:
         return contact.penetration
     full = p.full_damping
-    return contact.unclamped * full / (stiffness * power(full, p.exponent))
+    return contact.unclamped * full / elastic_and_damping(full, stiffness, p)[0]

@@ -1,7 +1,7 @@
 """Ideal motion of the slider-crank: exact, and the paper's series for comparison.
 
-Frame and signs as in DESIGN 2.1: crank centre at the origin, x along the cylinder, theta = 0 at
-top dead centre, rod direction from big end to small end (cos phi, -sin phi).
+Frame and signs: crank centre at the origin, x along the cylinder, theta = 0 at top dead centre, rod
+direction from big end to small end (cos phi, -sin phi) (physics/README.md, Frame).
 """
 
 import math

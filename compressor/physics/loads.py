@@ -1,4 +1,6 @@
-"""Piston force: the ideal gas cycle (typical) and the spring on a cam (design), DESIGN 2.4.
+"""Piston force: the ideal gas cycle (typical) and the spring on a cam (design).
+
+physics/README.md, Loads.
 
 The force is positive towards the crank. A load has four phases a revolution (expansion, suction,
 compression, discharge); the caller names the phase, so that both sides of a corner are exact.
@@ -36,7 +38,7 @@ def typical_force(phase, x, p):
 
 @jit
 def design_force(phase, x, v, deviation, deviation_rate, p):
-    """Spring force (N) between piston and cam follower: Eq. 8-10, closed as in DESIGN 2.4.
+    """Spring force (N) between piston and cam follower: Eq. 8-10, with the cam closed.
 
     x (m), v (m/s) of the crosshead and their deviations from the ideal motion. While the follower
     moves with the ideal piston the spring sees the deviation alone.
@@ -63,6 +65,24 @@ def piston_force(phase, x, v, deviation, deviation_rate, p):
         return design_force(phase, x, v, deviation, deviation_rate, p)
     if p.load == TYPICAL:
         return typical_force(phase, x, p)
+    return 0.0
+
+
+def static_load(p):
+    """Greatest force (N) of the record's load on a piston that stands still."""
+    if p["load"] == Load.DESIGN:
+        return p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
+    if p["load"] == Load.TYPICAL:
+        return p["discharge_force"]
+    return 0.0
+
+
+def greatest_load(p):
+    """The load's greatest value in the ideal machine (N), at most."""
+    if p["load"] == Load.DESIGN:
+        return static_load(p) + p["spring_damping"] * p["omega"] * p["crank_radius"]
+    if p["load"] == Load.TYPICAL:
+        return max(static_load(p), p["back_force"])
     return 0.0
 
 

@@ -1,4 +1,6 @@
-"""Equations of motion of the four scenes, in deviations from the ideal motion (DESIGN 2.2-2.3).
+"""Equations of motion of the four scenes, in deviations from the ideal motion.
+
+physics/README.md, Scenes and Contact.
 
 State y: the deviations, then their rates. Big end and small end: (x, phi); both joints: (x, X, Y,
 phi) with (X, Y) the rod's centre. Eccentricities come from difference identities, never from

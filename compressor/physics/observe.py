@@ -9,6 +9,7 @@ from enum import IntEnum
 
 from compressor.physics._jit import inlined, jit
 from compressor.physics.contact import nearness
+from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
 from compressor.physics.motion import (
     eccentricities_both,
@@ -143,12 +144,6 @@ def joint_forces(now, y, p):
 
 
 @jit
-def elastic_energy(contact, p):
-    """Energy (J) in a contact's spring, K delta^(p+1) / (p+1)."""
-    return contact.elastic * contact.penetration / (p.exponent + 1.0)
-
-
-@jit
 def damping_power(contact):
     """Power (W) a contact loses in its normal direction, the clamp's included; never negative."""
     return (contact.normal - contact.elastic) * contact.rate
@@ -176,7 +171,9 @@ def write_energies(now, y, p, row):
     vx, vy, height = centre_velocity(now, y, p)
     kinetic += p.rod_mass * (vx * vx + vy * vy)
     row[KINETIC] = 0.5 * kinetic
-    potential = elastic_energy(now.big, p) + elastic_energy(now.small, p)
+    big, small = now.big, now.small
+    potential = elastic_energy(big.elastic, big.penetration, p)
+    potential += elastic_energy(small.elastic, small.penetration, p)
     row[POTENTIAL] = potential + p.rod_mass * p.gravity * height
 
 

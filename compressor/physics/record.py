@@ -13,7 +13,7 @@ SMALL_END = 1
 
 
 class Scene(IntEnum):
-    """Which joints have clearance, hence what is integrated (DESIGN 2.2)."""
+    """Which joints have clearance, hence what is integrated (physics/README.md, Scenes)."""
 
     IDEAL = 0
     BIG_END = 1
@@ -22,27 +22,32 @@ class Scene(IntEnum):
 
 
 class Load(IntEnum):
-    """What presses on the piston (DESIGN 2.4)."""
+    """What presses on the piston (physics/README.md, Loads)."""
 
     NONE = 0
     TYPICAL = 1
     DESIGN = 2
 
 
-class Law(IntEnum):
-    """The normal contact law."""
-
-    IMPACT = 0
-
-
-# unknowns integrated in each scene: half of the state's length
-FREEDOMS = {Scene.IDEAL: 0, Scene.BIG_END: 2, Scene.SMALL_END: 2, Scene.BOTH: 4}
+# the state of each scene: deviations from the ideal motion, then their rates
+ROD_AND_CROSSHEAD = ("x deviation, m", "phi deviation, rad", "its rate, m/s", "its rate, rad/s")
+STATE_NAMES = {
+    Scene.IDEAL: (),
+    Scene.BIG_END: ROD_AND_CROSSHEAD,
+    Scene.SMALL_END: ROD_AND_CROSSHEAD,
+    Scene.BOTH: (
+        "x deviation, m", "X deviation, m", "Y deviation, m", "phi deviation, rad",
+        "x rate, m/s", "X rate, m/s", "Y rate, m/s", "phi rate, rad/s",
+    ),
+}  # fmt: skip
+# unknowns integrated in each scene
+FREEDOMS = {scene: len(names) // 2 for scene, names in STATE_NAMES.items()}
 
 RECORD = np.dtype(
     [
         ("scene", "i8"),
         ("load", "i8"),
-        ("law", "i8"),
+        ("law", "i8"),  # of contact_laws
         ("friction", "i8"),
         # mechanism
         ("omega", "f8"),  # crank speed, rad/s

@@ -16,9 +16,9 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
 LEAST_ERROR = math.log(1e-4)  # that the control remembers
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
-# stiffness: an explicit step is held by stability where h |lambda| exceeds the boundary
-BOUNDARY = 3.25  # of both pairs on the negative real axis, about
-SUSPECT = 0.6  # of the boundary: under PI control, steps held by stability swing around it
+# stiffness: an explicit step is held by stability where h |lambda| exceeds the limit
+STABILITY_LIMIT = 3.25  # of both pairs on the negative real axis, about
+SUSPECT = 0.6  # of the limit: under PI control, steps held by stability swing around it
 EVERY = 4  # explicit steps from one test to the next
 STIFF_STEPS, CALM_STEPS = 15, 10  # in a row, before a change of method
 REST, LONGEST_REST = 50, 2000  # steps without a test after a change back; doubled after each
@@ -123,7 +123,7 @@ def choose_method(w, h, z, work, size):
         return
     if not w.stiff and w.steps % EVERY:
         return
-    reach = h * stiff_rate(w, h, z, work, size) / BOUNDARY
+    reach = h * stiff_rate(w, h, z, work, size) / STABILITY_LIMIT
     if w.stiff:
         price = (size.size + rosenbrock.STIFF_STAGES + 0.2 * size.size**2) / (STAGES - 1)
         w.calm = w.calm + 1 if reach < price else 0

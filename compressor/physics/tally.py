@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from compressor.physics._jit import inlined, jit
+from compressor.physics.contact_laws import in_contact
 from compressor.physics.observe import (
     ACCELERATION,
     CRANK_POWER,
@@ -182,11 +183,22 @@ def shares_apart(nodes, rows, apart):
             apart[joint] += (nodes[i] - nodes[i - 1]) * share_apart(before, after)
 
 
+@jit
+def contact_within(rows, joint):
+    """Whether contact at a joint begins and ends between a step's first and last row."""
+    last = rows.shape[0] - 1
+    ends = in_contact(rows[0, NORMAL + joint]) or in_contact(rows[last, NORMAL + joint])
+    inside = False
+    for i in range(1, last):
+        inside = inside or in_contact(rows[i, NORMAL + joint])
+    return inside and not ends
+
+
 @inlined
 def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
     """Add a step's contact loss, impacts and penetration at one joint."""
     for i in range(0, nodes.size, every):
-        touching = rows[i, NORMAL + joint] > 0.0
+        touching = in_contact(rows[i, NORMAL + joint])
         if measured and touching and not tally.touching[joint]:
             tally.impacts[joint] += 1
         tally.touching[joint] = touching

@@ -13,7 +13,7 @@ import numpy as np
 
 from compressor.physics._jit import inlined, jit
 from compressor.physics.kinematics import crank_direction, ideal
-from compressor.physics.march import DONE, RUNNING, attempt, march
+from compressor.physics.march import attempt, march
 from compressor.physics.motion import turned
 from compressor.physics.observe import (
     COLUMNS,
@@ -22,6 +22,7 @@ from compressor.physics.observe import (
     eccentricity_row,
 )
 from compressor.physics.runge_kutta import STAGES
+from compressor.physics.walker import DONE, RUNNING
 
 
 def new_rows():

@@ -1,19 +1,12 @@
 """A case -> its outcome: motion, metrics, error bars, reasons."""
 
+from compressor.solve.attempts import Solution, attempt, solve
 from compressor.solve.cautions import cautions
 from compressor.solve.energy_audit import energy_residual
-from compressor.solve.error_bars import Metrics
+from compressor.solve.error_bars import Metrics, journal_distance
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.integrate import LOCAL
-from compressor.solve.parting import parted
+from compressor.solve.marching import COMPILED
 from compressor.solve.scales import JointScales, expected_seconds, expected_steps, joint_scales
+from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.si_record import record, scene
-from compressor.solve.simulate import (
-    STATE_NAMES,
-    Solution,
-    attempt,
-    measure,
-    observe,
-    simulate,
-    solve,
-)
+from compressor.solve.simulate import measure, observe, simulate

@@ -1,6 +1,6 @@
 """Where a case leaves the domain of its laws, or looks like a slip of units.
 
-Nothing here is refused: a case is told of once, before it runs, and grouped over a sweep. What
+Nothing here is refused: a case is spoken of once, before it runs, and grouped over a sweep. What
 cannot be simulated at all is refused by `compressor.cases.conflicts`.
 """
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from compressor.cases import IMPLAUSIBLE, Case, Study
-from compressor.solve.scales import JointScales, expected_seconds, expected_steps, scales
+from compressor.solve.scales import JointScales, contact_scales, expected_seconds, expected_steps
 
 # key -> values that nobody means in the key's unit, and the unit that they may be in
 SLIPS = {
@@ -41,7 +41,7 @@ class Remark(NamedTuple):
 
 @dataclass(frozen=True)
 class Caution:
-    """One oddity of a study, told of the first job that has it."""
+    """One oddity of a study, with the words for the first job that has it."""
 
     key: str
     message: str
@@ -51,16 +51,16 @@ class Caution:
 
 def remarks(case: Case) -> Iterator[Remark]:
     """What is odd about a case; nothing about the defaults."""
-    found = list(scales(case))
+    joints = list(contact_scales(case))
     yield from _slips(case)
-    for joint in found:
+    for joint in joints:
         yield from _depths(case, joint)
     friction = case.friction
-    if found and friction and 0 < friction.stiction_velocity_mm_per_s < LEAST_STICTION:
+    if joints and friction and 0 < friction.stiction_velocity_mm_per_s < LEAST_STICTION:
         key = "friction.stiction_velocity_mm_per_s"
         slow = f"{friction.stiction_velocity_mm_per_s:g} mm/s, below {LEAST_STICTION:g} mm/s"
         yield Remark(key, f"{slow}: friction all but sticks, and steps get short", "stiction")
-    yield from _budgets(case, found)
+    yield from _budgets(case, joints)
 
 
 def _slips(case: Case) -> Iterator[Remark]:
@@ -108,9 +108,9 @@ def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
         )
 
 
-def _budgets(case: Case, found: list[JointScales]) -> Iterator[Remark]:
+def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
     """Budgets that are likely to run out."""
-    solve, steps = case.solve, expected_steps(case, found)
+    solve, steps = case.solve, expected_steps(case, joints)
     if steps > SHORT * solve.max_steps:
         text = f"{solve.max_steps} steps, but about {steps:.1g} are expected"
         yield Remark("solve.max_steps", text, "steps")
@@ -135,6 +135,6 @@ def cautions(study: Study, most: int = MOST_JOBS) -> list[Caution]:
         for what, message in once.items():
             found.setdefault(what, []).append(message)
     return [
-        Caution(key, said[0], len(said), len(numbers))
-        for (key, _), said in sorted(found.items(), key=lambda item: -len(item[1]))
+        Caution(key, texts[0], len(texts), len(numbers))
+        for (key, _), texts in sorted(found.items(), key=lambda item: -len(item[1]))
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 PER_TURN = 10.0  # of rtol: the residual that a revolution may leave
 ROUNDING = 1e-9  # a residual below it says nothing of a run
-GREATEST = 0.05  # a residual above it is told of at any tolerance
+GREATEST = 0.05  # a residual above it is too large at any tolerance
 RUNGS = 2  # by tens of the tolerance, for a run that fails its audit to be repeated at
 
 

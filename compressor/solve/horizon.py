@@ -27,15 +27,11 @@ from compressor.physics import (
     segments,
     start,
 )
-from compressor.solve.integrate import (
-    CHUNK,
-    Request,
-    Stop,
-    check_march,
-    natural_sizes,
-    ready_walker,
-)
+from compressor.solve.march_driver import CHUNK, check_march
+from compressor.solve.marching import ready_walker
+from compressor.solve.request import Request, Stop
 from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.sizes import natural_sizes
 
 CLOSE = 1e-9  # of the clearance: how far from the motion its twin starts
 FAR = 1e-2  # of the clearance: how far apart they are no longer one motion

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from compressor.cases import Case, to_si
+from compressor.cases import Case, contact_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     Law,
@@ -19,10 +19,6 @@ from compressor.physics import (
     new_record,
     printed_corners,
 )
-from compressor.solve.scales import stiffness_of
-
-LOADS = {"none": Load.NONE, "typical": Load.TYPICAL, "design": Load.DESIGN}
-LAWS = {"impact": Law.IMPACT}
 
 
 def scene(case: Case) -> Scene:
@@ -34,7 +30,8 @@ def scene(case: Case) -> Scene:
 def record(case: Case) -> np.record:
     """The record of a case, every number in SI."""
     p = new_record()
-    p["scene"], p["load"], p["law"] = scene(case), LOADS[case.load], LAWS[case.contact.law]
+    p["scene"] = scene(case)
+    p["load"], p["law"] = Load[case.load.upper()], Law[case.contact.law.upper()]
     _machine(case, p)
     _contact(case, p)
     _gas(case, p)
@@ -65,6 +62,15 @@ def offsets(case: Case) -> np.ndarray:
     shift = case.initial_offset_mm
     rows = [[shift.big_end_x, shift.big_end_y], [shift.small_end_x, shift.small_end_y]]
     return np.array(rows) / 1000
+
+
+def stiffness_of(case: Case, joint: str) -> float:
+    """The contact stiffness of a joint, N/m^p."""
+    contact, pin = case.contact, to_si(case.machine.pin_radius_mm, "mm")
+    if contact.materials:
+        clearance = to_si(getattr(case.clearance_mm, joint), "mm")
+        return contact_stiffness(*contact.materials, pin, pin + clearance)
+    return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
 
 
 def _machine(case: Case, p: np.record) -> None:

@@ -5,17 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor.analysis.claims import (
-    CLEARANCES,
-    FAULT_LABELS,
-    RULES,
+from compressor.analysis.claims import RULES, claims, held_share
+from compressor.analysis.paper_cases import CLEARANCES, FAULT_LABELS, paper_cases
+from compressor.analysis.runs import (
     active_share,
     case_of,
-    claims,
     force_relation,
-    held_share,
     ideal_motion,
-    paper_cases,
+    load_corners,
+    load_phases,
+    record_of,
     settled,
 )
 
@@ -166,3 +165,15 @@ def test_held_share_counts_what_was_judged(paper_runs):
 def test_the_case_of_a_run_is_recovered(paper_runs):
     cases = paper_cases()
     assert case_of(paper_runs["both 0.3"]).physics_key == cases["both 0.3"].physics_key
+
+
+@pytest.mark.parametrize("label", ["typical", "design", "both 0.1"])
+def test_the_load_of_a_run_changes_phase_at_its_corners(paper_runs, label):
+    run = paper_runs[label]
+    degrees = np.degrees(run["crank_angle"].values)[:-1] % 360  # the last sample ends a phase
+    corners = np.degrees(load_corners(run))
+    far = (np.abs(degrees[:, None] - np.array([*corners, 360.0])) > 1e-6).all(axis=1)
+    expected = np.searchsorted(corners, degrees, side="right")
+    assert (load_phases(run)[:-1][far] == expected[far]).all()
+    assert load_phases(run)[-1] == 3
+    assert tuple(record_of(run).corners) == tuple(load_corners(run))

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from measure_accuracy import provenance
 
-from compressor.analysis.claims import FAULTS
+from compressor.analysis.paper_cases import FAULTS
 from compressor.cases.case import Case
 from compressor.cases.table import Contact
 from compressor.measure.work_precision import (
@@ -29,8 +29,9 @@ from compressor.measure.work_precision import (
 )
 from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
 from compressor.report.figures.style import render
+from compressor.solve.attempts import attempt
 from compressor.solve.energy_audit import allowed
-from compressor.solve.simulate import attempt, simulate, told
+from compressor.solve.simulate import simulate, with_series
 
 TOLERANCES = [10.0**-k for k in range(2, 11)]
 CLEARANCES = [10.0**-k for k in range(7)]  # mm
@@ -47,7 +48,7 @@ def alone(case):
     """The Dataset of one run at the case's own tolerance, whatever the energy audit says of it."""
     found = attempt(case, 0, case.solve.timeout_s, sampled=True)
     assert not found.reason, found.detail
-    table = told(case, found)[1]
+    table = with_series(case, found)[1]
     return xr.Dataset(table.variables, attrs=table.attrs)
 
 

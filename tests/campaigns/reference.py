@@ -1,4 +1,4 @@
-"""An independent formulation of the mechanics of DESIGN section 2: the truth for the tests.
+"""An independent formulation of the model (physics/README.md): the truth for the tests.
 
 Nothing here comes from the product. SymPy derives Lagrange's equations in *absolute* coordinates
 (the product integrates deviations from the ideal motion), contact and loads are written down anew
@@ -42,7 +42,7 @@ Record = namedtuple(
 
 
 def paper_params(load="design", joint="both", clearance=1e-4, exact=False, **changes) -> dict:
-    """The defaults of DESIGN as a dict in SI units; `changes` replaces any key.
+    """The default parameters as a dict in SI units; `changes` replaces any key.
 
     clearance [m] goes to the joints of the scene `joint`, the others get 0; a dict is taken as it
     is. The corners follow from the changed values; `exact` asks for the exact ones (see `corners`).
@@ -449,7 +449,7 @@ def reference_solution(
     The tolerance is absolute (see `_tolerances`): a relative one on x would be coarse beside c.
     """
     # max_step: without it DOP853 steps over returns of contact. Measured: a relative L2 error in a
-    # of 2e-2 in DESIGN 2.6's case with a 144 us pulse; none (under 1e-8) in the paper's nine cases.
+    # of 2e-2 in the case with a 144 us pulse; none (under 1e-8) in the paper's nine cases.
     # LSODA at 1e-12 without a limit agrees with the default to 3e-9 in all of these, in half the
     # time. Halving rtol changes a by less than 3e-9.
     t_grid = np.asarray(t_grid, dtype=float)

@@ -16,7 +16,7 @@ import pytest
 from compsim import cli, plan, run
 from compsim.screen import Screen, duration
 
-from compressor.analysis.claims import paper_cases
+from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.load import MAX_JOBS, load_cases
 from compressor.store import reader as store
 from compressor.store.studies import read_studies

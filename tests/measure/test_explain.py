@@ -8,7 +8,7 @@ import pytest
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.measure.explain import explain, promise, scales, terms
+from compressor.measure.explain import explain, ideal_scales, promise, terms
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0}
 
@@ -86,7 +86,7 @@ def test_a_job_that_fails_is_told_and_no_advice_given(explained):
 
 def test_scales_follow_the_contact():
     both = Case.from_values({"joint": "both", "clearance_mm": 0.2})
-    big, small = scales(both)
+    big, small = ideal_scales(both)
     assert (big.joint, small.joint) == ("big_end", "small_end")
     assert big.penetration == pytest.approx((big.force / 1.0625e10) ** (2 / 3), rel=1e-3)
     assert big.limited_by == "contact damping"
@@ -94,7 +94,7 @@ def test_scales_follow_the_contact():
         {"joint": "big_end", "clearance_mm": 0.2, "friction": False,
          "contact": {"stiffness_N_per_mm15": 3.36e7, "damping_N_s_per_mm": 0}}
     )  # fmt: skip
-    (found,) = scales(stiff)
+    (found,) = ideal_scales(stiff)
     assert found.limited_by == "contact stiffness"
     # the frequency goes as K^(1/2 + (p - 1)(-1/p) / 2) = K^(1/3) at a given force
     assert found.frequency / big.frequency == pytest.approx(100 ** (1 / 3), rel=1e-9)

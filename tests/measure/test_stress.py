@@ -13,19 +13,19 @@ from compressor.measure.extremes import SPANS, Budget, place, supported, values
 from compressor.measure.judge import (
     PARTS,
     Finding,
+    agreed_verdict,
     compare,
     compare_statistics,
-    cut,
     excess,
     judge,
     judges,
-    settled,
+    shortened,
 )
 from compressor.measure.stress import FILE, campaign, counts, dataset, slowest, worst
 from compressor.report.figures.outcomes import draw_outcomes, outcomes
 from compressor.report.figures.style import render
+from compressor.solve.attempts import solve
 from compressor.solve.error_bars import bars
-from compressor.solve.simulate import solve
 from compressor.store.files import StoreError
 
 pytestmark = pytest.mark.xdist_group("twins")  # which take long to compile
@@ -159,12 +159,12 @@ def test_a_wrong_number_that_no_bar_tells_of_is_silent(run):
     other = solve(Case.from_values(heavier))
     other.bars = run.bars
     result = finding(other)
-    verdict, excess, _ = settled(Case.from_values(CASE), other, compare, result)
+    verdict, excess, _ = agreed_verdict(Case.from_values(CASE), other, compare, result)
     assert verdict == "silent_wrong"
     assert excess.ratio > 1
     assert len(result.by) == 2
     other.bars = bars(other.metrics, [], other.rtol, 0.0)  # inf: it tells that it knows nothing
-    verdict, _, _ = settled(Case.from_values(CASE), other, compare, finding(other))
+    verdict, _, _ = agreed_verdict(Case.from_values(CASE), other, compare, finding(other))
     assert verdict == "ok"
 
 
@@ -196,9 +196,9 @@ def test_a_stiff_run_is_not_judged_by_the_stiff_partner(run):
 
 def test_a_claim_is_cut_to_parts_of_its_span():
     case = Case.from_values(CASE)
-    assert cut(case, PARTS) == case
-    assert cut(case, 1).duration == pytest.approx(case.duration / 16)
-    assert round(cut(case, 1).steps) == 45
+    assert shortened(case, PARTS) == case
+    assert shortened(case, 1).duration == pytest.approx(case.duration / 16)
+    assert round(shortened(case, 1).steps) == 45
 
 
 def row(number, verdict, **more):

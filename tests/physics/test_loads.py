@@ -7,7 +7,13 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics.kinematics import exact_motion
-from compressor.physics.loads import piston_force, sample_segments, segments
+from compressor.physics.loads import (
+    greatest_load,
+    piston_force,
+    sample_segments,
+    segments,
+    static_load,
+)
 from compressor.solve.si_record import record
 
 EXACT = {"load": "typical", "gas": {"switching": "exact"}}
@@ -113,3 +119,18 @@ def test_a_sample_on_a_corner_takes_the_phase_that_begins():
     edges, phases = segments(record(Case()), 0.48)
     times = np.array([0.0, 0.06, 0.12, 0.47, 0.48])
     assert phases[sample_segments(times, edges)].tolist() == [0, 2, 0, 3, 3]
+
+
+@pytest.mark.parametrize(
+    ("values", "at_rest", "greatest"),
+    [
+        (GAS, 3086.61, 3086.61),
+        ({"load": "typical", "gas": {"back_pressure_MPa": 1.0}}, 3086.61, 7853.98),
+        (SPRING, 3200, 3200 + 0.023 * 6283.19),
+        ({"load": "none"}, 0, 0),
+    ],
+)
+def test_greatest_loads(values, at_rest, greatest):
+    p = record(Case.from_values(values))
+    assert static_load(p) == pytest.approx(at_rest, abs=0.01)
+    assert greatest_load(p) == pytest.approx(greatest, abs=0.01)

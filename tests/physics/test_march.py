@@ -8,16 +8,19 @@ import reference
 
 from compressor.cases.case import Case
 from compressor.physics.loads import segments
-from compressor.physics.march import Status, march, new_walker, new_work
+from compressor.physics.march import march
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import Mode
 from compressor.physics.tally import new_tally
-from compressor.solve.integrate import Request, integrate, natural_sizes
-from compressor.solve.integrate import integrate as integration
+from compressor.physics.walker import Status, new_walker, new_work
+from compressor.solve import march_driver
+from compressor.solve.integrate import integrate
+from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.sizes import natural_sizes
 
 PULSES = {"load": "typical", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
 
@@ -42,7 +45,7 @@ def accelerations(found, p):
 def test_chunks_change_nothing(joint, monkeypatch):
     asked = request(1e-5, 0.12, joint=joint)
     whole = integrate(asked)
-    monkeypatch.setattr(integration, "CHUNK", 7)
+    monkeypatch.setattr(march_driver, "CHUNK", 7)
     chunked = integrate(asked)
     assert chunked.states.tobytes() == whole.states.tobytes()
     assert chunked.tally.tobytes() == whole.tally.tobytes()
@@ -86,7 +89,7 @@ PULSE_TIMES = [(0.2, 4.986e-3, 5.128e-3), (0.3, 5.878e-3, 5.931e-3), (0.3, 10.49
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
 @pytest.mark.parametrize(("clearance", "begin", "end"), PULSE_TIMES)
 def test_known_pulses_are_found(clearance, begin, end, rtol):
-    """DESIGN 2.6's pulses, down to 18 microseconds, show as contact in the sampled motion."""
+    """Pulses of down to 18 us are in the sampled motion (physics/README.md, Reference numbers)."""
     asked = request(rtol, 0.012, clearance_mm=clearance, **PULSES)
     asked.times = np.linspace(0, 0.012, 48001)
     found = integrate(asked)

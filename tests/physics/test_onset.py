@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from compressor.analysis.claims import paper_cases
+from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED
-from compressor.physics.contact import Contact, impact, nearness
+from compressor.physics.contact import Contact, nearness
+from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
-from compressor.physics.march import NODES, Status, march, measure_apart, new_walker, new_work
+from compressor.physics.march import march, measure_apart
 from compressor.physics.motion import evaluate, start
 from compressor.physics.observe import (
     COLUMNS,
@@ -39,9 +40,11 @@ from compressor.physics.onset import (
 from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, interpolate, take_step
 from compressor.physics.tally import new_tally
-from compressor.solve.integrate import COMPILED as METHODS
-from compressor.solve.integrate import CONTACT_STEP, natural_sizes, scales
+from compressor.physics.walker import NODES, Status, new_walker, new_work
+from compressor.solve.marching import COMPILED as METHODS
+from compressor.solve.marching import CONTACT_STEP
 from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.sizes import length_and_speed, natural_sizes
 
 H = 1e-3  # s, of the hand-made steps
 CLEARANCE = 2e-4  # m
@@ -207,7 +210,7 @@ def test_an_ideal_joint_never_touches():
 @pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
 def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     p = parameters()
-    normal, elastic, unclamped = impact(penetration, rate, p.stiffness[1], p)
+    normal, elastic, unclamped = normal_force(penetration, rate, p.stiffness[1], p)
     contact = Contact(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
     assert (nearness(contact, p.stiffness[1], p) > 0) == (normal > 0)
 
@@ -290,7 +293,7 @@ def release(rng, length, joint, t, y, phase, p):
     stiffness = p.stiffness[joint]
 
     def force(speed):
-        return impact(speed * length, -speed, stiffness, p)[2]
+        return normal_force(speed * length, -speed, stiffness, p)[2]
 
     speed = brentq(force, 1e-3, 0.5 * p.full_damping / length)
     y = with_radial_rate(joint, t, y, phase, p, -speed)
@@ -346,7 +349,7 @@ def walk(p, y, begin, edges, phases, rtol, watch, times=None, method=METHODS["DO
     mode, pair = method
     times = edges[-1:] if times is None else times
     walker, work, size = new_walker(mode), new_work(y.size), natural_sizes(p)
-    length, speed = scales(p)
+    length, speed = length_and_speed(p)
     walker.pair, walker.rtol, walker.watch, walker.t = pair, rtol, watch, begin
     walker.contact_step, walker.deepest = CONTACT_STEP * length / speed, p.pin_radius
     tally = new_tally()
@@ -387,7 +390,7 @@ def test_no_constructed_pulse_is_stepped_over(pulses, method, rtol):
     assert len(left) <= 0.02 * COUNT
     for pulse in left:
         assert not pulse.clamped
-        assert pulse.depth < 10 * rtol * scales(pulse.p)[0]
+        assert pulse.depth < 10 * rtol * length_and_speed(pulse.p)[0]
         assert passes_by(pulse, rtol, METHODS[method])
 
 

@@ -9,8 +9,9 @@ from compressor.cases.case import Case
 from compressor.physics import rosenbrock
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, interpolate
+from compressor.solve.attempts import attempt
 from compressor.solve.si_record import record
-from compressor.solve.simulate import attempt, simulate
+from compressor.solve.simulate import simulate
 
 FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))
 BEGIN, SPAN, PHASE = 0.09, 0.008, 3

@@ -7,16 +7,15 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics import rosenbrock
-from compressor.physics.march import new_walker, new_work
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, Pair
 from compressor.physics.step_control import (
-    BOUNDARY,
     CALM_STEPS,
     EVERY,
     LEAST_ERROR,
     LONGEST_REST,
     REST,
+    STABILITY_LIMIT,
     STIFF_STEPS,
     SUSPECT,
     Mode,
@@ -26,6 +25,7 @@ from compressor.physics.step_control import (
     refuse,
     stiff_rate,
 )
+from compressor.physics.walker import new_walker, new_work
 from compressor.solve.si_record import record
 
 H = 1e-3
@@ -159,7 +159,7 @@ def test_a_matrix_without_growth_has_no_radius():
 
 def explicit_steps(w, reach, limit=1000):
     """Steps at a reach (of the stability boundary) until the stiff partner takes over."""
-    work, z = linear_step(w.pair, -reach * BOUNDARY / H)
+    work, z = linear_step(w.pair, -reach * STABILITY_LIMIT / H)
     for steps in range(1, limit):
         w.steps = steps
         choose_method(w, H, z, work, SIZE)
@@ -178,7 +178,7 @@ def test_stability_that_holds_the_steps_calls_the_stiff_partner():
 def test_a_look_without_suspicion_takes_one_back():
     w = walker(pair=Pair.TSIT5)
     for reach, held in ((1.0, 4), (1.0, 8), (0.1, 4), (0.1, 0), (0.1, 0)):
-        work, z = linear_step(w.pair, -reach * BOUNDARY / H)
+        work, z = linear_step(w.pair, -reach * STABILITY_LIMIT / H)
         w.steps = EVERY
         choose_method(w, H, z, work, SIZE)
         assert w.held == held
@@ -187,7 +187,9 @@ def test_a_look_without_suspicion_takes_one_back():
 def test_calm_steps_bring_the_explicit_pair_back_and_rest_ever_longer():
     """The longer, the more stays in a row have cost more than they saved."""
     price = (4 + rosenbrock.STIFF_STAGES + 0.2 * 16) / (STAGES - 1)
-    calm, busy = (stiff_work([-f * price * BOUNDARY / H, -2.0, -1.0, 1.0]) for f in (0.9, 1.1))
+    calm, busy = (
+        stiff_work([-f * price * STABILITY_LIMIT / H, -2.0, -1.0, 1.0]) for f in (0.9, 1.1)
+    )
     w, z = walker(h=H), np.zeros(4 + FLOWS)
     pauses = []
     cost = CALM_STEPS * 0.1 * price

@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 
 from compressor.analysis import cam
-from compressor.analysis.claims import paper_cases
+from compressor.analysis.paper_cases import paper_cases
 from compressor.report.figures import FIGURES, curves, style, sweep_metric
 from compressor.report.figures.response import MOTION
 from compressor.solve.si_record import record

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 from conftest import CONFIGS, keep, store
 
-from compressor.analysis.claims import paper_cases
+from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases
 from compressor.reasons import Reason

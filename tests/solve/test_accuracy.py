@@ -8,11 +8,10 @@ from random_cases import random_cases
 from compressor.cases.accuracy import ACCURACY, TIGHTEST, first_rung
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.metrics import ERRORS, METRICS
-from compressor.solve.error_bars import LARGE, OWN, PEAKS, SHARES, Witness, bars, unmet
-from compressor.solve.parting import LOOKS, parted
+from compressor.metrics import ERRORS, METRICS, Bar, Metric
+from compressor.solve import attempts
+from compressor.solve.error_bars import INSTANTS, LARGE, OtherRun, bars, journal_distance, unmet
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.simulate import simulate as simulation
 from compressor.store.reader import job_status, open_study
 from compressor.store.studies import read_studies, write_study
 
@@ -71,7 +70,7 @@ def test_bars_of_the_same_run_twice_would_cover_little(eight):
     for found, truth in eight:
         metrics = {name: found[name] for name in METRICS}
         rtol = ACCURACY["draft"].rtol
-        same = bars(metrics, [Witness(metrics, 10 * rtol)], rtol, 0.0)
+        same = bars(metrics, [OtherRun(metrics, 10 * rtol)], rtol, 0.0)
         wrong = [np.ravel(np.abs(found[n] - truth[n]) > same[n]) for n in METRICS]
         covered.append(~np.concatenate(wrong))
     assert np.concatenate(covered).mean() < 0.6
@@ -79,48 +78,48 @@ def test_bars_of_the_same_run_twice_would_cover_little(eight):
 
 def test_the_looser_run_is_ten_times_looser(monkeypatch):
     asked = []
-    original = simulation.integrate
+    original = attempts.integrate
     monkeypatch.setattr(
-        simulation, "integrate", lambda request: asked.append(request) or original(request)
+        attempts, "integrate", lambda request: asked.append(request) or original(request)
     )
     run(BOTH, rtol=1e-5)
     assert [request.rtol for request in asked] == pytest.approx([1e-5, 1e-4])
-    assert asked[1].times.size == LOOKS + 1
+    assert asked[1].times.size == INSTANTS + 1
     assert set(asked[1].times) <= set(asked[0].times)
 
 
 @pytest.mark.parametrize(
     ("rtol", "others"), [(1e-3, [1e-4]), (2e-7, [2e-6, 2e-4]), (1e-8, [1e-7, 1e-5])]
 )
-def test_the_witnesses_of_a_run(rtol, others):
+def test_the_other_runs_of_a_run(rtol, others):
     case = Case.from_values(
         {**BOTH, "solve": {"duration_rev": 0.25, "settle_rev": 0, "rtol": rtol}}
     )
-    found = simulation.attempt(case, 0, 60.0, False)
-    runs = simulation.witnesses(case, found, 60.0)
+    found = attempts.attempt(case, 0, 60.0, False)
+    runs = attempts.other_runs(case, found, 60.0)
     assert [run.rtol for run in runs] == pytest.approx(others)
 
 
-def test_a_run_that_was_repeated_is_told_of_by_a_tighter_one():
+def test_a_run_that_was_repeated_is_compared_with_a_tighter_one():
     """Its looser run has failed the audit of its energy."""
     case = Case.from_values(
         {**BOTH, "solve": {"duration_rev": 0.25, "settle_rev": 0, "rtol": 1e-5}}
     )
-    found = simulation.attempt(case, 1, 60.0, False)
-    (other,) = simulation.witnesses(case, found, 60.0)
+    found = attempts.attempt(case, 1, 60.0, False)
+    (other,) = attempts.other_runs(case, found, 60.0)
     assert other.rtol == pytest.approx(1e-7)
 
 
 def test_a_looser_run_that_fails_leaves_the_error_unknown(monkeypatch):
-    original = simulation.integrate
+    original = attempts.integrate
 
     def failing(request):
         found = original(request)
-        if request.times.size == LOOKS + 1:
+        if request.times.size == INSTANTS + 1:
             found.reason, found.detail = "step_underflow", "made to fail"
         return found
 
-    monkeypatch.setattr(simulation, "integrate", failing)
+    monkeypatch.setattr(attempts, "integrate", failing)
     found = measure(Case.from_values({**BOTH, "solve": SHORT}))
     assert found.status == "ok"
     for name in ERRORS:
@@ -137,15 +136,15 @@ LOOSE = {
 }  # fmt: skip
 
 
-def test_beyond_loose_tolerances_the_stiff_partner_tells_the_error():
+def test_beyond_loose_tolerances_the_stiff_partner_estimates_the_error():
     """Explicit steps run over friction's fast modes, at ten times this tolerance as well."""
     solve = {"duration_rev": 0.03125, "settle_rev": 0, "output_step_deg": 0.0625}
     case, exact = (
         Case.from_values({**LOOSE, "solve": {**solve, **how}})
         for how in ({"rtol": 2.5e-4}, {"rtol": 1e-7, "method": "RODAS"})
     )
-    found, truth = simulation.solve(case), simulation.solve(exact)
-    looser = simulation.error_bars(found, [simulation.attempt(case, -1, 60.0, False)])
+    found, truth = attempts.solve(case), attempts.solve(exact)
+    looser = attempts.bars_of(found, [attempts.attempt(case, -1, 60.0, False)])
     name = "rms_acceleration_deviation"
     error = abs(found.metrics[name] - truth.metrics[name])
     assert error > 10 * looser[name]
@@ -155,40 +154,54 @@ def test_beyond_loose_tolerances_the_stiff_partner_tells_the_error():
 def test_bars_do_not_trust_metrics_that_agree_by_chance(eight):
     """Runs whose journals have parted, but whose metrics have not."""
     metrics = {name: eight[0][0][name] for name in METRICS}
-    near, together, astray = (
-        bars(metrics, [Witness(metrics, 1e-5, parted)], 1e-6, 0.0) for parted in (0.0, 0.009, 0.1)
+    near, together, parted = (
+        bars(metrics, [OtherRun(metrics, 1e-5, apart)], 1e-6, 0.0) for apart in (0.0, 0.009, 0.1)
     )
     for name, value in metrics.items():
-        if name in OWN:
-            assert astray[name] == pytest.approx(0.03 * np.maximum(value, 1.0)), name
+        if not METRICS[name].bar.relative:
+            assert parted[name] == pytest.approx(0.03 * np.maximum(value, 1.0)), name
             continue
         assert (near[name] <= 1e-12 * np.abs(value)).all(), name
-        path = 0.009 * SHARES[name][2]
+        path = 0.009 * METRICS[name].bar.of_path
         assert together[name] == pytest.approx(path * np.abs(value), rel=2 * path / LARGE), name
         grown = 0.03 * np.abs(value) * (1 + 0.03 * np.abs(value) / (LARGE * np.max(np.abs(value))))
-        assert astray[name] == pytest.approx(grown), name
+        assert parted[name] == pytest.approx(grown), name
 
 
-def test_a_second_witness_catches_what_the_first_misses(eight):
+def test_a_second_run_catches_what_the_first_misses(eight):
     """A run ten times looser that agrees by chance, and one a thousand times looser."""
     metrics = {name: eight[0][0][name] for name in METRICS}
     other = {name: 1.1 * value for name, value in metrics.items()}
-    twin, far = Witness(metrics, 1e-7), Witness(other, 1e-5)
+    twin, far = OtherRun(metrics, 1e-7), OtherRun(other, 1e-5)
     alone, both = bars(metrics, [twin], 1e-8, 0.0), bars(metrics, [twin, far], 1e-8, 0.0)
-    near = bars(metrics, [Witness(other, 1e-7)], 1e-8, 0.0)
-    for name in PEAKS:
+    near = bars(metrics, [OtherRun(other, 1e-7)], 1e-8, 0.0)
+    for name in (name for name, row in METRICS.items() if row.peak):
         size = np.max(np.abs(metrics[name]))
         assert np.max(alone[name]) < 1e-12 * size
         assert 2e-3 * size < np.max(both[name]) < 0.1 * np.max(near[name])
+
+
+def test_a_metric_added_to_the_table_has_error_bars(monkeypatch):
+    """Without shares of its own it gets the default ones."""
+    given = attempts.metrics
+    monkeypatch.setitem(METRICS, "loss", Metric("loss", (), "J", "a toy metric"))
+    monkeypatch.setattr(
+        attempts, "metrics", lambda p, tally: given(p, tally) | {"loss": tally["damping_loss"]}
+    )
+    how = {"duration_rev": 0.5, "settle_rev": 0, "rtol": 1e-5}
+    case = Case.from_values({**BOTH, "solve": how})
+    found, looser = attempts.solve(case), attempts.attempt(case, -1, 60.0, False)
+    apart = abs(found.metrics["loss"] - looser.metrics["loss"])
+    assert 0 < Bar().own * apart <= found.bars["loss"] < 0.5 * found.metrics["loss"]
 
 
 def test_long_bars_grow(eight):
     metrics = {name: eight[0][0][name] for name in METRICS}
     rms, ratio = metrics["rms_acceleration"], []
     for share in (1e-4, 1e-2, 1.0):
-        other = Witness({**metrics, "rms_acceleration": (1 + share) * rms}, 1e-5)
+        other = OtherRun({**metrics, "rms_acceleration": (1 + share) * rms}, 1e-5)
         ratio.append(bars(metrics, [other], 1e-6, 0.0)["rms_acceleration"] / (share * rms))
-    own = SHARES["rms_acceleration"][0]
+    own = METRICS["rms_acceleration"].bar.own
     grown = [own * (1 + own * share / LARGE) for share in (1e-4, 1e-2, 1.0)]
     assert ratio == pytest.approx(grown, rel=1e-3)
 
@@ -206,12 +219,12 @@ def test_bars_do_not_depend_on_the_output_grid():
 def test_journals_part_by_their_distance_over_their_room():
     p = np.array((np.array([1e-4, 0.0]),), dtype=[("clearance", "f8", 2)])[()]
     ours, theirs = np.zeros((3, 2, 2)), np.zeros((3, 2, 2))
-    assert parted(p, ours, theirs) == 0.0
+    assert journal_distance(p, ours, theirs) == 0.0
     theirs[1, 0] = 3e-5, 4e-5
     theirs[1, 1] = 1.0  # of a joint without clearance
-    assert parted(p, ours, theirs) == pytest.approx(0.5)
+    assert journal_distance(p, ours, theirs) == pytest.approx(0.5)
     ours[2, 0] = theirs[2, 0] = 0.0, 2e-4  # as far as it came
-    assert parted(p, ours, theirs) == pytest.approx(0.25)
+    assert journal_distance(p, ours, theirs) == pytest.approx(0.25)
 
 
 def test_a_failed_run_has_no_bars():
@@ -223,9 +236,7 @@ def test_a_failed_run_has_no_bars():
 @pytest.mark.parametrize("load", ["design", "typical", "none"])
 def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
     found = measure(Case.from_values({"load": load, "solve": SHORT}))
-    truth = simulation.attempt(
-        Case.from_values({"load": load, "solve": SHORT}), 3, 60, True
-    ).metrics
+    truth = attempts.attempt(Case.from_values({"load": load, "solve": SHORT}), 3, 60, True).metrics
     for name in METRICS:
         error = np.abs(found.numbers[name] - truth[name])
         assert (error <= found.numbers[f"{name}_error"]).all(), name

@@ -5,8 +5,9 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
+from compressor.solve import attempts
 from compressor.solve.energy_audit import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
-from compressor.solve.simulate import simulate as simulation
+from compressor.solve.simulate import measure, simulate
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
@@ -20,7 +21,7 @@ def case(**solve):
 def unbalance(monkeypatch):
     """Runs with an energy imbalance of so many times what their case allows."""
     asked = []
-    original = simulation.integrate
+    original = attempts.integrate
 
     def made(*times):
         def run(request):
@@ -32,7 +33,7 @@ def unbalance(monkeypatch):
                 found.tally.worst_imbalance *= ratio
             return found
 
-        monkeypatch.setattr(simulation, "integrate", run)
+        monkeypatch.setattr(attempts, "integrate", run)
         return asked
 
     return made
@@ -46,13 +47,13 @@ def test_what_is_allowed_follows_the_tolerance():
 
 def test_a_run_that_balances_is_run_once(unbalance):
     asked = unbalance(0.9)
-    found = simulation.measure(case(rtol=1e-5))
+    found = measure(case(rtol=1e-5))
     assert (found.status, asked) == ("ok", [1e-5])
 
 
 def test_a_run_that_does_not_balance_is_repeated_tighter(unbalance):
     asked = unbalance(5, 0.5)
-    found = simulation.measure(case(rtol=1e-5))
+    found = measure(case(rtol=1e-5))
     assert found.status == "ok"
     assert asked == pytest.approx([1e-5, 1e-6, 1e-7])  # the last one for the error bars
     assert found.attributes["rtol"] == pytest.approx(1e-6)
@@ -61,7 +62,7 @@ def test_a_run_that_does_not_balance_is_repeated_tighter(unbalance):
 
 def test_a_run_that_never_balances_fails_and_its_metrics_are_not_stored(unbalance):
     asked = unbalance(5)
-    found = simulation.simulate(case(rtol=1e-5))
+    found = simulate(case(rtol=1e-5))
     assert len(asked) == RUNGS + 1
     assert (found["status"].item(), found["reason"].item()) == ("failed", "energy_audit_failed")
     assert found.attrs["detail"] == "energy residual 0.0005, more than 0.0001; at rtol 1e-07"
@@ -74,7 +75,7 @@ def test_a_run_that_never_balances_fails_and_its_metrics_are_not_stored(unbalanc
 
 def test_an_imbalance_that_is_not_a_number_does_not_pass(unbalance):
     unbalance(np.nan)
-    assert simulation.measure(case(rtol=1e-5)).reason == "energy_audit_failed"
+    assert measure(case(rtol=1e-5)).reason == "energy_audit_failed"
 
 
 @pytest.mark.parametrize(
@@ -83,30 +84,30 @@ def test_an_imbalance_that_is_not_a_number_does_not_pass(unbalance):
 )
 def test_a_repetition_that_does_not_end_says_so(solve, reason, unbalance, monkeypatch):
     unbalance(5)
-    run = simulation.integrate
+    run = attempts.integrate
 
     def slow(request):
         if request.rtol < 5e-6 and reason == "budget_seconds":
             request.max_steps, request.timeout = 10**6, 0.0
         return run(request)
 
-    monkeypatch.setattr(simulation, "integrate", slow)
+    monkeypatch.setattr(attempts, "integrate", slow)
     monkeypatch.setattr("compressor.solve.integrate.CHUNK", 100)
-    found = simulation.measure(case(rtol=1e-5, **solve))
+    found = measure(case(rtol=1e-5, **solve))
     assert found.reason == reason
     assert "; the next run: more than " in found.detail
 
 
 def test_a_ladder_of_accuracy_keeps_the_audit(unbalance):
     unbalance(1e3)
-    found = simulation.measure(case(accuracy={"peak_acceleration": 1e-5}))
+    found = measure(case(accuracy={"peak_acceleration": 1e-5}))
     assert found.reason == "energy_audit_failed"
     assert found.detail.endswith("no run is tighter")
 
 
 @pytest.mark.parametrize("load", ["design", "typical", "none"])
 def test_the_ideal_machine_balances(load):
-    assert simulation.measure(Case.from_values({"load": load})).status == "ok"
+    assert measure(Case.from_values({"load": load})).status == "ok"
 
 
 EXTREMES = {
@@ -127,6 +128,6 @@ def test_good_runs_of_extremes_pass(extreme, joint):
     """Within the supported range, at standard; a few only at a tenth of the tolerance."""
     values = {"joint": joint, "clearance_mm": 0.2, **EXTREMES[extreme]}
     solve = SHORT | {"error_bars": False}
-    found = simulation.measure(Case.from_values({**values, "solve": solve}))
+    found = measure(Case.from_values({**values, "solve": solve}))
     assert (found.status, found.reason) == ("ok", "")
     assert found.numbers["energy_residual"] <= allowed(4e-6, 0.5)

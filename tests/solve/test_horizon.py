@@ -17,7 +17,8 @@ from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
 from compressor.solve.horizon import CLOSE, FAR, RTOL, predictability_horizon, time_of_parting
-from compressor.solve.integrate import Request, integrate
+from compressor.solve.integrate import integrate
+from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import read_store

@@ -10,9 +10,11 @@ from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.table import METHODS
 from compressor.physics.record import FREEDOMS
-from compressor.solve.integrate import CHUNK, COMPILED, absolute_tolerances, cut
+from compressor.solve.march_driver import CHUNK, with_edge
+from compressor.solve.marching import COMPILED
 from compressor.solve.si_record import record, scene
 from compressor.solve.simulate import measure, simulate
+from compressor.solve.sizes import absolute_tolerances
 
 pytestmark = pytest.mark.xdist_group("reference")  # which takes long to derive
 
@@ -81,13 +83,13 @@ def test_energy_residual_of_every_method(method, joint):
 def test_the_audit_sees_a_lost_flow(monkeypatch):
     """Without the damping loss in the ledger the energy no longer balances."""
     from compressor.physics.observe import derivative_with_flows
-    from compressor.solve.integrate import integrate
+    from compressor.solve import scipy_driver
 
     def lossless(t, z, phase, p, out):
         derivative_with_flows(t, z, phase, p, out)
         out[-2] = 0.0
 
-    monkeypatch.setattr(integrate, "derivative_with_flows", lossless)
+    monkeypatch.setattr(scipy_driver, "derivative_with_flows", lossless)
     found = run("big_end", 0.3, duration_rev=1, settle_rev=0, rtol=1e-5, method="DOP853")
     assert float(found["energy_residual"]) > 100 * residual_bound(found, revolutions=1)
 
@@ -108,7 +110,7 @@ def test_methods_agree_beyond_a_corner():
 
 
 def deviation(clearance_mm):
-    """Greatest |x - x_ideal| (m) with the contact scaled along (DESIGN 2.6)."""
+    """Greatest |x - x_ideal| (m), contact scaled along (physics/README.md, Reference numbers)."""
     size = clearance_mm / 0.2
     contact = {
         "stiffness_N_per_mm15": 3.36e5 * size**-1.5,
@@ -156,10 +158,10 @@ def test_tolerances_scale_with_the_clearance(joint):
 
 def test_settling_at_a_corner_makes_no_segment_of_rounding():
     edges, phases = np.array([0.0, 0.1, 0.2, 0.4]), np.array([0, 1, 2])
-    assert cut(edges, phases, 0.1 + 1e-17)[2] == 0.1
+    assert with_edge(edges, phases, 0.1 + 1e-17)[2] == 0.1
     for at in (0.1, np.nextafter(0.1, 1), 0.0, 0.4, 0.9):
-        assert cut(edges, phases, at)[0] is edges
-    found = cut(edges, phases, 0.3)
+        assert with_edge(edges, phases, at)[0] is edges
+    found = with_edge(edges, phases, 0.3)
     assert [part.tolist() for part in found[:2]] == [[0, 0.1, 0.2, 0.3, 0.4], [0, 1, 2, 2]]
 
 

@@ -7,12 +7,14 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.table import METHODS
-from compressor.solve.integrate import integrate as integration
-from compressor.solve.last_steps import LAST
-from compressor.solve.simulate import STATE_NAMES, measure, simulate
+from compressor.physics.record import STATE_NAMES, Scene
+from compressor.solve import march_driver
+from compressor.solve.integrate import integrate
+from compressor.solve.request import LAST
+from compressor.solve.simulate import measure, simulate
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
-SCIPY = [name for name in METHODS if name not in integration.COMPILED]
+SCIPY = [name for name in METHODS if name not in march_driver.COMPILED]
 
 
 def stopped(**values):
@@ -41,7 +43,7 @@ def test_a_history_is_that_of_the_run(method, monkeypatch):
     """Looked at step by step from the start, or only from the last chunk on: the same."""
     solve = {"max_steps": 300, "method": method}
     found = stopped(solve=solve)
-    monkeypatch.setattr(integration, "CHUNK", 40)
+    monkeypatch.setattr(march_driver, "CHUNK", 40)
     again = stopped(solve=solve)
     for name in ("time", "step", "error"):
         assert again[f"stop_history_{name}"].tolist() == found[f"stop_history_{name}"].tolist()
@@ -55,17 +57,17 @@ def test_the_errors_are_those_that_the_control_saw():
     """After a step that is taken the control remembers the logarithm of its error's norm."""
     request = simulate_request(max_steps=60)
     now = []
-    original = integration.retrace
+    original = march_driver.retrace
 
     def looking(before, after, *rest):
         now.append(float(after.walker.error))
         return original(before, after, *rest)
 
-    integration.retrace, kept = looking, integration.retrace
+    march_driver.retrace, kept = looking, march_driver.retrace
     try:
-        history = integration.integrate(request).history
+        history = integrate(request).history
     finally:
-        integration.retrace = kept
+        march_driver.retrace = kept
     last = [e for e, text in zip(history.errors, history.words, strict=True) if "taken" in text][-1]
     assert math.log(max(last, 1e-4)) == pytest.approx(now[0], abs=1e-9)
 
@@ -78,14 +80,14 @@ def simulate_request(max_steps):
     p, y = record(case), np.zeros(8)
     start(offsets(case), y, p)
     times = np.array([0.0, case.duration])
-    return integration.Request(p, y, times, 0.0, case.rtol, max_steps=max_steps)
+    return march_driver.Request(p, y, times, 0.0, case.rtol, max_steps=max_steps)
 
 
 def test_what_is_not_finite_is_named():
     gas = {"head_clearance_mm": 0.601, "switching": "exact"}
     solve = {"duration_rev": 1.25, "accuracy": "draft"}
     found = simulate(Case.from_values({**BOTH, "load": "typical", "gas": gas, "solve": solve}))
-    assert found.attrs["stop_dominant"] in STATE_NAMES[8]
+    assert found.attrs["stop_dominant"] in STATE_NAMES[Scene.BOTH]
     assert words(found.attrs)[-1].endswith("refused")
     assert not np.isfinite(found.attrs["stop_history_error"][-1])
 
@@ -112,7 +114,7 @@ def test_steps_of_scipy_s_methods_are_told_without_errors(method):
 
 
 def test_a_contact_that_lies_within_one_step_is_named(monkeypatch):
-    """RK45 at a loose tolerance steps over DESIGN 2.6's second pulse."""
+    """RK45 at a loose tolerance steps over a pulse (physics/README.md, Reference numbers)."""
     values = {"load": "typical", "joint": "big_end", "clearance_mm": 0.2,
               "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}  # fmt: skip
     solve = {"duration_rev": 0.25, "settle_rev": 0, "rtol": 1e-5}

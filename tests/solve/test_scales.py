@@ -10,48 +10,37 @@ from scipy.integrate import solve_ivp
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.metrics import JOINTS
-from compressor.physics.step_control import BOUNDARY
-from compressor.solve.scales import (
-    STABILITY,
-    expected_seconds,
-    expected_steps,
-    greatest_force,
-    impact_depth,
-    impact_time,
-    scales,
-    static_depth,
-    stiffness_of,
-)
-from compressor.solve.si_record import record
-from compressor.solve.simulate import attempt, simulate
+from compressor.physics.contact_laws import Power
+from compressor.physics.step_control import STABILITY_LIMIT
+from compressor.solve.attempts import attempt
+from compressor.solve.scales import contact_scales, expected_seconds, expected_steps, greatest_force
+from compressor.solve.si_record import record, stiffness_of
+from compressor.solve.simulate import simulate
 
-K = 3.36e5 * 1000**1.5
+HERTZ = Power(3.36e5 * 1000**1.5, 1.5)
 BOTH = {"joint": "both", "clearance_mm": 0.2}
 
 
-def test_the_limit_of_stability_is_the_integrator_s():
-    assert STABILITY == BOUNDARY
-
-
 def test_static_penetrations_of_the_paper():
-    """DESIGN 2.6: 0.018 mm at 825 N, 0.044 mm at 3087 N."""
-    assert static_depth(825, K, 1.5) == pytest.approx(0.018e-3, rel=0.02)
-    assert static_depth(3087, K, 1.5) == pytest.approx(0.044e-3, rel=0.01)
+    """0.018 mm at 825 N, 0.044 mm at 3087 N (physics/README.md, Reference numbers)."""
+    assert HERTZ.static_depth(825) == pytest.approx(0.018e-3, rel=0.02)
+    assert HERTZ.static_depth(3087) == pytest.approx(0.044e-3, rel=0.01)
 
 
 def test_hertz_s_bounce():
-    """DESIGN 2.6: contact time 2.9432 depth / speed, depth (5 m v^2 / 4 K)^0.4."""
-    depth = impact_depth(5.0, 0.3, K, 1.5)
-    assert depth == pytest.approx((5 * 5.0 * 0.3**2 / (4 * K)) ** 0.4, rel=1e-12)
-    assert impact_time(depth, 0.3, 1.5) == pytest.approx(2.9432 * depth / 0.3, rel=1e-4)
-    assert impact_time(0.0, 0.0, 1.5) == math.inf
+    """Contact time 2.9432 depth / speed (physics/README.md, Reference numbers)."""
+    depth = HERTZ.impact_depth(5.0, 0.3)
+    assert depth == pytest.approx((5 * 5.0 * 0.3**2 / (4 * HERTZ.stiffness)) ** 0.4, rel=1e-12)
+    assert HERTZ.impact_time(depth, 0.3) == pytest.approx(2.9432 * depth / 0.3, rel=1e-4)
+    assert HERTZ.impact_time(0.0, 0.0) == math.inf
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
 def test_contact_time_of_any_exponent(exponent):
     """The bounce of a mass on K delta^p, integrated."""
     mass, speed, stiffness = 2.0, 0.5, 1e9
-    depth = impact_depth(mass, speed, stiffness, exponent)
+    contact = Power(stiffness, exponent)
+    depth = contact.impact_depth(mass, speed)
 
     def leaves(t, y):
         return y[0] if t > 0 else 1.0
@@ -62,7 +51,7 @@ def test_contact_time_of_any_exponent(exponent):
         (0, 1), [0.0, speed], events=leaves, rtol=1e-10, atol=1e-15, max_step=1e-3,
     )  # fmt: skip
     assert found.y[0].max() <= depth * (1 + 1e-9)
-    assert found.t[-1] == pytest.approx(impact_time(depth, speed, exponent), rel=1e-6)
+    assert found.t[-1] == pytest.approx(contact.impact_time(depth, speed), rel=1e-6)
 
 
 @pytest.mark.parametrize("load", ["design", "typical", "none"])
@@ -72,7 +61,7 @@ def test_the_greatest_force_bounds_the_ideal_machine_s(load, speed):
     case = Case.from_values(values | {"spring": {"damping_N_s_per_mm": 0.5}})
     found = simulate(case)["peak_contact_force"].values
     for joint, force in zip(JOINTS, found, strict=True):
-        assert force <= greatest_force(case, joint) <= 3 * force
+        assert force <= greatest_force(record(case), joint) <= 3 * force
 
 
 def test_stiffness_is_given_or_of_the_materials():
@@ -88,7 +77,7 @@ def test_stiffness_is_given_or_of_the_materials():
 
 def test_the_ideal_machine_has_no_scales_and_no_cost():
     case = Case.from_values({"joint": "both", "clearance_mm": 0})
-    assert list(scales(case)) == []
+    assert list(contact_scales(case)) == []
     assert expected_seconds(case, expected_steps(case, [])) == 0
 
 
@@ -106,7 +95,8 @@ def runs():
 
 def test_expected_steps_of_random_cases(runs):
     ratios = np.array([
-        (run.steps + run.rejected) / expected_steps(case, list(scales(case))) for case, run in runs
+        (run.steps + run.rejected) / expected_steps(case, list(contact_scales(case)))
+        for case, run in runs
     ])  # fmt: skip
     assert ((ratios > 1 / 4) & (ratios < 4)).mean() >= 0.9
 
@@ -114,21 +104,22 @@ def test_expected_steps_of_random_cases(runs):
 def test_penetration_of_random_cases(runs):
     """The deepest contact of a run, by the static penetration under the greatest force."""
     ratios = np.array([
-        run.tally.deepest / max(one.penetration for one in scales(case)) for case, run in runs
+        run.tally.deepest / max(one.penetration for one in contact_scales(case))
+        for case, run in runs
     ])  # fmt: skip
     assert ((ratios > 0.5) & (ratios < 2)).mean() >= 0.9
 
 
 def test_limits_follow_what_is_stiff():
-    (calm,) = scales(Case.from_values({"joint": "big_end", "clearance_mm": 0.2}))
+    (calm,) = contact_scales(Case.from_values({"joint": "big_end", "clearance_mm": 0.2}))
     stuck = Case.from_values(
         {"joint": "big_end", "clearance_mm": 0.2,
          "friction": {"stiction_velocity_mm_per_s": 0.001}}
     )  # fmt: skip
-    (found,) = scales(stuck)
+    (found,) = contact_scales(stuck)
     assert found.limited_by == "friction"
     assert found.friction_rate == pytest.approx(1e4 * calm.friction_rate)
-    assert found.explicit_step == pytest.approx(STABILITY / found.friction_rate)
+    assert found.explicit_step == pytest.approx(STABILITY_LIMIT / found.friction_rate)
     assert found.implicit_step == calm.implicit_step == pytest.approx(
         1 / (2 * math.pi * calm.frequency)
     )  # fmt: skip

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compressor import library_versions
 from compressor.cases.case import Case
 from compressor.cases.table import Machine, Output, PerJoint, Solve
 from compressor.metrics import NUMBERS
@@ -158,3 +159,10 @@ def test_a_case_made_in_python_of_good_values_runs():
     assert measure(made).numbers["peak_acceleration"] == run(
         joint="big_end", clearance_mm=0.2
     ).peak_acceleration  # fmt: skip
+
+
+def test_a_run_names_the_libraries_it_depends_on(faulty):
+    versions = library_versions("numpy", "numba")
+    assert versions["numpy"] == np.__version__
+    for name, version in versions.items():
+        assert f"{name} {version}" in faulty.attrs["libraries"].split(", ")

@@ -1,8 +1,9 @@
 """The one problem of the comparison with other tools, and its equations as a notebook has them.
 
 Rod 3 kg, reciprocating mass 6 kg, typical load, clearance 0.2 mm, four revolutions at 500 rpm, all
-else as in DESIGN. The equations are Newton's and Lagrange's for absolute coordinates, worked out by
-hand with scalars; nothing comes from the product, and the numbers come from reference.py.
+else as in physics/README.md. The equations are Newton's and Lagrange's for absolute coordinates,
+worked out by hand with scalars; nothing comes from the product, and the numbers come from
+reference.py.
 `register_jitable` leaves a function plain Python for those who call it from Python.
 """
 

@@ -1,0 +1,32 @@
+"""The cases of the paper: two ideal machines, and nine with clearance."""
+
+from compressor.cases import Case
+from compressor.metrics import JOINTS
+
+CLEARANCES = (0.1, 0.2, 0.3)
+FAULTS = ("big_end", "small_end", "both")
+SPOKEN = {"big_end": "big end", "small_end": "small end", "both": "both joints"}
+
+
+def label(fault: str, clearance: float) -> str:
+    """The name of one of the paper's fault cases, such as `big_end 0.2`."""
+    return f"{fault} {clearance:g}"
+
+
+def faulty_joints(fault: str) -> tuple[str, ...]:
+    """The joints with clearance of a fault."""
+    return JOINTS if fault == "both" else (fault,)
+
+
+def paper_cases(**machine: float) -> dict[str, Case]:
+    """The paper's eleven cases by label; `machine` overrides keys such as rod_mass_kg."""
+    base: dict = {"machine": machine} if machine else {}
+    cases = {load: Case.from_values({**base, "load": load}) for load in ("typical", "design")}
+    for fault in FAULTS:
+        for clearance in CLEARANCES:
+            values = {**base, "load": "design", "joint": fault, "clearance_mm": clearance}
+            cases[label(fault, clearance)] = Case.from_values(values)
+    return cases
+
+
+FAULT_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)

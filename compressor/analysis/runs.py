@@ -1,0 +1,88 @@
+"""What a stored run says: its case, its load, and how it moves once start-up is over."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import xarray as xr
+
+from compressor.cases import Case
+from compressor.physics import exact_motion, sample_segments, segments
+from compressor.solve import record
+
+
+def settled(run: xr.Dataset) -> xr.Dataset:
+    """The samples from `settle_rev` on: start-up is not the machine."""
+    return run.isel(time=run["time"].values >= run.attrs["settle"] * (1 - 1e-12))
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Least squares of the horizontal joint force against acceleration: force = slope a + b."""
+
+    slope: float  # kg
+    intercept: float  # N
+    r2: float
+
+
+def force_relation(run: xr.Dataset, joint: str) -> Relation:
+    """`Relation` of a run's settled series at one joint (force on the rod)."""
+    kept = settled(run)
+    a = kept["acceleration"].values
+    force = kept["contact_force"].sel(joint=joint, axis="x").values
+    slope, intercept = np.polyfit(a, force, 1)
+    return Relation(float(slope), float(intercept), float(np.corrcoef(a, force)[0, 1] ** 2))
+
+
+def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Displacement, velocity and acceleration (SI) of the run's ideal twin on its own grid."""
+    case = case_of(run)
+    lengths = case.machine.crank_radius_mm / 1000, case.machine.rod_length_mm / 1000
+    return exact_motion(run["crank_angle"].values, *lengths, case.omega)
+
+
+def case_of(run: xr.Dataset) -> Case:
+    """The case that a stored run belongs to, from its attributes."""
+    return _case(run.attrs["case"])
+
+
+def record_of(run: xr.Dataset) -> np.record:
+    """The record (SI) of the case that a stored run belongs to; not to be written."""
+    return _record(run.attrs["case"])
+
+
+def load_corners(run: xr.Dataset) -> np.ndarray:
+    """Crank angles (rad) at which the phases of a run's load change, three a revolution."""
+    return np.array(record_of(run).corners)
+
+
+def load_phases(run: xr.Dataset) -> np.ndarray:
+    """Phase of the load at each sample, integers: expansion, suction, compression, discharge."""
+    times = run["time"].values
+    edges, phases = segments(record_of(run), times[-1])
+    return phases[sample_segments(times, edges)]
+
+
+@lru_cache(maxsize=32)
+def _case(text: str) -> Case:
+    return Case.from_attribute(text)
+
+
+@lru_cache(maxsize=32)
+def _record(text: str) -> np.record:
+    return record(_case(text))
+
+
+def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = 0.1) -> float:
+    """Share of the settled time in which the machine vibrates.
+
+    It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation
+    from the ideal motion exceeds `level` times the ideal peak acceleration.
+    """
+    kept = settled(run)
+    _, _, ideal = ideal_motion(kept)
+    angle = kept["crank_angle"].values
+    width = max(1, round(np.radians(window_deg) / (angle[1] - angle[0])))
+    square = (kept["acceleration"].values - ideal) ** 2
+    rms = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
+    return float((rms > level * np.abs(ideal).max()).mean())

@@ -1,0 +1,71 @@
+"""Integrate by the compiled march, in chunks between which budgets are checked."""
+
+import time
+
+import numpy as np
+
+from compressor.physics import FLOWS, Status, new_work
+from compressor.reasons import Reason
+from compressor.solve.last_steps import retrace
+from compressor.solve.marching import March, Snapshot, Standing, ready_walker
+from compressor.solve.request import LAST, Request, Stop, Trajectory, overdue, too_deep
+from compressor.solve.sizes import natural_sizes
+
+CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
+SAME_TIME = 1e-12  # of the run: edges this near to each other are one
+
+
+def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
+    """Integrate by the compiled loop; raises Stop."""
+    deadline = time.monotonic() + request.timeout
+    size = natural_sizes(request.p)
+    walker = ready_walker(request, size)
+    edges, phases, walker.settle = with_edge(edges, phases, request.settle)
+    march = March(request, size, edges, phases, result.states)
+    now = Standing(walker, z, new_work(size.size), result.tally)
+    earlier = before = Snapshot.of(now)
+    seen = 0  # attempts at the last snapshot
+    while walker.status == Status.RUNNING:
+        if result.steps + result.rejected >= seen + LAST:
+            earlier, before = before, Snapshot.of(now)
+            seen = result.steps + result.rejected
+        march.advance(now, min(CHUNK, request.max_steps - walker.steps - walker.rejected))
+        result.steps, result.rejected = int(walker.steps), int(walker.rejected)
+        result.evaluations = int(walker.evaluations)
+        if walker.status == Status.DONE:
+            return
+        try:
+            check_march(request, walker, float(result.tally.deepest), deadline)
+        except Stop:
+            result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
+            enough = result.steps + result.rejected >= seen + LAST
+            result.history = retrace((before if enough else earlier).standing(), now, march)
+            raise
+
+
+def with_edge(
+    edges: np.ndarray, phases: np.ndarray, time: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Segments that end at a time as well, and that time: of an edge that lies there already."""
+    near = edges[np.abs(edges - time).argmin()]
+    if abs(near - time) <= SAME_TIME * edges[-1]:
+        return edges, phases, float(near)
+    i = int(np.searchsorted(edges, time))
+    if i == edges.size:
+        return edges, phases, time
+    return np.insert(edges, i, time), np.insert(phases, i, phases[i - 1]), time
+
+
+def check_march(request: Request, walker: np.record, deepest: float, deadline: float) -> None:
+    """Raise Stop where a march has stopped, or may go no further."""
+    status = Status(int(walker.status))
+    if status == Status.PENETRATION_IMPLAUSIBLE:
+        raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest))
+    if status == Status.NON_FINITE:
+        raise Stop(Reason.NON_FINITE, "the state or its rates are no longer finite")
+    if status == Status.STEP_UNDERFLOW:
+        raise Stop(Reason.STEP_UNDERFLOW, f"the step has shrunk to {walker.h:.3g} s")
+    if walker.steps + walker.rejected >= request.max_steps:
+        raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
+    if time.monotonic() > deadline:
+        raise Stop(Reason.BUDGET_SECONDS, overdue(request.timeout))

@@ -1,0 +1,85 @@
+"""What an integration is asked for, what it gives, and why it stops."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+LAST = 16  # attempts that a history keeps
+NONE = -1  # in place of a number of the state
+
+
+@dataclass
+class Request:
+    """What to integrate: a record (SI), the initial state, samples, span, settings and budgets."""
+
+    p: np.record
+    start: np.ndarray
+    times: np.ndarray  # output grid, s, shape (m,)
+    settle: float  # s
+    rtol: float
+    method: str = "auto"
+    max_steps: int = 5_000_000
+    timeout: float = math.inf  # s
+
+
+@dataclass
+class History:
+    """The last steps before a stop, each attempt one entry; error: over its tolerance."""
+
+    times: list[float] = field(default_factory=list)  # s, where they begin
+    steps: list[float] = field(default_factory=list)  # s
+    errors: list[float] = field(default_factory=list)
+    words: list[str] = field(default_factory=list)  # method, and what became of the step
+    dominant: int = NONE  # number of the state that drove the last error, or went bad
+
+    def add(self, time: float, step: float, error: float, words: str) -> None:
+        """Append an attempt; more than LAST push out the first."""
+        self.times.append(time)
+        self.steps.append(step)
+        self.errors.append(error)
+        self.words.append(words)
+        kept: list
+        for kept in (self.times, self.steps, self.errors, self.words):
+            del kept[:-LAST]
+
+
+@dataclass
+class Trajectory:
+    """States on the output grid, the tally of the dense solution, and how the run ended.
+
+    `states` has shape (m, k) and is nan from the sample at which an incomplete run stopped;
+    `reason` is empty when the run is complete.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    phases: np.ndarray
+    tally: np.record
+    reason: str = ""
+    detail: str = ""
+    stop_time: float = math.nan
+    stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
+    history: History = field(default_factory=History)  # the last steps before a stop
+    steps: int = 0
+    rejected: int = 0
+    evaluations: int = 0
+    seconds: float = 0.0
+
+
+class Stop(Exception):
+    """A run that cannot go on, by its named reason."""
+
+    def __init__(self, reason: str, detail: str):
+        self.reason, self.detail = reason, detail
+        super().__init__(f"{reason}: {detail}")
+
+
+def overdue(timeout: float) -> str:
+    """What is wrong with a run that takes longer (s)."""
+    return f"more than {timeout:g} s of wall time"
+
+
+def too_deep(deepest: float) -> str:
+    """What is wrong with a penetration (m)."""
+    return f"{deepest * 1e3:.3g} mm, more than a tenth of the pin radius"

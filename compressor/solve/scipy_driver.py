@@ -1,0 +1,198 @@
+"""Integrate by SciPy's methods, by name: the only door to scipy.integrate.
+
+SciPy is not trusted with states that go bad: its LSODA reports success with nan, and its
+Runge-Kutta methods hang on inf.
+"""
+
+import math
+import time
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from compressor.cases import IMPLAUSIBLE
+from compressor.physics import (
+    COLUMNS,
+    FLOWS,
+    NORMAL,
+    contact_within,
+    derivative_with_flows,
+    lobatto,
+    observe,
+    observe_all,
+    sample_segments,
+    shares_apart,
+    tally_energy,
+    tally_step,
+)
+from compressor.reasons import Reason
+from compressor.solve.request import Request, Stop, Trajectory, overdue, too_deep
+from compressor.solve.sizes import absolute_tolerances, length_and_speed
+
+# Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
+# revolution at the small end (LSODA up to 4 times, BDF 2.5, RK45 2), so they get a share of it.
+LOCAL = {"LSODA": 0.1, "BDF": 0.1, "RK45": 0.3}
+LEAST_RTOL = 2.3e-14  # SciPy's own floor
+BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
+EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
+NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
+KICK = 30.0  # tolerances of speed: what a contact within one step may add unseen
+
+
+class Derivative:
+    """The compiled right-hand side as SciPy calls it, counted, timed and guarded."""
+
+    def __init__(self, request: Request):
+        self.p = request.p
+        self.z = np.zeros(request.start.size + FLOWS)
+        self.row = np.empty(COLUMNS)
+        self.phase = 0
+        self.evaluations = 0
+        self.bad = 0
+        self.limit = EVALUATIONS_PER_STEP * request.max_steps
+        self.timeout = request.timeout
+        self.deadline = time.monotonic() + request.timeout
+
+    def __call__(self, t: float, z: np.ndarray) -> np.ndarray:
+        self.z[:] = z
+        out = np.empty_like(self.z)
+        derivative_with_flows(t, self.z, self.phase, self.p, out)
+        self.evaluations += 1
+        if math.isfinite(out.sum()):
+            self.bad = 0
+        else:
+            self.bad += 1
+            if self.bad >= BAD_EVALUATIONS:
+                raise Stop(Reason.NON_FINITE, "the right-hand side stays non-finite")
+        if self.evaluations % 256 == 0:
+            self.check_budget()
+        return out
+
+    def check_budget(self) -> None:
+        """Raise Stop when evaluations or wall time have run out."""
+        if self.evaluations > self.limit:
+            raise Stop(Reason.BUDGET_STEPS, f"more than {self.limit} evaluations")
+        if time.monotonic() > self.deadline:
+            raise Stop(Reason.BUDGET_SECONDS, overdue(self.timeout))
+
+
+def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
+    """Integrate by one of SciPy's methods, segment by segment."""
+    right_hand_side = Derivative(request)
+    owner = sample_segments(request.times, edges)
+    try:
+        for i, phase in enumerate(phases):
+            right_hand_side.phase = int(phase)
+            wanted = np.flatnonzero(owner == i)
+            segment = Segment(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
+            z = segment.run(z)
+    finally:
+        result.evaluations = right_hand_side.evaluations
+
+
+@cache
+def scipy_method(name: str) -> Any:
+    """SciPy's method of a name, loaded when first used: a third of what a short run would take."""
+    from scipy import integrate as scipy_integrate
+
+    return getattr(scipy_integrate, name)
+
+
+class Segment:
+    """One stretch between load corners, stepped by a fresh SciPy solver."""
+
+    def __init__(self, request, right_hand_side, result, begin, end, wanted):
+        self.request, self.right_hand_side, self.result = request, right_hand_side, result
+        self.begin, self.end = begin, end
+        self.wanted = wanted  # indices of this segment's samples
+        self.times = np.clip(request.times[wanted], begin, end)
+
+    def run(self, z: np.ndarray) -> np.ndarray:
+        """Step to the segment's end and return state and flows there; raises Stop."""
+        request, result = self.request, self.result
+        result.stop_time, result.stop_state = self.begin, z[:-FLOWS]
+        rtol = max(request.rtol * LOCAL.get(request.method, 1.0), LEAST_RTOL)
+        solver = scipy_method(request.method)(
+            self.right_hand_side,
+            self.begin,
+            z,
+            self.end,
+            rtol=rtol,
+            atol=absolute_tolerances(request.p, rtol),
+        )
+        while solver.status == "running":
+            if result.steps >= request.max_steps:
+                raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
+            message = solver.step()
+            if solver.status == "failed":
+                raise Stop(Reason.STEP_UNDERFLOW, str(message))
+            if not np.isfinite(solver.y).all():
+                result.history.dominant = int(np.flatnonzero(~np.isfinite(solver.y))[0])
+                raise Stop(Reason.NON_FINITE, "the state is no longer finite")
+            result.steps += 1
+            self.take(solver)
+            self.audit(solver)
+            result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
+            taken = solver.t - solver.t_old
+            result.history.add(solver.t_old, taken, math.nan, f"{request.method} taken")
+            self.check()
+        if self.end == request.times[-1]:
+            result.stop_time = math.nan
+        return solver.y.copy()
+
+    def take(self, solver) -> None:
+        """Tally the accepted step and sample the output grid within it."""
+        dense = solver.dense_output()
+        settle = self.request.settle
+        if solver.t_old < settle < solver.t:
+            self.tally(dense, solver.t_old, settle, False)
+            self.tally(dense, settle, solver.t, True)
+        else:
+            self.tally(dense, solver.t_old, solver.t, solver.t_old >= settle)
+        low = np.searchsorted(self.times, solver.t_old, side="right")
+        if solver.t_old == self.begin:
+            low = 0
+        high = np.searchsorted(self.times, solver.t, side="right")
+        if high > low:
+            self.result.states[self.wanted[low:high]] = dense(self.times[low:high])[:-FLOWS].T
+
+    def tally(self, dense, begin: float, end: float, measured: bool) -> None:
+        """Observe the dense solution on [begin, end] and add it to the tally."""
+        times = begin + (end - begin) * NODES
+        states = np.ascontiguousarray(dense(times)[:-FLOWS].T)
+        rows = np.empty((times.size, COLUMNS))
+        phases = np.full(times.size, self.right_hand_side.phase)
+        observe_all(times, states, phases, self.request.p, rows)
+        self.check_contact(begin, end - begin, rows)
+        tally, p, apart = self.result.tally, self.request.p, np.empty(2)
+        shares_apart(NODES, rows, apart)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, measured, tally, p)
+
+    def check_contact(self, begin: float, span: float, rows: np.ndarray) -> None:
+        """Raise Stop where a whole contact lies within a step and its impulse is no small error."""
+        whole = [joint for joint in range(2) if contact_within(rows, joint)]
+        if not whole:
+            return
+        normal = rows[:, NORMAL : NORMAL + 2]
+        p, force = self.request.p, normal.max()
+        kick = span * (WEIGHTS @ normal[:, whole]).max() / min(p.rod_mass, p.reciprocating_mass)
+        if kick > KICK * self.request.rtol * length_and_speed(p)[1]:
+            detail = (
+                f"a contact of {force:.2g} N within one step of {span:.2g} s from {begin:.6g} s"
+            )
+            raise Stop(Reason.CONTACT_UNDERRESOLVED, detail)
+
+    def audit(self, solver) -> None:
+        """Compare the energy at the step's end with the flows up to there."""
+        state, flows = solver.y[:-FLOWS].copy(), solver.y[-FLOWS:].copy()
+        row = self.right_hand_side.row
+        observe(solver.t, state, self.right_hand_side.phase, self.request.p, row)
+        tally_energy(row, flows, self.result.tally)
+
+    def check(self) -> None:
+        """Raise Stop when a journal sinks in implausibly deep."""
+        deepest, limit = self.result.tally.deepest, IMPLAUSIBLE * self.request.p.pin_radius
+        if not deepest <= limit:
+            raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest))
+        self.right_hand_side.check_budget()

@@ -1,0 +1,43 @@
+"""The numbers of a job from what its run has tallied."""
+
+import math
+
+import numpy as np
+
+from compressor.physics import Column
+from compressor.solve.energy_audit import energy_residual
+from compressor.solve.error_bars import Metrics
+from compressor.solve.request import Trajectory
+
+
+def metrics(p: np.record, tally: np.record) -> Metrics:
+    """The metrics by name, from what was tallied after settling."""
+    ideal = p["clearance"] == 0
+    seconds = tally["seconds"] or math.nan
+    axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
+    return {
+        "peak_acceleration": tally["peak"][0],
+        "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
+        "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
+        "peak_contact_force": tally["peak"][sizes:],
+        "peak_contact_force_axis": tally["peak"][axes:sizes].reshape(2, 2),
+        "max_penetration": np.where(ideal, 0.0, tally["max_penetration"]),
+        "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
+        "impact_count": np.where(ideal, 0.0, tally["impacts"]),
+    }
+
+
+def ledger(trajectory: Trajectory) -> dict[str, float]:
+    """Energy flows and counts by name."""
+    tally = trajectory.tally
+    return {
+        "crank_work": tally["crank_work"],
+        "load_work": tally["load_work"],
+        "contact_damping_loss": tally["damping_loss"],
+        "friction_loss": tally["friction_loss"],
+        "energy_residual": energy_residual(tally) if tally["started"] else math.nan,
+        "steps": trajectory.steps,
+        "rejected": trajectory.rejected,
+        "evaluations": trajectory.evaluations,
+        "seconds": trajectory.seconds,
+    }

@@ -1,0 +1,79 @@
+"""What every contact law must satisfy, whatever its formula."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from compressor.cases.case import Case
+from compressor.cases.table import table
+from compressor.physics.contact_laws import (
+    Law,
+    elastic_and_damping,
+    elastic_energy,
+    elastic_form,
+    normal_force,
+)
+from compressor.physics.record import Load
+from compressor.solve.si_record import record
+
+DEPTH = 3e-5  # m
+laws = pytest.mark.parametrize("law", [law.name.lower() for law in Law])
+exponents = pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
+
+
+def contact(law, exponent=1.5, **more):
+    """A record with a law, and the stiffness of its joint."""
+    values = {"law": law, "exponent": exponent, **more}
+    p = record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "contact": values}))
+    return p, float(p["stiffness"][0])
+
+
+@pytest.mark.parametrize(("key", "names"), [("contact.law", Law), ("load", Load)])
+def test_every_choice_of_a_case_file_is_compiled(key, names):
+    assert {name.lower() for name in names.__members__} == set(table()[key].choices)
+
+
+@laws
+@exponents
+def test_the_energy_is_the_work_of_the_elastic_force(law, exponent):
+    p, stiffness = contact(law, exponent)
+    work, _ = quad(lambda depth: elastic_and_damping(depth, stiffness, p)[0], 0.0, DEPTH)
+    elastic, _ = elastic_and_damping(DEPTH, stiffness, p)
+    assert elastic_energy(elastic, DEPTH, p) == pytest.approx(work, rel=1e-7)
+
+
+@laws
+@exponents
+def test_the_closed_form_is_of_the_elastic_force(law, exponent):
+    p, stiffness = contact(law, exponent)
+    form = elastic_form(stiffness, p)
+    elastic, _ = elastic_and_damping(DEPTH, stiffness, p)
+    assert form.static_depth(elastic) == pytest.approx(DEPTH, rel=1e-12)
+    near = [elastic_and_damping(DEPTH * (1 + side), stiffness, p)[0] for side in (-1e-5, 1e-5)]
+    assert form.tangent(DEPTH) == pytest.approx((near[1] - near[0]) / (2e-5 * DEPTH), rel=1e-8)
+    speed = np.sqrt(2.0 * elastic_energy(elastic, DEPTH, p) / 3.0)
+    assert form.impact_depth(3.0, speed) == pytest.approx(DEPTH, rel=1e-12)
+
+
+@laws
+def test_the_force_is_elastic_and_damped_and_never_pulls(law):
+    p, stiffness = contact(law)
+    elastic, damping = elastic_and_damping(DEPTH, stiffness, p)
+    assert damping > 0.0
+    for rate in (0.01, 0.0, -1e-4):
+        expected = elastic + damping * rate
+        assert normal_force(DEPTH, rate, stiffness, p) == pytest.approx(
+            (expected, elastic, expected)
+        )
+    force, _, unclamped = normal_force(DEPTH, -100.0, stiffness, p)
+    assert force == 0.0 > unclamped
+    assert normal_force(0.0, 1.0, stiffness, p) == (0.0, 0.0, 0.0)
+
+
+def test_a_number_without_a_law_gives_no_force():
+    p, stiffness = contact("impact")
+    p["law"] = 99
+    assert np.isnan(normal_force(DEPTH, 0.0, stiffness, p)).all()
+    assert np.isnan(elastic_energy(1.0, DEPTH, p))
+    with pytest.raises(ValueError, match="99"):
+        elastic_form(stiffness, p)
