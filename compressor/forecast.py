@@ -14,7 +14,8 @@ from compressor.jobfiles import series_image
 from compressor.manifest import given
 from compressor.store import Folder, points, read_store
 from compressor.study import Study
-from compressor.sweep import stored, wanted, warm_up
+from compressor.sweep import stored, wanted
+from compressor.warm_up import Needs, load_telling
 
 ROW_BYTES = 341  # of one job in a file of rows, measured by `make store-bench`
 
@@ -73,7 +74,7 @@ def forecast(
     ahead: list[Next] = []
     told: set[str] = set()
     if missing:
-        warm_up([*missing.values()], remark)
+        load_telling(Needs.of(missing.values()), remark)
     for study in studies:
         jobs = []
         for job in selected(study):

@@ -1,13 +1,13 @@
 """Batches of jobs on a cluster's worker, in a process that keeps what they do away from it.
 
-Every thread of a worker has a process of compsim beside it, which does its batches as a run on one
-machine does (`compressor.workers`): a job that crashes, hangs or eats memory costs itself only, and
-never the cluster's worker. Both end together.
+Every thread of a worker has a process of compsim beside it, which runs its batches as a run on one
+machine does (`compressor.execution`): a job that crashes, hangs or eats memory costs itself only.
+joblib alone cannot: workers of dask are daemons, in which it would run jobs without any process of
+their own. Both processes end together.
 """
 
 import functools
 import hashlib
-import json
 import os
 import pickle
 import platform
@@ -22,13 +22,21 @@ from typing import Any, NamedTuple
 
 import compressor
 from compressor.case import MODEL_VERSION
-from compressor.process import MEMORY_SHARE, THREADS, cores, ending, memory_share
-from compressor.worker import end_with
-from compressor.workers import GRACE, Input, run_batches
+from compressor.execution import (
+    MEMORY_SHARE,
+    Done,
+    Local,
+    Lost,
+    Workers,
+    cores,
+    end_with,
+    ending,
+    memory_share,
+)
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 REMEDY = "have the same programs on all machines, then start the cluster's workers anew"
-BESIDE = threading.local()  # .process: the one of this thread
+THREAD = threading.local()  # .process: the one beside this thread
 
 
 class Unfit(Exception):
@@ -40,19 +48,17 @@ class Broken(Exception):
 
 
 class Batch(NamedTuple):
-    """What a process does in one go: `jobs` are named by their places in it.
+    """What a process does in one go; `work` and `prepare` are as for `execution.run_batches`."""
 
-    `prepare` is called with all payloads, before `work` is in the worker process that it forks.
-    """
-
-    prepare: Callable[[list[Any]], object]
+    versions: dict[str, str]  # that are asked for
     work: Callable[[Any], Any]
-    jobs: list[Input]
-    grace: float = GRACE
+    prepare: Callable[[], object]
+    grace: float
+    jobs: list[tuple[int, bytes, float]]  # place in the batch, pickled payload, time (s)
 
 
 @functools.cache
-def passport() -> dict[str, str]:
+def versions() -> dict[str, str]:
     """What decides the bits of a result: the programs here, and their versions."""
     sources = hashlib.sha256()
     root = Path(compressor.__file__).parent
@@ -70,112 +76,93 @@ def passport() -> dict[str, str]:
 
 
 def differences(ours: dict[str, str], theirs: dict[str, str]) -> str:
-    """Where two passports differ; empty if they agree."""
-    return ", ".join(
+    """Where versions differ, and what to do about it; empty if they agree."""
+    different = ", ".join(
         f"{name} {theirs.get(name, 'unknown')} in place of {ours.get(name, 'unknown')}"
         for name in ours | theirs
         if ours.get(name) != theirs.get(name)
     )
+    return f"has {different}; {REMEDY}" if different else ""
 
 
-# ---- in the cluster's worker --------------------------------------------------------------------
+def on_worker(number: int, batch: bytes) -> tuple[int, bytes | Exception]:
+    """Do a pickled Batch beside a thread of the cluster's worker: its number, its pickled ends.
 
-
-class Beside:
-    """A process of compsim from the outside."""
-
-    def __init__(self, memory: int):
-        call = [sys.executable, "-P", "-c", "from compressor.remote import serve; serve()"]
-        paths = os.pathsep.join(path for path in sys.path if path)
-        self.process = subprocess.Popen(
-            [*call, str(memory), str(os.getpid())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=dict.fromkeys(THREADS, "1") | os.environ | {"PYTHONPATH": paths},
-        )
-        try:
-            self.passport = json.loads(self.answer())
-        except Broken as error:
-            raise Unfit(f"cannot start compsim: {error}") from error
-
-    def ask(self, batch: bytes) -> bytes:
-        """Have a pickled Batch done: its ends, pickled. Raises Broken, and Unfit."""
-        try:
-            assert self.process.stdin is not None
-            pickle.dump(batch, self.process.stdin)
-            self.process.stdin.flush()
-        except OSError:
-            self.process.kill()
-        return self.answer()
-
-    def answer(self) -> bytes:
-        """What the process sends next."""
-        try:
-            assert self.process.stdout is not None
-            done, answer = pickle.load(self.process.stdout)
-        except (OSError, EOFError, pickle.UnpicklingError) as error:
-            self.process.kill()
-            raise Broken(f"its process ended by {ending(self.process.wait())}") from error
-        if not done:
-            raise Unfit(answer)
-        return answer
-
-
-def do_batch(ours: dict[str, str], batch: bytes, memory: int | None, threads: int) -> bytes:
-    """Do a pickled Batch: its ends, pickled, each with its place in the batch for a name.
-
-    ours: the passport that is asked for; memory: bytes that the cluster gives its worker here, all
-    its `threads` together; None: no limit. An empty batch only compares passports.
-
-    Raises Unfit where they differ, and Broken where the process died, which the jobs cannot do.
+    In their place Unfit where versions differ, and Broken where the process died.
     """
-    if not hasattr(BESIDE, "process"):
-        share = memory_share(cores()) if memory is None else int(MEMORY_SHARE * memory / threads)
-        BESIDE.process = Beside(share)
+    from distributed import get_worker
+
+    worker = get_worker()
+    most = worker.memory_manager.memory_limit  # of all threads together; None: no limit
+    share = int(MEMORY_SHARE * most / worker.state.nthreads) if most else memory_share(cores())
     try:
-        different = differences(ours, BESIDE.process.passport)
-        if different:
-            raise Unfit(f"has {different}; {REMEDY}")
-        return BESIDE.process.ask(batch) if batch else b""
-    except (Broken, Unfit):
-        BESIDE.process.process.kill()
-        BESIDE.process.process.wait()
-        del BESIDE.process  # the next batch has a new one, of what is installed then
-        raise
+        if not hasattr(THREAD, "process"):
+            THREAD.process = beside(share)
+        return number, ask(THREAD.process, batch)
+    except (Broken, Unfit) as error:
+        del THREAD.process  # the next batch has a new one, of what is installed then
+        return number, type(error)(f"{worker.address}: {error}")
 
 
-# ---- in the process beside it -------------------------------------------------------------------
+def beside(memory: int) -> "subprocess.Popen[bytes]":
+    """Start the process of a thread; memory: bytes that a job may add."""
+    call = [sys.executable, "-P", "-c", "from compressor.remote import serve; serve()"]
+    paths = os.pathsep.join(path for path in sys.path if path)
+    return subprocess.Popen(
+        [*call, str(memory), str(os.getpid())],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": paths},
+    )
+
+
+def ask(process: "subprocess.Popen[bytes]", batch: bytes) -> bytes:
+    """Have a process do a pickled Batch: its pickled ends. Raises Broken, and Unfit."""
+    assert process.stdin
+    assert process.stdout
+    try:
+        pickle.dump(batch, process.stdin)
+        process.stdin.flush()
+        done, answer = pickle.load(process.stdout)
+    except (OSError, EOFError, pickle.UnpicklingError) as error:
+        process.kill()
+        raise Broken(f"its process ended by {ending(process.wait())}") from error
+    if not done:
+        process.kill()
+        process.wait()
+        raise Unfit(answer)
+    return answer
 
 
 def serve() -> None:
-    """Tell the passport, then do batches until the cluster's worker ends."""
+    """Do batches until the cluster's worker ends: in the process beside it."""
     memory, parent = map(int, sys.argv[1:])
     for number in (signal.SIGINT, signal.SIGHUP):  # the cluster's worker ends us
         signal.signal(number, signal.SIG_IGN)
     end_with(parent)
     with open(os.dup(1), "wb") as out:
         os.dup2(2, 1)  # what is printed is no answer
-        tell(out, True, json.dumps(passport()).encode())
+        local = Local(int, [], Workers(1), 0)
+        told = b""  # of the work that `local` does
         while True:
             try:
-                batch = pickle.load(sys.stdin.buffer)
+                batch: Batch = pickle.loads(pickle.load(sys.stdin.buffer))
+                different = differences(batch.versions, versions())
+                if not different and told != (told := pickle.dumps(batch[1:4])):
+                    local.stop()
+                    rules = Workers(1, batch.prepare, memory, batch.grace)
+                    local = Local(batch.work, [], rules, 0)
+                answer = (not different, different or done(local, batch))
             except EOFError:
-                return
-            try:
-                tell(out, True, done(batch, memory))
+                return local.stop()
             except Exception as error:
-                tell(out, False, f"cannot run jobs: {type(error).__name__}: {error}")
+                answer = (False, f"cannot run jobs: {type(error).__name__}: {error}")
+            pickle.dump(answer, out, pickle.HIGHEST_PROTOCOL)
+            out.flush()
 
 
-def tell(out: Any, well: bool, answer: bytes | str) -> None:
-    """Send an answer, or why there is none."""
-    pickle.dump((well, answer), out, pickle.HIGHEST_PROTOCOL)
-    out.flush()
-
-
-def done(data: bytes, memory: int) -> bytes:
-    """Do a pickled Batch."""
-    batch: Batch = pickle.loads(data)
-    batch.prepare([payload for _, payload, _ in batch.jobs])
-    ends = list(run_batches(batch.work, batch.jobs, 1, memory=memory, grace=batch.grace))
+def done(local: Local, batch: Batch) -> bytes:
+    """Do a batch in a process of ours, which stays for the next one; its pickled ends."""
+    local.source, local.left = ((n, pickle.loads(p), s) for n, p, s in batch.jobs), len(batch.jobs)
+    ends: list[Done | Lost] = sorted(local.done(lambda: None), key=lambda end: end.id)
     return pickle.dumps(ends, pickle.HIGHEST_PROTOCOL)

@@ -10,6 +10,7 @@ import resource
 import time
 from collections import Counter
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,19 @@ import compressor
 from compressor import extremes
 from compressor.case import MODEL_VERSION, Case
 from compressor.durable import Folder, StoreError
+from compressor.execution import Done, Lost, Workers, run_batches
 from compressor.extremes import Budget
 from compressor.hdf5 import attributes, opened, variables
 from compressor.jobfiles import write_dataset
 from compressor.parameter import CaseError
 from compressor.reasons import Reason
-from compressor.sweep import Progress, warm_up
-from compressor.workers import Done, Lost, run_batches
+from compressor.sweep import Progress
+from compressor.warm_up import Needs, compile_once, load
 
 FILE = "stress.nc"
 FULL = Budget()
 TIMEOUT = 300.0  # s that a scene may take with all of its judges
+NEEDS = Needs(("auto",), horizon=True)
 FLUSH = 30.0  # s between two writings of what is finished
 VERDICTS = ("ok", "failed", "silent_wrong", "unjudged")
 REMEDY = "give another folder, or delete it"
@@ -124,9 +127,10 @@ def campaign(
     total, written = count, time.monotonic()
     progress(total - len(missing), total, "")
     if missing:
-        warm_up([], lambda remark: progress(total - len(missing), total, remark), horizon=True)
+        compile_once(NEEDS, lambda remark: progress(total - len(missing), total, remark))
     tasks = ((number, (number, seed, budget), TIMEOUT) for number in missing)
-    running = run_batches(run_scene, tasks, workers, total=len(missing))
+    rules = Workers(workers, partial(load, NEEDS))
+    running = run_batches(run_scene, tasks, rules, len(missing))
     try:
         for end in running:
             rows[end.id] = ended(end)

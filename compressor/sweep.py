@@ -1,12 +1,11 @@
 """Run the jobs of studies that the store does not hold yet, in worker processes.
 
-Workers (`compressor.workers`, or those of a `compressor.cluster`) store the time series that are
+Workers (`compressor.execution`, or those of a `compressor.cluster`) store the time series that are
 kept and send home the outcomes; this process alone writes the rows that make them stored
 (`compressor.writer`). A run that fails, breaks, or takes its worker with it, is a result with a
 named reason.
 """
 
-import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -16,20 +15,19 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from compressor.case import Case
+from compressor.execution import Done, Input, Lost, Workers, rest, run_batches
 from compressor.jobfiles import series_file
 from compressor.manifest import given
 from compressor.reasons import Reason
 from compressor.schema import Outcome, without_run
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
 from compressor.study import Study, shard
-from compressor.workers import Done, Input, Lost, rest, run_batches
+from compressor.warm_up import Needs, compile_once, load
 from compressor.writer import Writer
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
 GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
-PATIENCE = 2.0  # s of compiling before a remark on it
-COMPILING = "compiling the equations (once per machine, under a minute)"
 
 
 class Backend(Protocol):
@@ -189,9 +187,10 @@ def local(workers: int) -> Backend:
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]:
-        warm_up(cases, remark)
-        work, jobs = partial(run_job, place), as_jobs(cases)
-        return run_batches(work, jobs, workers, total=len(cases), grace=GRACE, pulse=pulse)
+        needs = Needs.of(cases)
+        compile_once(needs, remark)
+        rules = Workers(workers, partial(load, needs), grace=GRACE)
+        return run_batches(partial(run_job, place), as_jobs(cases), rules, len(cases), pulse)
 
     return run
 
@@ -262,36 +261,6 @@ def endings(
         counts.append(Count(study.name, len(selected), len(failed)))
         failures += failed
     return tuple(counts), tuple(failures)
-
-
-def warm_up(cases: Sequence[Case], remark: Callable[[str], None], horizon: bool = False) -> None:
-    """Load what the cases need, and compile the equations, before any worker has to.
-
-    horizon: whether twins are needed though no case asks for its horizon.
-    """
-    from compressor.simulation import measure  # needs numba: only where something is simulated
-
-    timer = threading.Timer(PATIENCE, remark, [COMPILING])
-    timer.daemon = True
-    timer.start()
-    began = time.monotonic()
-    try:
-        solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
-        measure(Case.from_values({"solve": solve}))
-        hows: list[dict[str, object]] = [
-            {"method": method} for method in sorted({"auto"} | {c.solve.method for c in cases})
-        ]
-        if horizon or any(case.solve.horizon for case in cases):
-            hows.append({"horizon": True})
-        for how in hows:
-            values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | how}
-            measure(Case.from_values(values))
-    finally:
-        timer.cancel()
-        timer.join()  # workers are forked from one thread
-    seconds = time.monotonic() - began
-    if seconds > PATIENCE:
-        remark(f"compiled in {seconds:.0f} s")
 
 
 def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:

@@ -519,7 +519,7 @@ def started(folder, jobs):
     )
     command = [sys.executable, "-c", "import sys; from compsim.cli import main; sys.exit(main())"]
     process = subprocess.Popen(
-        [*command, "run", "many.yaml"],
+        [*command, "run", "many.yaml", "--quiet"],
         cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     deadline = time.monotonic() + 60

@@ -1,6 +1,7 @@
 """A dask cluster does as one machine does, whatever becomes of its workers."""
 
 import contextlib
+import functools
 import itertools
 import json
 import os
@@ -14,17 +15,18 @@ from pathlib import Path
 import distributed
 import numpy as np
 import pytest
+from bad_jobs import POISON, named
+from bad_jobs import work as poisoned
 from compsim.cli import main
-from test_workers import POISON, lost, named, results
-from test_workers import work as poisoned
+from test_execution import lost, results
 
-from compressor import cluster, remote, store
-from compressor.cluster import Cluster, ClusterError, run_batches
+from compressor import cluster, store
+from compressor.cluster import Cluster, ClusterError, Remote
 from compressor.durable import StoreError
 from compressor.plan import load_studies
+from compressor.remote import Batch, differences, versions
 from compressor.sweep import sweep
 from compressor.verification import verify
-from compressor.workers import MOST_BATCH
 
 MEMORY = "800MB"  # of a worker, of which a job may add three quarters
 TIMES = ("seconds",)  # what two runs of a job may differ in
@@ -158,11 +160,16 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
 # ---- jobs that fail -----------------------------------------------------------------------------
 
 
-def run(client, work, payloads, **options):
-    """The ends of jobs by `cluster.run_batches`."""
-    jobs = named(payloads)
-    options = {"total": len(payloads), "grace": 0.3, "prepare": len} | options
-    return list(run_batches(client, work, jobs, **options))
+def remote(client, work, jobs, total, **more):
+    """The ends of jobs on a cluster."""
+    batch = functools.partial(Batch, versions(), work, int, 0.3)
+    made = Remote(client, batch, jobs, total)
+    vars(made).update(more)
+    return made.ends(lambda: None)
+
+
+def run(client, work, payloads):
+    return list(remote(client, work, named(payloads), len(payloads)))
 
 
 def test_poison_jobs_cost_themselves_only(client):
@@ -205,11 +212,11 @@ def test_a_job_that_fells_workers_is_tried_alone_then_lost(name, detail, dask, c
 def test_many_jobs_are_never_listed(client):
     issued = itertools.count()
     jobs = ((n, n, 9.0) for n in issued)
-    ends = run_batches(client, abs, jobs, total=10**6, grace=1, prepare=len)
+    ends = remote(client, abs, jobs, 10**6)
     first = [end.id for end in itertools.islice(ends, 3000)]
     ends.close()
     assert len(set(first)) == 3000
-    assert next(issued) < 3000 + 2 * (2 * cluster.A_THREAD + 1) * MOST_BATCH
+    assert next(issued) < 3000 + 2 * (2 * cluster.A_THREAD + 1) * 1000
 
 
 def large(payload):
@@ -220,7 +227,7 @@ def test_few_large_results_are_on_their_way(client, monkeypatch):
     monkeypatch.setattr(cluster, "MOST_BYTES", 3_000_000)
     issued = itertools.count()
     jobs = ((n, 1_000_000, 9.0) for n in issued)
-    ends = run_batches(client, large, jobs, total=10**6, grace=1, prepare=len, target_seconds=1e-9)
+    ends = remote(client, large, jobs, 10**6, target_seconds=1e-9)
     for taken in range(1, 30):
         next(ends)
         assert next(issued) < 2 * taken + 15  # one of each two is ours
@@ -231,11 +238,13 @@ def test_few_large_results_are_on_their_way(client, monkeypatch):
 
 
 def other_versions():
-    return remote.passport() | {"numpy": "1.0", "model": "none"}
+    return versions() | {"numpy": "1.0", "model": "none"}
 
 
 def test_workers_with_other_versions_are_refused(dask, monkeypatch):
-    monkeypatch.setattr(cluster, "passport", other_versions)
+    monkeypatch.setattr(
+        cluster, "differences", lambda ours, theirs: differences(other_versions(), theirs)
+    )
     with pytest.raises(ClusterError) as told, Cluster(dask.scheduler_address):
         pass
     lines = str(told.value).splitlines()
@@ -247,17 +256,17 @@ def test_workers_with_other_versions_are_refused(dask, monkeypatch):
 
 
 def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
-    monkeypatch.setattr(cluster, "passport", other_versions)
+    batch = functools.partial(Batch, other_versions(), abs, int, 0.3)
     with pytest.raises(ClusterError, match=r"worker tcp://.*: has model 1 in place of none, numpy"):
-        run(client, abs, range(10))
+        list(Remote(client, batch, named(range(10)), 10).ends(lambda: None))
 
 
-def test_a_passport_tells_programs_apart():
-    ours = remote.passport()
+def test_versions_tell_programs_apart():
+    ours = versions()
     assert {"compsim", "model", "sources of compsim", "Python", "numpy", "numba"} <= ours.keys()
-    assert remote.differences(ours, ours) == ""
+    assert differences(ours, ours) == ""
     without = {name: text for name, text in ours.items() if name != "numba"}
-    assert remote.differences(ours, without).startswith("numba unknown in place of ")
+    assert differences(ours, without).startswith("has numba unknown in place of ")
 
 
 # ---- schedulers ---------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from compressor.physics import _jit
+from compressor.physics import machine_code
 
 PROBE = """
 import json
@@ -61,13 +61,13 @@ def test_compiled_and_pure_agree():
 def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
     for name in ("_jit.py", "contact.py"):
         (tmp_path / name).write_text("K = 1\n", encoding="utf-8")
-    monkeypatch.setattr(_jit, "HERE", tmp_path)
-    first = _jit.cache_folder()
+    monkeypatch.setattr(machine_code, "HERE", tmp_path)
+    first = machine_code.cache_folder()
     first.mkdir(parents=True)
-    assert _jit.cache_folder() == first
+    assert machine_code.cache_folder() == first
     (tmp_path / "contact.py").write_text("K = 2\n", encoding="utf-8")
-    assert _jit.cache_folder() != first
-    _jit.discard_old(first)
+    assert machine_code.cache_folder() != first
+    machine_code.discard_old(first)
     assert first.exists()
-    _jit.discard_old(_jit.cache_folder())
+    machine_code.discard_old(machine_code.cache_folder())
     assert not first.exists()

@@ -3,17 +3,17 @@
 import json
 import math
 import os
+import re
 import signal
 
 import pytest
 
-import compressor.simulation
 import compressor.sweep
 import compressor.writer
-from compressor import store
+from compressor import store, warm_up
 from compressor.case import Case
 from compressor.plan import load_studies
-from compressor.sweep import COMPILING, Failure, sweep, wanted
+from compressor.sweep import Failure, sweep, wanted
 from compressor.verification import verify
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
@@ -193,10 +193,10 @@ def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypat
 
 
 def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):
-    def breaking(case, real=compressor.simulation.observe):
-        return real(case) if case.load != "none" else {}["the bug"]
+    def breaking(place, case, real=compressor.sweep.run_job):
+        return real(place, case) if case.load != "none" else {}["the bug"]
 
-    monkeypatch.setattr(compressor.simulation, "observe", breaking)
+    monkeypatch.setattr(compressor.sweep, "run_job", breaking)
     made = studies(one={"load": ["none", "design"]})
     summary = sweep(made, tmp_path / "out", 1)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]
@@ -220,12 +220,12 @@ def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monk
     ],
 )
 def test_a_poison_job_is_a_failed_job(end, reason, detail, again, studies, tmp_path, monkeypatch):
-    def poisoned(case, real=compressor.simulation.observe):
+    def poisoned(place, case, real=compressor.sweep.run_job):
         if case.load == "none":
             end()
-        return real(case)
+        return real(place, case)
 
-    monkeypatch.setattr(compressor.simulation, "observe", poisoned)
+    monkeypatch.setattr(compressor.sweep, "run_job", poisoned)
     monkeypatch.setattr(compressor.sweep, "GRACE", 0.5)
     made = studies(one={"load": ["design", "none", "typical"], "solve": {"timeout_s": 0.5}})
     summary = sweep(made, tmp_path / "out", 2)
@@ -244,11 +244,15 @@ def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path):
         assert summary.failed[0].reason == "budget_seconds"
 
 
-def test_compiling_that_takes_long_is_told(studies, tmp_path, monkeypatch):
-    monkeypatch.setattr(compressor.sweep, "PATIENCE", 0)
+def test_compiling_is_told_once_on_a_machine(studies, tmp_path, monkeypatch):
+    monkeypatch.setattr(warm_up, "PATIENCE", 0)
+    monkeypatch.setattr(warm_up, "cache_folder", lambda: tmp_path / "machine code")
     told = []
-    sweep(studies(one={}), tmp_path / "out", 1, lambda *event: told.append(event))
-    assert [remark for _, _, remark in told if remark] == [COMPILING, "compiled in 0 s"]
+    for name in ("one", "two"):
+        sweep(studies(one={}), tmp_path / name, 1, lambda *event: told.append(event[2]))
+    compiling, compiled = (remark for remark in told if remark)
+    assert compiling == warm_up.COMPILING
+    assert re.fullmatch(r"compiled in \d+ s", compiled)
 
 
 @pytest.mark.parametrize("workers", [1, 2])

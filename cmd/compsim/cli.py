@@ -32,6 +32,7 @@ from compsim.screen import (
     duration,
     jobs_option,
     limit,
+    one_thread_each,
     only_option,
     output_option,
     plural,
@@ -126,9 +127,8 @@ def run(
     ended. A summary line for each study goes to stdout.
     """
     check_backend(backend, scheduler, jobs)
-    from compressor.process import cores, one_thread_each
-
     one_thread_each()  # before numpy loads
+    from compressor.execution import cores
     from compressor.plan import load_studies
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)

@@ -44,8 +44,8 @@ def plan(
 
     Times one job of each study and of each set of worn joints; stores nothing.
     """
+    from compressor.execution import cores
     from compressor.plan import load_studies
-    from compressor.process import cores
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
     caution(studies)
