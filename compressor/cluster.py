@@ -1,17 +1,17 @@
 """Run jobs on the workers of a dask.distributed cluster, by joblib's dask backend.
 
-What a batch's jobs do wrong is seen to where they run (`compressor.remote`). A batch whose worker
-is lost runs elsewhere; if that happens again and again, it is tried alone, then job by job.
+Each worker of the cluster does its batches in processes of its own, as a run on one machine does
+(`compressor.execution`). A batch whose worker is lost runs elsewhere; if that happens again and
+again, it is tried alone, then job by job.
 """
 
 import contextlib
 import itertools
 import logging
-import os
+import math
 import pickle
 import threading
 import time
-import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,15 +20,15 @@ from typing import Any
 from joblib import Parallel, delayed
 from joblib._dask import DaskDistributedBackend
 
+from compressor.batches import AGAIN, Batches, End, Input, Job
 from compressor.case import Case
-from compressor.durable import StoreError, publish
-from compressor.execution import AGAIN, TARGET, Batches, Done, Input, Job, Lost
-from compressor.jobfiles import store_series
 from compressor.reasons import Reason
-from compressor.remote import REMEDY, Batch, Broken, Unfit, differences, on_worker, versions
-from compressor.schema import Outcome
-from compressor.sweep import GRACE, Carried, as_jobs, run_job
+from compressor.remote import Batch, Unfit, on_worker
+from compressor.shared_folder import received, run_near, visible
+from compressor.sweep import GRACE, as_jobs
+from compressor.versions import REMEDY, differences, versions
 from compressor.warm_up import Needs, load
+from compressor.worker import Done, Lost, Workers
 
 EXTRA = "--backend dask needs dask.distributed: pip install 'compsim[dask]'"
 CONNECTING = 8.0  # s until a scheduler that does not answer counts as not there
@@ -100,12 +100,11 @@ class Cluster:
     ) -> Generator[Done | Lost, None, None]:
         """Run cases; `compressor.sweep.Backend` tells the rest."""
         with visible(place) as (token, text):
-            batch = partial(
-                Batch, versions(), partial(run_near, place, token, text),
-                partial(load, Needs.of(cases)), GRACE,
-            )  # fmt: skip
-            remote = Remote(self.client, batch, as_jobs(cases), len(cases), remark)
-            remote.receive = partial(received, place)
+            rules = Workers(prepare=partial(load, Needs.of(cases)), grace=GRACE)
+            work = partial(run_near, place, token, text)
+            remote = Remote(self.client, work, rules, as_jobs(cases), len(cases))
+            remote.remark = remark
+            remote.decode = lambda result: received(place, pickle.loads(result))
             yield from remote.ends(pulse)
 
 
@@ -131,7 +130,7 @@ def within(seconds: float, call: Callable[[], Any]) -> Any:
 def unfitness(error: BaseException) -> str:
     """Why a worker's error means that none of its jobs can run; empty if it does not."""
     if isinstance(error, Unfit):
-        return str(error)
+        return str(error).removeprefix("worker ")
     if isinstance(error, ImportError | AttributeError):
         return f"has no compsim, or an old one ({error}); {REMEDY}"
     return ""
@@ -179,27 +178,25 @@ class Dask(DaskDistributedBackend):
 class Remote(Batches):
     """Jobs on a cluster; all functions that workers call are found there by their names.
 
-    `batch` makes a Batch of jobs, `receive` is called here with each result. What runs when it is
-    stopped ends by itself, and is forgotten.
-
-    Raises ClusterError where a worker has other versions, or the scheduler is lost.
+    What runs when it is stopped ends by itself, and is forgotten. Raises ClusterError where a
+    worker has other versions, or the scheduler is lost.
     """
 
     def __init__(
         self,
         client: Any,
-        batch: Callable[[Any], Batch],
+        work: Callable[[Any], Any],
+        rules: Workers,
         jobs: Iterable[Input],
         left: int,
-        remark: Callable[[str], None] = lambda text: None,
     ):
-        super().__init__(jobs, left, TARGET, 1)
-        self.client, self.batch, self.remark = client, batch, remark
-        self.receive: Callable[[Any], Any] = lambda result: result
+        super().__init__(jobs, left, rules.target_seconds, 1)
+        self.client, self.work, self.rules = client, work, rules
+        self.asked = versions()
+        self.remark: Callable[[str], None] = lambda text: None
         self.numbers = itertools.count()
-        self.threads, self.census = -1, 0.0  # of all workers, when
-        self.size = 0.0  # bytes of a job's result
-        self.renew = False
+        self.threads, self.census = -1, 0.0  # of all workers, when they were counted
+        self.size, self.renew = 0.0, False  # bytes of a result; whether the round should end
         self.backend: Dask | None = None
         self.patience = time.monotonic() + PATIENCE
 
@@ -221,58 +218,52 @@ class Remote(Batches):
     def call(self, batch: list[Job]) -> Any:
         number = next(self.numbers)
         self.out[number] = batch
-        jobs = [(n, job.payload, job.timeout) for n, job in enumerate(batch)]
-        return delayed(on_worker)(number, pickle.dumps(self.batch(jobs), pickle.HIGHEST_PROTOCOL))
+        jobs = [Job(n, *job[1:3]) for n, job in enumerate(batch)]
+        asked = Batch(self.asked, self.work, self.rules, jobs)
+        return delayed(on_worker)(number, pickle.dumps(asked, pickle.HIGHEST_PROTOCOL))
 
     def watch(self, now: float, news: bool) -> None:
         """Count the threads of all workers now and then, and tell where there is none."""
         if now - self.census < CENSUS:
             return
         try:
-            threads = sum(self.client.nthreads().values())
+            threads = [*self.client.nthreads().values()]
         except (OSError, TimeoutError, ValueError) as error:
             raise lost(self.client) from error
         if not threads and self.threads:
             self.remark(WAITING)
-        self.renew = self.renew or threads != self.threads
-        self.threads, self.census, self.width = threads, now, max(threads, 1)
+        self.renew = self.renew or sum(threads) != self.threads
+        self.threads, self.census, self.width = sum(threads), now, max(len(threads), 1)
+        self.target_seconds = self.rules.target_seconds * max(sum(threads) / self.width, 1)
         if threads and not self.weight and now > self.patience:
             self.remark(STARTING)
-            self.patience = float("inf")
+            self.patience = math.inf
 
-    def finish(self, batch: list[Job], found: Any) -> Iterator[Done | Lost]:
-        if isinstance(found, BaseException):
+    def finish(self, batch: list[Job], found: Any) -> Iterator[End]:
+        if isinstance(found, bytes):
+            self.size = max(len(found) / len(batch), 0.9 * self.size)
+            yield from super().finish(batch, pickle.loads(found))
+        elif not self.stopped:
             yield from self.lost_batch(batch, found)
-            return
-        data: bytes = found
-        self.size = max(len(data) / len(batch), 0.9 * self.size)
-        for job, end in zip(batch, pickle.loads(data), strict=True):
-            if isinstance(end, Lost):
-                yield Lost(job.id, end.reason, end.detail, end.traceback)
-            else:
-                self.learn(end.seconds)
-                yield Done(job.id, self.receive(end.result), end.seconds)
 
     def lost_batch(self, batch: list[Job], error: BaseException) -> Iterator[Lost]:
         """A batch has lost its workers: it is tried alone, then each of its jobs."""
         from distributed import KilledWorker
 
-        if self.stopped:
-            return
-        if isinstance(error, KilledWorker):
-            how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
-        elif isinstance(error, Broken):
-            how = str(error)
-        else:
+        if not isinstance(error, KilledWorker):
             unfit = unfitness(error) or f"a batch failed: {type(error).__name__}: {error}"
             raise ClusterError(f"worker {unfit}") from error
         if self.alone and len(batch) == 1:
+            how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
             yield Lost(batch[0].id, Reason.WORKER_DIED, f"{how}, {AGAIN}")
         else:
             self.suspects.extend([[job] for job in batch] if self.alone else [batch])
 
     def fail(self, error: BaseException) -> Iterable[Lost]:
         raise error if self.client.status == "running" else lost(self.client)
+
+    def discard(self) -> None:
+        """Nothing is shared with a suspect: no other batch is at work."""
 
     def stop(self) -> None:
         """Have what has not begun never begin."""
@@ -288,45 +279,3 @@ def lost(client: Any) -> ClusterError:
     """The scheduler has gone."""
     address = client.scheduler.address if client.scheduler else "the scheduler"
     return ClusterError(f"{address}: the scheduler was lost; the same command goes on with another")
-
-
-# ---- time series --------------------------------------------------------------------------------
-
-
-def run_near(place: Path, token: Path, text: str, case: Case) -> Outcome | Carried | StoreError:
-    """Run a case and store its time series in a place, if that is the same folder here."""
-    return run_job(place if case.output.keep == "series" and sees(token, text) else None, case)
-
-
-def sees(token: Path, text: str) -> bool:
-    """Whether a file of the run's is there, and others may be written beside it."""
-    try:
-        return token.read_text() == text and os.access(token.parent, os.W_OK)
-    except OSError:
-        return False
-
-
-@contextlib.contextmanager
-def visible(place: Path) -> Iterator[tuple[Path, str]]:
-    """A file, and its text, by which a worker knows a place for ours, not one of the same name."""
-    text = uuid.uuid4().hex
-    token = place / "jobs" / f".{text}.tmp"
-    publish(token, text.encode())
-    try:
-        yield token, text
-    finally:
-        with contextlib.suppress(OSError):
-            token.unlink()
-
-
-def received(place: Path, result: Any) -> Any:
-    """A result from a worker, its time series stored if they came with it."""
-    if not isinstance(result, Carried):
-        return result
-    outcome, data = result
-    assert outcome.series is not None
-    try:
-        store_series(place, outcome.key, outcome.series, data)
-    except StoreError as error:
-        return error
-    return outcome

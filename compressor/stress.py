@@ -21,7 +21,7 @@ import compressor
 from compressor import extremes
 from compressor.case import MODEL_VERSION, Case
 from compressor.durable import Folder, StoreError
-from compressor.execution import Done, Lost, Workers, run_batches
+from compressor.execution import run_batches
 from compressor.extremes import Budget
 from compressor.hdf5 import attributes, opened, variables
 from compressor.jobfiles import write_dataset
@@ -29,6 +29,7 @@ from compressor.parameter import CaseError
 from compressor.reasons import Reason
 from compressor.sweep import Progress
 from compressor.warm_up import Needs, compile_once, load
+from compressor.worker import Done, Lost, Workers
 
 FILE = "stress.nc"
 FULL = Budget()

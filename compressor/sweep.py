@@ -14,8 +14,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from compressor.batches import Input
 from compressor.case import Case
-from compressor.execution import Done, Input, Lost, Workers, rest, run_batches
+from compressor.execution import rest, run_batches
 from compressor.jobfiles import series_file
 from compressor.manifest import given
 from compressor.reasons import Reason
@@ -23,6 +24,7 @@ from compressor.schema import Outcome, without_run
 from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
 from compressor.study import Study, shard
 from compressor.warm_up import Needs, compile_once, load
+from compressor.worker import Done, Lost, Workers
 from compressor.writer import Writer
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""

@@ -1,7 +1,6 @@
 """A dask cluster does as one machine does, whatever becomes of its workers."""
 
 import contextlib
-import functools
 import itertools
 import json
 import os
@@ -18,15 +17,16 @@ import pytest
 from bad_jobs import POISON, named
 from bad_jobs import work as poisoned
 from compsim.cli import main
-from test_execution import lost, results
+from test_execution import is_running, lost, results, wait_for
 
-from compressor import cluster, store
+from compressor import cluster, shared_folder, store
 from compressor.cluster import Cluster, ClusterError, Remote
 from compressor.durable import StoreError
 from compressor.plan import load_studies
-from compressor.remote import Batch, differences, versions
 from compressor.sweep import sweep
 from compressor.verification import verify
+from compressor.versions import differences, versions
+from compressor.worker import Workers
 
 MEMORY = "800MB"  # of a worker, of which a job may add three quarters
 TIMES = ("seconds",)  # what two runs of a job may differ in
@@ -107,7 +107,9 @@ def watched(backend, after, act):
 
 
 def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "store_series", lambda *_: pytest.fail("the folder is shared"))
+    monkeypatch.setattr(
+        shared_folder, "store_series", lambda *_: pytest.fail("the folder is shared")
+    )
     victim = dask.workers[0].process.pid
     with Cluster(dask.scheduler_address) as backend:
         killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
@@ -125,12 +127,12 @@ def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path
 
     stored = []
 
-    def noted(*arguments, real=cluster.store_series):
+    def noted(*arguments, real=shared_folder.store_series):
         stored.append(arguments)
         return real(*arguments)
 
     monkeypatch.setattr(cluster, "visible", elsewhere)
-    monkeypatch.setattr(cluster, "store_series", noted)
+    monkeypatch.setattr(shared_folder, "store_series", noted)
     with Cluster(dask.scheduler_address) as backend:
         sweep(studies, tmp_path / "out", backend=backend)
     assert len(stored) == 10
@@ -138,10 +140,10 @@ def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path
 
 
 def test_a_folder_is_shared_if_our_file_is_seen(tmp_path):
-    with cluster.visible(tmp_path) as (token, text):
-        assert cluster.sees(token, text)
-        assert not cluster.sees(token, "of another run")
-    assert not cluster.sees(token, text)
+    with shared_folder.visible(tmp_path) as (token, text):
+        assert shared_folder.sees(token, text)
+        assert not shared_folder.sees(token, "of another run")
+    assert not shared_folder.sees(token, text)
 
 
 def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_path, monkeypatch):
@@ -149,7 +151,7 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         raise StoreError(place, "No space left on device", "free some")
 
     monkeypatch.setattr(cluster, "visible", lambda place: contextlib.nullcontext((place, "")))
-    monkeypatch.setattr(cluster, "store_series", full)
+    monkeypatch.setattr(shared_folder, "store_series", full)
     with (
         Cluster(dask.scheduler_address) as backend,
         pytest.raises(StoreError, match="No space left on device"),
@@ -160,10 +162,9 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
 # ---- jobs that fail -----------------------------------------------------------------------------
 
 
-def remote(client, work, jobs, total, **more):
+def remote(client, work, jobs, total, seconds=0.2, **more):
     """The ends of jobs on a cluster."""
-    batch = functools.partial(Batch, versions(), work, int, 0.3)
-    made = Remote(client, batch, jobs, total)
+    made = Remote(client, work, Workers(grace=0.3, target_seconds=seconds), jobs, total)
     vars(made).update(more)
     return made.ends(lambda: None)
 
@@ -184,29 +185,51 @@ def parent_of(pid):
     return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
 
 
+def pids(_):
+    return os.getpid()
+
+
+def slow_pid(_):
+    time.sleep(0.05)
+    return os.getpid()
+
+
 def felling(payload):
-    """Kill the cluster's worker, or the process that keeps us away from it."""
-    beside = os.getppid()
+    """Kill the cluster's worker."""
     if payload == "worker":
-        os.kill(parent_of(beside), signal.SIGKILL)
-    if payload == "beside":
-        os.kill(beside, signal.SIGKILL)
-    if isinstance(payload, str):
+        os.kill(os.getppid(), signal.SIGKILL)
         time.sleep(60)
     return payload
 
 
-@pytest.mark.parametrize(
-    ("name", "detail"), [("worker", "1 workers of the cluster died"), ("beside", "SIGKILL")]
-)
-def test_a_job_that_fells_workers_is_tried_alone_then_lost(name, detail, dask, client, monkeypatch):
+def test_a_job_that_fells_workers_is_tried_alone_then_lost(dask, client, monkeypatch):
     monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
-    ends = run(client, felling, [*range(20), name, *range(20, 40)])
+    ends = run(client, felling, [*range(20), "worker", *range(20, 40)])
     assert results(ends) == {n: n for n in range(40)}
     (end,) = lost(ends).values()
-    assert (end.id, end.reason) == (name, "worker_died")
-    assert detail in end.detail
+    assert (end.id, end.reason) == ("worker", "worker_died")
+    assert "1 workers of the cluster died" in end.detail
     assert end.detail.endswith("also when it ran again alone")
+
+
+def test_nothing_of_a_cluster_s_worker_outlives_it(dask, client):
+    """Its processes die with it, though dask does not know of them."""
+    pid, *_ = results(run(client, pids, range(4))).values()
+    worker = parent_of(pid)
+    os.kill(worker, signal.SIGKILL)
+    wait_for(lambda: not is_running(pid) and not is_running(worker))
+
+
+def test_threads_of_one_worker_share_its_processes():
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=True, dashboard_address=":0",
+        memory_limit=MEMORY,
+    ) as made, Cluster(made.scheduler_address) as backend:  # fmt: skip
+        ends = run(backend.client, slow_pid, range(40))
+        assert len({*results(ends).values()}) == 2
+        ends = run(backend.client, poisoned, [*range(40), "crash", *range(40, 80)])
+        assert results(ends) == {n: n for n in range(80)}
+        assert lost(ends)["crash"].reason == "worker_died"
 
 
 def test_many_jobs_are_never_listed(client):
@@ -227,7 +250,7 @@ def test_few_large_results_are_on_their_way(client, monkeypatch):
     monkeypatch.setattr(cluster, "MOST_BYTES", 3_000_000)
     issued = itertools.count()
     jobs = ((n, 1_000_000, 9.0) for n in issued)
-    ends = remote(client, large, jobs, 10**6, target_seconds=1e-9)
+    ends = remote(client, large, jobs, 10**6, 1e-9)
     for taken in range(1, 30):
         next(ends)
         assert next(issued) < 2 * taken + 15  # one of each two is ours
@@ -256,9 +279,8 @@ def test_workers_with_other_versions_are_refused(dask, monkeypatch):
 
 
 def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
-    batch = functools.partial(Batch, other_versions(), abs, int, 0.3)
     with pytest.raises(ClusterError, match=r"worker tcp://.*: has model 1 in place of none, numpy"):
-        list(Remote(client, batch, named(range(10)), 10).ends(lambda: None))
+        list(remote(client, abs, named(range(10)), 10, asked=other_versions()))
 
 
 def test_versions_tell_programs_apart():

@@ -20,7 +20,8 @@ from bad_jobs import LEAST, POISON, SECONDS, named, sleep, work
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from compressor import execution
-from compressor.execution import MOST_TEXT, Done, Lost, Workers, WorkersFailed, rest, run_batches
+from compressor.execution import WorkersFailed, rest, run_batches
+from compressor.worker import MOST_TEXT, Done, Lost, Workers
 
 RULES = {"memory": LEAST, "grace": 0.3}
 HERE = str(Path(__file__).parent)
@@ -357,7 +358,8 @@ def test_the_pulse_beats_while_no_job_ends():
 
 PARENT = """
 import os, signal, sys
-from compressor.execution import Workers, run_batches
+from compressor.execution import run_batches
+from compressor.worker import Workers
 
 def work(payload):
     os.write(2, f"{os.getpid()}\\n".encode())
