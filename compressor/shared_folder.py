@@ -10,8 +10,8 @@ from typing import Any
 from compressor.case import Case
 from compressor.durable import StoreError, publish
 from compressor.jobfiles import store_series
+from compressor.run_job import Carried, run_job
 from compressor.schema import Outcome
-from compressor.sweep import Carried, run_job
 
 
 def run_near(place: Path, token: Path, text: str, case: Case) -> Outcome | Carried | StoreError:

@@ -7,7 +7,6 @@ named reason.
 """
 
 import time
-import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,11 +16,10 @@ from typing import Any, NamedTuple, Protocol
 from compressor.batches import Input
 from compressor.case import Case
 from compressor.execution import rest, run_batches
-from compressor.jobfiles import series_file
 from compressor.manifest import given
-from compressor.reasons import Reason
+from compressor.run_job import run_job
 from compressor.schema import Outcome, without_run
-from compressor.store import Folder, Stored, StoreError, points, write_series, write_study
+from compressor.store import Folder, Stored, StoreError, points, write_study
 from compressor.study import Study, shard
 from compressor.warm_up import Needs, compile_once, load
 from compressor.worker import Done, Lost, Workers
@@ -46,13 +44,6 @@ class Backend(Protocol):
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]: ...
-
-
-class Carried(NamedTuple):
-    """An outcome, and the bytes of the file with its time series, which is still to be stored."""
-
-    outcome: Outcome
-    data: bytes
 
 
 class End(NamedTuple):
@@ -263,30 +254,6 @@ def endings(
         counts.append(Count(study.name, len(selected), len(failed)))
         failures += failed
     return tuple(counts), tuple(failures)
-
-
-def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
-    """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
-
-    Without a place, what is to be stored comes back. A StoreError is returned: it ends the sweep,
-    while an exception is a failure of the job.
-    """
-    from compressor import simulation  # needs numba: only where something is simulated
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
-        if case.output.keep == "metrics":
-            return simulation.measure(case)
-        found, dataset = simulation.observe(case)
-    if found.reason == Reason.INVALID_INPUT:
-        return found
-    if place is None:
-        file, data = series_file(dataset, case.output)
-        return Carried(replace(found, series=file), data)
-    try:
-        return replace(found, series=write_series(place, dataset, case.output))
-    except StoreError as error:
-        return error
 
 
 def settled(end: Done | Lost) -> Outcome:

@@ -57,6 +57,7 @@ FLOORS = [
     "hdf5",
     "manifest",
     "jobfiles",
+    "run_job",
     "segments",
     "labels",
     "store",
