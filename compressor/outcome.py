@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-import compressor
 from compressor.metrics import AXES, ERRORS, JOINTS, LEDGER, METRICS, NUMBERS, SIZES
+from compressor.program import PROGRAM
 
 __all__ = ["AXES", "ERRORS", "LEDGER", "METRICS", "NUMBERS", "ROW", "SIZES", "Outcome"]
 
@@ -73,7 +73,7 @@ def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more:
 
     `attributes`: what is to be said of its case (`Case.attributes`); `more`: other attributes.
     """
-    program = f"compsim {compressor.__version__}"
+    program = PROGRAM
     said = {**attributes, "complete": 0, "program": program, "detail": detail} | more
     return Outcome("failed", str(reason), np.full(1, math.nan, ROW)[0], said)
 

@@ -46,7 +46,7 @@ def plan(
     Times one job of each study and of each set of worn joints; stores nothing.
     """
     from compressor.cases import load_studies
-    from compressor.process import cores
+    from compressor.sweep import cores
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
     caution(studies)

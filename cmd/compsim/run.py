@@ -18,6 +18,7 @@ from compsim.screen import (
     duration,
     jobs_option,
     limit,
+    one_thread_each,
     only_option,
     output_option,
     plural,
@@ -82,10 +83,9 @@ def run(
     ended. A summary line for each study goes to stdout.
     """
     check_backend(backend, scheduler, jobs)
-    from compressor.process import cores, one_thread_each
-
     one_thread_each()  # before numpy loads
     from compressor.cases import load_studies
+    from compressor.sweep import cores
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
     if only and not quiet:
@@ -129,7 +129,7 @@ def cluster(scheduler: str | None) -> contextlib.AbstractContextManager["Backend
     """The cluster of a scheduler; none where jobs run here."""
     if scheduler is None:
         return contextlib.nullcontext()
-    from compressor.cluster import Cluster
+    from compressor.sweep import Cluster
 
     return Cluster(scheduler)
 

@@ -1,6 +1,7 @@
 """What the commands share: exit codes, options, and how they speak on stderr."""
 
 import contextlib
+import os
 import shlex
 import sys
 import time
@@ -42,6 +43,14 @@ limit = click.option(
     "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
     help="Refuse a case file that asks for more, before it is expanded.",
 )  # fmt: skip
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+def one_thread_each() -> None:
+    """Keep numeric libraries that load later, here or in workers, to one thread a process."""
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
 
 
 class Screen:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, Screen, duration, jobs_option, say
+from compsim.screen import DONE, SOME_FAILED, Screen, duration, jobs_option, one_thread_each, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,9 +38,9 @@ def stress(
 
     Exit code 3 if any number is wrong in silence, or more than 2 % of the scenes are unjudged.
     """
-    from compressor.process import cores, one_thread_each
-
     one_thread_each()  # before numpy loads
+    from compressor.sweep import cores
+
     if scene is not None:
         click.echo("\n".join(repeated(scene, seed)))
         return DONE

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compressor import CompsimError
 from compressor.cases import blocks
 from compressor.cases.case import Case
 from compressor.cases.conditions import NoComparison, Test, comparison
@@ -27,6 +26,7 @@ from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.swept import counted
 from compressor.cases.table import table
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, resolved, shortened
+from compressor.program import CompsimError
 
 MAX_JOBS = 10_000
 MAX_KEPT = 100_000  # cases of a study that stay in memory, each 1 kB

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import compressor
 from compressor.cases import ACCURACY, Case, Friction, Output
 from compressor.measure.work_precision import (
     Progress,
@@ -25,6 +24,7 @@ from compressor.measure.work_precision import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import exact_motion, series_motion
+from compressor.program import PROGRAM
 from compressor.solve import simulate
 
 GRAVITY = 9.81  # m/s2
@@ -291,5 +291,5 @@ def labelled(
         "change": ("change", np.array(names, object), {"long_name": "change of the model"}),
     }
     attrs = {"title": "what the model's features change and cost", "compared_at": EXACT,
-             "program": f"compsim {compressor.__version__}"}  # fmt: skip
+             "program": PROGRAM}  # fmt: skip
     return xr.Dataset(variables, coordinates, attrs)

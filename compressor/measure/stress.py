@@ -10,23 +10,24 @@ import resource
 import time
 from collections import Counter
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-import compressor
 from compressor.cases import MODEL_VERSION, Case, CaseError
 from compressor.measure import extremes
 from compressor.measure.extremes import Budget
+from compressor.program import PROGRAM
 from compressor.reasons import Reason
 from compressor.store import Folder, StoreError, attributes, opened, variables, write_dataset
-from compressor.sweep import Progress, warm_up
-from compressor.workers import Done, Lost, run_batches
+from compressor.sweep import Done, Lost, Needs, Progress, Workers, compile_once, load, run_batches
 
 FILE = "stress.nc"
 FULL = Budget()
+NEEDS = Needs(("auto",), horizon=True)
 TIMEOUT = 300.0  # s that a scene may take with all of its judges
 FLUSH = 30.0  # s between two writings of what is finished
 VERDICTS = ("ok", "failed", "silent_wrong", "unjudged")
@@ -124,9 +125,10 @@ def campaign(
     total, written = count, time.monotonic()
     progress(total - len(missing), total, "")
     if missing:
-        warm_up([], lambda remark: progress(total - len(missing), total, remark), horizon=True)
+        compile_once(NEEDS, lambda remark: progress(total - len(missing), total, remark))
     tasks = ((number, (number, seed, budget), TIMEOUT) for number in missing)
-    running = run_batches(run_scene, tasks, workers, total=len(missing))
+    rules = Workers(workers, partial(load, NEEDS))
+    running = run_batches(run_scene, tasks, rules, len(missing))
     try:
         for end in running:
             rows[end.id] = ended(end)
@@ -171,7 +173,7 @@ def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset
         "title": "outcomes of extreme scenes",
         "seed": seed,
         "settings": settings(budget),
-        "program": f"compsim {compressor.__version__}",
+        "program": PROGRAM,
     }
     return xr.Dataset(found, coordinates, attrs)
 

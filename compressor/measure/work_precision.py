@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import compressor
-from compressor import CompsimError
 from compressor.analysis import FAULTS, label, paper_cases, settled
 from compressor.cases import ACCURACY, METHODS, Case, Output
 from compressor.metrics import JOINTS
 from compressor.physics import Scene
+from compressor.program import PROGRAM, CompsimError
 from compressor.reasons import Reason
 from compressor.solve import LOCAL, scene, simulate
 
@@ -164,7 +163,7 @@ def work_precision(
             progress(next(done), total, "")
     study.attrs = {
         "title": "work and precision of integration methods",
-        "program": f"compsim {compressor.__version__}",
+        "program": PROGRAM,
         "references": f"{', '.join(REFERENCES)} at {REFERENCE_RTOL:g}",
         "repeats": repeats,
         "budget_seconds": budget,

@@ -6,49 +6,24 @@ a hash of all sources here: numba itself would go on using a caller's old code a
 what it calls in another file.
 """
 
-import hashlib
 import os
-import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
+
+from compressor.program import discard_machine_code, machine_code_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 ENABLED = os.environ.get("COMPSIM_JIT", "1") != "0"
-HERE = Path(__file__).parent
 FUSED = {"contract"}  # of what numba calls fast-math, this alone
-
-
-def sources_hash() -> str:
-    """Hash of the compiled modules' sources."""
-    digest = hashlib.sha256()
-    for path in sorted(HERE.glob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def cache_folder() -> Path:
-    """Where machine code is kept: beside the sources, or under the user's cache folder."""
-    beside = HERE / "__pycache__"
-    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compsim"
-    base = beside if os.access(beside if beside.exists() else HERE, os.W_OK) else user
-    return base / f"numba-{sources_hash()}"
-
-
-def discard_old(folder: Path) -> None:
-    """Remove the machine code of other sources, when that of the present ones is first made."""
-    if not folder.exists():
-        for old in folder.parent.glob("numba-*"):
-            shutil.rmtree(old, ignore_errors=True)
 
 
 if ENABLED:
     import numba
 
     if not numba.config.CACHE_DIR:  # type: ignore[attr-defined]
-        discard_old(cache_folder())
-        numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]
+        discard_machine_code(machine_code_folder())
+        numba.config.CACHE_DIR = str(machine_code_folder())  # type: ignore[attr-defined]
 
     def _compiled(function: Function, **options: Any) -> Function:
         made: Any = numba.njit(cache=True, error_model="numpy", fastmath=FUSED, **options)(function)

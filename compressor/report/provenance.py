@@ -4,11 +4,10 @@ import datetime
 import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
-import compressor
 from compressor.cases import MODEL_VERSION
+from compressor.program import PROGRAM, library_versions
 from compressor.report.page import Section
 from compressor.store import Folder, StoredStudy
 
@@ -30,9 +29,10 @@ class Provenance:
 
 def provenance_section(studies: Sequence[StoredStudy], results: Folder, command: str) -> Section:
     """What made this page now, and the studies it is about."""
+    versions = library_versions(*LIBRARIES)
     content = Provenance(
-        program=f"compsim {compressor.__version__}, model {MODEL_VERSION}",
-        libraries=", ".join(f"{name} {metadata.version(name)}" for name in LIBRARIES),
+        program=f"{PROGRAM}, model {MODEL_VERSION}",
+        libraries=", ".join(f"{name} {version}" for name, version in versions.items()),
         platform=f"Python {platform.python_version()}, {platform.platform()}",
         results=Path(results).absolute(),
         command=command,

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import compressor
 from compressor.cases import MODEL_VERSION, Case, CaseError
 from compressor.metrics import HORIZON, SIZES
 from compressor.outcome import ROW, Outcome, Table, Variable, coordinates, without_run
 from compressor.physics import COLUMNS, FLOWS, STATE_NAMES, Column, observe_all
+from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
 from compressor.solve.attempts import Solution, solve
 from compressor.solve.request import NONE, Trajectory
@@ -120,7 +120,7 @@ def attributes(case: Case, solution: Solution) -> dict[str, object]:
         "error_bars": int(case.wants_bars),
         "method": case.solve.method,
         "model_version": MODEL_VERSION,
-        "program": f"compsim {compressor.__version__}",
+        "program": PROGRAM,
         "libraries": libraries(),
     }
     if solution.reason:
@@ -150,5 +150,5 @@ def stop_attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
 @cache
 def libraries() -> str:
     """The libraries that results depend on, with their versions."""
-    versions = compressor.library_versions("numpy", "scipy", "numba")
+    versions = library_versions("numpy", "scipy", "numba")
     return ", ".join(f"{name} {version}" for name, version in versions.items())

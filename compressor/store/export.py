@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import compressor
-from compressor import CompsimError
+from compressor.program import PROGRAM, CompsimError
 from compressor.store.files import Folder, StoreError, publish, publishing
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import Stored, read_store
@@ -274,6 +273,6 @@ def _attributes(studies: Sequence[StoredStudy]) -> dict[str, str]:
     origin = [{name: getattr(study, name) for name in told} for study in studies]
     return {
         "title": f"compsim: {' '.join(study.name for study in studies)}",
-        "program": f"compsim {compressor.__version__}",
+        "program": PROGRAM,
         "studies": json.dumps(origin),
     }

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from compressor import CompsimError, CompsimWarning
+from compressor.program import CompsimError, CompsimWarning
 
 Folder = str | os.PathLike[str]
 

@@ -9,12 +9,11 @@ import os
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import compressor
 from compressor.cases import MODEL_VERSION, Study, given, points, row_of, table
+from compressor.program import VERSION, library_versions
 from compressor.store.files import KEY, Folder, StoreError, publish, refusals, system_error
 from compressor.store.hdf5 import digest
 
@@ -90,8 +89,8 @@ def write_study(folder: Folder, study: "Study", command: str = "") -> None:
         study.keys,
         study.cases[0].values(),
         command,
-        {"compsim": compressor.__version__, "model": MODEL_VERSION}
-        | {name: metadata.version(name) for name in ("numpy", "scipy", "numba", "h5py", "xarray")},
+        {"compsim": VERSION, "model": MODEL_VERSION}
+        | library_versions("numpy", "scipy", "numba", "h5py", "xarray"),
         datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         study.is_grid,
     )

@@ -11,7 +11,8 @@ from typing import Any
 
 from compressor.cases import Case, Study, given, points
 from compressor.store import Folder, read_store, series_image
-from compressor.sweep.sweep import stored, wanted, warm_up
+from compressor.sweep.sweep import stored, wanted
+from compressor.sweep.warm_up import Needs, load_telling
 
 ROW_BYTES = 341  # of one job in a file of rows, measured by `make store-bench`
 
@@ -70,7 +71,7 @@ def forecast(
     ahead: list[Next] = []
     told: set[str] = set()
     if missing:
-        warm_up([*missing.values()], remark)
+        load_telling(Needs.of(missing.values()), remark)
     for study in studies:
         jobs = []
         for job in selected(study):
@@ -116,7 +117,7 @@ def cost(cases: Sequence[Case]) -> tuple[float, int]:
 
 def measured(case: Case) -> tuple[float, float]:
     """A job's seconds for a revolution, and its file's bytes for a sample."""
-    from compressor.solve import measure, observe  # needs numba: only where something is simulated
+    from compressor.solve import measure, observe  # needs numba: only to simulate
 
     began = time.perf_counter()
     size = 0

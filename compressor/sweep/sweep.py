@@ -1,14 +1,12 @@
 """Run the jobs of studies that the store does not hold yet, in worker processes.
 
-Workers (`compressor.workers`, or those of a `compressor.cluster`) store the time series that are
+Workers (`execution`, or those of a `cluster`) store the time series that are
 kept and send home the outcomes; this process alone writes the rows that make them stored
-(`compressor.store.writer`). A run that fails, breaks, or takes its worker with it, is a result with
-a named reason.
+(`Writer`). A run that fails, breaks, or takes its worker with it, is a result with a
+named reason.
 """
 
-import threading
 import time
-import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,23 +15,16 @@ from typing import Any, NamedTuple, Protocol
 
 from compressor.cases import Case, Study, given, points, shard
 from compressor.outcome import Outcome, without_run
-from compressor.reasons import Reason
-from compressor.store import (
-    Folder,
-    Stored,
-    StoreError,
-    Writer,
-    series_file,
-    write_series,
-    write_study,
-)
-from compressor.workers import Done, Input, Lost, rest, run_batches
+from compressor.store import Folder, Stored, StoreError, Writer, write_study
+from compressor.sweep.batches import Input
+from compressor.sweep.execution import rest, run_batches
+from compressor.sweep.run_job import run_job
+from compressor.sweep.warm_up import Needs, compile_once, load
+from compressor.sweep.worker import Done, Lost, Workers
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
 GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
-PATIENCE = 2.0  # s of compiling before a remark on it
-COMPILING = "compiling the equations (once per machine, under a minute)"
 
 
 class Backend(Protocol):
@@ -50,13 +41,6 @@ class Backend(Protocol):
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]: ...
-
-
-class Carried(NamedTuple):
-    """An outcome, and the bytes of the file with its time series, which is still to be stored."""
-
-    outcome: Outcome
-    data: bytes
 
 
 class End(NamedTuple):
@@ -193,9 +177,10 @@ def local(workers: int) -> Backend:
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]:
-        warm_up(cases, remark)
-        work, jobs = partial(run_job, place), as_jobs(cases)
-        return run_batches(work, jobs, workers, total=len(cases), grace=GRACE, pulse=pulse)
+        needs = Needs.of(cases)
+        compile_once(needs, remark)
+        rules = Workers(workers, partial(load, needs), grace=GRACE)
+        return run_batches(partial(run_job, place), as_jobs(cases), rules, len(cases), pulse)
 
     return run
 
@@ -266,60 +251,6 @@ def endings(
         counts.append(Count(study.name, len(selected), len(failed)))
         failures += failed
     return tuple(counts), tuple(failures)
-
-
-def warm_up(cases: Sequence[Case], remark: Callable[[str], None], horizon: bool = False) -> None:
-    """Load what the cases need, and compile the equations, before any worker has to.
-
-    horizon: whether twins are needed though no case asks for its horizon.
-    """
-    from compressor.solve import measure  # needs numba: only where something is simulated
-
-    timer = threading.Timer(PATIENCE, remark, [COMPILING])
-    timer.daemon = True
-    timer.start()
-    began = time.monotonic()
-    try:
-        solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
-        measure(Case.from_values({"solve": solve}))
-        hows: list[dict[str, object]] = [
-            {"method": method} for method in sorted({"auto"} | {c.solve.method for c in cases})
-        ]
-        if horizon or any(case.solve.horizon for case in cases):
-            hows.append({"horizon": True})
-        for how in hows:
-            values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | how}
-            measure(Case.from_values(values))
-    finally:
-        timer.cancel()
-        timer.join()  # workers are forked from one thread
-    seconds = time.monotonic() - began
-    if seconds > PATIENCE:
-        remark(f"compiled in {seconds:.0f} s")
-
-
-def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
-    """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
-
-    Without a place, what is to be stored comes back. A StoreError is returned: it ends the sweep,
-    while an exception is a failure of the job.
-    """
-    from compressor.solve import measure, observe  # needs numba: only where something is simulated
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
-        if case.output.keep == "metrics":
-            return measure(case)
-        found, dataset = observe(case)
-    if found.reason == Reason.INVALID_INPUT:
-        return found
-    if place is None:
-        file, data = series_file(dataset, case.output)
-        return Carried(replace(found, series=file), data)
-    try:
-        return replace(found, series=write_series(place, dataset, case.output))
-    except StoreError as error:
-        return error
 
 
 def settled(end: Done | Lost) -> Outcome:

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from compressor.physics import _jit
+from compressor import program
 
 PROBE = """
 import json
@@ -61,13 +61,13 @@ def test_compiled_and_pure_agree():
 def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
     for name in ("_jit.py", "contact.py"):
         (tmp_path / name).write_text("K = 1\n", encoding="utf-8")
-    monkeypatch.setattr(_jit, "HERE", tmp_path)
-    first = _jit.cache_folder()
+    monkeypatch.setattr(program, "COMPILED", tmp_path)
+    first = program.machine_code_folder()
     first.mkdir(parents=True)
-    assert _jit.cache_folder() == first
+    assert program.machine_code_folder() == first
     (tmp_path / "contact.py").write_text("K = 2\n", encoding="utf-8")
-    assert _jit.cache_folder() != first
-    _jit.discard_old(first)
+    assert program.machine_code_folder() != first
+    program.discard_machine_code(first)
     assert first.exists()
-    _jit.discard_old(_jit.cache_folder())
+    program.discard_machine_code(program.machine_code_folder())
     assert not first.exists()

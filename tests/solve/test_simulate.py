@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor import library_versions
 from compressor.cases.case import Case
 from compressor.cases.table import Machine, Output, PerJoint, Solve
 from compressor.metrics import NUMBERS
+from compressor.program import library_versions
 from compressor.solve.simulate import SERIES, measure, simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}

@@ -14,18 +14,20 @@ from pathlib import Path
 import distributed
 import numpy as np
 import pytest
+from bad_jobs import POISON, named
+from bad_jobs import work as poisoned
 from compsim.cli import main
-from test_workers import POISON, lost, named, results
-from test_workers import work as poisoned
+from test_execution import is_running, lost, results, wait_for
 
-from compressor import cluster, remote
 from compressor.cases.load import load_studies
-from compressor.cluster import Cluster, ClusterError, run_batches
 from compressor.store import reader as store
 from compressor.store.files import StoreError
 from compressor.store.verify import verify
+from compressor.sweep import cluster, shared_folder
+from compressor.sweep.cluster import Cluster, ClusterError, Remote
 from compressor.sweep.sweep import sweep
-from compressor.workers import MOST_BATCH
+from compressor.sweep.versions import differences, versions
+from compressor.sweep.worker import Workers
 
 MEMORY = "800MB"  # of a worker, of which a job may add three quarters
 TIMES = ("seconds",)  # what two runs of a job may differ in
@@ -106,7 +108,9 @@ def watched(backend, after, act):
 
 
 def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "store_series", lambda *_: pytest.fail("the folder is shared"))
+    monkeypatch.setattr(
+        shared_folder, "store_series", lambda *_: pytest.fail("the folder is shared")
+    )
     victim = dask.workers[0].process.pid
     with Cluster(dask.scheduler_address) as backend:
         killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
@@ -124,12 +128,12 @@ def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path
 
     stored = []
 
-    def noted(*arguments, real=cluster.store_series):
+    def noted(*arguments, real=shared_folder.store_series):
         stored.append(arguments)
         return real(*arguments)
 
     monkeypatch.setattr(cluster, "visible", elsewhere)
-    monkeypatch.setattr(cluster, "store_series", noted)
+    monkeypatch.setattr(shared_folder, "store_series", noted)
     with Cluster(dask.scheduler_address) as backend:
         sweep(studies, tmp_path / "out", backend=backend)
     assert len(stored) == 10
@@ -137,10 +141,10 @@ def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path
 
 
 def test_a_folder_is_shared_if_our_file_is_seen(tmp_path):
-    with cluster.visible(tmp_path) as (token, text):
-        assert cluster.sees(token, text)
-        assert not cluster.sees(token, "of another run")
-    assert not cluster.sees(token, text)
+    with shared_folder.visible(tmp_path) as (token, text):
+        assert shared_folder.sees(token, text)
+        assert not shared_folder.sees(token, "of another run")
+    assert not shared_folder.sees(token, text)
 
 
 def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_path, monkeypatch):
@@ -148,7 +152,7 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         raise StoreError(place, "No space left on device", "free some")
 
     monkeypatch.setattr(cluster, "visible", lambda place: contextlib.nullcontext((place, "")))
-    monkeypatch.setattr(cluster, "store_series", full)
+    monkeypatch.setattr(shared_folder, "store_series", full)
     with (
         Cluster(dask.scheduler_address) as backend,
         pytest.raises(StoreError, match="No space left on device"),
@@ -159,11 +163,15 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
 # ---- jobs that fail -----------------------------------------------------------------------------
 
 
-def run(client, work, payloads, **options):
-    """The ends of jobs by `cluster.run_batches`."""
-    jobs = named(payloads)
-    options = {"total": len(payloads), "grace": 0.3, "prepare": len} | options
-    return list(run_batches(client, work, jobs, **options))
+def remote(client, work, jobs, total, seconds=0.2, **more):
+    """The ends of jobs on a cluster."""
+    made = Remote(client, work, Workers(grace=0.3, target_seconds=seconds), jobs, total)
+    vars(made).update(more)
+    return made.ends(lambda: None)
+
+
+def run(client, work, payloads):
+    return list(remote(client, work, named(payloads), len(payloads)))
 
 
 def test_poison_jobs_cost_themselves_only(client):
@@ -178,39 +186,61 @@ def parent_of(pid):
     return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
 
 
+def pids(_):
+    return os.getpid()
+
+
+def slow_pid(_):
+    time.sleep(0.05)
+    return os.getpid()
+
+
 def felling(payload):
-    """Kill the cluster's worker, or the process that keeps us away from it."""
-    beside = os.getppid()
+    """Kill the cluster's worker."""
     if payload == "worker":
-        os.kill(parent_of(beside), signal.SIGKILL)
-    if payload == "beside":
-        os.kill(beside, signal.SIGKILL)
-    if isinstance(payload, str):
+        os.kill(os.getppid(), signal.SIGKILL)
         time.sleep(60)
     return payload
 
 
-@pytest.mark.parametrize(
-    ("name", "detail"), [("worker", "1 workers of the cluster died"), ("beside", "SIGKILL")]
-)
-def test_a_job_that_fells_workers_is_tried_alone_then_lost(name, detail, dask, client, monkeypatch):
+def test_a_job_that_fells_workers_is_tried_alone_then_lost(dask, client, monkeypatch):
     monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
-    ends = run(client, felling, [*range(20), name, *range(20, 40)])
+    ends = run(client, felling, [*range(20), "worker", *range(20, 40)])
     assert results(ends) == {n: n for n in range(40)}
     (end,) = lost(ends).values()
-    assert (end.id, end.reason) == (name, "worker_died")
-    assert detail in end.detail
+    assert (end.id, end.reason) == ("worker", "worker_died")
+    assert "1 workers of the cluster died" in end.detail
     assert end.detail.endswith("also when it ran again alone")
+
+
+def test_nothing_of_a_cluster_s_worker_outlives_it(dask, client):
+    """Its processes die with it, though dask does not know of them."""
+    pid, *_ = results(run(client, pids, range(4))).values()
+    worker = parent_of(pid)
+    os.kill(worker, signal.SIGKILL)
+    wait_for(lambda: not is_running(pid) and not is_running(worker))
+
+
+def test_threads_of_one_worker_share_its_processes():
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=True, dashboard_address=":0",
+        memory_limit=MEMORY,
+    ) as made, Cluster(made.scheduler_address) as backend:  # fmt: skip
+        ends = run(backend.client, slow_pid, range(40))
+        assert len({*results(ends).values()}) == 2
+        ends = run(backend.client, poisoned, [*range(40), "crash", *range(40, 80)])
+        assert results(ends) == {n: n for n in range(80)}
+        assert lost(ends)["crash"].reason == "worker_died"
 
 
 def test_many_jobs_are_never_listed(client):
     issued = itertools.count()
     jobs = ((n, n, 9.0) for n in issued)
-    ends = run_batches(client, abs, jobs, total=10**6, grace=1, prepare=len)
+    ends = remote(client, abs, jobs, 10**6)
     first = [end.id for end in itertools.islice(ends, 3000)]
     ends.close()
     assert len(set(first)) == 3000
-    assert next(issued) < 3000 + 2 * (2 * cluster.A_THREAD + 1) * MOST_BATCH
+    assert next(issued) < 3000 + 2 * (2 * cluster.A_THREAD + 1) * 1000
 
 
 def large(payload):
@@ -221,7 +251,7 @@ def test_few_large_results_are_on_their_way(client, monkeypatch):
     monkeypatch.setattr(cluster, "MOST_BYTES", 3_000_000)
     issued = itertools.count()
     jobs = ((n, 1_000_000, 9.0) for n in issued)
-    ends = run_batches(client, large, jobs, total=10**6, grace=1, prepare=len, target_seconds=1e-9)
+    ends = remote(client, large, jobs, 10**6, 1e-9)
     for taken in range(1, 30):
         next(ends)
         assert next(issued) < 2 * taken + 15  # one of each two is ours
@@ -232,11 +262,13 @@ def test_few_large_results_are_on_their_way(client, monkeypatch):
 
 
 def other_versions():
-    return remote.passport() | {"numpy": "1.0", "model": "none"}
+    return versions() | {"numpy": "1.0", "model": "none"}
 
 
 def test_workers_with_other_versions_are_refused(dask, monkeypatch):
-    monkeypatch.setattr(cluster, "passport", other_versions)
+    monkeypatch.setattr(
+        cluster, "differences", lambda ours, theirs: differences(other_versions(), theirs)
+    )
     with pytest.raises(ClusterError) as told, Cluster(dask.scheduler_address):
         pass
     lines = str(told.value).splitlines()
@@ -248,17 +280,16 @@ def test_workers_with_other_versions_are_refused(dask, monkeypatch):
 
 
 def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
-    monkeypatch.setattr(cluster, "passport", other_versions)
     with pytest.raises(ClusterError, match=r"worker tcp://.*: has model 1 in place of none, numpy"):
-        run(client, abs, range(10))
+        list(remote(client, abs, named(range(10)), 10, asked=other_versions()))
 
 
-def test_a_passport_tells_programs_apart():
-    ours = remote.passport()
+def test_versions_tell_programs_apart():
+    ours = versions()
     assert {"compsim", "model", "sources of compsim", "Python", "numpy", "numba"} <= ours.keys()
-    assert remote.differences(ours, ours) == ""
+    assert differences(ours, ours) == ""
     without = {name: text for name, text in ours.items() if name != "numba"}
-    assert remote.differences(ours, without).startswith("numba unknown in place of ")
+    assert differences(ours, without).startswith("has numba unknown in place of ")
 
 
 # ---- schedulers ---------------------------------------------------------------------------------

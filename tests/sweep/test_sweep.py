@@ -3,19 +3,19 @@
 import json
 import math
 import os
+import re
 import signal
 
 import pytest
 
-import compressor.solve.simulate
 import compressor.store.writer
 import compressor.sweep.sweep
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
-from compressor.store.files import StoreError
 from compressor.store.verify import verify
-from compressor.sweep.sweep import COMPILING, Failure, sweep, wanted
+from compressor.sweep import warm_up
+from compressor.sweep.sweep import Failure, sweep, wanted
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 BOTH = {"joint": "both", "clearance_mm": 0.1}
@@ -194,10 +194,10 @@ def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypat
 
 
 def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):
-    def breaking(case, real=compressor.solve.simulate.observe):
-        return real(case) if case.load != "none" else {}["the bug"]
+    def breaking(place, case, real=compressor.sweep.sweep.run_job):
+        return real(place, case) if case.load != "none" else {}["the bug"]
 
-    monkeypatch.setattr(compressor.solve.simulate, "observe", breaking)
+    monkeypatch.setattr(compressor.sweep.sweep, "run_job", breaking)
     made = studies(one={"load": ["none", "design"]})
     summary = sweep(made, tmp_path / "out", 1)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]
@@ -221,12 +221,12 @@ def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monk
     ],
 )
 def test_a_poison_job_is_a_failed_job(end, reason, detail, again, studies, tmp_path, monkeypatch):
-    def poisoned(case, real=compressor.solve.simulate.observe):
+    def poisoned(place, case, real=compressor.sweep.sweep.run_job):
         if case.load == "none":
             end()
-        return real(case)
+        return real(place, case)
 
-    monkeypatch.setattr(compressor.solve.simulate, "observe", poisoned)
+    monkeypatch.setattr(compressor.sweep.sweep, "run_job", poisoned)
     monkeypatch.setattr(compressor.sweep.sweep, "GRACE", 0.5)
     made = studies(one={"load": ["design", "none", "typical"], "solve": {"timeout_s": 0.5}})
     summary = sweep(made, tmp_path / "out", 2)
@@ -245,25 +245,29 @@ def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path):
         assert summary.failed[0].reason == "budget_seconds"
 
 
-def test_compiling_that_takes_long_is_told(studies, tmp_path, monkeypatch):
-    monkeypatch.setattr(compressor.sweep.sweep, "PATIENCE", 0)
+def test_compiling_is_told_once_on_a_machine(studies, tmp_path, monkeypatch):
+    monkeypatch.setattr(warm_up, "PATIENCE", 0)
+    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path / "machine code")
     told = []
-    sweep(studies(one={}), tmp_path / "out", 1, lambda *event: told.append(event))
-    assert [remark for _, _, remark in told if remark] == [COMPILING, "compiled in 0 s"]
+    for name in ("one", "two"):
+        sweep(studies(one={}), tmp_path / name, 1, lambda *event: told.append(event[2]))
+    compiling, compiled = (remark for remark in told if remark)
+    assert compiling == warm_up.COMPILING
+    assert re.fullmatch(r"compiled in \d+ s", compiled)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_job_that_cannot_be_stored_ends_the_sweep(workers, studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/jobs").symlink_to("nowhere")
-    with pytest.raises(StoreError, match=r"out/jobs: is a file, where a folder is needed"):
+    with pytest.raises(store.StoreError, match=r"out/jobs: is a file, where a folder is needed"):
         sweep(studies(one={"load": ["none", "design"]}), tmp_path / "out", workers)
 
 
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/rows").write_text("in the way")
-    with pytest.raises(StoreError, match="Not a directory; choose another folder"):
+    with pytest.raises(store.StoreError, match="Not a directory; choose another folder"):
         sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
 
 

@@ -11,11 +11,11 @@ import re
 import shutil
 import signal
 import tempfile
+from functools import partial
 from pathlib import Path
 
-import compressor.solve.simulate
+import compressor.sweep.execution
 import compressor.sweep.sweep
-import compressor.workers
 from chaos.processes import Run
 from chaos.stored import LEAN, case_file, contents, damage
 from chaos.tally import Tally
@@ -67,21 +67,18 @@ def poisoned(kinds):
     """Returns what makes a fork's jobs of some keys do harm."""
 
     def prepare():
-        for name in ("measure", "observe"):
-            real = getattr(compressor.solve.simulate, name)
-            setattr(compressor.solve.simulate, name, harmful(real))
+        compressor.sweep.sweep.run_job = partial(harmful, kinds)
         compressor.sweep.sweep.GRACE = 0.2
-        compressor.workers.memory_share = lambda count: LEAST
-
-    def harmful(real):
-        def simulate(case):
-            if case.key in kinds:
-                KINDS[kinds[case.key]][0]()
-            return real(case)
-
-        return simulate
+        compressor.sweep.execution.memory_share = lambda count: LEAST
 
     return prepare
+
+
+def harmful(kinds, place, case):
+    """Run a case, unless it is one that does harm: in a worker."""
+    if case.key in kinds:
+        KINDS[kinds[case.key]][0]()
+    return compressor.sweep.sweep.run_job(place, case)
 
 
 def mixed(folder, draw):

@@ -15,9 +15,11 @@ import sys
 import termios
 import time
 import traceback
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 from compsim.cli import main
+from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 PROGRESS = re.compile(rb"(\d+) of \d+ jobs, \d+ %")
 LEAST_FILES = 3  # the first descriptor that is no standard stream
@@ -123,6 +125,8 @@ def become(arguments, folder, terminal, real, prepare):
         for stream, source in enumerate((nothing, nothing, terminal)):
             os.dup2(source, stream)
         os.closerange(LEAST_FILES, MOST_FILES)
+        for tracker in (resource_tracker, loky_tracker):
+            tracker._resource_tracker._fd = None  # it is our parent's
         if real:
             os.execv(sys.executable, [sys.executable, "-m", "compsim", *arguments])
         sys.stdout, sys.stderr = open(1, "w"), open(2, "w", buffering=1)

@@ -1,0 +1,257 @@
+"""Run jobs in joblib's worker processes: one that crashes, hangs or eats memory costs itself only.
+
+Starting, feeding and ending processes is joblib's work (its loky backend here, its dask backend in
+`cluster`). Ours is what it cannot know: how many jobs make a batch, which job was at
+work in a process that died or took too long, and what runs again.
+"""
+
+import contextlib
+import multiprocessing
+import operator
+import os
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import wait
+from dataclasses import replace
+from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, cpu_count, delayed
+from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.backend.process import LokyProcess
+from joblib.externals.loky.process_executor import BrokenProcessPool
+from joblib.parallel import LokyBackend
+
+from compressor.reasons import Reason
+from compressor.sweep.batches import MOST_BATCH, TICK, Batches, End, Input, Job
+from compressor.sweep.worker import ENDING, NOTE, Lost, Workers, do_batch, settle
+
+STALL = 60.0  # s without any result, while no job runs, after which the workers are killed
+UNSEEN = 3.0  # s that joblib may take to see that a worker died
+FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
+MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
+MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+
+
+class WorkersFailed(Exception):
+    """Worker processes cannot be started, or die before they begin a job."""
+
+
+def run_batches(
+    work: Callable[[Any], Any],
+    jobs: Iterable[Input],
+    workers: Workers,
+    total: int | None = None,
+    pulse: Callable[[], object] = lambda: None,
+) -> Generator[End, None, None]:
+    """Call work(payload) for each job in worker processes; yield how each one ended.
+
+    `jobs` is read as workers need it, in a thread; `total` (by default its length hint) lets
+    batches shrink towards the end. What `work` raises makes its job Lost. `pulse` is called several
+    times a second, whether or not jobs end.
+
+    Closing the iterator kills the workers. Whatever is raised here, a signal's exception too, comes
+    after the results that had arrived (`rest` does the same for what the caller raises). Raises
+    WorkersFailed, and what `jobs` raises.
+    """
+    left = operator.length_hint(jobs, 0) if total is None else total
+    return Local(work, jobs, workers, left).ends(pulse)
+
+
+def rest(ends: Generator[End, None, None], error: BaseException) -> Iterator[End]:
+    """After an error in the loop over `run_batches`: what had arrived by then, then the error."""
+    with contextlib.suppress(StopIteration):
+        yield ends.throw(error)
+        yield from ends
+
+
+class Loky(LokyBackend):
+    """joblib's loky backend, which tells of a batch at once, in its thread.
+
+    What waits in joblib's generator would be lost, and run again, when a worker dies.
+    """
+
+    def __init__(self, hand_over: Callable[[int, Any], None]):
+        super().__init__(inner_max_num_threads=1)
+        self.hand_over = hand_over
+
+    def retrieve_result_callback(self, out: Any) -> list[None]:
+        self.hand_over(*super().retrieve_result_callback(out)[0])
+        return [None]
+
+
+class Local(Batches):
+    """Jobs in processes of this machine, on a pool that ends with any of its processes.
+
+    A note in shared memory tells of every batch which process is at which of its jobs, and since
+    when. Nothing else names the job in which a process died, hung in compiled code or stood still:
+    joblib knows batches alone, and fails all of them at once.
+    """
+
+    def __init__(
+        self, work: Callable[[Any], Any], jobs: Iterable[Input], rules: Workers, left: int
+    ):
+        super().__init__(jobs, left, rules.target_seconds, rules.count)
+        self.rules = replace(rules, memory=rules.memory or memory_share(rules.count))
+        self.places = 4 * max(rules.count, 2)  # for notes: more than joblib asks for
+        # what a SIGKILL of ours leaves in shared memory is removed in silence
+        os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
+        self.shared = SharedMemory(create=True, size=self.places * NOTE.size)
+        self.notes: Any = self.shared.buf
+        self.initargs = (work, self.rules, self.shared, os.getpid())
+        self.pool = self.executor = None  # type: Any
+        self.heard = 0.0  # when a batch was last handed out, or ended
+        self.fruitless = 0
+        self.discard()
+
+    def parallel(self) -> Parallel:
+        """The pool; a new one after a death, and for a suspect: in the thread.
+
+        joblib would do a single job at a time in this process: it is told of two, loky of one.
+        """
+        signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in new workers, too, until they settle
+        if self.pool is None:
+            self.pool = Parallel(
+                max(self.width, 2), Loky(self.hand_over), "generator_unordered", batch_size=1,
+                pre_dispatch=2 * self.width, max_nbytes=None, initializer=settle,
+                initargs=self.initargs,
+            ).__enter__()  # fmt: skip
+            self.executor = get_reusable_executor(1 if self.alone else self.width, reuse=True)
+        return self.pool
+
+    def call(self, batch: list[Job]) -> Any:
+        place = self.free.popleft()
+        NOTE.pack_into(self.notes, place * NOTE.size, 0, 0, 0)
+        self.out[place], self.heard = batch, time.monotonic()
+        return delayed(do_batch)(place, [job.payload for job in batch])
+
+    def hand_over(self, number: int, found: Any) -> None:
+        super().hand_over(number, found)
+        self.free.append(number)
+
+    def note(self, place: int) -> tuple[int, int, float]:
+        """Process and job of a batch; since when the job runs, or minus its end; 0: none yet."""
+        pid, position, since = NOTE.unpack_from(self.notes, place * NOTE.size)
+        return int(pid), int(position), since
+
+    def watch(self, now: float, news: bool) -> None:
+        """Kill workers whose jobs take too long, and all of them where nothing moves any more."""
+        self.processes |= {child.pid: child for child in children()}
+        if news:
+            self.heard, self.fruitless, self.most = now, 0, MOST_BATCH
+        latest, at_work = self.heard, False
+        for place, batch in list(self.out.items()):
+            pid, position, since = self.note(place)
+            latest, at_work = max(latest, abs(since)), at_work or since > 0
+            if since > 0 and now - since > batch[position].timeout + self.rules.grace:
+                self.late.add(pid)
+                kill([pid])
+        dead = any(child.exitcode for child in self.processes.values())
+        if self.round and (dead or not at_work) and now - latest > (UNSEEN if dead else STALL):
+            self.break_up()
+
+    def break_up(self) -> None:
+        """Kill all workers, and have joblib see it.
+
+        One that died amid a message leaves joblib reading the rest of it for ever, since this
+        process, too, could write there: loky keeps that end open.
+        """
+        kill(self.processes)
+        results = getattr(self.executor, "_result_queue", None)
+        if results and not children():
+            results._writer.close()
+
+    def fail(self, error: BaseException) -> Iterator[Lost]:
+        """The pool has broken: see to its jobs. The one that ran in a dead process may be why."""
+        if isinstance(error, OSError) and not self.processes:
+            raise WorkersFailed(f"no worker process can be started: {error}") from error
+        if not isinstance(error, BrokenProcessPool):
+            raise error
+        codes = {pid: child.exitcode for pid, child in self.processes.items()}
+        died = {pid for pid, code in codes.items() if code not in (None, -signal.SIGKILL)}
+        notes = {place: self.note(place) for place in self.out}
+        running = {place: pid for place, (pid, _, since) in notes.items() if since > 0}
+        named = [place for place, pid in running.items() if pid in died | self.late]
+        largest = max(map(len, self.out.values()), default=1)
+        for place, batch in self.out.items():
+            if place in (named or running):  # joblib has killed the others, also by SIGKILL
+                pid, position, _ = notes[place]
+                yield from self.blame(batch.pop(position), pid in self.late, codes.get(pid))
+            if batch and self.alone:
+                self.suspects.append(batch)
+            else:
+                self.waiting.extendleft(reversed(batch))
+        if not running:  # nobody is named: smaller batches will tell
+            self.fruitless, self.most = self.fruitless + 1, max(1, largest // 2)
+            if self.fruitless > FRUITLESS:
+                how = ending(next((codes[pid] for pid in died), None))
+                raise WorkersFailed(f"jobs could not even begin: {how}")
+        self.discard()
+
+    def blame(self, job: Job, late: bool, code: int | None) -> Iterator[Lost]:
+        """A job was at work in a process that died, or was killed since it took too long."""
+        reason, text = Reason.WORKER_DIED, f"its worker ended by {ending(code)}"
+        if late:
+            reason = Reason.BUDGET_SECONDS
+            text = f"more than {job.timeout:g} s of wall time; its worker was killed"
+        yield from self.lose(job, Lost(None, reason, text), not late)
+
+    def discard(self) -> None:
+        """End the pool, if there is one."""
+        if self.executor:
+            self.executor.terminate(kill_workers=True)
+        self.pool = self.executor = None
+        self.processes: dict[int, Any] = {}
+        self.late: set[int] = set()  # processes that were killed for taking too long
+        self.out, self.free = {}, deque(range(self.places))
+
+    def stop(self) -> None:
+        self.stopped = True
+        while self.round and not self.round.done():
+            self.watch(time.monotonic(), True)
+            self.break_up()
+            wait([self.round], TICK)
+        self.thread.shutdown()
+        self.discard()
+        if self.notes:
+            self.notes = None
+            self.shared.close()
+            self.shared.unlink()
+
+
+def children() -> list[Any]:
+    """The processes that loky has started and that run."""
+    return [c for c in multiprocessing.active_children() if isinstance(c, LokyProcess)]
+
+
+def kill(pids: Iterable[int]) -> None:
+    """SIGKILL."""
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+def ending(code: int | None) -> str:
+    """How a process ended, from its exit code (less the signal's number)."""
+    if code is None or code >= 0:
+        return "an unknown cause" if code is None else f"exit code {code}"
+    if code == -signal.SIGKILL:
+        return "SIGKILL: out of memory, or killed from outside"
+    return signal.Signals(-code).name
+
+
+def cores() -> int:
+    """How many cores this process may use, by its affinity and its container's quota."""
+    return cpu_count()
+
+
+def memory_share(count: int) -> int:
+    """Bytes for each of `count` workers: three quarters of the machine's, or the container's."""
+    most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    for path in MEMORY_LIMITS:
+        with contextlib.suppress(OSError, ValueError):  # absent, or "max"
+            most = min(most, int(Path(path).read_text()))
+    return int(MEMORY_SHARE * most / count)

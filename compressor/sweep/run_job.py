@@ -1,0 +1,42 @@
+"""Run one job in a worker, which needs no more of the program than this."""
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from compressor.cases import Case
+from compressor.outcome import Outcome
+from compressor.reasons import Reason
+from compressor.store import StoreError, series_file, write_series
+
+
+class Carried(NamedTuple):
+    """An outcome, and the bytes of the file with its time series, which is still to be stored."""
+
+    outcome: Outcome
+    data: bytes
+
+
+def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
+    """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
+
+    Without a place, what is to be stored comes back. A StoreError is returned: it ends the sweep,
+    while an exception is a failure of the job.
+    """
+    from compressor.solve import measure, observe  # needs numba: only to simulate
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
+        if case.output.keep == "metrics":
+            return measure(case)
+        found, dataset = observe(case)
+    if found.reason == Reason.INVALID_INPUT:
+        return found
+    if place is None:
+        file, data = series_file(dataset, case.output)
+        return Carried(replace(found, series=file), data)
+    try:
+        return replace(found, series=write_series(place, dataset, case.output))
+    except StoreError as error:
+        return error

@@ -1,0 +1,133 @@
+"""A worker process from the inside: its limits, and batches of jobs with a note of each job."""
+
+import contextlib
+import ctypes
+import os
+import pickle
+import resource
+import signal
+import struct
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any
+
+from compressor.reasons import Reason
+
+OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
+MOST_TEXT = 20_000  # characters of a traceback
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+NOTE = struct.Struct("ddd")  # process; job of the batch; since when it runs, or minus its end (s)
+
+
+@dataclass(frozen=True)
+class Done:
+    """A job that ended, its result, and the seconds that it took."""
+
+    id: Any
+    result: Any
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A job that has no result.
+
+    `reason`: WORKER_DIED, OUT_OF_MEMORY, BUDGET_SECONDS, or INTERNAL_ERROR, with a traceback,
+    where the work raised an exception.
+    """
+
+    id: Any
+    reason: str
+    detail: str
+    traceback: str = ""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Worker processes: how many, and the rules for them.
+
+    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
+    job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
+    itself.
+    """
+
+    count: int = 2
+    prepare: Callable[[], object] = int
+    memory: int | None = None
+    grace: float = 1.0
+    target_seconds: float = 0.2
+
+
+HERE: dict[str, Any] = {}  # what `settle` leaves for `do_batch`
+
+
+def settle(work: Callable[[Any], Any], rules: Workers, notes: SharedMemory, parent: int) -> None:
+    """Make a new process a worker: its end, signals, streams, memory; what it is told once."""
+    if sys.platform == "linux":  # die when the parent does, even amid compiled code
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before
+        os._exit(0)
+    for number in (signal.SIGINT, signal.SIGHUP):  # Ctrl-C reaches all: the parent ends us
+        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    with contextlib.suppress(OSError):  # there may be no stderr
+        os.dup2(2, 1)  # stdout is for data
+    os.environ["PYTHONFAULTHANDLER"] = ""  # or loky has a crash print where it was
+    rules.prepare()
+    assert rules.memory
+    HERE.update(work=work, rules=rules, shared=notes, notes=notes.buf)
+    limit(rules.memory)
+
+
+def limit(memory: int) -> None:
+    """Have allocations fail once a job has added `memory` bytes, and no crash write a core file."""
+    _, most = resource.getrlimit(resource.RLIMIT_CORE)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, most))
+    if sys.platform != "linux":
+        return
+    with open("/proc/self/oom_score_adj", "w") as file:
+        file.write("500")  # should memory run out, a worker is a better victim than its parent
+    with open("/proc/self/statm") as file:
+        present = int(file.read().split()[5]) * resource.getpagesize()
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)
+    wanted = present + memory
+    if most == resource.RLIM_INFINITY or wanted < most:
+        resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
+
+
+def do_batch(place: int, payloads: Sequence[bytes]) -> tuple[int, list[Done | Lost]]:
+    """Do the jobs of a batch: its place, and how jobs ended, all but a rest that is given back."""
+    found: list[Done | Lost] = []
+    began = start = time.monotonic()
+    for position, payload in enumerate(payloads):
+        NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), position, start)
+        found.append(perform(payload, start))
+        start = time.monotonic()
+        NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), position, -start)
+        if start - began > OVERRUN * HERE["rules"].target_seconds:
+            break
+    return place, found
+
+
+def perform(payload: bytes, start: float) -> Done | Lost:
+    """Do one job; its result is pickled."""
+    try:
+        result = pickle.dumps(HERE["work"](pickle.loads(payload)), pickle.HIGHEST_PROTOCOL)
+        return Done(None, result, time.monotonic() - start)
+    except MemoryError:
+        most = f"needs more than the {HERE['rules'].memory / 1e9:.3g} GB that a worker may add"
+        return Lost(None, Reason.OUT_OF_MEMORY, most)
+    except BaseException as error:  # work may even call sys.exit
+        return Lost(None, Reason.INTERNAL_ERROR, *described(error))
+
+
+def described(error: BaseException) -> tuple[str, str]:
+    """An exception in a line, and its traceback."""
+    what = traceback.format_exception_only(error)[-1].strip()
+    return what[:MOST_TEXT], "".join(traceback.format_exception(error))[-MOST_TEXT:]

@@ -1,0 +1,416 @@
+"""Worker processes: a poison job costs itself only, and no process outlives its parent."""
+
+import fcntl
+import itertools
+import multiprocessing
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from multiprocessing import resource_tracker
+from pathlib import Path
+
+import pytest
+from bad_jobs import LEAST, POISON, SECONDS, named, sleep, work
+from joblib.externals.loky.backend import resource_tracker as loky_tracker
+
+from compressor.sweep import execution
+from compressor.sweep.execution import WorkersFailed, rest, run_batches
+from compressor.sweep.worker import MOST_TEXT, Done, Lost, Workers
+
+RULES = {"memory": LEAST, "grace": 0.3}
+HERE = str(Path(__file__).parent)
+
+
+def results(ends):
+    return {end.id: end.result for end in ends if isinstance(end, Done)}
+
+
+def lost(ends):
+    return {end.id: end for end in ends if isinstance(end, Lost)}
+
+
+def is_running(pid):
+    """Whether a process is there and is no zombie."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] != "Z"
+
+
+def children():
+    """Our own child processes, zombies too."""
+    mine = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == os.getpid():
+            mine.append(int(path.parent.name))
+    return set(mine)
+
+
+@pytest.fixture(autouse=True)
+def no_child_is_left():
+    before = children()
+    yield
+    trackers = {resource_tracker._resource_tracker._pid, loky_tracker._resource_tracker._pid}
+    assert children() <= before | trackers
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_said(capfd):
+    """No message of ours, of joblib or of a dying worker."""
+    yield
+    assert capfd.readouterr() == ("", "")
+
+
+def wait_for(condition, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert condition()
+
+
+# ---- good jobs ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_every_job_is_done_once(count):
+    ends = list(run_batches(work, named(range(500)), Workers(count)))
+    assert len(ends) == 500
+    assert results(ends) == {n: n for n in range(500)}
+    assert all(end.seconds >= 0 for end in ends)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_as_many_processes_as_were_asked_for(count):
+    jobs = named(range(100))
+    ends = results(run_batches(lambda _: (time.sleep(0.01), os.getpid())[1], jobs, Workers(count)))
+    assert len({*ends.values()}) == count
+    assert os.getpid() not in ends.values()
+
+
+def test_no_jobs_need_no_workers():
+    assert list(run_batches(work, [], Workers())) == []
+
+
+def test_many_jobs_are_never_listed():
+    issued = itertools.count()
+    ends = run_batches(work, ((n, n, 9.0) for n in issued), Workers())
+    first = [end.id for end in itertools.islice(ends, 5000)]
+    ends.close()
+    assert len(set(first)) == 5000
+    assert next(issued) < 9000
+
+
+def test_a_slow_caller_is_waited_for():
+    issued = itertools.count()
+    ends = run_batches(work, ((n, n, 9.0) for n in issued), Workers(), total=10**6)
+    list(itertools.islice(ends, 3000))
+    time.sleep(1)  # in which workers could do many times as much
+    assert next(issued) < 7000
+    ends.close()
+
+
+def test_a_long_batch_gives_its_rest_back():
+    def slow(payload):
+        time.sleep(0.001 if payload < 30 else 0.2)
+        return os.getpid()
+
+    ends = results(run_batches(slow, named(range(50)), Workers(target_seconds=0.05)))
+    assert len({ends[n] for n in range(30, 50)}) == 2
+
+
+def test_large_payloads_and_results_pass():
+    jobs = [(n, bytes(30_000_000), 60.0) for n in range(3)]
+    ends = results(run_batches(lambda data: data + b"1", jobs, Workers()))
+    assert {len(result) for result in ends.values()} == {30_000_001}
+
+
+def test_a_worker_has_none_of_our_files(tmp_path):
+    """A lock that we hold would else outlive us in a worker; what it prints is no data."""
+    with open(tmp_path / "lock", "w") as lock:
+        os.set_inheritable(lock.fileno(), True)
+        fcntl.flock(lock, fcntl.LOCK_EX)
+
+        def look(_):
+            return [os.path.realpath(f"/dev/fd/{name}") for name in os.listdir("/dev/fd")]
+
+        (files,) = results(run_batches(look, named([0]), Workers(1))).values()
+    assert not [name for name in files if "lock" in name]
+    assert files[0] == os.devnull
+    assert files[1] == files[2]
+
+
+def test_numeric_libraries_have_one_thread_in_a_worker():
+    ends = run_batches(lambda name: os.environ.get(name), named(["OMP_NUM_THREADS"]), Workers(1))
+    assert [*results(ends).values()] == ["1"]
+
+
+def test_what_is_prepared_is_not_timed(tmp_path):
+    def prepare():
+        time.sleep(1.5)
+        (tmp_path / f"{os.getpid()}").touch()
+
+    jobs = [(n, n, 0.5) for n in range(4)]
+    rules = Workers(2, prepare, grace=0.2)
+    ends = list(run_batches(lambda _: (tmp_path / f"{os.getpid()}").exists(), jobs, rules))
+    assert results(ends) == dict.fromkeys(range(4), True)
+
+
+# ---- poison -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", POISON)
+def test_a_poison_job_costs_itself_only(name):
+    jobs = named([*range(60), name, *range(60, 120)])
+    ends = list(run_batches(work, jobs, Workers(2, **RULES)))
+    assert len(ends) == 121
+    assert results(ends) == {n: n for n in range(120)}
+    (end,) = lost(ends).values()
+    assert (end.id, end.reason) == (name, POISON[name][1])
+    assert POISON[name][2] in end.detail
+    assert (end.reason == "internal_error") == ("Traceback" in end.traceback)
+    assert len(end.traceback) <= MOST_TEXT
+
+
+def test_a_payload_that_does_not_pickle_is_a_lost_job():
+    ends = list(run_batches(work, [*named([1]), ("odd", lambda: None, 9.0)], Workers(1)))
+    assert results(ends) == {1: 1}
+    assert lost(ends)["odd"].reason == "internal_error"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_mixes_of_poison(seed):
+    draw = random.Random(seed)
+    bad = [(f"{n}", draw.choice(list(POISON))) for n in range(draw.randint(1, 5))]
+    good = [(n, n) for n in range(draw.randint(1, 200))]
+    mixed = draw.sample(bad + good, len(bad) + len(good))
+    jobs = [(name, kind, SECONDS.get(kind, 1e9)) for name, kind in mixed]
+    ends = list(run_batches(work, jobs, Workers(draw.randint(1, 3), **RULES)))
+    assert len(ends) == len(jobs)
+    assert results(ends) == dict(good)
+    assert {name: end.reason for name, end in lost(ends).items()} == {
+        name: POISON[kind][1] for name, kind in bad
+    }
+
+
+def test_a_job_may_succeed_when_it_is_tried_again(tmp_path):
+    def flaky(payload):
+        if payload == 20 and not (tmp_path / "tried").exists():
+            (tmp_path / "tried").touch()
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return payload
+
+    ends = list(run_batches(flaky, named(range(40)), Workers()))
+    assert (tmp_path / "tried").exists()
+    assert results(ends) == {n: n for n in range(40)}
+
+
+def test_results_that_arrived_are_not_computed_again(tmp_path):
+    """Of the batches that had ended when a worker died, no job runs twice."""
+
+    def counted(payload):
+        with open(tmp_path / str(payload), "a") as file:
+            file.write("x")
+        time.sleep(0.02)
+        if payload == 150:
+            os._exit(3)
+        return payload
+
+    seen, again = {}, 0
+    for end in run_batches(counted, named(range(200)), Workers(target_seconds=0.1)):
+        seen[end.id] = (tmp_path / str(end.id)).read_text()
+    for payload, text in seen.items():
+        assert text == (tmp_path / str(payload)).read_text()  # not after it was handed over
+        again += len(text) > 1
+    assert len(seen) == 200
+    assert again <= 25  # at most the batches that were with the two workers
+
+
+def test_a_job_that_never_ends_is_named_without_a_search(tmp_path):
+    """One time limit passes, not one for each halving of its batch; others are not suspected."""
+    began = time.monotonic()
+    jobs = [*named(range(100)), ("hang", "hang", 6.0), *named(range(100, 200))]
+    ends = list(run_batches(work, jobs, Workers(2, **RULES)))
+    assert lost(ends)["hang"].reason == "budget_seconds"
+    assert len(results(ends)) == 200
+    assert 6 < time.monotonic() - began < 30
+
+
+def test_workers_that_die_between_jobs_are_replaced(tmp_path):
+    """Nobody is named, so that batches are halved; nothing is lost."""
+
+    def dying(payload):
+        if payload % 25 == 0 and not (tmp_path / str(payload)).exists():
+            (tmp_path / str(payload)).touch()
+            threading.Timer(0.05, os._exit, (0,)).start()  # it may hit a job, or none
+        return payload
+
+    ends = list(run_batches(dying, named(range(100)), Workers()))
+    assert results(ends) == {n: n for n in range(100)}
+
+
+def test_a_worker_that_dies_amid_a_message_costs_nothing(tmp_path):
+    """What it leaves half-said would have joblib read for ever."""
+
+    def end_amid_message():
+        talking, main = False, threading.main_thread().ident
+        while not talking:
+            time.sleep(0.001)
+            frames = traceback.walk_stack(sys._current_frames()[main])
+            talking = any(frame.f_code.co_name == "_send" for frame, _ in frames)
+        time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def large(payload):
+        if payload == 3 and not (tmp_path / "tried").exists():
+            (tmp_path / "tried").touch()
+            threading.Thread(target=end_amid_message).start()
+        return bytes(300_000_000) if payload == 3 else payload
+
+    ends = list(run_batches(large, named(range(6)), Workers(1, memory=4 * 10**9)))
+    assert len(results(ends)) == 6
+    assert (tmp_path / "tried").exists()
+
+
+def test_workers_that_cannot_begin_end_the_call():
+    with pytest.raises(WorkersFailed, match="jobs could not even begin: exit code 7"):
+        list(run_batches(work, named(range(100)), Workers(2, lambda: os._exit(7))))
+
+
+def test_no_room_for_workers_ends_the_call(monkeypatch):
+    def refuse(*arguments, **options):
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(multiprocessing.process.BaseProcess, "start", refuse)
+    with pytest.raises(WorkersFailed, match="no worker process can be started: no more processes"):
+        list(run_batches(work, named(range(100)), Workers()))
+
+
+# ---- ends ---------------------------------------------------------------------------------------
+
+
+def test_closing_ends_the_workers():
+    ends = run_batches(work, named([1, "hang", "stop"]), Workers(3, grace=60))
+    assert next(ends).id == 1
+    assert len(children()) >= 3
+    began = time.monotonic()
+    ends.close()
+    assert time.monotonic() - began < 5
+    assert list(ends) == []
+
+
+def test_results_that_came_before_an_interruption_are_kept():
+    """Ctrl-C while we wait: what had arrived by then still comes, then the exception."""
+    ours = os.getpid()
+
+    def interrupting(payload):
+        time.sleep(0.002)
+        if payload == 50:
+            time.sleep(0.5)  # what was sent before arrives
+            os.kill(ours, signal.SIGINT)
+            time.sleep(60)
+        return payload
+
+    ends = []
+    with pytest.raises(KeyboardInterrupt):
+        ends.extend(run_batches(interrupting, named(range(100)), Workers(1, target_seconds=0.01)))
+    assert results(ends).keys() >= set(range(30))
+    assert len(ends) <= 50
+
+
+def test_results_that_came_before_the_caller_failed_are_kept():
+    running = run_batches(sleep, named([0.005 + n / 1e6 for n in range(100)]), Workers(1))
+    ends = [next(running)]
+    time.sleep(0.5)
+    with pytest.raises(LookupError, match="no more"):
+        ends.extend(rest(running, LookupError("no more")))
+    assert len(results(ends)) >= 4
+    assert list(running) == []
+
+
+def test_what_the_jobs_raise_comes_through():
+    def jobs():
+        yield from named(range(30))
+        raise LookupError("no more")
+
+    ends = []
+    with pytest.raises(LookupError, match="no more"):
+        ends.extend(run_batches(work, jobs(), Workers()))
+
+
+def test_the_pulse_beats_while_no_job_ends():
+    beats = []
+    list(run_batches(sleep, named([1.5]), Workers(1), pulse=lambda: beats.append(time.monotonic())))
+    gaps = [after - before for before, after in itertools.pairwise(beats)]
+    assert len(beats) > 6
+    assert sorted(gaps)[len(gaps) // 2] < 0.3
+
+
+PARENT = """
+import os, signal, sys
+from compressor.sweep.execution import run_batches
+from compressor.sweep.worker import Workers
+
+def work(payload):
+    os.write(2, f"{os.getpid()}\\n".encode())
+    if payload == "stop":
+        os.kill(os.getpid(), signal.SIGSTOP)
+    while True:
+        pass
+
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+list(run_batches(work, [(name, name, 1e9) for name in ("busy", "stop")], Workers(2)))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_process_outlives_its_parent(number):
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    pids = [int(parent.stderr.readline()) for _ in range(2)]
+    assert all(map(is_running, pids))
+    parent.send_signal(number)
+    parent.wait(60)
+    wait_for(lambda: not any(map(is_running, pids)))
+    said = parent.stderr.read()  # until the last process of all has ended
+    parent.stderr.close()
+    if number == signal.SIGTERM:
+        assert said == ""
+    assert not list(Path("/dev/shm").glob(f"*{parent.pid}*"))
+
+
+def test_ctrl_c_is_silent_while_workers_start():
+    """It reaches the whole group, also processes that have just begun."""
+    code = PARENT.replace("signal.SIGTERM", "signal.SIGINT")
+    for seconds in (0.7, 0.9, 1.2):
+        parent = subprocess.Popen(
+            [sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
+        time.sleep(seconds)
+        os.killpg(parent.pid, signal.SIGINT)
+        _, said = parent.communicate(timeout=60)
+        assert parent.returncode in (143, 1, -signal.SIGINT)
+        if parent.returncode == 143:
+            assert re.fullmatch(r"(\d+\n)*", said)
+
+
+# ---- settings -----------------------------------------------------------------------------------
+
+
+def test_memory_is_shared_among_workers(monkeypatch, tmp_path):
+    (tmp_path / "most").write_text("8000000000\n")
+    monkeypatch.setattr(execution, "MEMORY_LIMITS", [tmp_path / "none", tmp_path / "most"])
+    assert execution.memory_share(2) == 3_000_000_000
+    (tmp_path / "most").write_text("max\n")
+    assert execution.memory_share(1) > execution.memory_share(4) > 0
