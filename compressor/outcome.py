@@ -11,10 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.metrics import AXES, ERRORS, JOINTS, LEDGER, METRICS, NUMBERS, SIZES
+from compressor.metrics import AXES, JOINTS, NUMBERS, SIZES
 from compressor.program import PROGRAM
-
-__all__ = ["AXES", "ERRORS", "LEDGER", "METRICS", "NUMBERS", "ROW", "SIZES", "Outcome"]
 
 # a job's numbers as one structured scalar: what workers send home and segments hold
 ROW = np.dtype(

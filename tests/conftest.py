@@ -95,6 +95,3 @@ def paper_runs(paper_store):
     return {labels[run.attrs["physics_key"]]: run for run in runs}
 
 
-def pytest_collection_modifyitems(items):
-    """Dask's tests last: threads that it leaves behind make later sweeps spawn, not fork."""
-    items.sort(key=lambda item: item.path.stem == "test_cluster")

@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "report": {"analysis", "cases", "store", "metrics", "reasons"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
-    "compsim": {"analysis", "cases", "measure", "metrics", "reasons", "report", "solve", "store",
+    "compsim": {"", "analysis", "cases", "measure", "metrics", "reasons", "report", "solve", "store",
                 "sweep"},
 }  # fmt: skip
 PACKAGES = ("cases", "physics", "solve", "store", "sweep", "analysis", "report", "measure")
@@ -42,7 +42,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "matplotlib": {"compressor.report.figures"},
     "click": {"compsim"},
 }
-MOST_NAMES = 180  # that cross a wall between two rooms
+MOST_NAMES = 198  # that cross a wall between two rooms
 MOST_LINES, MOST_FUNCTION, MOST_PARAMETERS = 350, 60, 6
 PUBLIC = {"Case", "load_cases", "open_study", "simulate"}  # found through the root by name
 
@@ -155,7 +155,7 @@ def faults_of_doors(sources: Sources) -> list[str]:
     for package in PACKAGES:
         door = f"compressor.{package}"
         tree = ast.parse(sources[door])
-        if not (ast.get_docstring(tree) or "").count("\n") == 0 or not ast.get_docstring(tree):
+        if len((ast.get_docstring(tree) or "").splitlines()) != 1:
             found.append(f"{door} needs one line of purpose")
         if not all(isinstance(node, ast.ImportFrom) for node in tree.body[1:]):
             found.append(f"{door} does more than hand on names")

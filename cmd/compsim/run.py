@@ -92,15 +92,13 @@ def run(
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     caution(studies)
-    from compressor.sweep import sweep
+    from compressor.sweep import Options, sweep
 
     screen = Screen(quiet)
     try:
         with cluster(scheduler) as elsewhere:
-            summary = sweep(
-                studies, output, jobs or cores(), screen, context.obj, rerun == "failed", part,
-                wait, elsewhere,
-            )  # fmt: skip
+            options = Options(context.obj, rerun == "failed", part, wait, elsewhere)
+            summary = sweep(studies, output, jobs or cores(), screen, options)
     except BaseException:
         screen.end()
         if screen.total:

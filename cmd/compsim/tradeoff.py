@@ -78,9 +78,7 @@ def write_study(folder: Path, study: "xr.Dataset") -> None:
 def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, Case]":
     """The cases to be studied, by label; each needs a joint with clearance."""
     from compressor.cases import load_studies, points
-    from compressor.measure import default_cases
-    from compressor.physics import Scene
-    from compressor.solve import scene
+    from compressor.measure import default_cases, faulty
 
     if not configs:
         if overrides:
@@ -90,7 +88,7 @@ def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, C
     for study in load_studies(*configs, overrides=overrides):
         for point, case in zip(points(study), study.cases, strict=True):
             name = " ".join([study.name, *(plain(value) for value in point.values())])
-            if scene(case) == Scene.IDEAL:
+            if not faulty(case):
                 raise click.UsageError(
                     f"{study.path}: {name} has no joint with clearance, so nothing is integrated: "
                     "set joint and clearance_mm"

@@ -8,8 +8,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
+from compressor.analysis.runs import record_of
+from compressor.cases import Case
 from compressor.physics import exact_motion, gas_corners
+from compressor.solve import record
 
 # Table 1 of the paper
 BASE_RADIUS = 0.200
@@ -66,6 +70,31 @@ def contour(p, angles, base_radius):
     return radius * np.cos(angles), radius * np.sin(angles)
 
 
+@dataclass(frozen=True)
+class Cam:
+    """The cam of a run's design load, in m over cam angles (rad, any shape)."""
+
+    run: xr.Dataset
+    base_radius: float = BASE_RADIUS
+
+    @property
+    def printed_fall(self) -> float:
+        """Cam angle (rad) at which the follower begins to fall as printed (the gas's corner)."""
+        return float(printed_corners_of_gas(record_of(self.run))[2])
+
+    def contour(self, angles, base_radius):
+        """`contour` of the closed cam around a base circle (m)."""
+        return contour(record_of(self.run), angles, base_radius)
+
+    def follower(self, angles):
+        """Displacement of the closed cam's follower."""
+        return cam_profile(record_of(self.run), angles)
+
+    def printed_follower(self, angles):
+        """Displacement of the follower by Eq. 10 taken literally."""
+        return printed_profile(record_of(self.run), angles)
+
+
 def pressure_angle(p, angles, base_radius):
     """Pressure angle (rad) of the aligned roller follower: tan = (ds/dphi) / (r0 + s)."""
     return np.arctan(cam_slope(p, angles) / (base_radius + cam_profile(p, angles)))
@@ -94,11 +123,13 @@ class Comparison:
     source: str
 
 
-def comparisons(p):
+def comparisons(p=None):
     """What the paper prints of spring and cam beside what follows (Eq. 8-12, Table 1).
 
-    `p` is a record of the design load with the paper's pressures; returns a list of Comparison.
+    `p` is a record of the design load with the paper's pressures, by default the paper's; returns a
+    list of Comparison.
     """
+    p = record(Case()) if p is None else p
     stroke = p.spring_stroke
     stiffness = (p.discharge_force - p.suction_force) / stroke
     expansion, _, compression = printed_corners_of_gas(p)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import xarray as xr
 
 from compressor.analysis import SPOKEN, claims, comparisons, paper_cases
-from compressor.cases import Case
 from compressor.report.figures import FIGURES
 from compressor.report.figures.sweep_metric import MEASURES, Measure, measures
 from compressor.report.page import Plate, Section
@@ -22,7 +21,6 @@ from compressor.report.tables import (
     number_cell,
     value_cell,
 )
-from compressor.solve import record
 from compressor.store import Folder
 
 
@@ -89,7 +87,7 @@ def printed_table() -> Table:
             number_cell(c.follows),
             Cell(c.source),
         ])
-        for c in comparisons(record(Case()))
+        for c in comparisons()
     ]  # fmt: skip
     return Table(["quantity", "printed", "follows", "from"], rows)
 

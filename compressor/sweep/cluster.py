@@ -21,6 +21,7 @@ from joblib import Parallel, delayed
 from joblib._dask import DaskDistributedBackend
 
 from compressor.cases import Case
+from compressor.program import CompsimError
 from compressor.reasons import Reason
 from compressor.sweep.batches import AGAIN, Batches, End, Input, Job
 from compressor.sweep.remote import Batch, Unfit, on_worker
@@ -42,8 +43,10 @@ STARTING = "the cluster's workers load, or compile, the equations (under a minut
 WAITING = "the cluster has no workers: waiting for the first"
 
 
-class ClusterError(Exception):
+class ClusterError(CompsimError):
     """A cluster that cannot be used: which, why, and what to do about it."""
+
+    exit_code = 2
 
 
 class Cluster:

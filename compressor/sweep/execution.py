@@ -25,6 +25,7 @@ from joblib.externals.loky.backend.process import LokyProcess
 from joblib.externals.loky.process_executor import BrokenProcessPool
 from joblib.parallel import LokyBackend
 
+from compressor.program import CompsimError
 from compressor.reasons import Reason
 from compressor.sweep.batches import MOST_BATCH, TICK, Batches, End, Input, Job
 from compressor.sweep.worker import ENDING, NOTE, Lost, Workers, do_batch, settle
@@ -36,7 +37,7 @@ MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
 MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
-class WorkersFailed(Exception):
+class WorkersFailed(CompsimError):
     """Worker processes cannot be started, or die before they begin a job."""
 
 

@@ -52,6 +52,22 @@ class End(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Options:
+    """How to sweep.
+
+    command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
+    part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
+    wait: until another run that writes there has ended; backend: where jobs run, if not here.
+    """
+
+    command: str = ""
+    rerun_failed: bool = False
+    part: tuple[int, int] | None = None
+    wait: bool = False
+    backend: Backend | None = None
+
+
+@dataclass(frozen=True)
 class Failure:
     """A failed job as one study sees it."""
 
@@ -92,38 +108,32 @@ def sweep(
     folder: Folder,
     workers: int = 2,
     progress: Progress = silent,
-    command: str = "",
-    rerun_failed: bool = False,
-    part: tuple[int, int] | None = None,
-    wait: bool = False,
-    backend: Backend | None = None,
+    options: Options | None = None,
 ) -> Summary:
     """Run what is missing of some studies and store it in a folder; failed jobs only on request.
 
-    backend: by default, `workers` processes of this machine;
-    part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
-    wait: until another run that writes there has ended.
-
-    Raises StoreError, and WorkersFailed; whatever ends a sweep early, finished jobs are stored and
-    the same call goes on.
+    workers: processes of this machine. Raises StoreError, and WorkersFailed; whatever ends a sweep
+    early, finished jobs are stored and the same call goes on.
     """
+    options = options or Options()
     began = time.monotonic()
     folder = Path(folder).absolute()
     name = ""
-    if part is not None:
-        studies, name = [shard(study, *part) for study in studies], f"{part[0]}-of-{part[1]}"
+    if options.part is not None:
+        studies = [shard(study, *options.part) for study in studies]
+        name = "{}-of-{}".format(*options.part)
     cases = wanted(studies)
-    with Writer(folder, name, wait, command) as writer:
+    with Writer(folder, name, options.wait, options.command) as writer:
         ends = stored(writer.found, cases)
-        if rerun_failed:
+        if options.rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}
         missing = [case for key, case in cases.items() if key not in ends]
         for study in studies:
-            write_study(folder, study, command)
+            write_study(folder, study, options.command)
         if missing:
             for damage in writer.found.damaged:
                 progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
-            run_missing(writer, missing, backend or local(workers), ends, progress)
+            run_missing(writer, missing, options.backend or local(workers), ends, progress)
     counts, failed = endings(studies, ends)
     seconds = time.monotonic() - began
     return Summary(len(cases), len(cases) - len(missing), len(missing), counts, failed, seconds)

@@ -25,7 +25,7 @@ from compressor.store.files import StoreError
 from compressor.store.verify import verify
 from compressor.sweep import cluster, shared_folder
 from compressor.sweep.cluster import Cluster, ClusterError, Remote
-from compressor.sweep.sweep import sweep
+from compressor.sweep.sweep import Options, sweep
 from compressor.sweep.versions import differences, versions
 from compressor.sweep.worker import Workers
 
@@ -114,7 +114,7 @@ def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path,
     victim = dask.workers[0].process.pid
     with Cluster(dask.scheduler_address) as backend:
         killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
-        summary = sweep(studies, tmp_path / "out", backend=killing)
+        summary = sweep(studies, tmp_path / "out", options=Options(backend=killing))
     assert (summary.run_now, summary.failed) == (130, ())
     assert_same(tmp_path / "out", locally)
     with pytest.raises(ProcessLookupError):
@@ -135,7 +135,7 @@ def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path
     monkeypatch.setattr(cluster, "visible", elsewhere)
     monkeypatch.setattr(shared_folder, "store_series", noted)
     with Cluster(dask.scheduler_address) as backend:
-        sweep(studies, tmp_path / "out", backend=backend)
+        sweep(studies, tmp_path / "out", options=Options(backend=backend))
     assert len(stored) == 10
     assert_same(tmp_path / "out", locally)
 
@@ -157,7 +157,7 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         Cluster(dask.scheduler_address) as backend,
         pytest.raises(StoreError, match="No space left on device"),
     ):
-        sweep(studies[1:], tmp_path / "out", backend=backend)
+        sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
 
 
 # ---- jobs that fail -----------------------------------------------------------------------------
@@ -324,7 +324,7 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
                 empty.close()
 
         with pytest.raises(ClusterError, match="the scheduler was lost; the same command goes on"):
-            sweep(studies, tmp_path / "out", progress=remark, backend=backend)
+            sweep(studies, tmp_path / "out", progress=remark, options=Options(backend=backend))
     assert told.count(cluster.WAITING) == 1
 
 

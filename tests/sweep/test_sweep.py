@@ -15,7 +15,7 @@ from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.verify import verify
 from compressor.sweep import warm_up
-from compressor.sweep.sweep import Failure, sweep, wanted
+from compressor.sweep.sweep import Failure, Options, sweep, wanted
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 BOTH = {"joint": "both", "clearance_mm": 0.1}
@@ -134,14 +134,16 @@ def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path):
 def test_failed_jobs_run_again_on_request(studies, tmp_path):
     made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}})
     sweep(made, tmp_path / "out", 1)
-    again = sweep(made, tmp_path / "out", 1, rerun_failed=True)
+    again = sweep(made, tmp_path / "out", 1, options=Options(rerun_failed=True))
     assert (again.done_before, again.run_now, len(again.failed)) == (1, 1, 1)
 
 
 def test_shards_are_one_study_together(studies, tmp_path):
     axes = {"load": ["none", "design"], "machine": {"rod_mass_kg": [3, 4, 5, 6]}}
     made = studies(one=axes, same={"load": "none"})
-    parts = [sweep(made, tmp_path / "out", 1, part=(number, 3)) for number in (1, 2, 3)]
+    parts = [
+        sweep(made, tmp_path / "out", 1, options=Options(part=(number, 3))) for number in (1, 2, 3)
+    ]
     assert all(part.done_before == 0 for part in parts)
     assert sum(part.run_now for part in parts) == len(wanted(made)) == 9
     assert sweep(made, tmp_path / "out", 1).run_now == 0
@@ -186,7 +188,7 @@ def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypat
 
     def meanwhile(done, total, remark):
         if not inside:
-            inside.append(sweep(shared, tmp_path / "out", 1, part=(1, 1)))
+            inside.append(sweep(shared, tmp_path / "out", 1, options=Options(part=(1, 1))))
 
     sweep(fewer, tmp_path / "out", 1, meanwhile)
     assert inside[0].run_now == 1

@@ -11,19 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
 
-from compressor.analysis import (
-    BASE_RADIUS,
-    cam_profile,
-    case_of,
-    contour,
-    printed_corners_of_gas,
-    printed_profile,
-    settled,
-)
-from compressor.physics import sample_segments, segments
+from compressor.analysis import Cam, case_of, load_phases, settled
 from compressor.report.figures.curves import Runs
 from compressor.report.figures.style import BLUE, GOLD, GREY, RED, Line, sheet, styled
-from compressor.solve import record
 
 PHASES = ("expansion", "suction", "compression", "discharge")
 CLOSED = Line(BLUE, "-", 1.8, 2.3)
@@ -59,10 +49,7 @@ def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 def name_phases(panel: Axes, run: xr.Dataset, volume: np.ndarray, pressure: np.ndarray) -> None:
     """Write each phase's name beside it, with an arrow along its direction."""
-    p = record(case_of(run))
-    times = run["time"].values
-    edges, phases = segments(p, times[-1])
-    phase = phases[sample_segments(times, edges)]
+    phase = load_phases(run)
     offsets = {"expansion": (14, 8), "suction": (0, -16), "compression": (10, 8)}
     for number, name in enumerate(PHASES):
         here = np.flatnonzero(phase == number)
@@ -89,23 +76,23 @@ def name_phases(panel: Axes, run: xr.Dataset, volume: np.ndarray, pressure: np.n
 @styled
 def draw_cam(runs: Runs) -> Figure:
     """Figure 4: the cam's contour, and its follower's displacement beside the printed one."""
-    p = record(case_of(runs["design"]))
+    cam = Cam(runs["design"])
     angles = np.radians(np.linspace(0, 360, 1441))
     figure, panels = sheet(1, 2, 4.9, width_ratios=(1, 1.25))
-    draw_contour(panels[0, 0], p, angles)
-    draw_follower(panels[0, 1], p, angles)
+    draw_contour(panels[0, 0], cam, angles)
+    draw_follower(panels[0, 1], cam, angles)
     return figure
 
 
-def draw_contour(panel: Axes, p: np.record, angles: np.ndarray) -> None:
+def draw_contour(panel: Axes, cam: Cam, angles: np.ndarray) -> None:
     """The closed cam's pitch curve around its base circle, with rays at every quarter turn."""
-    x, y = contour(p, angles, BASE_RADIUS)
-    disc = Circle((0, 0), BASE_RADIUS * 1e3, facecolor="#f1f1f1", edgecolor="none")
+    x, y = cam.contour(angles, cam.base_radius)
+    disc = Circle((0, 0), cam.base_radius * 1e3, facecolor="#f1f1f1", edgecolor="none")
     panel.add_patch(disc)
     turns = np.radians([0, 90, 180, 270])
-    for degrees, rim_x, rim_y in zip((0, 90, 180, 270), *contour(p, turns, 0.0), strict=True):
-        mark_ray(panel, degrees, math.hypot(rim_x, rim_y) + BASE_RADIUS)
-    circle = BASE_RADIUS * 1e3 * np.array([np.cos(angles), np.sin(angles)])
+    for degrees, rim_x, rim_y in zip((0, 90, 180, 270), *cam.contour(turns, 0.0), strict=True):
+        mark_ray(panel, degrees, math.hypot(rim_x, rim_y) + cam.base_radius)
+    circle = cam.base_radius * 1e3 * np.array([np.cos(angles), np.sin(angles)])
     panel.plot(*circle, **BASE.properties())
     panel.plot(x * 1e3, y * 1e3, **CLOSED.properties())
     panel.set_aspect("equal", adjustable="datalim")
@@ -113,7 +100,7 @@ def draw_contour(panel: Axes, p: np.record, angles: np.ndarray) -> None:
     panel.set_title("(a) contour of the closed cam")
     panel.set_xlabel("x (mm)")
     panel.set_ylabel("y (mm)")
-    base = f"base circle, {BASE_RADIUS * 1e3:g} mm"
+    base = f"base circle, {cam.base_radius * 1e3:g} mm"
     legend_below(panel, [(CLOSED, "roller's path"), (BASE, base)])
 
 
@@ -127,21 +114,21 @@ def mark_ray(panel: Axes, degrees: float, radius: float) -> None:
     panel.text(x, y, f"{degrees:g}°", ha="center", va="center")
 
 
-def draw_follower(panel: Axes, p: np.record, angles: np.ndarray) -> None:
+def draw_follower(panel: Axes, cam: Cam, angles: np.ndarray) -> None:
     """Follower displacement of the closed cam, and of Eq. 10 taken literally."""
-    fall = printed_corners_of_gas(p)[2]
+    fall = cam.printed_fall
     before, after = angles[angles < fall], np.append(fall, angles[angles >= fall])
     for part in (before, after):
-        panel.plot(np.degrees(part), printed_profile(p, part) * 1e3, **PRINTED.properties())
-    panel.plot(np.degrees(angles), cam_profile(p, angles) * 1e3, **CLOSED.properties())
-    height, left = (float(printed_profile(p, turn)) * 1e3 for turn in (math.pi, fall))
+        panel.plot(np.degrees(part), cam.printed_follower(part) * 1e3, **PRINTED.properties())
+    panel.plot(np.degrees(angles), cam.follower(angles) * 1e3, **CLOSED.properties())
+    height, left = (float(cam.printed_follower(turn)) * 1e3 for turn in (math.pi, fall))
     where = math.degrees(fall)
     panel.vlines(where, left, height, colors=RED, linestyles="dotted")
     write_at(panel, f"printed: rises by {height:.1f} mm", (150, height), (0, 5), "left")
     write_at(
         panel, f"and falls by {left:.1f} mm:\nit does not close", (where, 165), (-6, 0), "right"
     )
-    stroke = float(cam_profile(p, math.pi)) * 1e3
+    stroke = float(cam.follower(math.pi)) * 1e3
     write_at(panel, f"{stroke:.0f} mm each way", (183, stroke), (0, 5), "left")
     panel.set_xlim(0, 360)
     panel.xaxis.set_major_locator(MultipleLocator(60))
