@@ -93,5 +93,3 @@ def paper_runs(paper_store):
     stored = read_store(paper_store)
     runs = [stored.job(key) for key in sorted(stored.keys())]
     return {labels[run.attrs["physics_key"]]: run for run in runs}
-
-

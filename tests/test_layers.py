@@ -27,8 +27,8 @@ MAY_IMPORT = {
     "report": {"analysis", "cases", "store", "metrics", "reasons"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
-    "compsim": {"", "analysis", "cases", "measure", "metrics", "reasons", "report", "solve", "store",
-                "sweep"},
+    "compsim": {"", "analysis", "cases", "measure", "metrics", "reasons", "report", "solve",
+                "store", "sweep"},
 }  # fmt: skip
 PACKAGES = ("cases", "physics", "solve", "store", "sweep", "analysis", "report", "measure")
 LIBRARIES = {  # library -> the modules that may import it

@@ -7,10 +7,6 @@ EQUIVALENT: dict[str, str] = {
     "march.py, march: w.h < LEAST_STEP * (w.t + 1.0 / p.omega)"
     " -> w.h <= LEAST_STEP * (w.t + 1.0 / p.omega)":
         "differs only for a step that is refused at the limit to the last bit",
-    "step_control.py, choose_method: w.held >= STIFF_STEPS -> w.held > STIFF_STEPS":
-        "`held` counts in fours and is never 15: both change over at 16",
-    "cam.py, cam_profile: turned < bottom -> turned <= bottom":
-        "the follower stands at the same height on both sides of bottom dead centre",
     "runge_kutta.py, error_norm: a += weight * k[j, i] -> a -= weight * k[j, i]":
         "the whole sum changes its sign, and only its square is used",
     "runge_kutta.py, take_step: stage < STAGES - 1 -> stage > STAGES - 1":

@@ -48,8 +48,10 @@ def stub_sweep(jobs):
     from compressor.solve.simulate import measure
 
     (study,) = load_studies("many.yaml", max_jobs=jobs)
-    sweep.run_job = functools.partial(answered, measure(study.cases[0]))
-    sweep.sweep([study], "results", 2)
+    sys.modules["compressor.sweep.sweep"].run_job = functools.partial(
+        answered, measure(study.cases[0])
+    )
+    sweep([study], "results", 2)
 
 
 def process(*arguments):

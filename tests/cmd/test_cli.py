@@ -116,8 +116,9 @@ def test_a_second_run_does_nothing_and_says_so(case_file, capsys):
 
 
 def test_configs_are_the_paper_s_cases_and_nothing_else():
-    found = load_cases(*CONFIGS.glob("*"))
+    found = load_cases(*CONFIGS.glob("*.yaml"))
     assert sorted(case.key for case in found) == sorted(c.key for c in paper_cases().values())
+    assert {path.suffix for path in CONFIGS.iterdir()} == {".yaml", ".md"}
 
 
 def test_set_changes_every_case_file(case_file):

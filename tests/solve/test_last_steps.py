@@ -10,11 +10,12 @@ from compressor.cases.table import METHODS
 from compressor.physics.record import STATE_NAMES, Scene
 from compressor.solve import march_driver
 from compressor.solve.integrate import integrate
+from compressor.solve.marching import COMPILED
 from compressor.solve.request import LAST
 from compressor.solve.simulate import measure, simulate
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
-SCIPY = [name for name in METHODS if name not in march_driver.COMPILED]
+SCIPY = [name for name in METHODS if name not in COMPILED]
 
 
 def stopped(**values):

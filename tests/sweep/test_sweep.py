@@ -5,17 +5,19 @@ import math
 import os
 import re
 import signal
+import sys
 
 import pytest
 
 import compressor.store.writer
-import compressor.sweep.sweep
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.verify import verify
 from compressor.sweep import warm_up
 from compressor.sweep.sweep import Failure, Options, sweep, wanted
+
+SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 BOTH = {"joint": "both", "clearance_mm": 0.1}
@@ -196,10 +198,10 @@ def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypat
 
 
 def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):
-    def breaking(place, case, real=compressor.sweep.sweep.run_job):
+    def breaking(place, case, real=SWEEP.run_job):
         return real(place, case) if case.load != "none" else {}["the bug"]
 
-    monkeypatch.setattr(compressor.sweep.sweep, "run_job", breaking)
+    monkeypatch.setattr(SWEEP, "run_job", breaking)
     made = studies(one={"load": ["none", "design"]})
     summary = sweep(made, tmp_path / "out", 1)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]
@@ -223,13 +225,13 @@ def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monk
     ],
 )
 def test_a_poison_job_is_a_failed_job(end, reason, detail, again, studies, tmp_path, monkeypatch):
-    def poisoned(place, case, real=compressor.sweep.sweep.run_job):
+    def poisoned(place, case, real=SWEEP.run_job):
         if case.load == "none":
             end()
         return real(place, case)
 
-    monkeypatch.setattr(compressor.sweep.sweep, "run_job", poisoned)
-    monkeypatch.setattr(compressor.sweep.sweep, "GRACE", 0.5)
+    monkeypatch.setattr(SWEEP, "run_job", poisoned)
+    monkeypatch.setattr(SWEEP, "GRACE", 0.5)
     made = studies(one={"load": ["design", "none", "typical"], "solve": {"timeout_s": 0.5}})
     summary = sweep(made, tmp_path / "out", 2)
     assert statuses(tmp_path / "out", made[0]) == ["ok", "failed", "ok"]

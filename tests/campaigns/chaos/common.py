@@ -62,7 +62,7 @@ class Said(NamedTuple):
 def complete_store(folder: Path) -> Path:
     """A store with all jobs of `STUDIES`; loads and compiles all that forked processes need."""
     store = folder / "complete"
-    sweep.sweep(load_studies(*case_files(folder / "cases")), store, 1)
+    sweep(load_studies(*case_files(folder / "cases")), store, 1)
     contents(store)
     forecast.forecast(load_studies(*case_files(folder / "cases")), folder / "new", 1, 1, str)
     return store

@@ -22,6 +22,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+import compressor.sweep as door
 from chaos.common import (
     Said,
     case_files,
@@ -38,7 +39,7 @@ from compressor.store import hdf5
 from compressor.store.reader import read_store
 from compressor.store.rows import decode, encode, segment_name
 from compressor.store.studies import read_study
-from compressor.sweep.sweep import sweep
+from compressor.sweep.sweep import Summary
 
 ROOT = Path(__file__).parents[3]
 SECONDS = 2.0  # of processor time that a command may take
@@ -169,14 +170,14 @@ def words_of_case(trial: Path, texts: list[str], rng: random.Random) -> tuple[st
 
 def said_of_case(words: list[object]) -> Said:
     """What a run says of a case file; one that is valid, but much work, is read and no more."""
-    run = sweep.sweep
+    run = door.sweep
 
-    def cheap(studies: list[Study], *args: Any) -> sweep.Summary:
+    def cheap(studies: list[Study], *args: Any) -> Summary:
         if sum(case.steps for study in studies for case in study.cases) > MOST_SAMPLES:
             raise CaseFileError([])
         return run(studies, *args)
 
-    sweep.sweep = cheap  # type: ignore[assignment]
+    door.sweep = cheap  # type: ignore[assignment]
     return command("run", *words)
 
 

@@ -10,18 +10,19 @@ import random
 import re
 import shutil
 import signal
+import sys
 import tempfile
 from functools import partial
 from pathlib import Path
 
 import compressor.sweep.execution
-import compressor.sweep.sweep
 from chaos.processes import Run
 from chaos.stored import LEAN, case_file, contents, damage
 from chaos.tally import Tally
 from compressor.cases.load import load_studies
 from compressor.store.reader import read_store
 
+SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 WHAT = "jobs that crash, leave, hang, stand still or eat memory, among good ones"
 GOOD = [4 + n / 100 for n in range(24)]  # rod masses, kg
 MOST_BAD = 5
@@ -67,8 +68,8 @@ def poisoned(kinds):
     """Returns what makes a fork's jobs of some keys do harm."""
 
     def prepare():
-        compressor.sweep.sweep.run_job = partial(harmful, kinds)
-        compressor.sweep.sweep.GRACE = 0.2
+        SWEEP.run_job = partial(harmful, kinds)
+        SWEEP.GRACE = 0.2
         compressor.sweep.execution.memory_share = lambda count: LEAST
 
     return prepare
@@ -78,7 +79,7 @@ def harmful(kinds, place, case):
     """Run a case, unless it is one that does harm: in a worker."""
     if case.key in kinds:
         KINDS[kinds[case.key]][0]()
-    return compressor.sweep.sweep.run_job(place, case)
+    return SWEEP.run_job(place, case)
 
 
 def mixed(folder, draw):
