@@ -6,10 +6,12 @@ work in a process that died or took too long, and what runs again.
 """
 
 import contextlib
+import math
 import multiprocessing
 import operator
 import os
 import signal
+import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -30,7 +32,8 @@ from compressor.reasons import Reason
 from compressor.sweep.batches import MOST_BATCH, TICK, Batches, End, Input, Job
 from compressor.sweep.worker import ENDING, NOTE, Lost, Workers, do_batch, settle
 
-STALL = 60.0  # s without any result, while no job runs, after which the workers are killed
+STALL = 60.0  # s without any result, while no job runs, after which all workers are killed
+STARTING = 600.0  # s that workers may take to begin: what they prepare may have to be compiled
 UNSEEN = 3.0  # s that joblib may take to see that a worker died
 FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
 MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
@@ -98,14 +101,13 @@ class Local(Batches):
         super().__init__(jobs, left, rules.target_seconds, rules.count)
         self.rules = replace(rules, memory=rules.memory or memory_share(rules.count))
         self.places = 4 * max(rules.count, 2)  # for notes: more than joblib asks for
-        # what a SIGKILL of ours leaves in shared memory is removed in silence
-        os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
-        self.shared = SharedMemory(create=True, size=self.places * NOTE.size)
+        self.shared = shared_memory(self.places * NOTE.size)
         self.notes: Any = self.shared.buf
         self.initargs = (work, self.rules, self.shared, os.getpid())
         self.pool = self.executor = None  # type: Any
         self.heard = 0.0  # when a batch was last handed out, or ended
-        self.fruitless = 0
+        self.died: float = math.inf  # when a process was first seen to have died
+        self.fruitless, self.begun = 0, False  # begun: a job of this pool has
         self.discard()
 
     def parallel(self) -> Parallel:
@@ -117,8 +119,8 @@ class Local(Batches):
         if self.pool is None:
             self.pool = Parallel(
                 max(self.width, 2), Loky(self.hand_over), "generator_unordered", batch_size=1,
-                pre_dispatch=2 * self.width, max_nbytes=None, initializer=settle,
-                initargs=self.initargs,
+                pre_dispatch=2 * self.width, max_nbytes=None, temp_folder=tempfile.gettempdir(),
+                initializer=settle, initargs=self.initargs,
             ).__enter__()  # fmt: skip
             self.executor = get_reusable_executor(1 if self.alone else self.width, reuse=True)
         return self.pool
@@ -151,16 +153,20 @@ class Local(Batches):
                 self.late.add(pid)
                 kill([pid])
         dead = any(child.exitcode for child in self.processes.values())
-        if self.round and (dead or not at_work) and now - latest > (UNSEEN if dead else STALL):
-            self.break_up()
+        self.died = min(self.died, now) if dead else math.inf
+        self.begun = self.begun or latest > self.heard
+        if self.round and not at_work and now - latest > (STALL if self.begun else STARTING):
+            kill(self.processes)
+        if self.round and now - self.died > UNSEEN:
+            self.unblock()
 
-    def break_up(self) -> None:
-        """Kill all workers, and have joblib see it.
+    def unblock(self) -> None:
+        """Have joblib see that a worker died, which it should within milliseconds.
 
         One that died amid a message leaves joblib reading the rest of it for ever, since this
         process, too, could write there: loky keeps that end open.
         """
-        kill(self.processes)
+        kill(child.pid for child in children())
         results = getattr(self.executor, "_result_queue", None)
         if results and not children():
             results._writer.close()
@@ -207,13 +213,14 @@ class Local(Batches):
         self.pool = self.executor = None
         self.processes: dict[int, Any] = {}
         self.late: set[int] = set()  # processes that were killed for taking too long
+        self.died, self.begun = math.inf, False
         self.out, self.free = {}, deque(range(self.places))
 
     def stop(self) -> None:
         self.stopped = True
         while self.round and not self.round.done():
-            self.watch(time.monotonic(), True)
-            self.break_up()
+            kill(child.pid for child in children())
+            self.watch(time.monotonic(), False)
             wait([self.round], TICK)
         self.thread.shutdown()
         self.discard()
@@ -221,6 +228,19 @@ class Local(Batches):
             self.notes = None
             self.shared.close()
             self.shared.unlink()
+
+
+def shared_memory(size: int) -> SharedMemory:
+    """Shared memory, of which a process of Python's sees that it does not outlive us.
+
+    That process is to survive a hang-up, and to remove in silence what a SIGKILL of ours leaves.
+    """
+    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
+    old = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        return SharedMemory(create=True, size=size)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, old)
 
 
 def children() -> list[Any]:

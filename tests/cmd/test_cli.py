@@ -312,15 +312,13 @@ def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
 
 @pytest.fixture
 def reporter(monkeypatch):
-    """Stands in for compressor.report.report, which draws for seconds."""
+    """Stands in for compressor.report, which draws for seconds."""
 
     def write_report(results, report, command):
         read_studies(results)
         return Path(report, command)
 
-    module = types.ModuleType("compressor.report.report")
-    module.write_report = write_report
-    monkeypatch.setitem(sys.modules, "compressor.report.report", module)
+    monkeypatch.setattr("compressor.report.write_report", write_report)
 
 
 def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
@@ -589,6 +587,7 @@ def test_other_dropped_exceptions_are_told_as_ever(monkeypatch):
     ("send", "number", "code"),
     [
         (os.killpg, signal.SIGINT, 130),  # Ctrl-C reaches the whole group
+        (os.killpg, signal.SIGHUP, 129),  # so does a terminal that is closed
         (os.kill, signal.SIGKILL, -9),
     ],
 )

@@ -73,7 +73,9 @@ def test_the_force_is_elastic_and_damped_and_never_pulls(law):
 def test_a_number_without_a_law_gives_no_force():
     p, stiffness = contact("impact")
     p["law"] = 99
-    assert np.isnan(normal_force(DEPTH, 0.0, stiffness, p)).all()
+    normal, *parts = normal_force(DEPTH, 0.0, stiffness, p)
+    assert np.isnan(parts).all()
+    assert not normal > 0.0  # compilers choose between nan and 0 in max(0, nan)
     assert np.isnan(elastic_energy(1.0, DEPTH, p))
     with pytest.raises(ValueError, match="99"):
         elastic_form(stiffness, p)

@@ -92,7 +92,7 @@ def test_a_repetition_that_does_not_end_says_so(solve, reason, unbalance, monkey
         return run(request)
 
     monkeypatch.setattr(attempts, "integrate", slow)
-    monkeypatch.setattr("compressor.solve.integrate.CHUNK", 100)
+    monkeypatch.setattr("compressor.solve.march_driver.CHUNK", 100)
     found = measure(case(rtol=1e-5, **solve))
     assert found.reason == reason
     assert "; the next run: more than " in found.detail

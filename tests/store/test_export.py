@@ -72,7 +72,7 @@ def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
         assert row["status"] == job.status
         assert row["reason"] == job.reason
         assert row["key"] == job.key
-        for name, (dims, unit, *_) in METRICS.items():
+        for name, (_, dims, unit, *_) in METRICS.items():
             ending = "" if unit == "1" else f" [{unit}]"
             for index in np.ndindex(*(SIZES[dim] for dim in dims)):
                 labels = [str(job[dim].values[i]) for dim, i in zip(dims, index, strict=True)]

@@ -259,8 +259,10 @@ def test_workers_that_die_between_jobs_are_replaced(tmp_path):
     assert results(ends) == {n: n for n in range(100)}
 
 
-def test_a_worker_that_dies_amid_a_message_costs_nothing(tmp_path):
-    """What it leaves half-said would have joblib read for ever."""
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_worker_that_ends_amid_a_message_costs_nothing(number, tmp_path, monkeypatch):
+    """No job runs whose clock tells; what is left half-said would have joblib read for ever."""
+    monkeypatch.setattr(execution, "STALL", 2.0)
 
     def end_amid_message():
         talking, main = False, threading.main_thread().ident
@@ -269,7 +271,7 @@ def test_a_worker_that_dies_amid_a_message_costs_nothing(tmp_path):
             frames = traceback.walk_stack(sys._current_frames()[main])
             talking = any(frame.f_code.co_name == "_send" for frame, _ in frames)
         time.sleep(0.01)
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), number)
 
     def large(payload):
         if payload == 3 and not (tmp_path / "tried").exists():
