@@ -1,7 +1,7 @@
 """What the README pages say is executed or compared.
 
 Commands in `console` blocks run in one folder, page by page in the order of PAGES; `yaml` blocks
-are files named in their first line; `python` blocks run there; `bash` blocks are not run.
+are files named in their first line; `python` blocks run there; `bash` and `py` blocks are not run.
 """
 
 import json
