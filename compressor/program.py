@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import shutil
 from importlib import metadata
 from pathlib import Path
 
@@ -48,10 +47,3 @@ def machine_code_folder() -> Path:
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compsim"
     base = beside if os.access(beside if beside.exists() else COMPILED, os.W_OK) else user
     return base / f"numba-{sources_hash(COMPILED)}"
-
-
-def discard_machine_code(folder: Path) -> None:
-    """Remove the machine code of other sources, when that of the present ones is first made."""
-    if not folder.exists():
-        for old in folder.parent.glob("numba-*"):
-            shutil.rmtree(old, ignore_errors=True)

@@ -44,8 +44,7 @@ def cam_slope(p, angles):
 
 def printed_corners_of_gas(p):
     """The ideal gas's corners (rad), with which Eq. 10 as printed is evaluated."""
-    ratio = p.discharge_force / p.suction_force
-    return gas_corners(p.crank_radius, p.rod_length, p.head_clearance, ratio, p.gas_exponent)
+    return gas_corners(p, p.discharge_force / p.suction_force)
 
 
 def printed_profile(p, angles):

@@ -1,12 +1,11 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
-from compressor.physics.contact_laws import Law, Power, elastic_and_damping, elastic_form
+from compressor.physics.contact_laws import Law, Power, elastic_form
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.loads import (
-    cam_corners,
     gas_corners,
     greatest_load,
-    printed_corners,
+    load_corners,
     sample_segments,
     segments,
     static_load,
@@ -22,9 +21,8 @@ from compressor.physics.observe import (
     observe_all,
 )
 from compressor.physics.record import FREEDOMS, STATE_NAMES, Load, Scene, derive, new_record
-from compressor.physics.rosenbrock import STIFF_STAGES
-from compressor.physics.runge_kutta import FLOWS, STAGES, E, Pair
-from compressor.physics.step_control import STABILITY_LIMIT, Mode
+from compressor.physics.runge_kutta import FLOWS, Pair
+from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
 from compressor.physics.tally import (
     TALLY,
     add_flows,

@@ -6,11 +6,14 @@ a hash of all sources here: numba itself would go on using a caller's old code a
 what it calls in another file.
 """
 
+import functools
 import os
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
-from compressor.program import discard_machine_code, machine_code_folder
+from compressor.program import machine_code_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -18,42 +21,98 @@ ENABLED = os.environ.get("COMPSIM_JIT", "1") != "0"
 FUSED = {"contract"}  # of what numba calls fast-math, this alone
 
 
-if ENABLED:
+def discard_other_code(folder: Path) -> None:
+    """Remove the machine code of other sources, before that of the present ones is first made."""
+    if not folder.exists():
+        for old in folder.parent.glob("numba-*"):
+            shutil.rmtree(old, ignore_errors=True)
+
+
+class Deferred:
+    """Something of numba's that is made when it is first needed.
+
+    Importing numba takes a third of a second: what calls no compiled function need not wait for it.
+    """
+
+    def __init__(self, make: Callable[[], Any], function: Any):
+        functools.update_wrapper(self, function)
+        self.make = make
+
+    @functools.cached_property
+    def made(self) -> Any:
+        load_numba()
+        return self.make()
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.made(*arguments)
+
+    def __getattr__(self, name: str) -> Any:  # what numba asks of a function that another calls
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.made, name)
+
+
+@functools.cache
+def load_numba() -> None:
+    """Tell numba where machine code is kept, and that a Deferred is what it stands for."""
     import numba
+    from numba.core.registry import cpu_target
+    from numba.extending import typeof_impl
 
     if not numba.config.CACHE_DIR:  # type: ignore[attr-defined]
-        discard_machine_code(machine_code_folder())
+        discard_other_code(machine_code_folder())
         numba.config.CACHE_DIR = str(machine_code_folder())  # type: ignore[attr-defined]
 
-    def _compiled(function: Function, **options: Any) -> Function:
-        made: Any = numba.njit(cache=True, error_model="numpy", fastmath=FUSED, **options)(function)
-        return made
+    @typeof_impl.register(Deferred)
+    def type_of(value: Deferred, _: object) -> Any:
+        return cpu_target.typing_context.resolve_value_type(value.made)
 
-    def jit(function: Function) -> Function:
-        """Compile `function` on its first call and keep the machine code on disk.
+    vars(borrowed)["made"] = _borrowed()  # to be known before anything is compiled
 
-        Arithmetic is IEEE's, in the order written, but that a product and a sum may be fused,
-        rounded once; that takes a tenth off a step. A division by zero gives inf or nan, not an
-        exception, so that the caller can judge a state that went wrong.
-        """
-        return _compiled(function)
 
-    def inlined(function: Function) -> Function:
-        """`jit`, written into each caller: for what a hot loop calls with arrays or tuples.
+def _compiled(function: Function, **options: Any) -> Function:
+    def make() -> Any:
+        import numba
 
-        Passing them took, with `borrowed` missing, about half of a step of the march.
-        """
-        return _compiled(function, inline="always")
+        how: Any = {"cache": True, "error_model": "numpy", "fastmath": FUSED, **options}
+        return numba.njit(**how)(function)
 
+    deferred: Any = Deferred(make, function)
+    return deferred if ENABLED else function
+
+
+def jit(function: Function) -> Function:
+    """Compile `function` on its first call and keep the machine code on disk.
+
+    Arithmetic is IEEE's, in the order written, but that a product and a sum may be fused, rounded
+    once; that takes a tenth off a step. A division by zero gives inf or nan, not an exception, so
+    that the caller can judge a state that went wrong. As it is with ``COMPSIM_JIT=0``.
+    """
+    return _compiled(function)
+
+
+def inlined(function: Function) -> Function:
+    """`jit`, written into each caller: for what a hot loop calls with arrays or tuples.
+
+    Passing them took, with `borrowed` missing, about half of a step of the march.
+    """
+    return _compiled(function, inline="always")
+
+
+def plain(function: Function) -> Function:
+    """The Python function itself: for a single call, which does not wait for machine code.
+
+    What it calls is compiled all the same.
+    """
+    return getattr(function, "__wrapped__", function)
+
+
+def _borrowed() -> Any:
     from numba.core import types
     from numba.extending import intrinsic
     from numba.np.arrayobj import make_array, populate_array
 
-    def _borrowed(typing_context: Any, array: Any) -> Any:
-        """The same array without a share in its ownership: nothing counts its references.
-
-        Counting is atomic, and every call that takes an array counts twice.
-        """
+    def borrowed(typing_context: Any, array: Any) -> Any:
         if not isinstance(array, types.Array):
             return None
 
@@ -68,16 +127,16 @@ if ENABLED:
 
         return array(array), lower
 
-    borrowed: Any = intrinsic(_borrowed)
+    return intrinsic(borrowed)
 
-else:
 
-    def borrowed(array: Any) -> Any:
-        """The array itself (``COMPSIM_JIT=0``)."""
-        return array
+def borrowed(array: Any) -> Any:
+    """The same array without a share in its ownership: nothing counts its references.
 
-    def jit(function: Function) -> Function:
-        """Leave `function` as it is (``COMPSIM_JIT=0``)."""
-        return function
+    Counting is atomic, and every call that takes an array counts twice.
+    """
+    return array
 
-    inlined = jit
+
+if ENABLED:
+    borrowed = Deferred(_borrowed, borrowed)  # type: ignore[assignment]

@@ -7,7 +7,7 @@ import math
 from typing import NamedTuple
 
 from compressor.physics._jit import inlined, jit
-from compressor.physics.contact_laws import elastic_and_damping, in_contact, normal_force, rise
+from compressor.physics.contact_laws import elastic_force, in_contact, normal_force, rise
 
 
 @jit
@@ -76,4 +76,4 @@ def nearness(contact, stiffness, p):
     if contact.penetration <= 0.0:
         return contact.penetration
     full = p.full_damping
-    return contact.unclamped * full / elastic_and_damping(full, stiffness, p)[0]
+    return contact.unclamped * full / elastic_force(full, stiffness, p)

@@ -91,12 +91,14 @@ def printed_corners():
     return math.radians(38.95), math.pi, math.radians(294.2)
 
 
-def gas_corners(crank_radius, rod_length, head_clearance, pressure_ratio, exponent):
+def gas_corners(p, pressure_ratio):
     """Exact corners of the ideal gas cycle (rad): ends of expansion, suction and compression.
 
-    Lengths in m, `pressure_ratio` = p_d / p_s. Raises ValueError when the gas left in the head
-    clearance never expands to the suction pressure within the stroke.
+    `pressure_ratio`: p_d / p_s. Raises ValueError when the gas left in the head clearance never
+    expands to the suction pressure within the stroke.
     """
+    crank_radius, rod_length = p["crank_radius"], p["rod_length"]
+    head_clearance, exponent = p["head_clearance"], float(p["gas_exponent"])
     head = rod_length + crank_radius + head_clearance
     growth = pressure_ratio ** (1.0 / exponent)
     expansion = angle_at(head - head_clearance * growth, crank_radius, rod_length)
@@ -115,6 +117,15 @@ def cam_corners(crank_radius, rod_length, stroke):
     rise = angle_at(rod_length + crank_radius - stroke, crank_radius, rod_length)
     fall = angle_at(rod_length - crank_radius + stroke, crank_radius, rod_length)
     return rise, math.pi, 2.0 * math.pi - fall
+
+
+def load_corners(p, pressure_ratio, printed):
+    """Corners (rad) of the record's load, (3,): Eq. 13's if `printed`, where it is the gas's."""
+    if p["load"] == Load.NONE:
+        return p["corners"]
+    if p["load"] == Load.DESIGN:
+        return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
+    return printed_corners() if printed else gas_corners(p, pressure_ratio)
 
 
 def segments(p, duration):

@@ -7,10 +7,12 @@ a walker turns to the stiff partner and back.
 import math
 from enum import IntEnum
 
+import numpy as np
+
 from compressor.physics import rosenbrock
 from compressor.physics._jit import inlined, jit
 from compressor.physics.observe import derivative_with_flows
-from compressor.physics.runge_kutta import FLOWS, STAGES, A
+from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
@@ -36,6 +38,16 @@ class Mode(IntEnum):
 
 # numba wants plain integers
 AUTO = int(Mode.AUTO)
+
+
+def step_error(w, before, after, step):
+    """Estimated error of each number of an attempted step, flows included, (n + 4,).
+
+    `w`: the walker before it; `before` and `after`: `Work.k` then and now; `step` (s): its length.
+    """
+    if w.stiff:
+        return after[rosenbrock.STIFF_STAGES]
+    return step * (E[w.pair] @ np.vstack((before[:1], after[1:STAGES])))
 
 
 @jit

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from compressor.cases import IMPLAUSIBLE, Case, Study
-from compressor.solve.scales import JointScales, contact_scales, expected_seconds, expected_steps
+from compressor.solve.scales import JointScales, contact_scales, expected_cost
 
 # key -> values that nobody means in the key's unit, and the unit that they may be in
 SLIPS = {
@@ -110,11 +110,10 @@ def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
 
 def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
     """Budgets that are likely to run out."""
-    solve, steps = case.solve, expected_steps(case, joints)
+    solve, (steps, seconds) = case.solve, expected_cost(case, joints)
     if steps > SHORT * solve.max_steps:
         text = f"{solve.max_steps} steps, but about {steps:.1g} are expected"
         yield Remark("solve.max_steps", text, "steps")
-    seconds = expected_seconds(case, steps)
     if seconds > SHORT * solve.timeout_s:
         text = f"{solve.timeout_s:g} s, but about {seconds:.1g} s are expected"
         yield Remark("solve.timeout_s", text, "seconds")

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from compressor.physics import FLOWS, STAGES, STIFF_STAGES, E, Pair, derivative_with_flows
+from compressor.physics import FLOWS, Pair, derivative_with_flows, step_error
 from compressor.solve.marching import March, Standing
 from compressor.solve.request import LAST, History
 
@@ -52,11 +52,7 @@ def scaled_error(
 ) -> np.ndarray:
     """Estimated error of each number of the motion over its tolerance, (n,)."""
     n = now.z.size - FLOWS
-    if now.walker.stiff:
-        error = then.work.k[STIFF_STAGES, :n]
-    else:
-        stages = np.vstack((now.work.k[:1], then.work.k[1:STAGES]))
-        error = step * (E[now.walker.pair] @ stages)[:n]
+    error = step_error(now.walker, now.work.k, then.work.k, step)[:n]
     largest = np.maximum(np.abs(now.z[:n]), np.abs(then.work.new[:n]))
     return error / (rtol * (size + largest))
 

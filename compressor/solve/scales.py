@@ -13,13 +13,7 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import JOINTS
-from compressor.physics import (
-    STABILITY_LIMIT,
-    Scene,
-    elastic_and_damping,
-    elastic_form,
-    greatest_load,
-)
+from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load
 from compressor.solve.marching import COMPILED
 from compressor.solve.si_record import record, scene
 
@@ -75,7 +69,7 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
         friction = 1.5 * p["static"].item() * force / (p["stiction_velocity"].item() * mass)
     rates = {
         "contact stiffness": natural,
-        "contact damping": elastic_and_damping(depth, stiffness, p)[1] / mass,
+        "contact damping": contact.damping(depth) / mass,
         "friction": friction,
     }
     fastest = max(rates, key=rates.__getitem__)
@@ -96,6 +90,12 @@ def contact_scales(case: Case) -> Iterator[JointScales]:
     for joint, clearance in zip(JOINTS, p["clearance"], strict=True):
         if clearance > 0:
             yield joint_scales(p, joint, greatest_force(p, joint))
+
+
+def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, float]:
+    """About how many steps a run of a case attempts, and how long they take (s)."""
+    steps = expected_steps(case, joints)
+    return steps, expected_seconds(case, steps)
 
 
 def expected_steps(case: Case, joints: Sequence[JointScales]) -> float:

@@ -9,16 +9,7 @@ import numpy as np
 
 from compressor.cases import Case, contact_stiffness, to_si
 from compressor.metrics import JOINTS
-from compressor.physics import (
-    Law,
-    Load,
-    Scene,
-    cam_corners,
-    derive,
-    gas_corners,
-    new_record,
-    printed_corners,
-)
+from compressor.physics import Law, Load, Scene, derive, load_corners, new_record
 
 
 def scene(case: Case) -> Scene:
@@ -36,25 +27,10 @@ def record(case: Case) -> np.record:
     _contact(case, p)
     _gas(case, p)
     _spring(case, p)
-    if case.load == "design":
-        p["corners"] = cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
-    elif case.load == "typical":
-        p["corners"] = typical_corners(case)
+    ratio = case.gas.discharge_MPa / case.gas.suction_MPa
+    p["corners"] = load_corners(p, ratio, printed=case.gas.switching == "paper")
     derive(p)
     return p
-
-
-def typical_corners(case: Case) -> tuple[float, float, float]:
-    """Crank angles (rad) at which suction, compression and discharge begin."""
-    if case.gas.switching == "paper":
-        return printed_corners()
-    return gas_corners(
-        to_si(case.machine.crank_radius_mm, "mm"),
-        to_si(case.machine.rod_length_mm, "mm"),
-        to_si(case.gas.head_clearance_mm, "mm"),
-        case.gas.discharge_MPa / case.gas.suction_MPa,
-        case.gas.exponent,
-    )
 
 
 def offsets(case: Case) -> np.ndarray:

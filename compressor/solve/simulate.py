@@ -8,7 +8,7 @@ import numpy as np
 
 from compressor.cases import MODEL_VERSION, Case, CaseError
 from compressor.metrics import HORIZON, SIZES
-from compressor.outcome import ROW, Outcome, Table, Variable, coordinates, without_run
+from compressor.outcome import ROW, Outcome, Table, without_run
 from compressor.physics import COLUMNS, FLOWS, STATE_NAMES, Column, observe_all
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
@@ -52,20 +52,17 @@ def simulate(case: Case) -> "xr.Dataset":
 
 def observe(case: Case) -> tuple[Outcome, Table]:
     """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
-    return tabled(refused(case), {}) if case.problems else with_series(case, solve(case))
+    if case.problems:
+        found = refused(case)
+        return found, found.table({})
+    return with_series(case, solve(case))
 
 
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
     """The `Outcome` of a solution and what its Dataset is made of."""
     kept = case.output.keep == "series"
-    return tabled(outcome(case, solution), series(solution.p, solution.trajectory) if kept else {})
-
-
-def tabled(end: Outcome, more: dict[str, tuple]) -> tuple[Outcome, Table]:
-    """An outcome and, with more variables, what its Dataset is made of."""
-    variables = end.variables() | coordinates() | more
-    named = {name: Variable(d, np.asarray(v), attrs) for name, (d, v, attrs) in variables.items()}
-    return end, Table(named, end.attributes)
+    found = outcome(case, solution)
+    return found, found.table(series(solution.p, solution.trajectory) if kept else {})
 
 
 def measure(case: Case) -> Outcome:

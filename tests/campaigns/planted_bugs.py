@@ -7,7 +7,7 @@ BUGS = [
     ("friction pushes along the slip", "physics/contact.py",
      "-friction_coefficient(slip, p) * normal", "friction_coefficient(slip, p) * normal"),
     ("K a hundredth too large", "physics/contact_laws.py",
-     "elastic = stiffness * power", "elastic = 1.01 * stiffness * power"),
+     "return stiffness * power", "return 1.01 * stiffness * power"),
     ("STEP is a parabola", "physics/contact_laws.py", "(3.0 - 2.0 * s)", "1.0"),
     ("contact pulls", "physics/contact_laws.py",
      "return max(0.0, unclamped), ", "return unclamped, "),

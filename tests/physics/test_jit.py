@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from compressor import program
+from compressor.physics import _jit
 
 PROBE = """
 import json
@@ -67,7 +68,7 @@ def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
     assert program.machine_code_folder() == first
     (tmp_path / "contact.py").write_text("K = 2\n", encoding="utf-8")
     assert program.machine_code_folder() != first
-    program.discard_machine_code(first)
+    _jit.discard_other_code(first)
     assert first.exists()
-    program.discard_machine_code(program.machine_code_folder())
+    _jit.discard_other_code(program.machine_code_folder())
     assert not first.exists()
