@@ -14,7 +14,7 @@ from compressor.program import CompsimError, CompsimWarning
 
 if TYPE_CHECKING:
     from compressor.cases import Case, load_cases
-    from compressor.solve.simulate import simulate
+    from compressor.solve import simulate
     from compressor.store import open_study
 
 __all__ = [

@@ -55,6 +55,15 @@ class Outcome:
         """What is known of a failure beyond its reason."""
         return str(self.attributes.get("detail", ""))
 
+    def table(self, more: dict[str, tuple]) -> "Table":
+        """With more variables, what the job's Dataset is made of."""
+        variables = self.variables() | coordinates() | more
+        named = {
+            name: Variable(dims, np.asarray(values), attrs)
+            for name, (dims, values, attrs) in variables.items()
+        }
+        return Table(named, self.attributes)
+
     def variables(self) -> dict[str, tuple]:
         """Status, reason and numbers as xarray variables: (dims, values, attributes)."""
         named: dict[str, tuple] = {

@@ -17,7 +17,7 @@ from typing import Any
 
 import click
 
-import compressor
+from compressor.program import VERSION, CompsimError, CompsimWarning
 from compsim import (
     explain,
     export,
@@ -46,7 +46,7 @@ class Interrupted(BaseException):
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(compressor.__version__, prog_name="compsim")
+@click.version_option(VERSION, prog_name="compsim")
 def cli() -> None:
     """Sweep a reciprocating compressor over joint clearances, and draw what comes out.
 
@@ -111,7 +111,7 @@ def warnings_told() -> Iterator[None]:
     show, told = warnings.showwarning, set()
 
     def say_it(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
-        if not issubclass(category, compressor.CompsimWarning):
+        if not issubclass(category, CompsimWarning):
             show(message, category, *where, **more)
         elif str(message) not in told:
             told.add(str(message))
@@ -141,7 +141,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def told(error: Exception) -> int:
     """Say what went wrong and return the exit code; only what nobody foresaw has a traceback."""
-    if isinstance(error, compressor.CompsimError):
+    if isinstance(error, CompsimError):
         say(f"{error.prefix}{error}")
         return error.exit_code
     lines = traceback.format_exception(error)

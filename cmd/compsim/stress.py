@@ -68,11 +68,11 @@ def stress(
 
 def repeated(number: int, seed: int) -> Iterator[str]:
     """A scene as a case file, and below it, as comments, how it ends."""
-    from compressor.measure import FULL, run_scene, values
+    from compressor.measure import repeat
 
-    drawn = values(number, seed)
+    drawn, row = repeat(number, seed)
     yield from (f"{key}: {json.dumps(value)}" for key, value in drawn.items())
-    for key, value in run_scene((number, seed, FULL)).items():
+    for key, value in row.items():
         if key not in ("load", "joint") and value != "":
             yield f"# {key}: {value:.3g}" if isinstance(value, float) else f"# {key}: {value}"
 

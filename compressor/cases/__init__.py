@@ -7,7 +7,7 @@ from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import contact_stiffness
 from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
 from compressor.cases.shorthands import row_of, value_in
-from compressor.cases.study import Study, given, points, shard
+from compressor.cases.study import Study, points
 from compressor.cases.swept import design
 from compressor.cases.table import METHODS, Friction, Output, table
 from compressor.cases.yaml_reader import printable

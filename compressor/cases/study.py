@@ -39,15 +39,14 @@ class Study:
     def jobs(self) -> int:
         return len(self.keys)
 
+    def shard(self, number: int, of: int) -> "Study":
+        """The study with the jobs of one shard selected, 1 <= number <= of.
 
-def shard(study: Study, number: int, of: int) -> Study:
-    """A study of which the jobs of one shard are selected, 1 <= number <= of.
-
-    A job's key says which shard it belongs to, so that any number of machines agree without asking
-    each other, and studies that share a job put it in the same one.
-    """
-    mine = [n for n in study.selected if int(study.keys[n], 16) % of == number - 1]
-    return replace(study, selected=mine)
+        A job's key says which shard it belongs to, so that any number of machines agree without
+        asking each other, and studies that share a job put it in the same one.
+        """
+        mine = [n for n in self.selected if int(self.keys[n], 16) % of == number - 1]
+        return replace(self, selected=mine)
 
 
 class Cases(Sequence[Case]):
@@ -112,7 +111,10 @@ class Jobs(Protocol):
 
 
 def points(study: Jobs) -> Iterator[dict[str, Any]]:
-    """The swept values of each job by dotted key, in the order of the jobs."""
+    """The swept values that each job has, by dotted key, in the order of the jobs.
+
+    What is swept in other blocks only is left out.
+    """
     keys = [axis.key for axis in study.axes]
     columns = [axis.values for axis in study.axes]
     rows: Iterable[tuple[Any, ...]]
@@ -121,9 +123,4 @@ def points(study: Jobs) -> Iterator[dict[str, Any]]:
     else:
         rows = (tuple(column[n] for column in columns) for n in range(study.jobs))
     for values in rows:
-        yield dict(zip(keys, values, strict=True))
-
-
-def given(point: dict[str, Any]) -> dict[str, Any]:
-    """The swept values that a job has, without those of other blocks."""
-    return {key: value for key, value in point.items() if value is not None}
+        yield {key: value for key, value in zip(keys, values, strict=True) if value is not None}

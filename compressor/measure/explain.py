@@ -12,14 +12,13 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.cases import ACCURACY, Case, Study, given, points
+from compressor.cases import ACCURACY, Case, Study, points
 from compressor.measure.features import FEATURES, Effect, Feature, compare
 from compressor.measure.work_precision import SLOW, complete, faulty
 from compressor.physics import FREEDOMS, STATE_NAMES, Scene
 from compressor.solve import (
     JointScales,
-    expected_seconds,
-    expected_steps,
+    expected_cost,
     joint_scales,
     record,
     scene,
@@ -89,19 +88,19 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
     ended = complete(run)
     active, absent = terms(case)
     joints = tuple(ideal_scales(case))
-    steps = expected_steps(case, joints)
+    steps, expected = expected_cost(case, joints)
     return Explanation(
         study=study.name,
         path=study.path,
         jobs=len(study.cases),
-        point=given(next(points(study))),
+        point=next(points(study)),
         scene=SCENES[scene(case)],
         unknowns=STATE_NAMES[scene(case)][: FREEDOMS[scene(case)]],
         active=active,
         absent=absent,
         scales=joints,
         expected_steps=steps,
-        expected_seconds=expected_seconds(case, steps),
+        expected_seconds=expected,
         accuracy=asked(case),
         rtol=case.rtol,
         promise=promise(case),

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.cases import Case
+from compressor.cases import TIGHTEST, Case
 from compressor.metrics import METRICS
 from compressor.solve import (
     COMPILED,
@@ -41,7 +41,7 @@ from compressor.solve import (
 
 FACTOR = 10.0  # times its bar: an error beyond it is silent
 EXPECTED, MOST_EXPECTED = 1e3, 0.05  # times rtol: the relative error that nobody is surprised by
-TIGHTER, TENTH, TIGHTEST = 1e-2, 0.1, 1e-12  # a judge's tolerance, of statistics, the least
+TIGHTER, TENTH = 1e-2, 0.1  # a judge's tolerance, of statistics
 PARTS = 16  # of a span, in which horizons are counted
 LENGTHS = (PARTS, PARTS // 4, 1)  # parts that are judged where the whole is too much
 JUDGED = tuple(name for name in METRICS if name != "impact_count")

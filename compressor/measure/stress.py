@@ -22,8 +22,8 @@ from compressor.measure import extremes
 from compressor.measure.extremes import Budget
 from compressor.program import PROGRAM
 from compressor.reasons import Reason
-from compressor.store import Folder, StoreError, attributes, opened, variables, write_dataset
-from compressor.sweep import Done, Lost, Needs, Progress, Workers, compile_once, load, run_batches
+from compressor.store import Folder, StoreError, read_dataset, write_dataset
+from compressor.sweep import Done, Lost, Needs, Progress, run_here
 
 FILE = "stress.nc"
 FULL = Budget()
@@ -107,6 +107,11 @@ def run_scene(task: tuple[int, int, Budget]) -> Row:
     }  # fmt: skip
 
 
+def repeat(number: int, seed: int) -> tuple[dict[str, Any], Row]:
+    """The values of a scene's case, by key, and its row, from another run."""
+    return extremes.values(number, seed), run_scene((number, seed, FULL))
+
+
 def campaign(
     folder: Folder,
     count: int,
@@ -124,11 +129,9 @@ def campaign(
     missing = [number for number in range(count) if number not in rows]
     total, written = count, time.monotonic()
     progress(total - len(missing), total, "")
-    if missing:
-        compile_once(NEEDS, lambda remark: progress(total - len(missing), total, remark))
-    tasks = ((number, (number, seed, budget), TIMEOUT) for number in missing)
-    rules = Workers(workers, partial(load, NEEDS))
-    running = run_batches(run_scene, tasks, rules, len(missing))
+    tasks = [(number, (number, seed, budget), TIMEOUT) for number in missing]
+    remark = partial(progress, total - len(missing), total)
+    running = run_here(run_scene, tasks, NEEDS, workers, remark)
     try:
         for end in running:
             rows[end.id] = ended(end)
@@ -208,17 +211,13 @@ def kept(path: Path, seed: int, budget: Budget) -> list[Row]:
     """The rows of an earlier run. Raises StoreError if they are of other scenes."""
     if not path.exists():
         return []
-    with opened(path.read_bytes(), path, REMEDY) as file:
-        attrs, found = attributes(file), variables(file)
-        if (attrs["seed"], attrs["settings"]) != (seed, settings(budget)):
-            raise StoreError(
-                path, f"holds scenes of seed {attrs['seed']}, {attrs['settings']}", REMEDY
-            )
-        numbers = found["scene"][1].tolist()
-        columns = {name: found[name][1].tolist() for name in found if name != "scene"}
+    found = read_dataset(path, REMEDY)
+    attrs = found.attrs
+    if (attrs["seed"], attrs["settings"]) != (seed, settings(budget)):
+        raise StoreError(path, f"holds scenes of seed {attrs['seed']}, {attrs['settings']}", REMEDY)
+    columns = {str(name): found[name].values.tolist() for name in found.variables}
     return [
-        {"scene": number} | {name: values[i] for name, values in columns.items()}
-        for i, number in enumerate(numbers)
+        {name: values[i] for name, values in columns.items()} for i in range(found.sizes["scene"])
     ]
 
 

@@ -4,7 +4,7 @@ How a job's file is read is handed in by `compressor.store.reader`.
 """
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,15 +80,19 @@ def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
     coordinates = {"study": xr.Variable("job", [study.name for study, _ in rows])}
     for key, name in coordinate_names(list(units)).items():
         missing = np.nan if units[key] else ""
-        values = [_value(study, point, key, missing) for study, point in rows]
+        swept = {study.name: any(axis.key == key for axis in study.axes) for study in studies}
+        values = [
+            point.get(key, missing) if swept[study.name] else _fixed(study, key, missing)
+            for study, point in rows
+        ]
         coordinates[name] = _coordinate(("job",), key, values, units[key])
     keys = [key for study in studies for key in study.keys]
     return Layout(("job",), np.array(keys), coordinates)
 
 
-def _value(study: StoredStudy, point: Mapping[str, Any], key: str, missing: Any) -> Any:
-    """The value of a key in one job of a study; `missing` where it has no single one."""
-    value = point[key] if key in point else value_in(study.fixed, key)
+def _fixed(study: StoredStudy, key: str, missing: Any) -> Any:
+    """The value of a key in all jobs of a study; `missing` where it has no single one."""
+    value = value_in(study.fixed, key)
     return missing if value is None else value
 
 

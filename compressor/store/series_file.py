@@ -67,6 +67,14 @@ def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
     return path
 
 
+def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
+    """What `write_dataset` stored. Raises StoreError where a file is no such thing."""
+    import xarray as xr
+
+    with opened(path.read_bytes(), path, remedy) as file:
+        return xr.Dataset(hdf5.variables(file), attrs=hdf5.attributes(file))
+
+
 def image_of(
     dataset: "Table | xr.Dataset", rounded: Collection[str] = (), deflated: Collection[str] = ()
 ) -> bytes:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compressor.cases import MODEL_VERSION, Study, given, points, row_of, table
+from compressor.cases import MODEL_VERSION, Study, points, row_of, table
 from compressor.program import VERSION, library_versions
 from compressor.store.files import KEY, Folder, StoreError, publish, refusals, system_error
 from compressor.store.hdf5 import digest
@@ -75,7 +75,7 @@ def owners(
         if not found.keys().isdisjoint(study.keys):
             for key, point in zip(study.keys, points(study), strict=True):
                 if key in found:
-                    found[key].setdefault(study.name, given(point))
+                    found[key].setdefault(study.name, point)
     return found
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import operator
 import pickle
 import queue
 import time
@@ -49,8 +50,8 @@ class Batches:
     discard: Callable[[], None]  # ends what a job that is tried alone must not share with others
     stop: Callable[[], None]  # ends all workers; what had arrived stays
 
-    def __init__(self, jobs: Iterable[Input], left: int, target_seconds: float, width: int):
-        self.source, self.left = iter(jobs), left
+    def __init__(self, jobs: Iterable[Input], target_seconds: float, width: int):
+        self.source, self.left = iter(jobs), operator.length_hint(jobs, 0)
         self.target_seconds, self.width = target_seconds, width  # width: batches at work at once
         self.waiting: deque[Job] = deque()  # to be done again
         self.suspects: deque[list[Job]] = deque()  # batches to be tried alone

@@ -8,7 +8,6 @@ work in a process that died or took too long, and what runs again.
 import contextlib
 import math
 import multiprocessing
-import operator
 import os
 import signal
 import tempfile
@@ -48,21 +47,19 @@ def run_batches(
     work: Callable[[Any], Any],
     jobs: Iterable[Input],
     workers: Workers,
-    total: int | None = None,
     pulse: Callable[[], object] = lambda: None,
 ) -> Generator[End, None, None]:
     """Call work(payload) for each job in worker processes; yield how each one ended.
 
-    `jobs` is read as workers need it, in a thread; `total` (by default its length hint) lets
-    batches shrink towards the end. What `work` raises makes its job Lost. `pulse` is called several
-    times a second, whether or not jobs end.
+    `jobs` is read as workers need it, in a thread; where it has a length, batches shrink towards
+    the end. What `work` raises makes its job Lost. `pulse` is called several times a second,
+    whether or not jobs end.
 
     Closing the iterator kills the workers. Whatever is raised here, a signal's exception too, comes
     after the results that had arrived (`rest` does the same for what the caller raises). Raises
     WorkersFailed, and what `jobs` raises.
     """
-    left = operator.length_hint(jobs, 0) if total is None else total
-    return Local(work, jobs, workers, left).ends(pulse)
+    return Local(work, jobs, workers).ends(pulse)
 
 
 def rest(ends: Generator[End, None, None], error: BaseException) -> Iterator[End]:
@@ -95,10 +92,8 @@ class Local(Batches):
     joblib knows batches alone, and fails all of them at once.
     """
 
-    def __init__(
-        self, work: Callable[[Any], Any], jobs: Iterable[Input], rules: Workers, left: int
-    ):
-        super().__init__(jobs, left, rules.target_seconds, rules.count)
+    def __init__(self, work: Callable[[Any], Any], jobs: Iterable[Input], rules: Workers):
+        super().__init__(jobs, rules.target_seconds, rules.count)
         self.rules = replace(rules, memory=rules.memory or memory_share(rules.count))
         self.places = 4 * max(rules.count, 2)  # for notes: more than joblib asks for
         self.shared = shared_memory(self.places * NOTE.size)

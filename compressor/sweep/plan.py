@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from compressor.cases import Case, Study, given, points
-from compressor.store import Folder, read_store, series_image
+from compressor.cases import Case, Study, points
+from compressor.store import Folder, read_store, series_file
 from compressor.sweep.sweep import stored, wanted
 from compressor.sweep.warm_up import Needs, load_telling
 
@@ -100,7 +100,7 @@ def selected(study: Study) -> Iterator[Next]:
     chosen = {*study.selected}
     for number, point in enumerate(points(study)):
         if number in chosen:
-            yield Next(study.name, given(point), study.keys[number])
+            yield Next(study.name, point, study.keys[number])
 
 
 def cost(cases: Sequence[Case]) -> tuple[float, int]:
@@ -124,6 +124,6 @@ def measured(case: Case) -> tuple[float, float]:
     if case.output.keep == "metrics":
         measure(case)
     else:
-        size = len(series_image(observe(case)[1], case.output))
+        size = len(series_file(observe(case)[1], case.output)[1])
     seconds = time.perf_counter() - began
     return seconds / (case.duration / case.turn), size / (case.steps + 1)

@@ -9,15 +9,11 @@ from typing import Any, NamedTuple
 
 from compressor.sweep.batches import Job
 from compressor.sweep.execution import MEMORY_SHARE, Local, WorkersFailed, cores, memory_share
-from compressor.sweep.versions import differences, versions
+from compressor.sweep.versions import Unfit, differences, versions
 from compressor.sweep.worker import Workers
 
 ONE = threading.Lock()  # joblib has one pool a process: threads take turns, each with all of it
 KEPT: dict[bytes, Local] = {}  # the pool that is kept for the next batch, by what it does
-
-
-class Unfit(Exception):
-    """A machine where jobs cannot run, or would not end in the same bits: which, and why."""
 
 
 class Batch(NamedTuple):
@@ -56,7 +52,7 @@ def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) ->
     if key not in KEPT:
         while KEPT:
             KEPT.popitem()[1].stop()
-        KEPT[key] = Local(work, [], rules, 0)
+        KEPT[key] = Local(work, [], rules)
         KEPT[key].decode = bytes  # results travel on as they are
     local = KEPT[key]
     local.waiting.extend(jobs)

@@ -7,13 +7,13 @@ named reason.
 """
 
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from compressor.cases import Case, Study, given, points, shard
+from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.store import Folder, Stored, StoreError, Writer, write_study
 from compressor.sweep.batches import Input
@@ -120,7 +120,7 @@ def sweep(
     folder = Path(folder).absolute()
     name = ""
     if options.part is not None:
-        studies = [shard(study, *options.part) for study in studies]
+        studies = [study.shard(*options.part) for study in studies]
         name = "{}-of-{}".format(*options.part)
     cases = wanted(studies)
     with Writer(folder, name, options.wait, options.command) as writer:
@@ -187,17 +187,28 @@ def local(workers: int) -> Backend:
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]:
-        needs = Needs.of(cases)
-        compile_once(needs, remark)
-        rules = Workers(workers, partial(load, needs), grace=GRACE)
-        return run_batches(partial(run_job, place), as_jobs(cases), rules, len(cases), pulse)
+        needs, work = Needs.of(cases), partial(run_job, place)
+        return run_here(work, as_jobs(cases), needs, workers, remark, pulse)
 
     return run
 
 
-def as_jobs(cases: Sequence[Case]) -> Iterator[Input]:
+def run_here(
+    work: Callable[[Any], Any],
+    jobs: Sequence[Input],
+    needs: Needs,
+    workers: int,
+    remark: Callable[[str], None],
+    pulse: Callable[[], object] = lambda: None,
+) -> Generator[Done | Lost, None, None]:
+    """`run_batches` in processes that have loaded the equations, which are compiled before."""
+    compile_once(needs, remark)
+    return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), pulse)
+
+
+def as_jobs(cases: Sequence[Case]) -> list[Input]:
     """Cases as workers take them."""
-    return ((case, case, case.solve.timeout_s) for case in cases)
+    return [(case, case, case.solve.timeout_s) for case in cases]
 
 
 def wanted(studies: Sequence[Study]) -> dict[str, Case]:
@@ -254,7 +265,7 @@ def endings(
     for study in studies:
         selected = {*study.selected}
         failed = [
-            Failure(study.name, given(point), key, ends[key].reason, ends[key].detail)
+            Failure(study.name, point, key, ends[key].reason, ends[key].detail)
             for number, point in enumerate(points(study))
             if number in selected and ends[key := study.keys[number]].status != "ok"
         ]

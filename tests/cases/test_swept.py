@@ -324,9 +324,9 @@ blocks:
     assert rows(study) == [
         (0.1, "none", "big_end", 0.1, 0.0, True),
         (0.2, "none", "big_end", 0.2, 0.0, True),
-        (None, "none", "both", 0.1, 0.3, False),
-        (None, "design", "none", 0.0, 0.0, True),
-        (None, "typical", "none", 0.0, 0.0, True),
+        ("none", "both", 0.1, 0.3, False),
+        ("design", "none", 0.0, 0.0, True),
+        ("typical", "none", 0.0, 0.0, True),
     ]
     assert [case.friction is None for case in study.cases] == [False, False, True, False, False]
 

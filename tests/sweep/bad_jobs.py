@@ -71,6 +71,19 @@ def work(payload):
     return POISON[payload][0]() if payload in POISON else payload
 
 
+class Many:
+    """Jobs that are listed nowhere, of which there may be a million."""
+
+    def __init__(self, jobs):
+        self.jobs = jobs
+
+    def __iter__(self):
+        return iter(self.jobs)
+
+    def __length_hint__(self):
+        return 10**6
+
+
 def named(payloads):
     """Payloads as jobs of their own names."""
     return [(payload, payload, SECONDS.get(payload, math.inf)) for payload in payloads]

@@ -14,7 +14,7 @@ from pathlib import Path
 import distributed
 import numpy as np
 import pytest
-from bad_jobs import POISON, named
+from bad_jobs import POISON, Many, named
 from bad_jobs import work as poisoned
 from compsim.cli import main
 from test_execution import is_running, lost, results, wait_for
@@ -23,10 +23,11 @@ from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.files import StoreError
 from compressor.store.verify import verify
-from compressor.sweep import cluster, shared_folder
-from compressor.sweep.cluster import Cluster, ClusterError, Remote
+from compressor.sweep import cluster, cluster_batches, shared_folder
+from compressor.sweep.cluster import Cluster
+from compressor.sweep.cluster_batches import Remote
 from compressor.sweep.sweep import Options, sweep
-from compressor.sweep.versions import differences, versions
+from compressor.sweep.versions import ClusterError, differences, versions
 from compressor.sweep.worker import Workers
 
 MEMORY = "800MB"  # of a worker, of which a job may add three quarters
@@ -163,15 +164,15 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
 # ---- jobs that fail -----------------------------------------------------------------------------
 
 
-def remote(client, work, jobs, total, seconds=0.2, **more):
+def remote(client, work, jobs, seconds=0.2, **more):
     """The ends of jobs on a cluster."""
-    made = Remote(client, work, Workers(grace=0.3, target_seconds=seconds), jobs, total)
+    made = Remote(client, work, Workers(grace=0.3, target_seconds=seconds), jobs)
     vars(made).update(more)
     return made.ends(lambda: None)
 
 
 def run(client, work, payloads):
-    return list(remote(client, work, named(payloads), len(payloads)))
+    return list(remote(client, work, named(payloads)))
 
 
 def test_poison_jobs_cost_themselves_only(client):
@@ -235,12 +236,11 @@ def test_threads_of_one_worker_share_its_processes():
 
 def test_many_jobs_are_never_listed(client):
     issued = itertools.count()
-    jobs = ((n, n, 9.0) for n in issued)
-    ends = remote(client, abs, jobs, 10**6)
+    ends = remote(client, abs, Many((n, n, 9.0) for n in issued))
     first = [end.id for end in itertools.islice(ends, 3000)]
     ends.close()
     assert len(set(first)) == 3000
-    assert next(issued) < 3000 + 2 * (2 * cluster.A_THREAD + 1) * 1000
+    assert next(issued) < 3000 + 2 * (2 * cluster_batches.A_THREAD + 1) * 1000
 
 
 def large(payload):
@@ -248,10 +248,9 @@ def large(payload):
 
 
 def test_few_large_results_are_on_their_way(client, monkeypatch):
-    monkeypatch.setattr(cluster, "MOST_BYTES", 3_000_000)
+    monkeypatch.setattr(cluster_batches, "MOST_BYTES", 3_000_000)
     issued = itertools.count()
-    jobs = ((n, 1_000_000, 9.0) for n in issued)
-    ends = remote(client, large, jobs, 10**6, 1e-9)
+    ends = remote(client, large, Many((n, 1_000_000, 9.0) for n in issued), 1e-9)
     for taken in range(1, 30):
         next(ends)
         assert next(issued) < 2 * taken + 15  # one of each two is ours
@@ -281,7 +280,7 @@ def test_workers_with_other_versions_are_refused(dask, monkeypatch):
 
 def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
     with pytest.raises(ClusterError, match=r"worker tcp://.*: has model 1 in place of none, numpy"):
-        list(remote(client, abs, named(range(10)), 10, asked=other_versions()))
+        list(remote(client, abs, named(range(10)), asked=other_versions()))
 
 
 def test_versions_tell_programs_apart():
@@ -320,12 +319,12 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
 
         def remark(done, total, text):
             told.append(text)
-            if text == cluster.WAITING:
+            if text == cluster_batches.WAITING:
                 empty.close()
 
         with pytest.raises(ClusterError, match="the scheduler was lost; the same command goes on"):
             sweep(studies, tmp_path / "out", progress=remark, options=Options(backend=backend))
-    assert told.count(cluster.WAITING) == 1
+    assert told.count(cluster_batches.WAITING) == 1
 
 
 def test_without_distributed_the_extra_is_named(monkeypatch):

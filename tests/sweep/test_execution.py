@@ -16,7 +16,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
-from bad_jobs import LEAST, POISON, SECONDS, named, sleep, work
+from bad_jobs import LEAST, POISON, SECONDS, Many, named, sleep, work
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from compressor.sweep import execution
@@ -113,7 +113,7 @@ def test_many_jobs_are_never_listed():
 
 def test_a_slow_caller_is_waited_for():
     issued = itertools.count()
-    ends = run_batches(work, ((n, n, 9.0) for n in issued), Workers(), total=10**6)
+    ends = run_batches(work, Many((n, n, 9.0) for n in issued), Workers())
     list(itertools.islice(ends, 3000))
     time.sleep(1)  # in which workers could do many times as much
     assert next(issued) < 7000

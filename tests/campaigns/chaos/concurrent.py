@@ -16,7 +16,6 @@ from chaos.processes import Run
 from chaos.stored import case_file, contents, damage, rows
 from chaos.tally import Tally
 from compressor.cases.load import load_studies
-from compressor.cases.study import shard
 from compressor.store import writer
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -107,7 +106,7 @@ def served(folder, command):
     part = command[command.index("--shard") + 1].split("/") if "--shard" in command else None
     studies = load_studies(folder / command[0])
     if part:
-        studies = [shard(study, int(part[0]), int(part[1])) for study in studies]
+        studies = [study.shard(int(part[0]), int(part[1])) for study in studies]
     cases = wanted(studies)
     return set(stored(read_store(folder / "out"), dict(cases))), set(cases)
 

@@ -1,0 +1,172 @@
+"""Batches of jobs for the workers of a dask cluster, by joblib's dask backend.
+
+A batch whose worker is lost runs elsewhere; if that happens again and again, it is tried alone,
+then job by job.
+"""
+
+import itertools
+import math
+import pickle
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from joblib import Parallel, delayed
+from joblib._dask import DaskDistributedBackend
+
+from compressor.reasons import Reason
+from compressor.sweep.batches import AGAIN, Batches, End, Input, Job
+from compressor.sweep.remote import Batch, on_worker
+from compressor.sweep.versions import ClusterError, unfitness, versions
+from compressor.sweep.worker import Lost, Workers
+
+CENSUS = 2.0  # s between two counts of the workers
+A_THREAD = 3  # batches that a thread of a worker has at most: one at work, others on their way
+MOST_BYTES = 100_000_000  # of results that may be on their way
+PATIENCE = 5.0  # s without a result before a remark on it
+STARTING = "the cluster's workers load, or compile, the equations (under a minute)"
+WAITING = "the cluster has no workers: waiting for the first"
+
+
+class Dask(DaskDistributedBackend):
+    """joblib's dask backend, which tells of a batch at once, also of one that lost its workers.
+
+    joblib waits for such a batch for ever: its `_collect` does not call back what has failed.
+    """
+
+    def __init__(self, client: Any, hand_over: Callable[[int, Any], None]):
+        super().__init__(client=client, pure=False)
+        self.hand_over, self.open = hand_over, set[Any]()
+
+    def effective_n_jobs(self, n_jobs: int) -> int:
+        return max(2, sum(self.client.nthreads().values()))  # a single one, joblib would do here
+
+    def submit(self, func: Any, callback: Any = None) -> Any:
+        number = func.items[0][1][0]
+        future = super().submit(func, callback)
+        self.open.add(future)
+        future.add_done_callback(lambda ended: self.see(ended, number, callback))
+        return future
+
+    def see(self, ended: Any, number: int, callback: Any) -> None:
+        """A batch has ended; of good ones joblib tells."""
+        self.open.discard(ended)
+        error = StopIteration() if ended.cancelled() else ended.exception()
+        if error:
+            callback((number, error))
+
+    def retrieve_result_callback(self, out: Any) -> list[None]:
+        found = out if isinstance(out, tuple) else super().retrieve_result_callback(out)[0]
+        self.hand_over(*found)
+        return [None]
+
+    def end(self) -> None:
+        """Wait for no batch any more."""
+        self.abort_everything()
+        for future in [*self.open]:
+            future.cancel()
+
+
+class Remote(Batches):
+    """Jobs on a cluster; all functions that workers call are found there by their names.
+
+    What runs when it is stopped ends by itself, and is forgotten. Raises ClusterError where a
+    worker has other versions, or the scheduler is lost.
+    """
+
+    def __init__(
+        self,
+        client: Any,
+        work: Callable[[Any], Any],
+        rules: Workers,
+        jobs: Iterable[Input],
+    ):
+        super().__init__(jobs, rules.target_seconds, 1)
+        self.client, self.work, self.rules = client, work, rules
+        self.asked = versions()
+        self.remark: Callable[[str], None] = lambda text: None
+        self.numbers = itertools.count()
+        self.threads, self.census = -1, 0.0  # of all workers, when they were counted
+        self.size, self.renew = 0.0, False  # bytes of a result; whether the round should end
+        self.backend: Dask | None = None
+        self.patience = time.monotonic() + PATIENCE
+
+    def begin(self) -> bool:
+        self.renew = False
+        return super().begin()
+
+    def parallel(self) -> Parallel:
+        """joblib's for a round: as many batches as the workers have threads for."""
+        self.backend = Dask(self.client, self.hand_over)
+        ahead = A_THREAD * self.width
+        return Parallel(-1, self.backend, "generator_unordered", batch_size=1, pre_dispatch=ahead)
+
+    def next_batch(self) -> list[Job]:
+        """As ever, but a round ends when workers come or go, or large results wait."""
+        on_way = sum(map(len, [*self.out.values()])) + self.arrived.qsize()
+        return [] if self.renew or self.size * on_way > MOST_BYTES else super().next_batch()
+
+    def call(self, batch: list[Job]) -> Any:
+        number = next(self.numbers)
+        self.out[number] = batch
+        jobs = [Job(n, *job[1:3]) for n, job in enumerate(batch)]
+        asked = Batch(self.asked, self.work, self.rules, jobs)
+        return delayed(on_worker)(number, pickle.dumps(asked, pickle.HIGHEST_PROTOCOL))
+
+    def watch(self, now: float, news: bool) -> None:
+        """Count the threads of all workers now and then, and tell where there is none."""
+        if now - self.census < CENSUS:
+            return
+        try:
+            threads = [*self.client.nthreads().values()]
+        except (OSError, TimeoutError, ValueError) as error:
+            raise lost(self.client) from error
+        if not threads and self.threads:
+            self.remark(WAITING)
+        self.renew = self.renew or sum(threads) != self.threads
+        self.threads, self.census, self.width = sum(threads), now, max(len(threads), 1)
+        self.target_seconds = self.rules.target_seconds * max(sum(threads) / self.width, 1)
+        if threads and not self.weight and now > self.patience:
+            self.remark(STARTING)
+            self.patience = math.inf
+
+    def finish(self, batch: list[Job], found: Any) -> Iterator[End]:
+        if isinstance(found, bytes):
+            self.size = max(len(found) / len(batch), 0.9 * self.size)
+            yield from super().finish(batch, pickle.loads(found))
+        elif not self.stopped:
+            yield from self.lost_batch(batch, found)
+
+    def lost_batch(self, batch: list[Job], error: BaseException) -> Iterator[Lost]:
+        """A batch has lost its workers: it is tried alone, then each of its jobs."""
+        from distributed import KilledWorker
+
+        if not isinstance(error, KilledWorker):
+            unfit = unfitness(error) or f"a batch failed: {type(error).__name__}: {error}"
+            raise ClusterError(f"worker {unfit}") from error
+        if self.alone and len(batch) == 1:
+            how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
+            yield Lost(batch[0].id, Reason.WORKER_DIED, f"{how}, {AGAIN}")
+        else:
+            self.suspects.extend([[job] for job in batch] if self.alone else [batch])
+
+    def fail(self, error: BaseException) -> Iterable[Lost]:
+        raise error if self.client.status == "running" else lost(self.client)
+
+    def discard(self) -> None:
+        """Nothing is shared with a suspect: no other batch is at work."""
+
+    def stop(self) -> None:
+        """Have what has not begun never begin."""
+        self.stopped = True
+        while self.round and not self.round.done():
+            if self.backend:
+                self.backend.end()
+            time.sleep(0.01)
+        self.thread.shutdown()
+
+
+def lost(client: Any) -> ClusterError:
+    """The scheduler has gone."""
+    address = client.scheduler.address if client.scheduler else "the scheduler"
+    return ClusterError(f"{address}: the scheduler was lost; the same command goes on with another")
