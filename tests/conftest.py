@@ -27,6 +27,44 @@ hypothesis.settings.load_profile("untimed")
 CONFIGS = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))
 
 
+# one process runs them after each other: only there is compiled, or derived, what they share
+TOGETHER = {
+    "tests/campaigns/test_chaotic.py": "twins",
+    "tests/measure/test_stress.py": "twins",
+    "tests/solve/test_horizon.py": "twins",
+}
+# modules that take long; the others, in small pieces, then even out the two processes
+LONG = (
+    "campaigns/test_chaos_processes", "sweep/test_execution", "sweep/test_cluster",
+    "measure/test_stress", "solve/test_integrate", "test_pages", "campaigns/test_chaos_files",
+    "sweep/test_sweep", "report/test_report", "cmd/test_cli",
+)  # fmt: skip
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items):
+    """Long modules come first."""
+    place = {f"tests/{name}.py": number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(LONG)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """All tests of a module in one process, since they share what they make.
+
+    pytest-xdist 3.8 no longer sees its own groups with pytest 9.2.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Modules(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            module = nodeid.partition("::")[0]
+            return TOGETHER.get(module, module)
+
+    config.option.loadscopereorder = False
+    return Modules(config, log)
+
+
 @pytest.fixture(scope="session")
 def once(tmp_path_factory):
     """Fill a folder once a session, whichever process comes first: once(name, fill) -> folder."""

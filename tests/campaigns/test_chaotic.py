@@ -19,8 +19,6 @@ from page_tables import kept
 
 from compressor.solve.simulate import simulate
 
-pytestmark = pytest.mark.xdist_group("twins")  # which take long to compile
-
 REVOLUTIONS = 8 + 7 * BATCHES
 MOST = 4.0  # standard errors of a mean over 16 batches: exceeded by chance once in 2,000
 

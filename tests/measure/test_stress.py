@@ -28,10 +28,8 @@ from compressor.solve.attempts import solve
 from compressor.solve.error_bars import bars
 from compressor.store.files import StoreError
 
-pytestmark = pytest.mark.xdist_group("twins")  # which take long to compile
-
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
-COUNT, SEED = 100, 1
+COUNT, SEED = 60, 1
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +41,7 @@ def folder(once):
 
 @pytest.fixture(scope="module")
 def study(folder):
-    """The seeded hundred, as the folder holds it: nothing is run."""
+    """The seeded sixty, as the folder holds it: nothing is run."""
     return campaign(folder, COUNT, SEED, 1, budget=SMALL)
 
 
@@ -91,12 +89,12 @@ def test_stiffness_is_that_of_the_same_force_at_full_damping():
         assert place(case)["stiffness"] * 1e-4**1.5 == pytest.approx(force, rel=1e-9)
 
 
-def test_a_hundred_extreme_scenes(study):
+def test_sixty_extreme_scenes(study):
     """All end ok or with a named reason within their budget; none is wrong in silence."""
     verdicts = study["verdict"].values
     assert study.sizes["scene"] == COUNT
     assert set(verdicts) <= {"ok", "failed", "unjudged"}
-    assert (verdicts == "unjudged").sum() <= 2
+    assert (verdicts == "unjudged").sum() <= 1
     failed = study.isel(scene=verdicts == "failed")
     assert all(re.fullmatch("[a-z_]+", reason) for reason in failed["reason"].values)
     assert not {"internal_error", "worker_died"} & set(failed["reason"].values)
@@ -110,18 +108,14 @@ def test_most_supported_scenes_are_ok(study):
     assert ends["ok"] >= 0.9 * COUNT // 2, ends
 
 
-def test_the_same_scenes_give_the_same_verdicts(folder, study, tmp_path):
-    again = campaign(tmp_path, 8, SEED, 1, budget=SMALL)
-    first = study.isel(scene=slice(8))
+def test_a_campaign_goes_on_and_scenes_repeat_their_verdicts(study, tmp_path):
+    told = []
+    campaign(tmp_path, 4, SEED, 1, budget=SMALL)
+    again = campaign(tmp_path, 6, SEED, 1, lambda *event: told.append(event), SMALL)
+    first = study.isel(scene=slice(6))
     for name in study.data_vars:
         if name not in ("seconds", "judging_seconds", "peak_memory"):
             np.testing.assert_array_equal(again[name].values, first[name].values, name)
-
-
-def test_a_campaign_goes_on_from_what_is_kept(study, tmp_path):
-    told = []
-    campaign(tmp_path, 4, SEED, 1, budget=SMALL)
-    campaign(tmp_path, 6, SEED, 1, lambda *event: told.append(event), SMALL)
     assert told[0][:2] == (4, 6)
     assert told[-1][:2] == (6, 6)
     with pytest.raises(StoreError, match="holds scenes of seed 1"):

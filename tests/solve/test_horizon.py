@@ -24,8 +24,6 @@ from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import read_store
 from compressor.sweep.sweep import serving_both
 
-pytestmark = pytest.mark.xdist_group("twins")  # which take long to compile
-
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
 CHAOTIC = {
     "joint": "big_end",

@@ -16,8 +16,6 @@ from compressor.solve.si_record import record, scene
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.sizes import absolute_tolerances
 
-pytestmark = pytest.mark.xdist_group("reference")  # which takes long to derive
-
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
 
 
@@ -37,7 +35,10 @@ def residual_bound(found, revolutions=4):
 @pytest.mark.slow
 @pytest.mark.parametrize(("joint", "clearance"), NINE)
 def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance):
-    """Every promise on the nine fault cases over 0.48 s, judged by sympy's equations."""
+    """Every promise on the nine fault cases over 0.48 s, judged by sympy's equations.
+
+    At 0.2 mm SciPy's methods are judged, too.
+    """
     params = reference.paper_params("design", joint, clearance * 1e-3)
     words = {word: run(joint, clearance, accuracy=word) for word in ("draft", "standard", "fine")}
     times = words["fine"]["time"].values
@@ -45,6 +46,8 @@ def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance)
     for word, found in words.items():
         assert apart(found["acceleration"].values, truth) <= ACCURACY[word].promise, word
         assert float(found["energy_residual"]) <= residual_bound(found), word
+    if clearance != 0.2:
+        return
     one, other = (
         run(joint, clearance, rtol=rtol, method=method, error_bars=False)
         for method, rtol in (("DOP853", 1e-10), ("LSODA", 1e-8))
