@@ -6,6 +6,7 @@ the sources that lists what breaks it, so that a planted fault shows that the ru
 
 import ast
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -70,14 +71,17 @@ def room(module: str) -> str:
     return parts[1] if len(parts) > 1 else ""
 
 
-def imports(text: str):
+@cache
+def imports(text: str) -> list[tuple[str, str]]:
     """(module, name) of each import; the name is "" where the whole module is imported."""
+    found = []
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
-            yield from ((alias.name, "") for alias in node.names)
+            found += [(alias.name, "") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "a relative import"
-            yield from ((node.module, alias.name) for alias in node.names)
+            found += [(str(node.module), alias.name) for alias in node.names]
+    return found
 
 
 def ours(sources: Sources, module: str):

@@ -20,10 +20,10 @@ SEED = 1
 FAST = Path("/dev/shm")  # in memory, where there is one: what is tried is not the disk
 CAMPAIGNS = {  # name: (module of chaos/, trials, trials of a sample)
     "kill": ("kill", 300, 5),
-    "power": ("power", 100, 2),
-    "faults": ("faults", 10_000, 12),
+    "power": ("power", 100, 1),
+    "faults": ("faults", 10_000, 6),
     "poison": ("poison", 200, 4),
-    "flips": ("flips", 3000, 16),
+    "flips": ("flips", 3000, 8),
     "concurrent": ("concurrent", 100, 3),
     "hostile": ("hostile", 1000, 40),
 }

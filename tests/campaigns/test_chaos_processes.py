@@ -29,7 +29,7 @@ def test_the_real_command_is_killed_and_resumes(tmp_path):
 
 
 def test_mixes_of_good_and_bad_jobs(tmp_path):
-    found = poison.campaign(2, 1, tmp_path)
+    found = poison.campaign(1, 1, tmp_path)
     assert found["failures"] == []
     assert sum(found["counts"].values()) > found["counts"]["good jobs"] > 0
 

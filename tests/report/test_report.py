@@ -431,7 +431,7 @@ def test_configs_are_the_papers_cases():
     assert ours == {case.physics_key for case in paper_cases().values()}
 
 
-def test_printed_numbers_stand_beside_what_follows(paper_store, tmp_path):
-    page = write_report(paper_store, tmp_path).read_text(encoding="utf-8")
+def test_printed_numbers_stand_beside_what_follows(full):
+    page = (full / "index.html").read_text(encoding="utf-8")
     found = re.search(r"fall, gas corners \(mm\)</td>(.*?)</tr>", page, re.DOTALL)
     assert re.findall(r">([\d.]+)<", found[1])[:2] == ["120", "81.28"]

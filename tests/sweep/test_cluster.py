@@ -35,19 +35,41 @@ TIMES = ("seconds",)  # what two runs of a job may differ in
 
 
 @pytest.fixture(scope="module")
-def dask():
+def living():
+    """Gives a cluster of two worker processes on this machine.
+
+    It is a new one where dask has not replaced a worker that a test has killed.
+    """
+    made = []
+
+    def cluster_of_two():
+        if made:
+            with contextlib.suppress(TimeoutError):
+                made[-1].wait_for_workers(2, timeout=15)
+                return made[-1]
+            made.pop().close()
+        made.append(
+            distributed.LocalCluster(
+                n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
+                memory_limit=MEMORY,
+            )
+        )  # fmt: skip
+        made[-1].wait_for_workers(2, timeout=60)
+        return made[-1]
+
+    yield cluster_of_two
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def dask(living):
     """A cluster of two worker processes on this machine."""
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
-        memory_limit=MEMORY,
-    ) as made:  # fmt: skip
-        made.wait_for_workers(2, timeout=60)
-        yield made
+    return living()
 
 
 @pytest.fixture
 def client(dask):
-    dask.wait_for_workers(2, timeout=60)
     with Cluster(dask.scheduler_address) as made:
         yield made.client
 
