@@ -24,11 +24,16 @@ KEPT = re.compile("HOME|LANG|PIP_.*|SSL_CERT_.*|REQUESTS_CA_BUNDLE|(HTTPS?|NO|AL
 
 
 def bare(folder):
-    """The environment, with links in a folder to the programs that are there."""
-    found = {name: shutil.which(name) for name in PROGRAMS} | {"python3": sys.executable}
-    for name, path in found.items():
-        if path:
+    """The environment, with links in a folder to the programs that are there.
+
+    Python is called by its own path: a virtual environment that is made here outlives the folder.
+    """
+    for name in PROGRAMS:
+        if path := shutil.which(name):
             (folder / name).symlink_to(path)
+    python = folder / "python3"
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n', encoding="utf-8")
+    python.chmod(0o755)
     kept = {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)}
     return {"HOME": str(Path.home()), "LANG": "C.UTF-8", **kept, "PATH": str(folder)}
 

@@ -29,6 +29,12 @@ def test_no_other_program_is_found(environment):
     assert {"python3", "make", "git", "sh", "cp", "mktemp"} <= names <= {"python3", *PROGRAMS}
 
 
+def test_a_virtual_environment_outlives_the_guard(tmp_path):
+    words = [sys.executable, str(SCRIPT), "python3", "-m", "venv", "--without-pip", str(tmp_path)]
+    subprocess.run(words, check=True)
+    assert subprocess.run([tmp_path / "bin" / "python", "-c", ""]).returncode == 0
+
+
 def test_a_command_s_exit_code_is_passed_on():
     for code in (0, 3):
         words = [sys.executable, str(SCRIPT), "python3", "-c", f"raise SystemExit({code})"]

@@ -17,8 +17,9 @@ from measure_tradeoff import fingerprint
 
 import compressor
 from compressor.cases.json_schema import case_schema
-from compressor.cases.load import MAX_JOBS, load_studies
+from compressor.cases.load import MAX_JOBS, load_cases, load_studies
 from compressor.cases.swept import FORMS
+from compressor.solve.simulate import simulate
 
 ROOT = page_tables.ROOT
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -197,6 +198,14 @@ def test_python_example_works(folder, monkeypatch, capsys):
     assert names["a"].attrs["units"] == "m/s2"
     assert names["run"].attrs["complete"] == 1
     assert "clearance_mm" in capsys.readouterr().out
+
+
+def test_the_peaks_of_the_readme_are_those_of_the_program():
+    told = re.search(r"peaks at 0.1, 0.2 and 0.3 mm are (.*?)\sm/s²", PAGES["README.md"])
+    cases = load_cases(ROOT / "configs" / "big-end.yaml")
+    assert [case.clearance_mm.big_end for case in cases] == [0.1, 0.2, 0.3]
+    peaks = [f"{simulate(case)['peak_acceleration'].item():.1f}" for case in cases]
+    assert re.findall(r"[\d.]+\d", told[1]) == peaks
 
 
 def test_the_table_of_contents_of_the_package():
