@@ -56,7 +56,9 @@ def responses(fault):
 
 
 def test_the_registry_has_the_papers_figures():
-    assert [figure.number for figure in FIGURES] == [3, 4, *range(6, 17)]
+    numbers = [figure.number for figure in FIGURES]
+    assert numbers[:13] == [3, 4, *range(6, 17)]
+    assert numbers == sorted(set(numbers))
 
 
 @pytest.mark.parametrize("number", FIGURE)
@@ -296,7 +298,8 @@ def test_legends_cover_no_panel(drawn, number):
     figure = drawn[number]
     figure.draw_without_rendering()
     legends = [*figure.legends, *(p.get_legend() for p in figure.axes if p.get_legend())]
-    assert legends or number in (3, 10, 13)
+    several = any(len(panel.lines) > 1 for panel in figure.axes)
+    assert legends or not several or number in (3, 10, 13)
     for legend in legends:
         box = legend.get_window_extent()
         assert not any(box.overlaps(panel.get_window_extent()) for panel in figure.axes)
