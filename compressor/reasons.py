@@ -85,7 +85,7 @@ class Reason(StrEnum):
     )
     INTERNAL_ERROR = (
         "internal_error",
-        "the program raised an exception that nobody foresaw",
+        "an unexpected exception in the program",
         "a bug of compsim: please report it, with what Python prints for "
         "compressor.store.read_job(FOLDER, JOB).traceback",
     )

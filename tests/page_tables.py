@@ -296,7 +296,7 @@ def million_table():
 def sweep_table():
     found = kept("sweep.json")
     lines = [
-        "| killed after | SIGKILL of | jobs it had told of | jobs stored |",
+        "| killed after | SIGKILL of | jobs reported done | jobs stored |",
         "|---|---|---|---|",
     ]
     for kill in found["kills"]:
@@ -420,7 +420,7 @@ def worst_table():
         + [cell(row["horizon"])]
         for row in kept("stress.json")["worst"]
     ]
-    head = ["repeat by", "verdict", "metric", "error over the greatest untold one",
+    head = ["repeat by", "verdict", "metric", "error / ten error bars",
             "beyond the horizon", "error", "bar", "horizon / span"]  # fmt: skip
     return markdown(head, rows)
 
