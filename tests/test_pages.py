@@ -91,6 +91,13 @@ def test_make_verbs_exist(verb):
     assert re.search(rf"^{verb}:", MAKEFILE, re.MULTILINE), f"make {verb}"
 
 
+def test_tests_that_are_named_exist():
+    sources = "".join(p.read_text(encoding="utf-8") for p in (ROOT / "tests").rglob("test_*.py"))
+    named = set(re.findall(r"`(test_\w+)`", TEXT))
+    assert named
+    assert [name for name in named if f"def {name}(" not in sources] == []
+
+
 def test_every_verb_of_the_command_line_is_in_the_readme():
     named = set(re.findall(r"`compsim ([a-z]+)`", PAGES["README.md"]))
     assert named == set(cli.commands)
