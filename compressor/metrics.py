@@ -43,6 +43,7 @@ class Metric(NamedTuple):
     bar: Bar = Bar()
     peak: bool = False  # the greatest value over time: the relative errors of all are of one size
     shown: Shown | None = None  # None: not drawn
+    contact: bool = False  # of a contact: of an ideal joint it tells nothing
 
 
 METRICS = {
@@ -71,16 +72,17 @@ METRICS = {
         ),
         Metric(
             "max_penetration", ("joint",), "m", "greatest penetration; negative: never touched",
-            Bar(0.8, 0.01, 0.002), True, Shown("greatest penetration", "µm", 1e6),
+            Bar(0.8, 0.01, 0.002), True, Shown("greatest penetration", "µm", 1e6), True,
         ),
         Metric(
             "contact_loss_fraction", ("joint",), "1",
             "share of time without contact (F_N = 0)",
             Bar(of_path=0.01, relative=False), shown=Shown("time without contact", "%", 1e2),
+            contact=True,
         ),
         Metric(
             "impact_count", ("joint",), "1", "times that contact began",
-            Bar(of_path=0.0, relative=False), shown=Shown("times contact began", ""),
+            Bar(of_path=0.0, relative=False), shown=Shown("times contact began", ""), contact=True,
         ),
     )
 }  # fmt: skip

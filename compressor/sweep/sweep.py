@@ -156,7 +156,7 @@ def run_missing(
             progress(done, total, "")
 
     def keep(end: Done | Lost) -> None:
-        outcome = settled(end)
+        outcome = outcome_of(end)
         ends[outcome.key] = End(outcome.status, outcome.reason, outcome.detail)
         tell(writer.add(outcome))
 
@@ -274,7 +274,7 @@ def endings(
     return tuple(counts), tuple(failures)
 
 
-def settled(end: Done | Lost) -> Outcome:
+def outcome_of(end: Done | Lost) -> Outcome:
     """The outcome of a job, also of one that raised an exception or lost its worker."""
     if isinstance(end, Done):
         if isinstance(end.result, StoreError):

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from compressor.metrics import JOINTS
+from compressor.metrics import JOINTS, METRICS
 from compressor.report.figures.style import (
     BLUE,
     CYCLE,
@@ -24,7 +24,6 @@ from compressor.report.figures.style import (
     styled,
 )
 
-CONTACT = ("max_penetration", "contact_loss_fraction", "impact_count")
 COLUMNS = 3
 MARKERS = "osD^v"
 MANY = Line(GREY, "-", 0.8, 2.0)
@@ -57,27 +56,23 @@ class Measure:
         An ideal joint has a penetration of exactly 0.
         """
         values = data[self.variable]
-        if self.variable in CONTACT:
+        if METRICS[self.variable].contact:
             values = values.where(data["max_penetration"] != 0)
         return (values.sel(joint=self.joint, drop=True) if self.joint else values) * self.factor
 
 
-def per_joint(variable: str, title: str, unit: str, factor: float) -> Iterator[Measure]:
-    """A metric of each joint."""
-    for joint in JOINTS:
-        name = f"{title}, {joint.replace('_', ' ')}"
-        yield Measure(variable, name, unit, factor, joint)
+def shown(name: str) -> Iterator[Measure]:
+    """A metric as the report draws it, if it does: of each joint apart."""
+    metric = METRICS[name]
+    if metric.shown and not metric.dims:
+        yield Measure(name, *metric.shown)
+    elif metric.shown:
+        title, unit, factor = metric.shown
+        for joint in JOINTS:
+            yield Measure(name, f"{title}, {joint.replace('_', ' ')}", unit, factor, joint)
 
 
-MEASURES = (
-    Measure("peak_acceleration", "peak acceleration", "m/s²"),
-    Measure("rms_acceleration", "rms acceleration", "m/s²"),
-    Measure("rms_acceleration_deviation", "rms deviation from ideal", "m/s²"),
-    *per_joint("peak_contact_force", "peak contact force", "kN", 1e-3),
-    *per_joint("max_penetration", "greatest penetration", "µm", 1e6),
-    *per_joint("contact_loss_fraction", "time without contact", "%", 1e2),
-    *per_joint("impact_count", "times contact began", "", 1.0),
-)
+MEASURES = tuple(measure for name in METRICS for measure in shown(name))
 
 
 def measures(data: xr.Dataset) -> list[Measure]:
