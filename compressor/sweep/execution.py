@@ -7,16 +7,17 @@ work in a process that died or took too long, and what runs again.
 
 import contextlib
 import math
+import mmap
 import multiprocessing
 import os
 import signal
+import sys
 import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import wait
 from dataclasses import replace
-from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ STALL = 60.0  # s without any result, while no job runs, after which all workers
 STARTING = 600.0  # s that workers may take to begin: what they prepare may have to be compiled
 UNSEEN = 3.0  # s that joblib may take to see that a worker died
 FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
+BROKEN = (BrokenProcessPool, BrokenPipeError)  # the latter: loky's own helper was killed
 MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
 MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
@@ -96,9 +98,9 @@ class Local(Batches):
         super().__init__(jobs, rules.target_seconds, rules.count)
         self.rules = replace(rules, memory=rules.memory or memory_share(rules.count))
         self.places = 4 * max(rules.count, 2)  # for notes: more than joblib asks for
-        self.shared = shared_memory(self.places * NOTE.size)
-        self.notes: Any = self.shared.buf
-        self.initargs = (work, self.rules, self.shared, os.getpid())
+        self.shared, self.path = shared_file(self.places * NOTE.size)
+        self.notes: Any = mmap.mmap(self.shared, 0)
+        self.initargs = (work, self.rules, self.path, os.getpid())
         self.pool = self.executor = None  # type: Any
         self.heard = 0.0  # when a batch was last handed out, or ended
         self.died: float = math.inf  # when a process was first seen to have died
@@ -111,6 +113,8 @@ class Local(Batches):
         joblib would do a single job at a time in this process: it is told of two, loky of one.
         """
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in new workers, too, until they settle
+        # one of loky's processes removes what a SIGKILL of ours leaves: in silence
+        os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
         if self.pool is None:
             self.pool = Parallel(
                 max(self.width, 2), Loky(self.hand_over), "generator_unordered", batch_size=1,
@@ -168,9 +172,9 @@ class Local(Batches):
 
     def fail(self, error: BaseException) -> Iterator[Lost]:
         """The pool has broken: see to its jobs. The one that ran in a dead process may be why."""
-        if isinstance(error, OSError) and not self.processes:
-            raise WorkersFailed(f"no worker process can be started: {error}") from error
-        if not isinstance(error, BrokenProcessPool):
+        if not isinstance(error, BROKEN):
+            if isinstance(error, OSError) and not self.processes:
+                raise WorkersFailed(f"no worker process can be started: {error}") from error
             raise error
         codes = {pid: child.exitcode for pid, child in self.processes.items()}
         died = {pid for pid, code in codes.items() if code not in (None, -signal.SIGKILL)}
@@ -204,7 +208,9 @@ class Local(Batches):
     def discard(self) -> None:
         """End the pool, if there is one."""
         if self.executor:
-            self.executor.terminate(kill_workers=True)
+            with contextlib.suppress(BrokenPipeError):
+                self.executor.terminate(kill_workers=True)
+            kill(child.pid for child in children())
         self.pool = self.executor = None
         self.processes: dict[int, Any] = {}
         self.late: set[int] = set()  # processes that were killed for taking too long
@@ -220,22 +226,25 @@ class Local(Batches):
         self.thread.shutdown()
         self.discard()
         if self.notes:
-            self.notes = None
-            self.shared.close()
-            self.shared.unlink()
+            self.notes = self.notes.close()
+            os.close(self.shared)
+            with contextlib.suppress(OSError):
+                os.unlink(self.path)  # where it is a file on disk
 
 
-def shared_memory(size: int) -> SharedMemory:
-    """Shared memory, of which a process of Python's sees that it does not outlive us.
+def shared_file(size: int) -> tuple[int, str]:
+    """A file that workers can map, and its path: on Linux one in memory, which ends with us.
 
-    That process is to survive a hang-up, and to remove in silence what a SIGKILL of ours leaves.
+    Python's own shared memory is removed by whichever process of it ends first, once the process
+    that keeps count of it has been killed.
     """
-    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
-    old = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
-    try:
-        return SharedMemory(create=True, size=size)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, old)
+    if sys.platform == "linux":
+        number = os.memfd_create("notes of compsim's workers")
+        path = f"/proc/{os.getpid()}/fd/{number}"
+    else:
+        number, path = tempfile.mkstemp()
+    os.truncate(number, size)
+    return number, path
 
 
 def children() -> list[Any]:

@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import mmap
 import os
 import pickle
 import resource
@@ -12,7 +13,6 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
 from compressor.reasons import Reason
@@ -66,7 +66,7 @@ class Workers:
 HERE: dict[str, Any] = {}  # what `settle` leaves for `do_batch`
 
 
-def settle(work: Callable[[Any], Any], rules: Workers, notes: SharedMemory, parent: int) -> None:
+def settle(work: Callable[[Any], Any], rules: Workers, notes: str, parent: int) -> None:
     """Make a new process a worker: its end, signals, streams, memory; what it is told once."""
     if sys.platform == "linux":  # die when the parent does, even amid compiled code
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -81,7 +81,8 @@ def settle(work: Callable[[Any], Any], rules: Workers, notes: SharedMemory, pare
     os.environ["PYTHONFAULTHANDLER"] = ""  # or loky has a crash print where it was
     rules.prepare()
     assert rules.memory
-    HERE.update(work=work, rules=rules, shared=notes, notes=notes.buf)
+    with open(notes, "r+b") as file:
+        HERE.update(work=work, rules=rules, notes=mmap.mmap(file.fileno(), 0))
     limit(rules.memory)
 
 

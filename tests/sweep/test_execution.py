@@ -393,6 +393,45 @@ def test_no_process_outlives_its_parent(number):
     assert not list(Path("/dev/shm").glob(f"*{parent.pid}*"))
 
 
+HELPERS = """
+import os, signal, threading, time
+from pathlib import Path
+from compressor.sweep.execution import children, run_batches
+from compressor.sweep.worker import Workers
+
+def work(payload):
+    time.sleep(0.02)
+    return payload
+
+def end_helpers():
+    while True:
+        workers = {child.pid for child in children()}
+        for path in Path(f"/proc/{os.getpid()}/task").glob("*/children"):
+            for pid in set(map(int, path.read_text().split())) - workers:
+                words = Path(f"/proc/{pid}/cmdline").read_text()
+                if "resource_tracker" in words:
+                    os.kill(pid, signal.SIGKILL)
+                    print("ended", flush=True)
+        time.sleep(PAUSE)
+
+threading.Thread(target=end_helpers, daemon=True).start()
+jobs = [(n, n, 9.0) for n in range(100)]
+ends = list(run_batches(work, jobs, Workers(2)))
+print(sorted(end.result for end in ends) == [*range(100)])
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize("pause", [0.01, 0.3])
+def test_helpers_of_joblib_that_are_killed_cost_nothing(pause):
+    """Beside workers, loky and Python start processes that remove what is left behind."""
+    words = [sys.executable, "-c", HELPERS.replace("PAUSE", str(pause))]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.stdout.splitlines()[-1:] == ["True"], done.stderr[-2000:]
+    assert "ended" in done.stdout
+
+
 def test_ctrl_c_is_silent_while_workers_start():
     """It reaches the whole group, also processes that have just begun."""
     code = PARENT.replace("signal.SIGTERM", "signal.SIGINT")
