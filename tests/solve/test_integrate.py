@@ -74,6 +74,7 @@ def test_every_compiled_method_is_in_the_table():
     assert [name for name in METHODS if name in COMPILED] == [*COMPILED]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "auto"])
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_energy_residual_of_every_method(method, joint):
