@@ -107,9 +107,24 @@ class Batches:
 
     def run(self, batches: Iterable[list[Job]]) -> None:
         """Have joblib do batches: in the thread. What they give arrives by `hand_over`."""
+        begun = False
+
+        def calls() -> Iterator[Any]:
+            nonlocal begun
+            for batch in batches:
+                begun = True
+                yield self.call(batch)
+
         try:
-            for _ in self.parallel()(map(self.call, batches)):
+            for _ in self.parallel()(calls()):
                 pass
+        except BaseException:
+            for batch in itertools.islice(batches, 0 if begun else 1):  # joblib has taken none
+                if self.alone:
+                    self.suspects.append(batch)
+                else:
+                    self.waiting.extendleft(reversed(batch))
+            raise
         finally:
             self.arrived.put(None)
 
