@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "report": {"analysis", "cases", "store", "metrics", "reasons"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
-    "compsim": {"", "analysis", "cases", "measure", "metrics", "reasons", "report", "solve",
+    "compsim": {"analysis", "cases", "measure", "metrics", "reasons", "report", "solve",
                 "store", "sweep"},
 }  # fmt: skip
 PACKAGES = ("cases", "physics", "solve", "store", "sweep", "analysis", "report", "measure")

@@ -201,8 +201,9 @@ def run_here(
     remark: Callable[[str], None],
     pulse: Callable[[], object] = lambda: None,
 ) -> Generator[Done | Lost, None, None]:
-    """`run_batches` in processes that have loaded the equations, which are compiled before."""
-    compile_once(needs, remark)
+    """`run_batches` in processes that load the equations, compiled before if there is a job."""
+    if jobs:
+        compile_once(needs, remark)
     return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), pulse)
 
 

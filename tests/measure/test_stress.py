@@ -1,6 +1,7 @@
 """Extreme scenes: drawn alike for a seed, judged by others, and none wrong in silence."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -43,6 +44,11 @@ def folder(once):
 def study(folder):
     """The seeded sixty, as the folder holds it: nothing is run."""
     return campaign(folder, COUNT, SEED, 1, budget=SMALL)
+
+
+def test_what_is_complete_compiles_nothing(study, folder, monkeypatch):
+    monkeypatch.setattr(sys.modules["compressor.sweep.sweep"], "compile_once", pytest.fail)
+    assert campaign(folder, COUNT, SEED, 1, budget=SMALL).identical(study)
 
 
 def test_scenes_lie_in_their_ranges():

@@ -417,7 +417,7 @@ def end_helpers():
 threading.Thread(target=end_helpers, daemon=True).start()
 jobs = [(n, n, 9.0) for n in range(100)]
 ends = list(run_batches(work, jobs, Workers(2)))
-print(sorted(end.result for end in ends) == [*range(100)])
+print(sorted(end.result for end in ends) == [*range(100)], flush=True)
 os._exit(0)
 """
 
@@ -428,8 +428,9 @@ def test_helpers_of_joblib_that_are_killed_cost_nothing(pause):
     """Beside workers, loky and Python start processes that remove what is left behind."""
     words = [sys.executable, "-c", HELPERS.replace("PAUSE", str(pause))]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120)
-    assert done.stdout.splitlines()[-1:] == ["True"], done.stderr[-2000:]
-    assert "ended" in done.stdout
+    said = done.stdout.splitlines()
+    assert "True" in said, done.stderr[-2000:]
+    assert "ended" in said
 
 
 def test_ctrl_c_is_silent_while_workers_start():
