@@ -18,6 +18,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import wait
 from dataclasses import replace
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +113,7 @@ class Local(Batches):
 
         joblib would do a single job at a time in this process: it is told of two, loky of one.
         """
+        resource_tracker.ensure_running()  # before: Python 3.11 lets signals in as it starts this
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in new workers, too, until they settle
         # one of loky's processes removes what a SIGKILL of ours leaves: in silence
         os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")

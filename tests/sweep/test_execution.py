@@ -433,6 +433,27 @@ def test_helpers_of_joblib_that_are_killed_cost_nothing(pause):
     assert "ended" in said
 
 
+STARTS = """
+import signal
+from joblib.externals.loky.backend import fork_exec
+from compressor.sweep.execution import run_batches
+from compressor.sweep.worker import ENDING, Workers
+
+def start(*words, begin=fork_exec.fork_exec, **more):
+    print(signal.pthread_sigmask(signal.SIG_BLOCK, ()) >= set(ENDING))
+    return begin(*words, **more)
+
+fork_exec.fork_exec = start
+list(run_batches(int, [(n, n, 9.0) for n in range(2)], Workers(2)))
+"""
+
+
+def test_workers_start_with_signals_blocked():
+    """Until they settle, Ctrl-C would end each with a traceback."""
+    done = subprocess.run([sys.executable, "-c", STARTS], capture_output=True, text=True)
+    assert done.stdout.splitlines() == ["True", "True"]
+
+
 def test_ctrl_c_is_silent_while_workers_start():
     """It reaches the whole group, also processes that have just begun."""
     code = PARENT.replace("signal.SIGTERM", "signal.SIGINT")
