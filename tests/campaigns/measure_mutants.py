@@ -149,7 +149,8 @@ def become(folder, output, jit, cache):
     kept = [path for path in sys.path if not Path(path or ".").resolve().is_relative_to(ROOT)
             or ".venv" in path]  # fmt: skip
     sys.path[:] = [str(folder), str(folder / "cmd"), *kept]
-    os.environ["COMPSIM_JIT"] = str(int(jit))
+    # workers that a test starts are no forks: they go by the environment
+    os.environ |= {"COMPSIM_JIT": str(int(jit)), "NUMBA_CACHE_DIR": str(folder / cache)}
     numba.config.CACHE_DIR = str(folder / cache)
 
 
