@@ -390,7 +390,7 @@ def test_no_process_outlives_its_parent(number):
     parent.stderr.close()
     if number == signal.SIGTERM:
         assert said == ""
-    assert not list(Path("/dev/shm").glob(f"*{parent.pid}*"))
+    assert not list(Path("/dev/shm").glob(f"*[-_]{parent.pid}[-_]*"))
 
 
 HELPERS = """
