@@ -169,8 +169,9 @@ class Local(Batches):
         """
         kill(child.pid for child in children())
         results = getattr(self.executor, "_result_queue", None)
-        if results and not children():
-            results._writer.close()
+        if results and not children():  # loky will close it, perhaps at this moment
+            with contextlib.suppress(OSError), open(os.devnull, "wb") as nobody:
+                os.dup2(nobody.fileno(), results._writer.fileno())
 
     def fail(self, error: BaseException) -> Iterator[Lost]:
         """The pool has broken: see to its jobs. The one that ran in a dead process may be why."""

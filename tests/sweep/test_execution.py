@@ -259,6 +259,7 @@ def test_workers_that_die_between_jobs_are_replaced(tmp_path):
     assert results(ends) == {n: n for n in range(100)}
 
 
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_worker_that_ends_amid_a_message_costs_nothing(number, tmp_path, monkeypatch):
     """No job runs whose clock tells; what is left half-said would have joblib read for ever."""
