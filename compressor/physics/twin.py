@@ -77,7 +77,8 @@ def march_twins(
             return
         steps, phase = w.steps, phases[w.segment]
         fellow.t, fellow.stiff = w.t, w.stiff
-        march(w, p, z, work, atol, size, edges, phases, times, states, tally, 1)
+        # a plain 1 would be a type of its own, for which numba compiles all of march again
+        march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))
         if w.steps > steps:
             follow(w, fellow, twin, twin_work, atol, size, phase, p)
             if not separation(w.t, z[:n], twin[:n], p, rows) <= far:

@@ -13,6 +13,7 @@ from conftest import keep
 
 from compressor.cases.case import Case
 from compressor.metrics import ERRORS, METRICS
+from compressor.physics.march import march
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
@@ -219,3 +220,11 @@ def test_show_and_report_tell_of_jobs_beyond_their_horizon(tmp_path, capsys, mon
     assert "beyond the horizon" not in told[1]
     assert cli.main(["report"]) == 0
     assert "Of 1 of the jobs the run is longer" in (tmp_path / "report/index.html").read_text()
+
+
+def test_twins_go_by_the_march_that_is_compiled_already():
+    """numba made a second one for a plain 1 among its arguments, in half a minute."""
+    assert predictability_horizon(case(REGULAR, duration_rev=0.02, settle_rev=0)) == math.inf
+    index = march.made._cache._cache_file._load_index()
+    assert index
+    assert not [types for (types, *_) in index if "Literal" in str(types)]
