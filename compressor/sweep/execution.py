@@ -113,10 +113,10 @@ class Local(Batches):
 
         joblib would do a single job at a time in this process: it is told of two, loky of one.
         """
+        # helper processes remove what a SIGKILL of ours leaves: in silence
+        os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
         resource_tracker.ensure_running()  # before: Python 3.11 lets signals in as it starts this
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in new workers, too, until they settle
-        # one of loky's processes removes what a SIGKILL of ours leaves: in silence
-        os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
         if self.pool is None:
             self.pool = Parallel(
                 max(self.width, 2), Loky(self.hand_over), "generator_unordered", batch_size=1,
