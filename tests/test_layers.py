@@ -17,6 +17,7 @@ MAY_IMPORT = {
     "": {"cases", "solve", "store"},  # the public calls, found when they are first used
     "program": set(),
     "metrics": set(),
+    "digits": set(),
     "reasons": set(),
     "outcome": {"metrics", "reasons"},
     "cases": {"metrics"},

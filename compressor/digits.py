@@ -1,0 +1,58 @@
+"""Numbers as people read them: with the digits that their error bars allow.
+
+Without libraries: results are read without any.
+"""
+
+import math
+
+UNKNOWN = "unknown"  # a number whose error bar is as long as itself
+PLAIN, MOST = 6, 12  # digits without an error bar, and with one
+SMALL, LARGE = 1e-3, 1e7  # sizes between which a number is written without a power of ten
+
+
+def is_known(value: float, bar: float, relative: bool = True) -> bool:
+    """Whether a number is larger than its error bar; nan, of no bar, is no error bar at all.
+
+    Of a share or a count (not relative) any bar below inf tells something, also beside 0.
+    """
+    if math.isnan(value) or math.isnan(bar) or math.isinf(bar):
+        return False
+    return not relative or bar < abs(value) or bar == 0.0
+
+
+def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) -> str:
+    """A number and its error bar, such as 647.1 ± 0.3, or at most six of its digits alone (bare).
+
+    bar: nan where none was made; the number then has six digits.
+    """
+    if math.isnan(value):
+        return "–"
+    if math.isnan(bar):
+        return f"{value:.{PLAIN}g}"
+    if not is_known(value, bar, relative):
+        return UNKNOWN
+    if bar == 0.0:
+        return f"{value:.{PLAIN}g}"
+    if not relative and bar >= abs(value):
+        return f"≤ {_rounded_up(abs(value) + bar)[0]:g}"
+    error, place = _rounded_up(bar)
+    top = math.floor(math.log10(abs(value))) if value else place
+    place = max(place, top - (PLAIN if bare else MOST) + 1)
+    error = max(error, 10.0**place)
+    pair: tuple[float, ...] = (value,) if bare else (value, error)
+    if SMALL <= abs(value) < LARGE or value == 0.0:
+        return " ± ".join(f"{round(one, -place):.{max(0, -place)}f}" for one in pair)
+    text = " ± ".join(f"{one / 10.0**top:.{max(0, top - place)}f}" for one in pair)
+    return f"{text if bare else f'({text})'}e{top:+03d}"
+
+
+def _rounded_up(bar: float) -> tuple[float, int]:
+    """A bar to one digit, two where the first is 1, never shorter; and its last digit's power."""
+    place = math.floor(math.log10(bar))
+    if bar / 10.0**place < 2.0:
+        place -= 1
+    count = math.ceil(round(bar / 10.0**place, 9))
+    if count in (10, 20, 100):
+        place += 1
+        count = 1 if count == 10 else count // 10
+    return count * 10.0**place, place

@@ -1,0 +1,75 @@
+"""Numbers to the digits that their error bars allow."""
+
+import math
+
+import pytest
+
+from compressor.digits import by_bar, is_known
+
+INF, NAN = math.inf, math.nan
+
+
+@pytest.mark.parametrize(
+    ("value", "bar", "text"),
+    [
+        (647.0912, 0.2831, "647.1 ± 0.3"),
+        (647.0912, 0.12, "647.09 ± 0.12"),
+        (-3.2, 0.04, "-3.20 ± 0.04"),
+        (99.97, 0.95, "100 ± 1"),
+        (1234.5, 19.3, "1230 ± 20"),
+        (5102.3, 206.6, "5100 ± 300"),
+        (1.23456e-5, 3e-8, "(1.235 ± 0.003)e-05"),
+        (82345678.9, 12340.0, "(8.2346 ± 0.0013)e+07"),
+        (12.0, 0.0, "12"),
+        (647.09123, NAN, "647.091"),
+        (NAN, 1.0, "–"),
+        (0.5, 0.6, "unknown"),
+        (-0.5, 0.5, "unknown"),
+        (0.0, 1e-9, "unknown"),
+        (647.1, INF, "unknown"),
+    ],
+)
+def test_a_number_has_the_digits_that_its_bar_allows(value, bar, text):
+    assert by_bar(value, bar) == text
+    bare = by_bar(value, bar, bare=True)
+    assert bare == text.partition(" ±")[0].replace("(", "") + text.partition(")")[2]
+
+
+@pytest.mark.parametrize(
+    ("value", "bar", "text"),
+    [
+        (0.0, 0.0, "0"),
+        (0.0, 1e-5, "≤ 1e-05"),
+        (0.0001, 0.0002, "≤ 0.0003"),
+        (0.32, 0.01, "0.32 ± 0.01"),
+        (14.0, 2.0, "14 ± 2"),
+        (0.32, INF, "unknown"),
+    ],
+)
+def test_a_share_or_a_count_is_bounded_where_it_may_be_nothing(value, bar, text):
+    assert by_bar(value, bar, relative=False) == text
+
+
+@pytest.mark.parametrize("exponent", range(-12, 12))
+@pytest.mark.parametrize("bar", [0.0123, 0.0199, 0.02, 0.0999, 0.3, 0.949, 0.951])
+def test_the_bar_that_is_shown_is_never_shorter(exponent, bar):
+    value, bar = 3.14159265358979 * 10.0**exponent, bar * 10.0**exponent
+    text = by_bar(value, bar)
+    scale = float("1e" + text.partition(")e")[2]) if ")e" in text else 1.0
+    shown, error = (float(part) * scale for part in text.strip("(").partition(")")[0].split(" ± "))
+    assert bar * (1 - 1e-9) <= error <= 1.5 * bar * (1 + 1e-9)
+    assert abs(shown - value) <= 0.51 * error
+
+
+def test_no_more_digits_are_shown_than_double_precision_vouches_for():
+    assert by_bar(math.pi, 1e-30) == "3.14159265359 ± 0.00000000001"
+    assert by_bar(math.pi, 1e-9, bare=True) == "3.14159"
+
+
+def test_what_is_known_is_larger_than_its_bar():
+    assert is_known(2.0, 1.0)
+    assert is_known(0.0, 0.0)
+    assert is_known(0.0, 0.1, relative=False)
+    for value, bar in ((1.0, 1.0), (1.0, INF), (1.0, NAN), (NAN, 0.1)):
+        assert not is_known(value, bar)
+    assert not is_known(0.0, INF, relative=False)
