@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-pure check format accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -47,7 +47,10 @@ format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-accuracy: install  ## measure the errors behind accuracy and error bars (about three minutes)
+calibration: install  ## measure what estimates of errors are worth, on cases that judge nothing
+	$(CAMPAIGN)/calibrate_errors.py tests/results/calibration.json
+
+accuracy: install  ## judge promises and error bars on 1,000 other random cases
 	$(CAMPAIGN)/measure_accuracy.py tests/results/accuracy.json
 
 claims: install  ## measure the paper's claims over a range of masses (seconds)
@@ -89,7 +92,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers pages  ## all of these (25 minutes)
+measurements: calibration accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers pages  ## all of these (25 minutes)
 
 pages: install  ## write the generated tables of the README pages
 	$(BIN)/python tests/page_tables.py

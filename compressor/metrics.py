@@ -5,11 +5,12 @@ case files that name a metric are read at once. A new metric is a row of `METRIC
 `compressor.solve.tallied.metrics`.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 JOINTS = ("big_end", "small_end")
 AXES = ("x", "y")
-SIZES = {"joint": len(JOINTS), "axis": len(AXES)}
+QUANTILES = (0.5, 0.95)  # of the revolutions' greatest values
+SIZES = {"joint": len(JOINTS), "axis": len(AXES), "quantile": len(QUANTILES)}
 
 
 class Bar(NamedTuple):
@@ -19,10 +20,10 @@ class Bar(NamedTuple):
     the most careful of those that were.
     """
 
-    own: float = 1.0  # share of the metric's own difference
-    of_peaks: float = 0.6  # of the mean relative difference of the peaks
-    of_path: float = 0.02  # of the distance of the journals over their room
-    relative: bool = True  # False: the bar of a share or a count is its difference, or of_path
+    own: float = 5.0  # share of the metric's own difference
+    path: float = 0.3  # of the distance of the time series that it is taken from
+    relative: bool = True  # False: of a share or a count, whose bar is a number of its own unit
+    least: float = 1e-13  # share of the metric that a relative bar has at least: rounding, or more
 
 
 class Shown(NamedTuple):
@@ -40,49 +41,52 @@ class Metric(NamedTuple):
     dims: tuple[str, ...]
     unit: str
     phrase: str  # long name
+    series: str  # the time series that it is taken from
     bar: Bar = Bar()
-    peak: bool = False  # the greatest value over time: the relative errors of all are of one size
     shown: Shown | None = None  # None: not drawn
     contact: bool = False  # of a contact: of an ideal joint it tells nothing
+    kind: Literal["greatest", "root", "share", "count"] = "share"  # how it comes from the run
 
 
 METRICS = {
     row.name: row
     for row in (
         Metric(
-            "peak_acceleration", (), "m/s2", "greatest |acceleration|",
-            Bar(0.8, 0.5, 0.02), True, Shown("peak acceleration", "m/s²"),
+            "peak_acceleration", (), "m/s2", "greatest |acceleration|", "acceleration",
+            # a parabola between the nodes of a step finds the peak to some 5e-9
+            Bar(3.0, 0.2, least=5e-9), Shown("peak acceleration", "m/s²"), kind="greatest",
         ),
         Metric(
-            "rms_acceleration", (), "m/s2", "root mean square of acceleration",
-            Bar(0.4, 0.02, 0.003), shown=Shown("rms acceleration", "m/s²"),
+            "rms_acceleration", (), "m/s2", "root mean square of acceleration", "acceleration",
+            Bar(3.5, 0.01), Shown("rms acceleration", "m/s²"), kind="root",
         ),
         Metric(
             "rms_acceleration_deviation", (), "m/s2",
-            "rms of acceleration less the ideal machine's",
-            Bar(0.5, 0.4, 0.02), shown=Shown("rms deviation from ideal", "m/s²"),
+            "rms of acceleration less the ideal machine's", "acceleration",
+            Bar(3.5, 0.17), Shown("rms deviation from ideal", "m/s²"), kind="root",
         ),
         Metric(
             "peak_contact_force", ("joint",), "N", "greatest joint force on the rod",
-            Bar(0.7, 0.6, 0.02), True, Shown("peak contact force", "kN", 1e-3),
+            "contact_force", Bar(4.0, 0.1), Shown("peak contact force", "kN", 1e-3),
+            kind="greatest",
         ),
         Metric(
             "peak_contact_force_axis", ("joint", "axis"), "N",
-            "greatest joint force along an axis", Bar(1.0, 0.4, 0.02), True,
+            "greatest joint force along an axis", "contact_force", Bar(4.2, 0.16), kind="greatest",
         ),
         Metric(
             "max_penetration", ("joint",), "m", "greatest penetration; negative: never touched",
-            Bar(0.8, 0.01, 0.002), True, Shown("greatest penetration", "µm", 1e6), True,
+            "penetration", Bar(4.0, 0.04), Shown("greatest penetration", "µm", 1e6), True,
+            "greatest",
         ),
         Metric(
             "contact_loss_fraction", ("joint",), "1",
-            "share of time without contact (F_N = 0)",
-            Bar(of_path=0.01, relative=False), shown=Shown("time without contact", "%", 1e2),
-            contact=True,
+            "share of time without contact (F_N = 0)", "penetration",
+            Bar(1.5, 0.01, False), Shown("time without contact", "%", 1e2), True,
         ),
         Metric(
-            "impact_count", ("joint",), "1", "times that contact began",
-            Bar(of_path=0.0, relative=False), shown=Shown("times contact began", ""), contact=True,
+            "impact_count", ("joint",), "1", "times that contact began", "penetration",
+            Bar(1.0, 0.0, False), Shown("times contact began", ""), True, "count",
         ),
     )
 }  # fmt: skip
@@ -94,6 +98,46 @@ ERRORS: Rows = {
     f"{row.name}_error": (row.dims, row.unit, f"error bar of {row.name}")
     for row in METRICS.values()
 }
+# time series, over time and these dimensions
+SERIES: Rows = {
+    "displacement": ((), "m", "crosshead position from the crank centre"),
+    "velocity": ((), "m/s", "crosshead velocity"),
+    "acceleration": ((), "m/s2", "crosshead acceleration"),
+    "rod_angle": ((), "rad", "rod angle phi"),
+    "piston_force": ((), "N", "piston force, positive towards the crank"),
+    "contact_force": (("joint", "axis"), "N", "joint force on the rod"),
+    "eccentricity": (("joint", "axis"), "m", "journal centre less bearing centre"),
+    "penetration": (("joint",), "m", "contact penetration, negative where there is a gap"),
+}
+# how far a time series may be from the exact one, as ERRORS; vectors by their length
+SERIES_ERRORS: Rows = {
+    f"{name}_error": (
+        tuple(dim for dim in dims if dim != "axis"), "1",
+        f"relative L2 error of {name} after settling",
+    )
+    for name, (dims, _, _) in SERIES.items()
+}  # fmt: skip
+# of a chaotic run, by batch means over its settled revolutions; nan of any other
+STATISTICS: Rows = {}
+for row in METRICS.values():
+    if row.kind != "greatest":
+        STATISTICS[f"{row.name}_standard_error"] = (
+            row.dims, row.unit, f"standard error of {row.name}"
+        )  # fmt: skip
+        continue
+    for word, dims, phrase in (
+        ("mean", (), "mean over revolutions of each one's"),
+        ("quantile", ("quantile",), "quantile over revolutions of each one's"),
+    ):
+        one = f"{row.name}_{word}"
+        STATISTICS[one] = ((*row.dims, *dims), row.unit, f"{phrase} {row.name}")
+        STATISTICS[f"{one}_standard_error"] = (
+            (*row.dims, *dims), row.unit, f"standard error of {one}"
+        )  # fmt: skip
+STATISTICS["revolutions"] = ((), "1", "settled revolutions that statistics are taken over")
+STATISTICS["revolutions_to_one_percent"] = (
+    (), "1", "settled revolutions that would bring the standard error of rms_acceleration to 1 %"
+)  # fmt: skip
 HORIZON = "predictability_horizon"
 # energy flows and how the run went
 LEDGER: Rows = {
@@ -107,6 +151,8 @@ LEDGER: Rows = {
     "evaluations": ((), "1", "evaluations of the right-hand side"),
     "seconds": ((), "s", "wall time of the solution, without that of its error bars"),
     HORIZON: ((), "s", "time up to which close twins stay together; inf: to the end"),
+    "period_rev": ((), "rev", "period of a motion that repeats itself within its errors"),
+    "settled_rev": ((), "rev", "revolutions after which it does, or metrics no longer change"),
 }
 NUMBERS: Rows = {row.name: (row.dims, row.unit, row.phrase) for row in METRICS.values()}
-NUMBERS |= ERRORS | LEDGER
+NUMBERS |= ERRORS | SERIES_ERRORS | LEDGER | STATISTICS

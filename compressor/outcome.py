@@ -5,19 +5,34 @@ So that results are read without loading either; the numbers' names and units ar
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.metrics import AXES, JOINTS, NUMBERS, SIZES
+from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SIZES, STATISTICS
 from compressor.program import PROGRAM
 
 # a job's numbers as one structured scalar: what workers send home and segments hold
 ROW = np.dtype(
     [(name, "f8", tuple(SIZES[dim] for dim in dims)) for name, (dims, _, _) in NUMBERS.items()]
 )
+
+
+class Regime(StrEnum):
+    """How far a motion can be foretold; a run that was not asked has none.
+
+    PREDICTABLE: to its end, within its errors. PERIODIC: and it repeats itself. CHAOTIC: close
+    motions part before the end, so that statistics alone have a meaning. UNDECIDED: errors are
+    large, and the search for chaos came to its budget's end.
+    """
+
+    PREDICTABLE = "predictable"
+    PERIODIC = "periodic"
+    CHAOTIC = "chaotic"
+    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True)
@@ -57,7 +72,8 @@ class Outcome:
 
     def table(self, more: dict[str, tuple]) -> "Table":
         """With more variables, what the job's Dataset is made of."""
-        variables = self.variables() | coordinates() | more
+        variables = self.variables() | more
+        variables |= coordinates(dim for dims, _, _ in variables.values() for dim in dims)
         named = {
             name: Variable(dims, np.asarray(values), attrs)
             for name, (dims, values, attrs) in variables.items()
@@ -65,12 +81,17 @@ class Outcome:
         return Table(named, self.attributes)
 
     def variables(self) -> dict[str, tuple]:
-        """Status, reason and numbers as xarray variables: (dims, values, attributes)."""
+        """Status, reason and numbers as xarray variables: (dims, values, attributes).
+
+        Statistics of a chaotic motion are absent from any other.
+        """
         named: dict[str, tuple] = {
             "status": ((), self.status, {"long_name": "ok or failed"}),
             "reason": ((), self.reason, {"long_name": "why a run failed, by a stable name"}),
         }
         for name, (dims, unit, phrase) in NUMBERS.items():
+            if name in STATISTICS and np.isnan(self.numbers[name]).all():
+                continue
             named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
         return named
 
@@ -101,9 +122,12 @@ class Table:
     attrs: dict[str, Any]
 
 
-def coordinates() -> dict[str, tuple]:
-    """The coordinates of joint and axis as xarray variables."""
-    return {
+def coordinates(used: Iterable[Any] = SIZES) -> dict[str, tuple]:
+    """The coordinates of those dimensions that are used as xarray variables; always the space's."""
+    wanted = {"joint", "axis", *used}
+    every = {
         "joint": (("joint",), list(JOINTS), {"long_name": "joint of the rod"}),
         "axis": (("axis",), list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
+        "quantile": (("quantile",), list(QUANTILES), {"long_name": "share of values below"}),
     }
+    return {name: one for name, one in every.items() if name in wanted}

@@ -68,8 +68,16 @@ class Reason(StrEnum):
     )
     ACCURACY_NOT_REACHED = (
         "accuracy_not_reached",
-        "no run's error bars are as short as solve.accuracy asks for; its numbers are kept",
-        "ask for less in solve.accuracy, or raise solve.max_steps where the detail names steps",
+        "no run's estimated errors are as small as solve.accuracy promises; numbers and errors are "
+        "kept",
+        "ask for less in solve.accuracy, or raise solve.max_steps where the detail names steps; "
+        "solve.horizon tells whether the motion is chaotic",
+    )
+    NOT_SETTLED = (
+        "not_settled",
+        "solve.settle_rev is auto, and the metrics of no revolutions in a row agree within what "
+        "solve.accuracy promises; numbers and errors are kept, of the run's second half",
+        "raise solve.duration_rev, or give settle_rev as a number",
     )
     WORKER_DIED = (
         "worker_died",

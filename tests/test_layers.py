@@ -23,19 +23,24 @@ MAY_IMPORT = {
     "cases": {"metrics"},
     "physics": set(),
     "solve": {"cases", "physics", "outcome", "metrics", "reasons"},
-    "store": {"cases", "outcome", "metrics", "reasons"},
+    "store": {"cases", "outcome", "metrics", "reasons", "digits"},
     "sweep": {"cases", "solve", "store", "outcome", "reasons"},
     "analysis": {"cases", "physics", "solve", "metrics"},
-    "report": {"analysis", "cases", "store", "metrics", "reasons"},
+    "report": {"analysis", "cases", "store", "outcome", "metrics", "reasons", "digits"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
-    "compsim": {"analysis", "cases", "measure", "metrics", "reasons", "report", "solve",
+    "compsim": {"analysis", "cases", "digits", "measure", "metrics", "reasons", "report", "solve",
                 "store", "sweep"},
 }  # fmt: skip
 PACKAGES = ("cases", "physics", "solve", "store", "sweep", "analysis", "report", "measure")
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
-    "scipy": {"compressor.cases.swept", "compressor.solve.scipy_driver"},
+    # its designs, its integrators, its Student's t
+    "scipy": {
+        "compressor.cases.swept",
+        "compressor.solve.scipy_driver",
+        "compressor.solve.statistics",
+    },
     "yaml": {"compressor.cases.load", "compressor.cases.yaml_reader"},
     "joblib": {"compressor.sweep"},
     "distributed": {"compressor.sweep"},

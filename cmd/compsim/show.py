@@ -13,6 +13,8 @@ from compsim.screen import DONE, as_json, results, run_commands, say
 if TYPE_CHECKING:
     from compressor.store import JobReport
 
+SPREAD = "_standard_error"
+
 
 @click.command()
 @click.argument("job")
@@ -78,32 +80,44 @@ def stop(found: "JobReport") -> list[str]:
 
 
 def numbers(found: "JobReport") -> list[str]:
-    """A job's numbers, a line each, with what is known of their errors."""
-    from compressor.metrics import ERRORS, HORIZON, NUMBERS
+    """A job's numbers, a line each, to the digits that their errors allow."""
+    from compressor.metrics import METRICS, NUMBERS
 
     lines = []
     for name, value in found.numbers.items():
-        if name in ERRORS or (name == HORIZON and blank(value)):
+        beside = name.endswith(SPREAD) or name.removesuffix("_error") in {*METRICS} - {name}
+        if beside or (blank(value) and name not in METRICS):
             continue
         unit = "" if NUMBERS[name][1] == "1" else NUMBERS[name][1]
-        error = found.numbers.get(f"{name}_error")
-        known = "" if error is None or blank(error) else f" ± {plain(error)}"
-        lines.append(f"{name:<28} {plain(value)}{known} {unit}".rstrip())
+        relative, error, said = True, found.numbers.get(name + SPREAD), "(standard error)"
+        if name in METRICS:
+            relative, error, said = METRICS[name].bar.relative, found.numbers[f"{name}_error"], ""
+        if error is None or blank(error):
+            text, said = plain(value), ""
+        else:
+            text = measured(value, error, relative)
+        lines.append(" ".join(filter(None, (f"{name:<28} {text}", unit, said))))
     return lines
 
 
 def cautions(found: "JobReport") -> list[str]:
-    """What is to be said of numbers that no error bar can be claimed of."""
-    from compressor.metrics import HORIZON
-
-    if not math.isfinite(found.numbers.get(HORIZON, math.nan)):
+    """How far the numbers may be trusted, where their errors do not say it."""
+    if found.attributes.get("regime") == "undecided":
+        return ["errors are as large as numbers, and chaos could not be ruled out in the time that "
+                "was spent: ask by solve.horizon: true"]  # fmt: skip
+    if found.attributes.get("regime") != "chaotic":
         return []
-    return ["the metrics go beyond the horizon: statistics may be trusted, single peaks may not"]
+    lines = ["the motion is chaotic: averages may be trusted, single peaks may not"]
+    wanted = found.numbers.get("revolutions_to_one_percent", math.nan)
+    if math.isfinite(wanted):
+        lines.append(f"{wanted:.0f} settled revolutions would bring the standard error of "
+                     "rms_acceleration to 1 %")  # fmt: skip
+    return lines
 
 
 def facts(found: "JobReport") -> list[str]:
     """What a job was run with, a line each."""
-    shown = ("method", "rtol", "case", "program", "libraries")
+    shown = ("promise", "regime", "method", "rtol", "case", "program", "libraries")
     lines = [f"{name:<28} {found.attributes[name]}" for name in shown if name in found.attributes]
     return [*lines, f"{'file':<28} {os.path.relpath(found.file)}"] if found.file else lines
 
@@ -117,6 +131,16 @@ def sayable(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None if math.isnan(value) else str(value)
     return value
+
+
+def measured(value: Any, error: Any, relative: bool) -> str:
+    """A number, or numbers of joints and axes, with their errors."""
+    from compressor.digits import by_bar
+
+    if isinstance(value, list):
+        pairs = zip(value, error, strict=True)
+        return f"[{', '.join(measured(*pair, relative) for pair in pairs)}]"
+    return by_bar(value, error, relative)
 
 
 def plain(value: Any) -> str:

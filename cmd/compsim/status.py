@@ -1,4 +1,4 @@
-"""`compsim status`: how many jobs of each stored study are done, failed or missing."""
+"""`compsim status`: how many jobs of each stored study are done, and how far to trust them."""
 
 import dataclasses
 import json
@@ -7,12 +7,24 @@ import click
 
 from compsim.screen import DONE, as_json, plural, results, run_commands, say
 
+PROMISES = {"kept": "keep what accuracy promises", "none": "promise nothing"}
+REGIMES = {
+    "periodic": "periodic",
+    "predictable": "predictable",
+    "chaotic": "chaotic (averages hold, single peaks do not)",
+    "undecided": "perhaps chaotic",
+}
+
 
 @click.command()
 @results
 @as_json
 def status(folder: str, as_json: bool) -> int:
-    """Tell how many jobs of each stored study are done, failed or missing, and why they failed."""
+    """Tell how many jobs of each stored study are done, failed or missing, and why they failed.
+
+    Of those that are ok, also how many keep what their accuracy promises, and how many move
+    periodically, predictably or chaotically.
+    """
     from compressor.reasons import remedy
     from compressor.store import standings
 
@@ -24,6 +36,10 @@ def status(folder: str, as_json: bool) -> int:
     for one in found:
         click.echo(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
                    f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
+        for words, known in ((PROMISES, one.promises), (REGIMES, one.regimes)):
+            said = [f"{number} {words[word]}" for word, number in known.items() if words.get(word)]
+            if said:
+                click.echo(f"{'':<{width}}  of those ok: {', '.join(said)}")
         for reason, number in one.reasons.items():
             click.echo(f"{'':<{width}}  {number:>4} {reason}: {remedy(reason)}")
     for command in run_commands((one.again for one in found if one.missing), folder):

@@ -1,6 +1,6 @@
 """A YAML text -> checked cases and studies."""
 
-from compressor.cases.accuracy import ACCURACY, LOOSEST, TIGHTEST, Targets
+from compressor.cases.accuracy import ACCURACY, TIGHTEST
 from compressor.cases.case import MODEL_VERSION, Case
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import load_cases, load_studies

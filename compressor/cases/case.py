@@ -3,6 +3,7 @@
 import contextlib
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -109,6 +110,13 @@ class Case(Settings):
         return ACCURACY[accuracy].rtol if isinstance(accuracy, str) else first_rung(accuracy)
 
     @property
+    def promise(self) -> float:
+        """The relative L2 error of acceleration that `accuracy` promises; inf: none is named."""
+        word = self.solve.accuracy
+        named = isinstance(word, str) and self.solve.rtol is None
+        return ACCURACY[str(word)].promise if named else math.inf
+
+    @property
     def targets(self) -> Targets:
         """The greatest relative error of each metric that accuracy is asked for by."""
         return () if isinstance(self.solve.accuracy, str) else self.solve.accuracy
@@ -144,11 +152,18 @@ class Case(Settings):
         for unread in (*_groups_outside_identity(), "solve"):
             del values[unread]
         values["model"] = MODEL_VERSION
-        values["span"] = [self.duration, self.settle, round(self.steps)]
+        values["span"] = self._span()
         if with_solver:
-            accuracy = dict(self.targets) or self.rtol
+            accuracy = self.solve.rtol or dict(self.targets) or self.solve.accuracy
             values["solver"] = [accuracy, self.solve.method, self.solve.max_steps]
         return values
+
+    def _span(self) -> list[float | str]:
+        """What is integrated and from where on it counts, however it is written."""
+        how = self.solve
+        duration: float | str = self.duration if how.duration_rev != "auto" else "auto"
+        settle: float | str = self.settle if how.settle_rev != "auto" else "auto"
+        return [duration, settle, round(self.steps)]
 
 
 @cache

@@ -21,7 +21,7 @@ def checked(key: str, value: Any, problems: list[Problem]) -> Any:
     if message:
         problems.append(Problem(key, message))
         return value
-    if row.kind == "number":
+    if row.kind == "number" and not isinstance(value, str):
         return float(value) + 0.0  # no -0.0: equal cases have one key
     if row.kind == "integer":
         return int(value)

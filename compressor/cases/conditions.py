@@ -137,12 +137,20 @@ class _Reader:
             self.refuse(after, f"{key} is a word: compare it by == or !=")
         right = node.comparators[0]
         wanted = self.value(right)
-        if not (type(wanted) in (int, float) if numeric else not row.check(wanted)):
+        word = wanted in row.choices and sign in ("==", "!=")
+        if not (word or (type(wanted) in (int, float) if numeric else not row.check(wanted))):
             self.refuse(right.col_offset, f"{key} needs {'a number' if numeric else row.range}")
         if len(node.ops) > 1:
             self.refuse(self.beyond(right), NEEDS_JOIN)
         missing = sign == "!="
-        return lambda value: missing if (found := value(key)) is None else compare(found, wanted)
+
+        def test(value: Callable[[str], Any]) -> bool:
+            found = value(key)
+            if found is None or isinstance(found, str) is not isinstance(wanted, str):
+                return missing  # a word is neither more nor less than a number
+            return bool(compare(found, wanted))
+
+        return test
 
     def key(self, node: ast.expr) -> tuple[str, Parameter]:
         """A key that can be compared, and the row that its values keep."""

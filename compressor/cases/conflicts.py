@@ -145,6 +145,11 @@ def _time_conflicts(case: Settings) -> Iterator[Problem]:
         yield Problem(
             step_key, f"the duration is {case.steps:.6g} output steps, not a whole number of them"
         )
+    if solve.duration_rev == "auto" or (solve.settle_rev == "auto" and solve.duration_s is None):
+        each = case.steps * case.turn / case.duration
+        if abs(each - round(each)) > 1e-6:
+            text = f"a revolution is {each:.6g} output steps; auto needs a whole number of them"
+            yield Problem(step_key, text)
     if case.settle >= case.duration * (1 - 1e-12):
         revolutions = case.duration / case.turn
         yield Problem(

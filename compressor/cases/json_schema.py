@@ -80,14 +80,15 @@ def _one(row: Parameter) -> Schema:
     words = {"enum": list(row.choices)}
     if row.kind in ("number", "integer"):
         lower = {"exclusiveMinimum" if row.above else "minimum": row.low}
-        return {"type": row.kind, **lower, "maximum": row.high}
+        number = {"type": row.kind, **lower, "maximum": row.high}
+        return {"anyOf": [words, number]} if row.choices else number
     if row.kind == "materials":
         return {"type": "array", "items": words, "minItems": 2, "maxItems": 2}
     if row.kind == "accuracy":
         targets = _mapping(dict.fromkeys(METRICS, _one(TARGET)))
         return {"anyOf": [words, targets | {"minProperties": 1}]}
     kinds: dict[str, Schema] = {
-        "boolean": {"type": "boolean"},
+        "boolean": {"enum": [*row.choices, True, False]},
         "choice": words,
         "text": {"type": "string", "pattern": rf"^(?!\.){NAME.pattern}$"},
     }

@@ -94,7 +94,7 @@ class Parameter:
         if self.kind == "choice":
             return " | ".join(self.choices)
         if self.kind == "boolean":
-            return "true | false"
+            return " | ".join([*self.choices, "true", "false"])
         if self.kind == "accuracy":
             return " | ".join(self.choices) + " | {metric: relative error}"
         if self.kind == "materials":
@@ -102,18 +102,22 @@ class Parameter:
         if self.kind == "text":
             return "[A-Za-z0-9._-], at most 64"
         opening = "(" if self.above else "["
-        return f"{opening}{self.low:g}, {self.high:g}]"
+        return " | ".join([*self.choices, f"{opening}{self.low:g}, {self.high:g}]"])
 
     def check(self, value: Any) -> str | None:
         """What is wrong with a scalar value of this parameter, or None."""
         if self.kind in ("choice", "text", "accuracy"):
             return self._check_text(value)
-        if self.kind == "boolean":
-            return None if isinstance(value, bool) else f"needs true or false, not {shown(value)}"
         if self.kind == "materials":
             return self._check_materials(value)
+        if isinstance(value, str) and value in self.choices:
+            return None
+        words = "".join(f"{word}, " for word in self.choices)
+        if self.kind == "boolean":
+            good = isinstance(value, bool)
+            return None if good else f"needs {words}true or false, not {shown(value)}"
         if isinstance(value, bool) or not isinstance(value, int | float):
-            return f"needs a number, not {shown(value)}"
+            return f"needs {words}a number, not {shown(value)}".replace("auto, a", "auto or a")
         if not _is_finite(value):
             return "must be finite"
         if self.kind == "integer" and value != int(value):

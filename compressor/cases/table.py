@@ -15,6 +15,7 @@ from compressor.cases.accuracy import ACCURACY
 from compressor.cases.parameter import Parameter, choice, parameter
 
 # those that `compressor.solve` has compiled, and then SciPy's
+MOST_REV = 50.0  # with `duration_rev: auto`
 METHODS = ("auto", "DOPRI5", "TSIT5", "RODAS", "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
@@ -143,16 +144,20 @@ class Friction:
 class Solve:
     """How far, how finely and how exactly to integrate."""
 
-    duration_rev: float | None = parameter(
-        4.0, "rev", (0, 1e5), "§3.1: 0.48 s", "duration in revolutions", above=True, optional=True
-    )
+    duration_rev: float | str | None = parameter(
+        4.0, "rev", (0, 1e5), "§3.1: 0.48 s",
+        "duration in revolutions; auto: three after settling", above=True, optional=True,
+        choices=("auto",),
+    )  # fmt: skip
     duration_s: float | None = parameter(
         None, "s", (0, 1e5), "§3.1", "duration in seconds, in place of duration_rev",
         above=True, optional=True,
     )  # fmt: skip
-    settle_rev: float = parameter(
-        1.0, "rev", (0, 1e5), "ours", "start-up left out of metrics and figures"
-    )
+    settle_rev: float | str = parameter(
+        1.0, "rev", (0, 1e5), "ours",
+        "start-up left out of metrics and figures; auto: until revolutions agree",
+        choices=("auto",),
+    )  # fmt: skip
     output_step_deg: float | None = parameter(
         0.3, "deg", (0, 360), "§3.1: 0.1 ms", "output step in degrees of crank angle",
         above=True, optional=True,
@@ -173,9 +178,10 @@ class Solve:
         True, (), "ours", "an error beside each metric, by a second run; not part of a "
         "job's identity", kind="boolean", identity=False,
     )  # fmt: skip
-    horizon: bool = choice(
-        False, (), "ours", "how long the motion can be foretold, by a twin at rtol 1e-12; bars "
-        "end there; not part of a job's identity", kind="boolean", identity=False,
+    horizon: bool | str = choice(
+        "auto", ("auto",), "ours", "how long the motion can be foretold: auto looks where errors "
+        "are large, true by a twin at rtol 1e-12; not part of a job's identity",
+        kind="boolean", identity=False,
     )  # fmt: skip
     method: str = choice(
         "auto", METHODS, "ours", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
@@ -264,15 +270,17 @@ class Settings:
 
     @property
     def duration(self) -> float:
-        """Duration, s."""
+        """Duration, s; with `duration_rev: auto` the longest that it may come to."""
         if self.solve.duration_s is not None:
             return self.solve.duration_s
-        return float(self.solve.duration_rev or 0.0) * self.turn
+        given = self.solve.duration_rev
+        return (MOST_REV if given == "auto" else float(given or 0.0)) * self.turn
 
     @property
     def settle(self) -> float:
-        """Time from which metrics count, s."""
-        return self.solve.settle_rev * self.turn
+        """Time from which metrics count, s; with `settle_rev: auto` 0, until that is known."""
+        given = self.solve.settle_rev
+        return 0.0 if given == "auto" else float(given) * self.turn
 
     @property
     def steps(self) -> float:

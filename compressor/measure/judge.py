@@ -22,7 +22,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,11 +30,9 @@ from compressor.cases import TIGHTEST, Case
 from compressor.metrics import METRICS
 from compressor.solve import (
     COMPILED,
-    Metrics,
     Solution,
     attempt,
     energy_residual,
-    journal_distance,
     predictability_horizon,
     solve,
 )
@@ -128,7 +126,7 @@ def by_numbers(case: Case, result: Finding) -> None:
         if other is not None:
             result.verdict, result.judged = verdict, parts
             result.reason = "judges_disagree" if verdict == "unjudged" else ""
-            result.apart = journal_distance(found.p, found.instants, other.instants)
+            result.apart = found.journals_apart(other)
             return
     result.reason = "judges_fail"
 
@@ -194,14 +192,14 @@ def asked(case: Case, method: str, rtol: float, result: Finding) -> Solution | N
         case.solve, method=method, rtol=rtol, accuracy="standard",
         max_steps=MORE_STEPS * case.solve.max_steps,
     )  # fmt: skip
-    other = attempt(replace(case, solve=how), 0, seconds, True)
+    other = attempt(replace(case, solve=how), rtol, seconds, True)
     result.by.append(f"({method})" if other.reason else method)
     return None if other.reason else other
 
 
 def shortened(case: Case, parts: int) -> Case:
     """A case over the first parts of its span."""
-    whole = case.solve.duration_rev or 0.0
+    whole = float(case.solve.duration_rev or 0.0)
     return replace(case, solve=replace(case.solve, duration_rev=whole * parts / PARTS))
 
 
@@ -228,7 +226,7 @@ def excess(name: str, found: Solution, other: Solution, least: float) -> Excess:
     return Excess(error / max(FACTOR * bar, least), name, error, bar)
 
 
-def size(name: str, metrics: Metrics) -> float:
+def size(name: str, metrics: dict[str, Any]) -> float:
     """What errors of a metric are relative to: its greatest value over joints and axes."""
     return 1.0 if name in ABSOLUTE else float(np.abs(metrics[name]).max()) or 1.0
 

@@ -14,7 +14,6 @@ from compressor.physics.march import march
 from compressor.physics.motion import start
 from compressor.physics.observe import (
     COLUMNS,
-    NORMAL,
     Column,
     derivative_with_flows,
     observe,

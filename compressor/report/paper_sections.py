@@ -17,6 +17,7 @@ from compressor.report.tables import (
     Table,
     ending,
     job_row,
+    measured_cell,
     metric_columns,
     number_cell,
     value_cell,
@@ -58,18 +59,22 @@ def cases_table(paper: PaperRuns) -> Table:
             rows.append(Row(cells, "missing"))
             continue
         status = str(run["status"].item())
-        start = [Cell(spoken(name)), Cell(ending(status, run["reason"].item()))]
-        metrics = [number_cell(*(value_of(m, run) for m in same)) for same in columns.values()]
+        regime = run.attrs.get("regime", "")
+        start = [Cell(spoken(name)), Cell(ending(status, run["reason"].item(), regime))]
+        metrics = [measured_cell(same, (value_of(m, run) for m in same))
+                   for same in columns.values()]  # fmt: skip
         residual = number_cell(float(run.get("energy_residual", math.nan)))
         tolerance = value_cell(run.attrs.get("rtol", ""))
         trust = [residual, tolerance, Cell(run.attrs["key"], "code")]
-        rows.append(job_row([*start, *metrics, *trust], status))
+        rows.append(job_row([*start, *metrics, *trust], status, regime))
     return Table(head, rows)
 
 
-def value_of(measure: Measure, run: xr.Dataset) -> float:
-    """A measure of one run; nan where it has none."""
-    return float(measure.of(run)) if measure.variable in run else math.nan
+def value_of(measure: Measure, run: xr.Dataset) -> tuple[float, float]:
+    """A measure of one run and its error bar; nan where it has none."""
+    if measure.variable not in run:
+        return math.nan, math.nan
+    return float(measure.of(run)), float(measure.bar(run))
 
 
 def spoken(name: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from compressor.metrics import HORIZON
+from compressor.outcome import Regime
 from compressor.reasons import remedy
 from compressor.report.figures.sweep_metric import measures
 from compressor.report.page import Plate, Section
@@ -16,8 +16,8 @@ from compressor.report.tables import (
     Table,
     ending,
     job_row,
+    measured_cell,
     metric_columns,
-    number_cell,
     value_cell,
 )
 from compressor.store import Stored, StoredStudy
@@ -28,11 +28,11 @@ MOST_ROWS = 500
 
 @dataclass(frozen=True)
 class StudyContent:
-    """What a page says of a study; `beyond_horizon` counts jobs longer than their prediction."""
+    """What a page says of a study; `chaotic` counts jobs of which statistics alone hold."""
 
     case_file: str
     counts: str
-    beyond_horizon: int
+    chaotic: int
     failures: Sequence[str]
     remedies: Sequence[str]
     jobs: int
@@ -44,12 +44,11 @@ def study_section(
     stored: Stored, study: StoredStudy, data: xr.Dataset, plates: Sequence[Plate]
 ) -> Section:
     """A study as `open_study` gives it: its table, its failures, and its figures."""
-    horizons = data[HORIZON].values if HORIZON in data else np.array([])
     reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
     content = StudyContent(
         case_file=study.case_file,
         counts=job_counts(data),
-        beyond_horizon=int(np.isfinite(horizons).sum()),
+        chaotic=int((data["regime"].values == Regime.CHAOTIC).sum()),
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
         jobs=data["status"].size,
@@ -89,15 +88,23 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
 def jobs_table(data: xr.Dataset) -> Table:
     """A row for every job of a study, as far as a page can hold them."""
     swept, columns = swept_values(data), metric_columns(measures(data))
-    metrics = [[m.of(data).values.ravel() for m in same] for same in columns.values()]
-    ends = zip(*(data[name].values.flat for name in ("status", "reason", "key")), strict=True)
+    metrics = [(same, [(ravelled(m.of(data)), ravelled(m.bar(data))) for m in same])
+               for same in columns.values()]  # fmt: skip
+    words = ("status", "reason", "regime", "key")
+    ends = zip(*(data[name].values.flat for name in words), strict=True)
     rows = []
-    for place, (status, reason, key) in zip(range(MOST_ROWS), ends, strict=False):
+    for place, (status, reason, regime, key) in zip(range(MOST_ROWS), ends, strict=False):
         cells = [value_cell(values[place]) for values in swept.values()]
-        cells.append(Cell(ending(status, reason)))
-        cells += [number_cell(*(series[place] for series in same)) for same in metrics]
-        rows.append(job_row([*cells, Cell(str(key), "code")], str(status)))
+        cells.append(Cell(ending(status, reason, regime)))
+        cells += [measured_cell(same, ((value[place], bar[place]) for value, bar in pairs))
+                  for same, pairs in metrics]  # fmt: skip
+        rows.append(job_row([*cells, Cell(str(key), "code")], str(status), str(regime)))
     return Table([*swept, "status", *columns, "job"], rows)
+
+
+def ravelled(values: xr.DataArray) -> np.ndarray:
+    """A study's values in a row, a job after the other."""
+    return values.values.ravel()
 
 
 def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:

@@ -9,6 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from compressor.analysis import SPOKEN
+from compressor.digits import by_bar
+from compressor.metrics import METRICS
+from compressor.outcome import Regime
 from compressor.report.figures.sweep_metric import Measure
 
 
@@ -22,10 +25,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A row's cells; `mark` shows that a job failed or is missing."""
+    """A row's cells; `mark` shows that a job failed, is missing, or is chaotic."""
 
     cells: Sequence[Cell]
-    mark: Literal["", "failed", "missing"] = ""
+    mark: Literal["", "failed", "missing", "chaotic"] = ""
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,20 @@ def number_cell(*values: float) -> Cell:
     return Cell(" | ".join(map(number, values)), "number")
 
 
+def measured_cell(measures: Sequence[Measure], values: Iterable[tuple[float, float]]) -> Cell:
+    """A metric, or one of each joint, and its error bar in one cell, to the digits that it allows.
+
+    values: of each measure, the number and its bar, in its unit.
+    """
+    texts = [
+        by_bar(value, bar, METRICS[measure.variable].bar.relative, bare=True)
+        if not math.isnan(bar)
+        else number(value)
+        for measure, (value, bar) in zip(measures, values, strict=True)
+    ]
+    return Cell(" | ".join(texts), "number")
+
+
 def value_cell(value: Any) -> Cell:
     """A setting of a job: a number as the case file may give it, or a word."""
     if isinstance(value, int | float | np.number):
@@ -60,16 +77,19 @@ def value_cell(value: Any) -> Cell:
     return Cell(str(value))
 
 
-def job_row(cells: Sequence[Cell], status: str) -> Row:
-    """A job's row, marked where the job failed or is missing."""
+def job_row(cells: Sequence[Cell], status: str, regime: str = "") -> Row:
+    """A job's row, marked where the job failed, is missing, or is chaotic."""
     if status == "failed":
         return Row(cells, "failed")
-    return Row(cells, "missing" if status == "missing" else "")
+    if status == "missing":
+        return Row(cells, "missing")
+    return Row(cells, "chaotic" if regime == Regime.CHAOTIC else "")
 
 
-def ending(status: object, reason: object) -> str:
-    """How a job ended, in words."""
-    return f"{status}: {reason}" if reason else str(status)
+def ending(status: object, reason: object, regime: object = "") -> str:
+    """How a job ended, in words, and how its motion goes, if it is known."""
+    said = reason or regime
+    return f"{status}: {said}" if said else str(status)
 
 
 def metric_columns(shown: Iterable[Measure]) -> dict[str, list[Measure]]:

@@ -1,21 +1,12 @@
-"""Error bars: how far metrics may lie from the exact ones, by other runs of the same case.
+"""How far the numbers of a run may lie from the exact ones, by another run of the same case.
 
-The difference of a metric from a run ten times looser is mostly that run's error, so that a share
-of it bounds the metric's own. Beyond `accuracy.LOOSEST` both may take the same wrong course over
-friction's fast modes, and a looser run that failed its energy audit says little: there a run ten
-times tighter is compared with. Where the tolerance lets it be no looser than LOOSEST, a run a
-thousand times looser is a second one, cheap and unlikely to err alike.
+The difference from a tighter run is mostly the run's own error, and a little more than it bounds
+that; of the difference from a looser run, which is mostly the looser one's error, a share does
+(`closeness`). A metric's own difference may be small by chance: the distance of the time series
+that it is taken from stands beside it. The energy residual is a floor.
 
-Two runs may agree by chance in one metric; there the differences of all the peaks of a run, which
-share their causes, and the distance of the journals of the two runs stand in. The energy residual
-is a floor. Where the journals have parted, as in chaotic motion, agreement is chance: a larger
-share of their distance is a floor. Estimates of an error hold while it is small: a bar of a few
-per cent grows beyond them.
-
-Shares stand in `compressor.metrics`. They were chosen on the 200 random cases of
-tests/random_cases.py, for bars that hold 95 % of the errors and are at most ten times as long
-(median), and on the extreme scenes of `compsim stress`; tests/results/accuracy.json and stress.json
-say how far that went (make accuracy, make stress).
+Shares stand in `compressor.metrics`; those and the ones below were chosen on random cases that
+judge nothing (tests/results/README.md, "Accuracy").
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,132 +14,91 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.cases import Targets
-from compressor.metrics import METRICS
-from compressor.physics import COLUMNS, Column, observe_all
-from compressor.solve.request import Trajectory
+from compressor.metrics import METRICS, SERIES
 
 Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
 
+WHOLE = 3.0  # of the distance of a time series to a tighter run's
+LOOSER, TEN, FALL = 0.37, 10.0, 0.65  # share of a run TEN times looser, and how it falls beyond
 FLOOR = 0.1  # of the energy residual, relative to the metric
-PARTED, SHARE_PARTED = 0.01, 0.3  # of a journal's room: runs farther apart agree by chance
-WHOLE = 1.5  # of the difference to a tighter run, which is mostly the run's own error
-FAR, SHARE_FAR = 100.0, 0.04  # times the tolerance: runs beyond; share of their difference
-LARGE = 0.015  # of a metric: a bar that long doubles
-ROUNDING = 1e-13  # of the metric
-INSTANTS = 64  # from the start to the end of a run, at which two runs are compared
 
 
-class OtherRun(NamedTuple):
-    """Another run of a case: its metrics, its tolerance, and how far its journals came apart.
+class Companion(NamedTuple):
+    """Another run of a case, by which a run's errors are estimated.
 
-    `distance`: over the journals' room (`journal_distance`).
+    `ratio`: its tolerance over the run's; `apart`: the distance of each time series of the two
+    (`compressor.solve.series.distances`).
     """
 
     metrics: Mapping[str, Any]
-    rtol: float
-    distance: float = 0.0
+    ratio: float
+    apart: Mapping[str, Any]
+
+    @property
+    def closeness(self) -> float:
+        """What the difference from this run counts, as against one from a tighter run."""
+        return closeness(self.ratio)
 
 
-def bars(
-    metrics: Mapping[str, Any], others: Sequence[OtherRun], rtol: float, residual: float
-) -> Metrics:
-    """The error bar of each metric of a run at a tolerance, in its unit and shape.
+def closeness(ratio: float) -> float:
+    """The share of the error of a run some ratio looser by which a run's own one is bounded."""
+    return 1.0 if ratio < 1.0 else LOOSER * (ratio / TEN) ** -FALL
 
-    Without another run every bar is inf. residual: energy imbalance relative to what the contacts
-    lose.
+
+def ratio_of(share: float) -> float:
+    """The ratio of tolerances with a closeness."""
+    return TEN * (LOOSER / share) ** (1.0 / FALL)
+
+
+def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -> Metrics:
+    """The error bar of each metric of a run, in its unit and shape; inf without another run.
+
+    residual: energy imbalance relative to what the contacts lose.
     """
-    if not others:
+    if other is None:
         return {name: np.full(np.shape(value), np.inf) for name, value in metrics.items()}
-    estimates = [estimate(metrics, other, rtol) for other in others]
-    error = {name: np.maximum.reduce([one[name] for one in estimates]) for name in metrics}
-    for name in metrics:
-        if METRICS[name].bar.relative:
-            size = np.abs(metrics[name])
-            error[name] = np.maximum(error[name], max(FLOOR * residual, ROUNDING) * size)
-            error[name] = grown(error[name], float(np.max(size)))
-    return error
-
-
-def estimate(metrics: Mapping[str, Any], other: OtherRun, rtol: float) -> Metrics:
-    """The error of each metric of a run by its difference from one other run."""
-    apart = {name: np.abs(np.asarray(metrics[name]) - other.metrics[name]) for name in metrics}
-    shared = shared_difference(metrics, apart)
-    far, tighter = other.rtol > FAR * rtol, other.rtol < rtol
-    distance, weight = (0.0, SHARE_FAR) if far else (other.distance, 1.0)
-    parted = SHARE_PARTED * min(distance, 1.0) if distance > PARTED else 0.0
-    error = {}
-    for name in metrics:
+    found = {}
+    for name, value in metrics.items():
         bar = METRICS[name].bar
+        size = np.abs(value) if bar.relative else np.ones(np.shape(value))
+        own = bar.own * np.abs(np.asarray(value) - other.metrics[name])
+        path = bar.path * spread(other.apart[METRICS[name].series], np.ndim(value)) * size
+        found[name] = other.closeness * np.hypot(own, path)
         if bar.relative:
-            size = np.abs(metrics[name])
-            own = WHOLE if tighter else bar.own
-            difference = weight * np.hypot(own * apart[name], bar.of_peaks * shared * size)
-            error[name] = np.maximum(difference, max(bar.of_path * distance, parted) * size)
-        else:
-            floor = np.maximum(bar.of_path * distance, parted * np.maximum(metrics[name], 1.0))
-            error[name] = np.maximum(weight * apart[name], floor)
-    return error
+            found[name] = np.maximum(found[name], max(FLOOR * residual, bar.least) * size)
+    return found
 
 
-def grown(bar: np.ndarray, size: float) -> np.ndarray:
-    """Bars of a metric of some size, long ones longer."""
-    return bar * (1.0 + bar / (LARGE * size)) if size > 0.0 else bar
+def spread(apart: Any, ndim: int) -> np.ndarray:
+    """A number, or one of each joint, in the shape of a metric over joints, and axes."""
+    return np.reshape(apart, np.shape(apart) + (1,) * (ndim - np.ndim(apart)))
 
 
-def shared_difference(metrics: Mapping[str, Any], apart: Mapping[str, Any]) -> float:
-    """The mean of the relative differences of all peaks but the largest one; 0 where none is."""
-    peaks = [name for name, row in METRICS.items() if row.peak]
-    size = np.concatenate([np.ravel(np.abs(metrics[name])) for name in peaks])
-    moved = np.concatenate([np.ravel(apart[name]) for name in peaks])
-    relative = np.sort(moved[size > 0] / size[size > 0])[:-1]
-    return float(relative.mean()) if relative.size else 0.0
+def series_errors(other: Companion | None) -> Metrics:
+    """The relative L2 error of each time series of a run; inf without another run."""
+    if other is None:
+        shape = {name: (2,) if "joint" in dims else () for name, (dims, _, _) in SERIES.items()}
+        return {name: np.full(shape[name], np.inf) for name in SERIES}
+    return {name: WHOLE * other.closeness * value for name, value in other.apart.items()}
 
 
-def unmet(targets: Targets, metrics: Mapping[str, Any], error: Mapping[str, Any]) -> list[str]:
+def unmet(
+    targets: Sequence[tuple[str, float]], metrics: Mapping[str, Any], error: Mapping[str, Any]
+) -> list[str]:
     """What to say of each metric whose relative bar, at its worst joint, is longer than asked for.
 
     A metric of 0, such as the penetration of an ideal joint, is met by a bar of 0 alone.
     """
     messages = []
     for name, target in targets:
-        size, bar = np.ravel(np.abs(metrics[name])), np.ravel(error[name])
-        long = bar > target * size
-        if long.any():
-            with np.errstate(divide="ignore"):
-                worst = (bar[long] / size[long]).max()
-            messages.append(f"{name}: its error bar is {worst:.2g} of it, not {target:g}")
+        long = beyond(metrics[name], error[name])
+        if long > target:
+            messages.append(f"{name}: its error bar is {long:.2g} of it, not {target:g}")
     return messages
 
 
-def with_instants(times: np.ndarray) -> np.ndarray:
-    """The times of an output grid (s) and those at which runs are compared, whatever the grid."""
-    return np.union1d(times, _instants(times[-1]))
-
-
-def take_instants(p: np.record, run: Trajectory, times: np.ndarray) -> np.ndarray:
-    """Eccentricities (m) at the instants of a run on `with_instants(times)`, now put on `times`.
-
-    Shape (INSTANTS + 1, joint, axis); nan from where the run stopped.
-    """
-    at = np.searchsorted(run.times, _instants(times[-1]))
-    rows = np.empty((at.size, COLUMNS))
-    observe_all(run.times[at], run.states[at], run.phases[at], p, rows)
-    kept = np.searchsorted(run.times, times)
-    run.times, run.states, run.phases = times, run.states[kept], run.phases[kept]
-    return rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(-1, 2, 2)
-
-
-def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
-    """Greatest distance of the eccentricities of two runs at the instants, over the room.
-
-    A journal's room is its clearance, or how far it came if that is more. 0 for ideal joints.
-    """
-    faulty = p["clearance"] > 0
-    away = np.linalg.norm(ours - theirs, axis=2).max(axis=0)
-    room = np.maximum(p["clearance"], np.linalg.norm(ours, axis=2).max(axis=0))
-    return float((away[faulty] / room[faulty]).max(initial=0.0))
-
-
-def _instants(end: float) -> np.ndarray:
-    return end * (np.arange(INSTANTS + 1) / INSTANTS)
+def beyond(metric: Any, bar: Any) -> float:
+    """The relative length of a metric's error bar at its worst joint; 0 where both are 0."""
+    size, length = np.ravel(np.abs(metric)), np.ravel(bar)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.where(length > 0.0, length / size, 0.0).max())

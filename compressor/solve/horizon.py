@@ -11,6 +11,7 @@ revolution; at 1e-11 one horizon of five was off by a third. At 1e-12 horizons a
 
 import math
 import time
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,22 +50,42 @@ def predictability_horizon(
     before, as by `timeout` (s) or the case's max_steps, the time up to there: no more is known.
     The case's own method and tolerance do not count: the horizon belongs to the motion.
     """
+    return part(case, case.duration, rtol, close, timeout).horizon
+
+
+class Parting(NamedTuple):
+    """Up to when (s) twins were followed, whether they parted there, or came to the end."""
+
+    time: float
+    parted: bool
+    whole: bool
+
+    @property
+    def horizon(self) -> float:
+        """Time (s) up to which they stayed together; inf to the end."""
+        return math.inf if self.whole else self.time
+
+
+def part(case: Case, span: float, rtol: float, close: float, timeout: float) -> Parting:
+    """Follow twins over a span (s), `close` at its begin, within a wall time (s).
+
+    As `predictability_horizon`, which tells more.
+    """
     if scene(case) == Scene.IDEAL:
-        return math.inf
+        return Parting(span, False, True)
     p = record(case)
     moved, shifted = (np.zeros(2 * FREEDOMS[scene(case)]) for _ in range(2))
     start(offsets(case), moved, p)
     start(offsets(case) + close * p["clearance"][:, None] / math.sqrt(2.0), shifted, p)
-    ends = np.array([0.0, case.duration])
+    ends = np.array([0.0, span])
     request = Request(p, moved, ends, 0.0, rtol, "auto", case.solve.max_steps, timeout)
-    return time_of_parting(request, shifted)
+    return followed(request, shifted)
 
 
-def time_of_parting(request: Request, shifted: np.ndarray, far: float = FAR) -> float:
-    """Time (s) at which a motion and its twin are `far` apart, as a share of the clearance.
+def followed(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting:
+    """Follow a motion and its twin until they are `far` apart, as a share of the clearance.
 
-    request: of a compiled method; shifted: the twin's initial state. inf where they never are; the
-    time reached where the run stops before.
+    request: of a compiled method; shifted: the twin's initial state.
     """
     deadline = time.monotonic() + request.timeout
     p, tally = request.p, new_tally()
@@ -84,5 +105,6 @@ def time_of_parting(request: Request, shifted: np.ndarray, far: float = FAR) -> 
             if Status.DONE not in (walker.status, fellow.status):
                 check_march(request, walker, float(tally.deepest), deadline)
     except Stop:
-        return float(walker.t)
-    return float(walker.t) if fellow.status == Status.DONE else math.inf
+        return Parting(float(walker.t), False, False)
+    parted = fellow.status == Status.DONE
+    return Parting(float(walker.t), parted, not parted)

@@ -10,9 +10,9 @@ from compressor.solve.last_steps import retrace
 from compressor.solve.marching import March, Snapshot, Standing, ready_walker
 from compressor.solve.request import LAST, Request, Stop, Trajectory, overdue, too_deep
 from compressor.solve.sizes import natural_sizes
+from compressor.solve.turns import with_cuts, with_edge
 
 CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
-SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
 
 def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
@@ -21,6 +21,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     size = natural_sizes(request.p)
     walker = ready_walker(request, size)
     edges, phases, walker.settle = with_edge(edges, phases, request.settle)
+    edges, phases, ends = with_cuts(edges, phases, request.cuts)
     march = March(request, size, edges, phases, result.states)
     now = Standing(walker, z, new_work(size.size), result.tally)
     earlier = before = Snapshot.of(now)
@@ -29,9 +30,14 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
         if result.steps + result.rejected >= seen + LAST:
             earlier, before = before, Snapshot.of(now)
             seen = result.steps + result.rejected
-        march.advance(now, min(CHUNK, request.max_steps - walker.steps - walker.rejected))
+        attempts = min(CHUNK, request.max_steps - walker.steps - walker.rejected)
+        march.advance(now, attempts, ends[0] if ends else phases.size)
         result.steps, result.rejected = int(walker.steps), int(walker.rejected)
         result.evaluations = int(walker.evaluations)
+        if walker.status == Status.DONE and ends and request.cuts:
+            del ends[0]
+            if request.cuts.cut(result.tally) and walker.segment < phases.size:
+                walker.status = Status.RUNNING
         if walker.status == Status.DONE:
             return
         try:
@@ -41,19 +47,6 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             enough = result.steps + result.rejected >= seen + LAST
             result.history = retrace((before if enough else earlier).standing(), now, march)
             raise
-
-
-def with_edge(
-    edges: np.ndarray, phases: np.ndarray, time: float
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Segments that end at a time as well, and that time: of an edge that lies there already."""
-    near = edges[np.abs(edges - time).argmin()]
-    if abs(near - time) <= SAME_TIME * edges[-1]:
-        return edges, phases, float(near)
-    i = int(np.searchsorted(edges, time))
-    if i == edges.size:
-        return edges, phases, time
-    return np.insert(edges, i, time), np.insert(phases, i, phases[i - 1]), time
 
 
 def check_march(request: Request, walker: np.record, deepest: float, deadline: float) -> None:

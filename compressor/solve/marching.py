@@ -87,12 +87,15 @@ class March:
     phases: np.ndarray
     states: np.ndarray
 
-    def advance(self, now: Standing, attempts: int) -> None:
-        """Go on by at most so many attempts of a step."""
+    def advance(self, now: Standing, attempts: int, segments: int | None = None) -> None:
+        """Go on by at most so many attempts of a step, through the first so many segments."""
         request, size = self.request, self.size
+        edges, phases = self.edges, self.phases
+        if segments is not None:
+            edges, phases = edges[: segments + 1], phases[:segments]
         march(
-            now.walker, request.p, now.z, now.work, request.rtol * size, size, self.edges,
-            self.phases, request.times, self.states, now.tally, attempts,
+            now.walker, request.p, now.z, now.work, request.rtol * size, size, edges, phases,
+            request.times, self.states, now.tally, attempts,
         )  # fmt: skip
 
 

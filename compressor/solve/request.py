@@ -5,13 +5,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from compressor.solve.turns import Cuts
+
 LAST = 16  # attempts that a history keeps
 NONE = -1  # in place of a number of the state
 
 
 @dataclass
 class Request:
-    """What to integrate: a record (SI), the initial state, samples, span, settings and budgets."""
+    """What to integrate: a record (SI), the initial state, samples, span, settings and budgets.
+
+    `cuts`: where the tally is cut into revolutions, if it is; the run's own tally is then of what
+    follows the last one.
+    """
 
     p: np.record
     start: np.ndarray
@@ -21,6 +27,7 @@ class Request:
     method: str = "auto"
     max_steps: int = 5_000_000
     timeout: float = math.inf  # s
+    cuts: Cuts | None = None
 
 
 @dataclass

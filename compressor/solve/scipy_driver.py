@@ -15,7 +15,7 @@ from compressor.cases import IMPLAUSIBLE
 from compressor.physics import (
     COLUMNS,
     FLOWS,
-    NORMAL,
+    Column,
     contact_within,
     derivative_with_flows,
     lobatto,
@@ -29,6 +29,7 @@ from compressor.physics import (
 from compressor.reasons import Reason
 from compressor.solve.request import Request, Stop, Trajectory, overdue, too_deep
 from compressor.solve.sizes import absolute_tolerances, length_and_speed
+from compressor.solve.turns import with_cuts
 
 # Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
 # revolution at the small end (LSODA up to 4 times, BDF 2.5, RK45 2), so they get a share of it.
@@ -80,6 +81,7 @@ class Derivative:
 def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
     """Integrate by one of SciPy's methods, segment by segment."""
     right_hand_side = Derivative(request)
+    edges, phases, ends = with_cuts(edges, phases, request.cuts)
     owner = sample_segments(request.times, edges)
     try:
         for i, phase in enumerate(phases):
@@ -87,6 +89,9 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
             wanted = np.flatnonzero(owner == i)
             segment = Segment(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
             z = segment.run(z)
+            if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally):
+                result.stop_time = math.nan
+                break
     finally:
         result.evaluations = right_hand_side.evaluations
 
@@ -174,7 +179,7 @@ class Segment:
         whole = [joint for joint in range(2) if contact_within(rows, joint)]
         if not whole:
             return
-        normal = rows[:, NORMAL : NORMAL + 2]
+        normal = rows[:, Column.NORMAL : Column.NORMAL + 2]
         p, force = self.request.p, normal.max()
         kick = span * (WEIGHTS @ normal[:, whole]).max() / min(p.rod_mass, p.reciprocating_mass)
         if kick > KICK * self.request.rtol * length_and_speed(p)[1]:

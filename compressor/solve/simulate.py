@@ -7,34 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compressor.cases import MODEL_VERSION, Case, CaseError
-from compressor.metrics import HORIZON, SIZES
+from compressor.metrics import SERIES
 from compressor.outcome import ROW, Outcome, Table, without_run
-from compressor.physics import COLUMNS, FLOWS, STATE_NAMES, Column, observe_all
+from compressor.physics import FLOWS, STATE_NAMES
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
-from compressor.solve.attempts import Solution, solve
+from compressor.solve.attempts import Solution
 from compressor.solve.request import NONE, Trajectory
+from compressor.solve.series import block, rows_of
 from compressor.solve.si_record import scene
+from compressor.solve.solution import solve
 from compressor.solve.tallied import ledger
 
 if TYPE_CHECKING:
     import xarray as xr
-
-# name: (column, extra dimensions, unit, long name)
-SERIES = {
-    "displacement": (Column.DISPLACEMENT, (), "m", "crosshead position from the crank centre"),
-    "velocity": (Column.VELOCITY, (), "m/s", "crosshead velocity"),
-    "acceleration": (Column.ACCELERATION, (), "m/s2", "crosshead acceleration"),
-    "rod_angle": (Column.ROD_ANGLE, (), "rad", "rod angle phi"),
-    "piston_force": (Column.PISTON_FORCE, (), "N", "piston force, positive towards the crank"),
-    "contact_force": (Column.FORCE, ("joint", "axis"), "N", "joint force on the rod"),
-    "eccentricity": (
-        Column.ECCENTRICITY, ("joint", "axis"), "m", "journal centre less bearing centre",
-    ),
-    "penetration": (
-        Column.PENETRATION, ("joint",), "m", "contact penetration, negative where there is a gap",
-    ),
-}  # fmt: skip
 
 
 def simulate(case: Case) -> "xr.Dataset":
@@ -77,19 +63,15 @@ def refused(case: Case) -> Outcome:
 
 def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
     """The time series as xarray variables."""
-    rows = np.empty((trajectory.times.size, COLUMNS))
-    observe_all(trajectory.times, trajectory.states, trajectory.phases, p, rows)
-    rows[np.isnan(trajectory.states).any(axis=1)] = math.nan
+    rows = rows_of(p, trajectory)
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
     variables: dict[str, tuple] = {
         "time": (("time",), trajectory.times, {"units": "s", "long_name": "time"}),
         "crank_angle": (("time",), p.omega * trajectory.times, angle),
     }
-    for name, (column, dims, unit, phrase) in SERIES.items():
-        shape = tuple(SIZES[dim] for dim in dims)
-        block = rows[:, column : column + math.prod(shape)].reshape(-1, *shape)
+    for name, (dims, unit, phrase) in SERIES.items():
         attrs = {"units": unit, "long_name": phrase}
-        variables[name] = (("time", *dims), np.ascontiguousarray(block), attrs)
+        variables[name] = (("time", *dims), np.ascontiguousarray(block(name, rows)), attrs)
     return variables
 
 
@@ -97,8 +79,14 @@ def outcome(case: Case, solution: Solution) -> Outcome:
     """What is kept of a solution without its series."""
     numbers = np.full(1, math.nan, dtype=ROW)[0]
     known = {**solution.metrics, **ledger(solution.trajectory)}
-    known |= {f"{name}_error": bar for name, bar in solution.bars.items()}
-    known[HORIZON] = solution.horizon
+    errors = solution.bars | solution.series_errors
+    known |= {f"{name}_error": error for name, error in errors.items()}
+    known |= solution.statistics
+    known |= {
+        "predictability_horizon": solution.horizon,
+        "period_rev": solution.period,
+        "settled_rev": solution.settled,
+    }
     for name, value in known.items():
         numbers[name] = value
     status = "failed" if solution.reason else "ok"
@@ -112,9 +100,11 @@ def attributes(case: Case, solution: Solution) -> dict[str, object]:
         "Conventions": "SI units; forces act on the rod; the frame of the README",
         **case.attributes(),
         "complete": 0 if trajectory.reason else 1,
-        "settle": case.settle,
+        "settle": solution.settle,
         "rtol": solution.rtol,
         "error_bars": int(case.wants_bars),
+        "promise": solution.promise,
+        "regime": solution.regime,
         "method": case.solve.method,
         "model_version": MODEL_VERSION,
         "program": PROGRAM,

@@ -14,7 +14,8 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from compressor.cases import points, table, value_in
-from compressor.metrics import NUMBERS
+from compressor.digits import is_known
+from compressor.metrics import METRICS, NUMBERS, STATISTICS
 from compressor.outcome import coordinates
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
@@ -103,7 +104,8 @@ def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
     found = positions[positions >= 0]
     if (rows.words["reason"][found] != Reason.INTERNAL_ERROR).any():
         variables |= _metrics(layout, rows, positions)
-        variables |= {n: xr.Variable(*parts) for n, parts in coordinates().items()}
+        axes = coordinates(dim for one in variables.values() for dim in one.dims)
+        variables |= {n: xr.Variable(*parts) for n, parts in axes.items()}
     return _with_coordinates(variables, layout)
 
 
@@ -121,21 +123,42 @@ def labelled(
     return _with_coordinates(dict(dataset.variables) | series, layout)
 
 
+def trusted(dataset: xr.Dataset) -> xr.Dataset:
+    """A Dataset of jobs in which metrics are nan where their error bars do not vouch for them.
+
+    So are those of jobs that are not ok, and of runs without error bars.
+    """
+    known = np.vectorize(is_known, otypes=[bool])
+    good = dataset["status"] == "ok"
+    kept = {}
+    for name in METRICS:
+        if name in dataset:
+            bar = dataset[f"{name}_error"]
+            vouched = xr.apply_ufunc(known, dataset[name], bar, METRICS[name].bar.relative)
+            kept[name] = dataset[name].where(vouched & good)
+            kept[f"{name}_error"] = bar.where(vouched & good)
+    return dataset.assign(kept)
+
+
 def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
-    names = ["key", "study", "joint", "axis", "time", *layout.coordinates]
+    names = ["key", "study", "joint", "axis", "quantile", "time", *layout.coordinates]
     dataset = xr.Dataset(variables | layout.coordinates)
     return dataset.set_coords([name for name in names if name in dataset])
 
 
 def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """Key, status and reason of every job."""
+    """Key, status, reason, promise and regime of every job."""
     there = positions >= 0
-    status = np.where(there, _taken(rows.words["status"], positions), "missing")
-    reason = np.where(there, _taken(rows.words["reason"], positions), "")
+
+    def words(name: str, otherwise: str) -> np.ndarray:
+        return np.where(there, _taken(rows.words[name], positions), otherwise)
+
     texts = {
         "key": (layout.keys, "a job's identity"),
-        "status": (status, "ok, failed or missing"),
-        "reason": (reason, "why a run failed"),
+        "status": (words("status", "missing"), "ok, failed or missing"),
+        "reason": (words("reason", ""), "why a run failed"),
+        "promise": (words("promise", ""), "whether what accuracy promises was kept; none given"),
+        "regime": (words("regime", ""), "predictable, periodic, chaotic or undecided"),
     }
     return {
         name: xr.Variable(layout.dims, values, {"long_name": phrase})
@@ -149,11 +172,13 @@ def _taken(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
 
 def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """All numbers of the rows; nan where a job has none."""
+    """All numbers of the rows; nan where a job has none. Statistics where a job is chaotic."""
     found = {}
     for name, (dims, unit, phrase) in NUMBERS.items():
         values = np.array(rows.numbers[name][positions])
         values[positions < 0] = np.nan
+        if name in STATISTICS and np.isnan(values).all():
+            continue
         attrs = {"units": unit, "long_name": phrase}
         found[name] = xr.Variable((*layout.dims, *dims), values, attrs)
     return found

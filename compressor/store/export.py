@@ -218,7 +218,7 @@ def _series(task: _Task, stored: Stored, form: str) -> Exported:
 
 
 def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
-    """The variables along a dimension as columns by header, those of joints and axes one by one."""
+    """The variables along a dimension by header, a column for each joint, axis and so on."""
     found = {}
     leading = [name for name in table.coords if table[name].dims == (dim,)]
     for name in dict.fromkeys([*leading, *table.data_vars]):
@@ -230,7 +230,7 @@ def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
         inner = [table[other].values.tolist() for other in item.dims[1:]]
         values = item.values.reshape(len(item), -1)
         for number, labels in enumerate(itertools.product(*inner)):
-            found["_".join([str(name), *labels]) + ending] = values[:, number]
+            found["_".join(map(str, (name, *labels))) + ending] = values[:, number]
     return found
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import HORIZON
-from compressor.outcome import Outcome, coordinates
+from compressor.outcome import Outcome
 from compressor.reasons import Reason
 from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
 from compressor.store.hdf5 import DamagedJob
@@ -63,9 +63,11 @@ class JobStatus:
             return False  # a machine with more time to spare may do it
         if self.reason in BROKEN:
             return True
+        if self.reason == Reason.ACCURACY_NOT_REACHED and not case.wants_bars:
+            return False  # nothing is promised without error bars
         if case.wants_bars and self.status == "ok" and not self.bars:
             return False
-        if case.solve.horizon and self.status == "ok" and np.isnan(self.numbers[HORIZON]):
+        if case.solve.horizon is True and self.status == "ok" and np.isnan(self.numbers[HORIZON]):
             return False
         if case.output.keep == "metrics":
             return True
@@ -137,7 +139,8 @@ class Stored:
         import xarray as xr
 
         found = self.outcome(position)
-        return xr.Dataset(found.variables(), coordinates(), found.attributes)
+        table = found.table({})
+        return xr.Dataset(table.variables, attrs=table.attrs)
 
     def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Some variables of a stored job's time series."""
@@ -212,7 +215,7 @@ def finished_keys(folder: Folder) -> set[str]:
     return read_store(folder).keys()
 
 
-def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
+def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
     """A study as one Dataset, labelled by its axes; series are read when they are used.
 
     One study (that of `name`, or the only one) has its axes as dimensions: the last part of each
@@ -224,12 +227,11 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
 
     Series have the dimension `time`. If the jobs have different output grids (a swept speed),
     they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.
+
+    With `trusted`, metrics are nan where they are not known: where the error bar is as long as the
+    number or inf, as of single peaks of a chaotic motion, or was not made; and where a job failed.
     """
-    from compressor.store.dataset import (  # loads xarray: half a second
-        grid,
-        labelled,
-        table_of_jobs,
-    )
+    from compressor.store import dataset as datasets  # loads xarray: half a second
 
     folder = os.path.abspath(folder)
     studies = read_studies(folder)
@@ -240,7 +242,9 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
             raise StoreError(folder, f"holds no study {name!r}", f"it holds {known}")
     stored = read_store(folder).warned()
     is_grid = len(studies) == 1 and studies[0].is_grid
-    layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
-    dataset = labelled(layout, stored.rows, stored.job, stored.values)
+    layout = datasets.grid(studies[0]) if is_grid else datasets.table_of_jobs(studies)
+    dataset = datasets.labelled(layout, stored.rows, stored.job, stored.values)
+    if trusted:
+        dataset = datasets.trusted(dataset)
     dataset.attrs = {"folder": folder, "studies": [study.name for study in studies]}
     return dataset

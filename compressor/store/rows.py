@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from compressor.metrics import NUMBERS
-from compressor.outcome import ROW, Outcome, SeriesFile, coordinates
+from compressor.metrics import NUMBERS, STATISTICS
+from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
 from compressor.store.files import HEX20
 from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
 from compressor.store.series_file import intact, series_path
@@ -32,6 +32,8 @@ WORDS = {  # columns -> what their texts look like
     "status": re.compile(rb"ok|failed"),
     "reason": re.compile(rb"[a-z_]*"),
     "precision": re.compile(rb"(single|double)?"),
+    "promise": re.compile(rb"(kept|none)?"),
+    "regime": re.compile("|".join(["", *Regime]).encode()),
     "digest": re.compile(f"({HEX20})?".encode()),
 }
 FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
@@ -48,7 +50,10 @@ COLUMNS = {
     "end": ("f8", "last time of the series, s"),
     "precision": ("S", "of the series: double or single"),
     "digest": ("S20", "of the file with the series"),
+    "promise": ("S", "kept, or none given; empty in files of before 2026-11-22"),
+    "regime": ("S", "how far the motion can be foretold; empty where that is not known"),
 }
+LATER = ("promise", "regime")  # columns that older files do not have
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +96,8 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
         "reason": [outcome.reason for outcome in outcomes],
         "precision": [item.precision for item in series],
         "digest": [item.digest for item in series],
+        "promise": [str(outcome.attributes.get("promise", "")) for outcome in outcomes],
+        "regime": [str(outcome.attributes.get("regime", "")) for outcome in outcomes],
     }
     columns = {name: _text_column(name, values) for name, values in words.items()}
     columns["serial"] = np.full(len(outcomes), serial)
@@ -144,12 +151,14 @@ def encode(segment: Segment) -> bytes:
     columns = segment.columns
     variables: dict[str, Any] = {}
     for name, (dims, values, attrs) in coordinates().items():
-        variables[name] = (dims, np.array(values, object), attrs)
+        kind = object if isinstance(values[0], str) else float
+        variables[name] = (dims, np.array(values, kind), attrs)
     for name, (_, phrase) in COLUMNS.items():
         variables[name] = (("row",), columns[name], {"long_name": phrase})
     for name, (dims, unit, phrase) in NUMBERS.items():
-        attrs = {"units": unit, "long_name": phrase}
-        variables[name] = (("row", *dims), segment.numbers[name], attrs)
+        values = segment.numbers[name]
+        if name not in STATISTICS or not np.isnan(values).all():
+            variables[name] = (("row", *dims), values, {"units": unit, "long_name": phrase})
     for name, packed in (("attributes", segment.texts), ("details", segment.notes)):
         data = np.frombuffer(packed, np.uint8)
         attrs = {"long_name": "zlib of JSON, a line a row"}
@@ -164,8 +173,12 @@ def decode(data: bytes, path: Path) -> Segment:
     Raises DamagedJob for what is no segment.
     """
     with opened(data, path, REMEDY) as file:
-        columns = {name: file[name][()] for name in COLUMNS}
-        rows = len(columns["key"])
+        rows = len(file["key"])
+        absent = np.full(rows, b"", "S1")
+        columns = {
+            name: absent if name in LATER and name not in file else file[name][()]
+            for name in COLUMNS
+        }
         for name, (kind, _) in COLUMNS.items():
             if columns[name].dtype.kind != kind[0] or columns[name].shape != (rows,):
                 raise ValueError(name)
@@ -283,8 +296,8 @@ class Rows:
 
     @cached_property
     def words(self) -> dict[str, np.ndarray]:
-        """Status, reason and precision of every job as text."""
-        names = ("status", "reason", "precision")
+        """Status, reason, precision, promise and regime of every job as text."""
+        names = ("status", "reason", "precision", "promise", "regime")
         return {name: np.char.decode(self.columns[name], "utf-8", "replace") for name in names}
 
     def detail(self, position: int) -> str:

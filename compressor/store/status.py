@@ -22,7 +22,12 @@ MOST_LIKE = 5  # keys that an ambiguous beginning of one is answered with
 
 @dataclass(frozen=True)
 class Standing:
-    """How the jobs of one study stand; `reasons`: failed ones by reason, most frequent first."""
+    """How the jobs of one study stand.
+
+    `reasons`: failed ones by reason; `promises`, `regimes`: those that are ok by what their
+    accuracy promises, and by how far they can be foretold, "" where that is not known; each with
+    the most frequent first.
+    """
 
     study: str
     case_file: str
@@ -31,6 +36,8 @@ class Standing:
     failed: int
     missing: int
     reasons: dict[str, int]
+    promises: dict[str, int]
+    regimes: dict[str, int]
     again: Again
 
 
@@ -57,13 +64,18 @@ def standings(folder: Folder) -> list[Standing]:
         positions = rows.find(study.keys)
         stored = positions[positions >= 0]
         good = rows.words["status"][stored] == "ok"
-        reasons = Counter(rows.words["reason"][stored][~good].tolist())
+
+        def counts(word: str, which: np.ndarray) -> dict[str, int]:
+            return dict(Counter(rows.words[word][which].tolist()).most_common())
+
+        done = stored[good]
         ok, failed = int(good.sum()), int((~good).sum())
         missing = study.jobs - ok - failed
         found.append(
             Standing(
                 study.name, study.case_file, study.jobs, ok, failed, missing,
-                dict(reasons.most_common()), study.again,
+                counts("reason", stored[~good]), counts("promise", done), counts("regime", done),
+                study.again,
             )
         )  # fmt: skip
     return found

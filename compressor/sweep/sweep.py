@@ -233,7 +233,7 @@ def serving_both(first: Case, second: Case) -> Case:
     solve = replace(
         first.solve,
         error_bars=first.solve.error_bars or second.solve.error_bars,
-        horizon=first.solve.horizon or second.solve.horizon,
+        horizon=max(first.solve.horizon, second.solve.horizon, key=(False, "auto", True).index),
         timeout_s=max(first.solve.timeout_s, second.solve.timeout_s),
     )
     return replace(first, output=output, solve=solve)

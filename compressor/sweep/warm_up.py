@@ -24,7 +24,7 @@ class Needs(NamedTuple):
     def of(cls, cases: Iterable[Case]) -> "Needs":
         solves = [case.solve for case in cases]
         methods = tuple(sorted({"auto"} | {solve.method for solve in solves}))
-        return cls(methods, any(solve.horizon for solve in solves))
+        return cls(methods, any(solve.horizon is True for solve in solves))
 
 
 def load(needs: Needs) -> None:

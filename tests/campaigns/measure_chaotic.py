@@ -1,24 +1,34 @@
-"""Two chaotic scenes by two integrators: points differ, statistics agree (make chaotic).
+"""Chaotic motions by two integrators: points differ, statistics agree (make chaotic).
 
 Beyond the predictability horizon two correct solutions have nothing in common point by point. What
 may still be compared are statistics, each within its own error: means over revolutions, with
 errors by batch means (revolutions follow on each other, so that single ones are no independent
-draws), and the distributions of the revolutions' peaks, by Kolmogorov and Smirnov's distance.
-Writes a small JSON file.
+draws), and the distributions of the revolutions' peaks, by Kolmogorov and Smirnov's distance. Two
+scenes are looked at closely. Of random cases with a thousandth of the damping it is counted how
+many say by themselves that they are chaotic, and how many of these have the rms, by the standard
+error that they tell, of a run by an implicit method, and a few of one by SciPy. Writes a small
+JSON file.
 """
 
+import argparse
 import json
 import math
-import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from joblib import Parallel, delayed
 from measure_accuracy import provenance
+from random_cases import strangers
 
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
+from compressor.outcome import Regime
+from compressor.solve.attempts import attempt
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.simulate import simulate
+from compressor.solve.simulate import measure, simulate
+from compressor.solve.tallied import metrics
+from compressor.solve.turns import Cuts, revolutions
 
 REVOLUTIONS, SETTLE = 200, 8
 BATCHES = 16
@@ -36,6 +46,11 @@ SCENES = {
         "joint": "both", "clearance_mm": 0.3, "contact": {"damping_N_s_per_mm": 0.336},
     },
 }  # fmt: skip
+DAMPING = 0.336  # N s/mm: a thousandth of the paper's
+SEED, DRAWN, WANTED = 401, 260, 100  # random cases, and how many chaotic ones are judged
+RANDOM = {"duration_rev": 44, "settle_rev": 4, "output_step_deg": 3.6, "timeout_s": 3000}
+OTHER, OTHER_RTOL = "RODAS", 1e-6
+SCIPY, FEW = "LSODA", 6  # half a minute each
 
 
 def case(values, method, revolutions=REVOLUTIONS, settle=SETTLE, rtol=RTOL):
@@ -135,11 +150,71 @@ def scene_row(values, methods, revolutions=REVOLUTIONS):
     }
 
 
-def main(target):
+def told(values, method):
+    """What a case says of itself, and how its rms differs from another integrator's."""
+    values = {**values, "contact": {"damping_N_s_per_mm": DAMPING}}
+    values |= {"solve": RANDOM, "output": {"keep": "metrics"}}
+    of = Case.from_values(values)
+    found = measure(of)
+    row = {"regime": found.attributes.get("regime", ""), "reason": found.reason}
+    if row["regime"] != Regime.CHAOTIC or found.status != "ok":
+        return row
+    how = {**RANDOM, "method": method, "rtol": OTHER_RTOL, "error_bars": False}
+    other = Case.from_values({**values, "solve": how})
+    cuts = Cuts(revolutions(of.settle, of.duration, of.turn))
+    run = attempt(other, OTHER_RTOL, how["timeout_s"], False, cuts)
+    if run.reason:
+        return {**row, "other": run.reason}
+    squares = np.array([metrics(run.p, turn)["rms_acceleration"] ** 2 for turn in cuts.turns])
+    mean, error = batch_mean(squares)
+    rms, theirs = float(found.numbers["rms_acceleration"]), math.sqrt(mean)
+    ours = float(found.numbers["rms_acceleration_standard_error"])
+    return {
+        **row,
+        "values": values,
+        "apart": abs(rms - theirs) / math.hypot(ours, error / (2 * theirs)),
+        "relative": abs(rms / theirs - 1),
+        "known": ours / rms,
+        "horizon_rev": float(found.numbers["predictability_horizon"]) / of.turn,
+        "more": float(found.numbers["revolutions_to_one_percent"]),
+    }
+
+
+def random_row(drawn, wanted):
+    """How random cases end, and how the chaotic ones agree with another integrator."""
+    with Parallel(n_jobs=2) as parallel:
+        rows = parallel(delayed(told)(values, OTHER) for values in strangers(SEED, drawn))
+        judged = [row for row in rows if "apart" in row][:wanted]
+        few = parallel(delayed(told)(row["values"], SCIPY) for row in judged[:FEW])
+
+    def spread(name, *of):
+        return [short(value) for value in np.percentile([row[name] for row in judged], of)]
+
+    return {
+        "seed": SEED,
+        "drawn": drawn,
+        "method": OTHER,
+        "rtol": OTHER_RTOL,
+        "settle": RANDOM["settle_rev"],
+        "revolutions": RANDOM["duration_rev"] - RANDOM["settle_rev"],
+        "regimes": dict(Counter(row["regime"] or row["reason"] for row in rows)),
+        "stopped": dict(Counter(row["other"] for row in rows if "other" in row)),
+        "judged": len(judged),
+        "within": {str(k): sum(row["apart"] <= k for row in judged) for k in (1, 2, 3)},
+        "scipy": {"method": SCIPY, "apart": [short(row["apart"]) for row in few]},
+        "relative": spread("relative", 50, 90, 100),
+        "known": spread("known", 50, 90, 100),
+        "horizon_rev": spread("horizon_rev", 50, 90, 100),
+        "more": spread("more", 50, 90, 100),
+    }
+
+
+def main(target, drawn, wanted):
     kept = {
         **provenance("make chaotic"),
         "revolutions": REVOLUTIONS, "settle": SETTLE, "batches": BATCHES, "rtol": RTOL,
         "scenes": {name: scene_row(values, METHODS) for name, values in SCENES.items()},
+        "random": random_row(drawn, wanted),
     }  # fmt: skip
     text = json.dumps(kept, indent=1)
     Path(target).write_text(text + "\n", encoding="utf-8")
@@ -147,4 +222,9 @@ def main(target):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("target", help="file to write")
+    parser.add_argument("--drawn", type=int, default=DRAWN, help="random cases")
+    parser.add_argument("--wanted", type=int, default=WANTED, help="chaotic ones that are judged")
+    asked = parser.parse_args()
+    main(asked.target, asked.drawn, asked.wanted)

@@ -46,7 +46,7 @@ def short(value):
 
 def alone(case):
     """The Dataset of one run at the case's own tolerance, whatever the energy audit says of it."""
-    found = attempt(case, 0, case.solve.timeout_s, sampled=True)
+    found = attempt(case, case.rtol, case.solve.timeout_s, sampled=True)
     assert not found.reason, found.detail
     table = with_series(case, found)[1]
     return xr.Dataset(table.variables, attrs=table.attrs)

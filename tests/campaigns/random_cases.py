@@ -1,11 +1,17 @@
-"""Cases drawn at random: the ground on which tolerances and error bars are judged.
+"""Cases drawn at random: the ground on which promises and error bars are judged.
 
-A Sobol sequence with a fixed seed over clearance 0.01-1 mm (log-uniform), rod 2-8 kg,
-reciprocating mass 4-25 kg, 100-1500 rpm, all loads and all scenes with clearance; friction is on,
-all else as by default.
+Clearance 0.01-1 mm, rod 2-8 kg, reciprocating mass 4-25 kg, 100-1500 rpm, all loads and all scenes
+with clearance; friction is on, all else as by default. `random_cases` is a Sobol sequence, with
+speeds drawn evenly; `strangers` draws clearance and speed evenly in their logarithms.
 """
 
+from functools import cache
+
+import numpy as np
 from scipy.stats import qmc
+
+from compressor.cases.case import Case
+from compressor.solve.simulate import simulate
 
 SEED = 2021
 LOADS = ("design", "typical", "none")
@@ -33,3 +39,29 @@ def random_cases(count=200):
         }
         for clearance, rod, mass, speed, load, joint in points
     ]
+
+
+def strangers(seed, count):
+    """Cases as a stranger would draw them, as values of a case file without `solve`."""
+    drawn = np.random.default_rng(seed).random((count, 6))
+    return [
+        {
+            "load": LOADS[int(3 * load)],
+            "joint": JOINTS[int(3 * joint)],
+            "clearance_mm": rounded(10 ** (2 * clearance - 2)),
+            "machine": {
+                "rod_mass_kg": rounded(2 + 6 * rod),
+                "reciprocating_mass_kg": rounded(4 + 21 * mass),
+                "speed_rpm": rounded(100 * 15**speed),
+            },
+        }
+        for load, joint, clearance, rod, mass, speed in drawn
+    ]
+
+
+@cache
+def load_equations():
+    """Load once in a process what would else count for its first cases."""
+    for how in ({}, {"method": "RODAS"}, {"horizon": True}):
+        solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36, **how}
+        simulate(Case.from_values({"joint": "both", "clearance_mm": 0.1, "solve": solve}))

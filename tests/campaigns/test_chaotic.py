@@ -1,4 +1,4 @@
-"""Beyond the horizon points differ and statistics agree: two chaotic scenes, two integrators."""
+"""Beyond the horizon points differ and statistics agree, of two integrators."""
 
 import math
 
@@ -7,6 +7,7 @@ import pytest
 from measure_chaotic import (
     BATCHES,
     METHODS,
+    OTHER,
     SCENES,
     batch_mean,
     by_revolution,
@@ -14,6 +15,7 @@ from measure_chaotic import (
     compare,
     distance,
     scene_row,
+    told,
 )
 from page_tables import kept
 
@@ -64,6 +66,22 @@ def test_what_is_kept_says_the_same():
             assert other["beyond"] > 0.5
             assert max(other["standard_errors"].values()) < MOST
             assert other["peaks_distance"] < furthest(measured["revolutions"] - measured["settle"])
+
+
+@pytest.mark.slow
+def test_a_chaotic_case_says_so_and_knows_its_rms():
+    (scene,) = (values for name, values in SCENES.items() if name.startswith("both"))
+    row = told({**scene, "clearance_mm": 0.2}, OTHER)
+    assert row["regime"] == "chaotic"
+    assert row["apart"] < MOST
+    assert row["known"] < 0.1
+
+
+def test_a_hundred_chaotic_cases_know_their_rms():
+    row = kept("chaotic.json")["random"]
+    assert row["judged"] == 100
+    assert row["within"]["2"] >= 95
+    assert max(row["scipy"]["apart"]) < MOST
 
 
 def test_errors_of_means_allow_for_revolutions_that_follow_on_each_other():

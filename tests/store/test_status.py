@@ -8,6 +8,7 @@ import pytest
 from compsim import cli
 
 from compressor.cases.load import load_studies
+from compressor.digits import by_bar
 from compressor.store.files import StoreError
 from compressor.store.status import report_job, standings
 from compressor.sweep.sweep import sweep
@@ -53,10 +54,10 @@ def test_show_tells_how_a_job_ended(mix, capsys):
     assert f"job {by_end['ok']}: ok" in out
     assert "in mix clearance_mm=0.1 solve.max_steps=1000000" in out
     (line,) = (line for line in out.split("\n") if "peak_acceleration " in line)
-    value, error = line.replace("m/s2", "").split("±")
-    report = report_job("results", by_end["ok"])
-    assert float(value.split()[1]) == pytest.approx(report.numbers["peak_acceleration"], rel=1e-5)
-    assert float(error) == pytest.approx(report.numbers["peak_acceleration_error"], rel=1e-5)
+    numbers = report_job("results", by_end["ok"]).numbers
+    said = by_bar(numbers["peak_acceleration"], numbers["peak_acceleration_error"])
+    assert line.split(maxsplit=1)[1] == f"{said} m/s2"
+    assert "±" in said
     assert cli.main(["show", by_end["failed"]]) == 0
     out = capsys.readouterr().out
     assert "failed: budget_steps: more than 5 steps" in out

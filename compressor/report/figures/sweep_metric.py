@@ -55,7 +55,17 @@ class Measure:
 
         An ideal joint has a penetration of exactly 0.
         """
-        values = data[self.variable]
+        return self.scaled(data, self.variable)
+
+    def bar(self, data: xr.Dataset) -> xr.DataArray:
+        """Its error bar, as `of`; nan where there is none."""
+        if f"{self.variable}_error" not in data:
+            return self.of(data) * math.nan
+        return self.scaled(data, f"{self.variable}_error")
+
+    def scaled(self, data: xr.Dataset, name: str) -> xr.DataArray:
+        """A variable of the metric in the measure's unit."""
+        values = data[name]
         if METRICS[self.variable].contact:
             values = values.where(data["max_penetration"] != 0)
         return (values.sel(joint=self.joint, drop=True) if self.joint else values) * self.factor

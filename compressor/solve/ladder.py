@@ -1,0 +1,139 @@
+"""Ever tighter runs of a case, until energy balances and what accuracy promises is kept."""
+
+from compressor.cases import TIGHTEST, Case
+from compressor.reasons import Reason
+from compressor.solve.attempts import Solution, attempt, companion, estimate_errors
+from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
+from compressor.solve.error_bars import beyond, closeness, ratio_of, unmet
+from compressor.solve.regime import DOUBTFUL, Search
+
+OUT_OF_BUDGET = (
+    Reason.BUDGET_STEPS,
+    Reason.BUDGET_SECONDS,
+    Reason.STEP_UNDERFLOW,
+)  # a tighter run may end so
+ORDER = 0.8  # power of the tolerance with which errors fall
+AIM = 0.7  # of what is allowed: where the next run's error is aimed at
+LEAST, MOST = 10.0, 1000.0  # times tighter that the next run may be
+
+
+def climb(case: Case, search: Search) -> Solution:
+    """The first run that balances and keeps its promise, or the last whole one as a failed job.
+
+    A first run is compared with one a little tighter. Each further one is as much tighter as its
+    errors are expected to need, and is compared with the one before. Where errors are as large as
+    the numbers, it is asked first whether the motion is chaotic; that ends the climb.
+    """
+    rtol = case.rtol
+    best: Solution | None = None  # the last whole run
+    before: Solution | None = (
+        None  # the tightest one that balances, which the next is compared with
+    )
+    unsound = 0  # runs that did not balance
+    while True:
+        now = attempt(case, rtol, search.left, case.output.keep == "series")
+        if now.reason:
+            return cut_short(case, best, now)
+        best = now
+        if not balanced(case, now):
+            unsound += 1
+            if unsound > RUNGS or rtol < 9.9 * TIGHTEST:
+                return unbalanced(case, now, f"at rtol {rtol:.2g}")
+            rtol /= 10.0
+            continue
+        if not case.wants_bars:
+            return now
+        if before is None:
+            other = companion(case, now, search.left)
+        else:
+            other = before
+        estimate_errors(now, other)
+        excess = over_promise(case, now)
+        if excess <= 1.0:
+            now.promise = "kept" if promises(case) else "none"
+            return now
+        if lost(now) and search.look(whole=before is not None):
+            return now
+        if other.reason or min(rtol, other.rtol) < 1.01 * TIGHTEST:
+            return short_of(case, now, other.detail or "no run is tighter")
+        tighter = other.rtol < rtol and balanced(case, other)
+        before = other if tighter else now
+        rtol = max(short(before.rtol / further(excess, other.rtol / rtol)), TIGHTEST)
+
+
+def promises(case: Case) -> bool:
+    """Whether a case's accuracy promises an error, and not only sets a tolerance."""
+    return case.wants_bars and case.solve.rtol is None
+
+
+def over_promise(case: Case, solution: Solution) -> float:
+    """The greatest estimated error over what accuracy promises; 0 where it promises nothing."""
+    if case.targets:
+        return max(
+            beyond(solution.metrics[name], solution.bars[name]) / target
+            for name, target in case.targets
+        )
+    return solution.series_errors["acceleration"] / case.promise if promises(case) else 0.0
+
+
+def lost(solution: Solution) -> bool:
+    """Whether a run's acceleration is as far from another's as chaotic motions are."""
+    return solution.series_errors["acceleration"] >= DOUBTFUL
+
+
+def further(excess: float, ratio: float) -> float:
+    """How many times tighter than both of a pair the next run is to be.
+
+    excess: of the pair's estimate over what is promised; ratio: of their tolerances.
+    """
+    error = excess * max(ratio, 1.0 / ratio) ** -ORDER / closeness(ratio)
+    return min(max(ratio_of(AIM / error), LEAST), MOST)
+
+
+def short(rtol: float) -> float:
+    """A tolerance that is told in two digits."""
+    return float(f"{rtol:.1e}")
+
+
+def balanced(case: Case, solution: Solution) -> bool:
+    """Whether the energy of a whole run balances as well as the case asks for."""
+    return energy_residual(solution.trajectory.tally) <= allowed(
+        case.rtol, case.duration / case.turn
+    )
+
+
+def cut_short(case: Case, best: Solution | None, now: Solution) -> Solution:
+    """What is left of a case whose present run did not reach its end."""
+    if best is None or now.reason not in OUT_OF_BUDGET:
+        return now
+    detail = f"the next run: {now.detail}"
+    if not balanced(case, best):
+        return unbalanced(case, best, detail, now.reason)
+    return short_of(case, best, detail, now.reason)
+
+
+def unbalanced(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
+    """A whole run as a failed job: its series and energies are kept, its metrics are not."""
+    residual = energy_residual(best.trajectory.tally)
+    most = allowed(case.rtol, case.duration / case.turn)
+    best.metrics, best.bars, best.series_errors = {}, {}, {}
+    timed_out = reason == Reason.BUDGET_SECONDS
+    best.reason = reason if timed_out else Reason.ENERGY_AUDIT_FAILED
+    best.detail = f"energy residual {residual:.2g}, more than {most:.2g}; {detail}"
+    return best
+
+
+def short_of(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
+    """A run with its errors as a failed job, since they are larger than promised."""
+    timed_out = reason == Reason.BUDGET_SECONDS
+    best.reason = reason if timed_out else Reason.ACCURACY_NOT_REACHED
+    best.detail = "; ".join([*missed(case, best), f"at rtol {best.rtol:.2g}", detail])
+    return best
+
+
+def missed(case: Case, solution: Solution) -> list[str]:
+    """What a run promised and does not keep, a message each."""
+    if case.targets:
+        return unmet(case.targets, solution.metrics, solution.bars)
+    error = solution.series_errors["acceleration"]
+    return [f"acceleration: its error may be {error:.2g} of it, not {case.promise:g}"]

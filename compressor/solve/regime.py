@@ -1,0 +1,137 @@
+"""Which regime a motion is in: predictable to its end, periodic, or chaotic.
+
+A run that keeps a promise is predictable: two runs at different tolerances, each a motion started a
+little elsewhere, stayed together to its end. Where errors stay as large as the numbers, twins in
+step tell a motion that cannot be foretold from one that needs a tighter run.
+"""
+
+import math
+import time
+
+import numpy as np
+
+from compressor.cases import TIGHTEST, Case
+from compressor.metrics import METRICS
+from compressor.solve.error_bars import Metrics, beyond
+from compressor.solve.horizon import Parting, part
+from compressor.solve.series import a_turn, distances
+
+DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
+BUDGET = 3.0  # times what the runs took
+SHORT = 0.5  # rev: looked at first
+RTOL = 1e-9  # of the twins, at first
+SURE = 10.0  # times tighter: where twins part, these are to part as well
+CLOSE = 1e-6  # of the clearance: how far from the motion its twin starts
+LATER = 1.5  # times the first horizon, within which they are to
+MOMENT = 1e-6  # rev
+SAME = 1e-9  # relative distance of revolutions that rounding makes
+
+
+class Search:
+    """A search for the horizon of a case beside its runs, within a budget that grows with them.
+
+    `horizon`: time (s) at which twins part; inf where they do not, nan as long as that is not
+    known.
+    """
+
+    def __init__(self, case: Case):
+        self.case = case
+        self.began = time.monotonic()
+        self.horizon = math.nan
+        self.rtol = RTOL
+        self.seen = 0.0  # s up to which twins stayed together
+        self.spent = 0.0  # s of wall time
+
+    @property
+    def taken(self) -> float:
+        """Wall time (s) since the case's runs began."""
+        return time.monotonic() - self.began
+
+    @property
+    def left(self) -> float:
+        """Wall time (s) that the case may still take."""
+        return self.case.solve.timeout_s - self.taken
+
+    def look(self, whole: bool) -> bool:
+        """Whether twins part, as far as is known.
+
+        A short span is looked at first, of which most chaotic motions need no more, and the whole
+        one only if so asked.
+        """
+        end = self.case.duration
+        if self.case.solve.horizon != "auto":
+            return self.horizon < end
+        for span in [min(SHORT * self.case.turn, end), end][: 1 + whole]:
+            left = min(BUDGET * (self.taken - self.spent) - self.spent, self.left)
+            if left > 0.0 and math.isnan(self.horizon) and span > self.seen:
+                self.twins(span, left)
+        return self.horizon < end
+
+    def twins(self, span: float, left: float) -> None:
+        """Look at a span (s) for so long (s), and at where twins part by tighter ones again.
+
+        Where the tighter ones stay together it was the steps that parted the others; what follows
+        is looked at as tightly.
+        """
+        self.began += load_twins(self.case)
+        began = time.monotonic()
+
+        def follow(span: float, rtol: float) -> Parting:
+            return part(self.case, span, rtol, CLOSE, began + left - time.monotonic())
+
+        found = follow(span, self.rtol)
+        while found.parted and self.rtol > TIGHTEST * SURE:
+            again = min(LATER * found.time, self.case.duration)
+            surely = follow(again, self.rtol / SURE)
+            if surely.parted:
+                self.horizon = surely.time
+            if not surely.whole:
+                break
+            self.rtol /= SURE
+            found = follow(span, self.rtol)
+        if found.whole:
+            self.seen = span
+            self.horizon = math.inf if span == self.case.duration else math.nan
+        self.spent += time.monotonic() - began
+
+
+def load_twins(case: Case) -> float:
+    """Load what twins need, or compile it once on a machine; the time (s) that took counts not."""
+    began = time.monotonic()
+    part(case, MOMENT * case.turn, RTOL, CLOSE, math.inf)
+    return time.monotonic() - began
+
+
+def doubtful(metrics: Metrics, bars: Metrics) -> bool:
+    """Whether a metric's error bar reaches a tenth of it; shares and counts do not tell."""
+    return any(
+        beyond(metrics[name], bars[name]) >= DOUBTFUL
+        for name, row in METRICS.items()
+        if row.bar.relative
+    )
+
+
+def repeats(
+    case: Case, samples: np.ndarray, errors: Metrics
+) -> tuple[int, float] | tuple[None, float]:
+    """Period of a motion in revolutions, and the revolution from which on it repeats itself.
+
+    samples: observed rows at the times of `compressor.solve.series.compared_times`. Revolutions
+    are the same if no series is farther apart than both its errors. None and nan where the settled
+    part is too short to tell, or does not repeat itself.
+    """
+    per = a_turn(case)
+    count = len(samples) // per if per else 0
+    turns = [samples[k * per : (k + 1) * per] for k in range(count)]
+    for period in range(1, count // 2 + 1):
+        same = [
+            all(
+                (apart <= 2.0 * np.asarray(errors[name]) + SAME).all()
+                for name, apart in distances(turns[k], turns[k + period]).items()
+            )
+            for k in range(count - period)
+        ]
+        if all(same[-period:]):
+            first = count - period - next((i for i, s in enumerate(same[::-1]) if not s), len(same))
+            return period, case.settle / case.turn + first
+    return None, math.nan

@@ -1,0 +1,103 @@
+"""The time series of a run, and how far those of two runs of a case are apart.
+
+Two runs are compared at the same times, whatever is stored of either: `A_TURN` times a revolution.
+Their distance is a relative L2 norm over the settled part, sqrt(sum |a - b|^2 / sum |a|^2); of a
+vector its length counts.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.cases import Case
+from compressor.metrics import SERIES, SIZES
+from compressor.physics import COLUMNS, Column, observe_all
+from compressor.solve.request import Trajectory
+
+COLUMN = {
+    "displacement": Column.DISPLACEMENT,
+    "velocity": Column.VELOCITY,
+    "acceleration": Column.ACCELERATION,
+    "rod_angle": Column.ROD_ANGLE,
+    "piston_force": Column.PISTON_FORCE,
+    "contact_force": Column.FORCE,
+    "eccentricity": Column.ECCENTRICITY,
+    "penetration": Column.PENETRATION,
+}
+A_TURN = 150  # times a revolution at which two runs are compared
+FEWEST, MOST = 64, 20_000  # of these times over a settled part
+
+
+def rows_of(p: np.record, run: Trajectory) -> np.ndarray:
+    """Observed rows of a run at its times, shape (m, COLUMNS); nan from where it stopped."""
+    rows = np.empty((run.times.size, COLUMNS))
+    observe_all(run.times, run.states, run.phases, p, rows)
+    rows[np.isnan(run.states).any(axis=1)] = math.nan
+    return rows
+
+
+def block(name: str, rows: np.ndarray) -> np.ndarray:
+    """A time series from observed rows, shape (m,), (m, joint) or (m, joint, axis)."""
+    shape = tuple(SIZES[dim] for dim in SERIES[name][0])
+    column = COLUMN[name]
+    return rows[:, column : column + math.prod(shape)].reshape(-1, *shape)
+
+
+def compared_times(case: Case) -> np.ndarray:
+    """The times (s) at which runs of a case are compared, from where it has settled to its end.
+
+    In each whole revolution at the same angles, so that revolutions can be compared, too.
+    """
+    span = case.duration - case.settle
+    each = a_turn(case)
+    step = case.turn / each if each else span / FEWEST
+    count = max(1, int(span / step * (1 + 1e-12)))
+    return case.settle + step * (np.arange(count) + 0.5)  # off the corners of the load
+
+
+def a_turn(case: Case) -> int:
+    """How many of these times a revolution has; 0 where the run settles within no whole one."""
+    revolutions = (case.duration - case.settle) / case.turn
+    return round(min(A_TURN, max(1.0, MOST / revolutions))) if revolutions >= 1.0 else 0
+
+
+def take_samples(p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Observed rows at some of a run's times; the run keeps its samples at others.
+
+    times, kept: subsets of `run.times`, s.
+    """
+    at, stay = np.searchsorted(run.times, times), np.searchsorted(run.times, kept)
+    whole = run.times, run.states, run.phases
+    run.times, run.states, run.phases = (array[at] for array in whole)
+    rows = rows_of(p, run)
+    run.times, run.states, run.phases = (array[stay] for array in whole)
+    return rows
+
+
+def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
+    """The relative L2 distance of each time series of two runs, by joint where it has one.
+
+    ours, theirs: observed rows at the same times, (m, COLUMNS). 0 where both are 0.
+    """
+    away = ((ours - theirs) ** 2).sum(axis=0, keepdims=True)
+    size = (ours**2).sum(axis=0, keepdims=True)
+    found = {}
+    for name, (dims, _, _) in SERIES.items():
+        one, other = (block(name, sums)[0] for sums in (away, size))
+        if "axis" in dims:
+            one, other = one.sum(axis=-1), other.sum(axis=-1)
+        found[name] = np.sqrt(np.divide(one, other, out=np.zeros_like(one), where=other > 0.0))
+    return found
+
+
+def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
+    """Greatest distance of the eccentricities of two runs, over the room; 0 for ideal joints.
+
+    ours, theirs: observed rows at the same times. A journal's room is its clearance, or how far it
+    came if that is more.
+    """
+    one, other = block("eccentricity", ours), block("eccentricity", theirs)
+    faulty = p["clearance"] > 0
+    away = np.linalg.norm(one - other, axis=2).max(axis=0)
+    room = np.maximum(p["clearance"], np.linalg.norm(one, axis=2).max(axis=0))
+    return float((away[faulty] / room[faulty]).max(initial=0.0))

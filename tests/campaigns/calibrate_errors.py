@@ -1,0 +1,124 @@
+"""Measure by how much a run's difference from another one bounds its error (make calibration).
+
+Cases of seeds that judge nothing are run at a ladder of tolerances, each with companions tighter
+and looser, and at 1e-12. Kept are percentiles of true error over distance by the ratio of the two
+tolerances, for acceleration, and by ratio and metric how many true errors the bars would hold and
+how long they would be. From these the shares of `compressor.metrics` and
+`compressor.solve.error_bars` were chosen; `make accuracy` judges them on other seeds.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+from measure_accuracy import CONTACT, EXACT, percentiles, provenance, short
+from random_cases import strangers
+
+from compressor.cases.case import Case
+from compressor.metrics import METRICS
+from compressor.solve.attempts import attempt
+from compressor.solve.error_bars import WHOLE, Companion, bars, closeness
+from compressor.solve.series import distances
+
+SEEDS = (101, 102, 103)
+TRUTH = 1e-12
+RTOLS = (2e-5, 2e-6, 2e-7, 2e-8, 1e-9, 1e-10)
+RATIOS = (0.4, 0.5, 3.0, 10.0, 30.0, 100.0, 1000.0)  # of the other run's tolerance
+LOOSEST = 1e-4  # of the other run: beyond it both may take the same wrong course
+SMALL = 0.1  # distances beyond are no estimates
+LIMITS = (50, 90, 95, 99, 99.5)
+
+
+def one_case(values):
+    """By tolerance and ratio: error and distance of acceleration; each metric's error and bar."""
+    case = Case.from_values({**values, "solve": {"rtol": TRUTH}})
+    runs = {}
+
+    def run(rtol):
+        if rtol not in runs:
+            runs[rtol] = attempt(case, rtol, 600.0, False)
+        return runs[rtol]
+
+    truth, rows = run(TRUTH), []
+    for rtol in RTOLS:
+        for ratio in RATIOS:
+            other_rtol = float(f"{ratio * rtol:.3g}")
+            if other_rtol > LOOSEST or run(rtol).reason or run(other_rtol).reason:
+                continue
+            here, other = run(rtol), run(other_rtol)
+            apart = distances(here.samples, other.samples)
+            found = bars(here.metrics, Companion(other.metrics, ratio, apart), 0.0)
+            rows.append({
+                "rtol": rtol,
+                "ratio": ratio,
+                "error": float(distances(truth.samples, here.samples)["acceleration"]),
+                "distance": float(apart["acceleration"]),
+                "metrics": {
+                    name: relative(name, here.metrics, truth.metrics, found[name])
+                    for name in METRICS
+                },
+            })  # fmt: skip
+    return rows
+
+
+def relative(name, metrics, truth, bar):
+    """Errors and bars of a metric, of joints with contact where it is one of contact."""
+    there = np.ravel(truth["max_penetration"]) != 0 if name in CONTACT else slice(None)
+    value, sure, length = (np.ravel(x)[there] for x in (metrics[name], truth[name], bar))
+    error = np.abs(value - sure)
+    return np.where(error > EXACT * np.abs(sure), error, 0.0), length
+
+
+def series_row(rows, ratio):
+    """Percentiles of error over distance at a ratio, and over what the shares make of it."""
+    over = [
+        row["error"] / row["distance"]
+        for row in rows
+        if row["ratio"] == ratio and 0 < row["distance"] < SMALL
+    ]
+    return {
+        "ratio": ratio,
+        "pairs": len(over),
+        "error_over_distance": percentiles(over, LIMITS),
+        "share": short(WHOLE * closeness(ratio)),
+    }
+
+
+def metric_row(rows, name, ratio):
+    """Share of errors within their bars, and bar over error in the median, at a ratio."""
+    pairs = [row["metrics"][name] for row in rows if row["ratio"] == ratio]
+    error, bar = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    wrong = error > 0
+    return {
+        "ratio": ratio,
+        "within": short(np.mean(error <= bar)),
+        "tightness": short(np.median(bar[wrong] / error[wrong])),
+    }
+
+
+def main(target, jobs, count):
+    cases = [values for seed in SEEDS for values in strangers(seed, count)]
+    found = Parallel(n_jobs=jobs)(delayed(one_case)(values) for values in cases)
+    rows = [row for case in found for row in case]
+    result = {
+        **provenance("make calibration"),
+        "cases": {"seeds": SEEDS, "of_each": count, "percentiles": LIMITS},
+        "series": [series_row(rows, ratio) for ratio in RATIOS],
+        "metrics": {
+            name: [metric_row(rows, name, ratio) for ratio in RATIOS] for name in METRICS
+        },
+    }  # fmt: skip
+    text = json.dumps(result, indent=1)
+    Path(target).write_text(text + "\n", encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("target", help="file to write")
+    parser.add_argument("--jobs", type=int, default=2, help="worker processes")
+    parser.add_argument("--cases", type=int, default=350, help="cases of each seed")
+    asked = parser.parse_args()
+    main(asked.target, asked.jobs, asked.cases)

@@ -1,0 +1,88 @@
+"""What accuracy promises is kept: of the stored campaign, and of a few cases run here."""
+
+import numpy as np
+import pytest
+from measure_accuracy import SEEDS, TRUTH, apart, drawing, run, settled
+from page_tables import kept
+from random_cases import strangers
+
+from compressor.cases.accuracy import ACCURACY
+from compressor.cases.case import Case
+from compressor.metrics import METRICS
+from compressor.solve.simulate import simulate
+
+JUDGED = ("standard", "fine")
+SAMPLE = strangers(999, 6)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return kept("accuracy.json")
+
+
+def test_the_campaign_judged_fresh_cases_of_today_s_words(measured):
+    assert measured["random"]["cases"] >= 1000
+    assert measured["random"]["seeds"] == list(SEEDS)
+    assert not {*SEEDS} & {*kept("calibration.json")["cases"]["seeds"]}
+    for word, tier in ACCURACY.items():
+        row = measured["words"][word]
+        assert (row["rtol"], row["promise"]) == (tier.rtol, tier.promise)
+
+
+@pytest.mark.parametrize("word", ACCURACY)
+def test_every_run_says_what_became_of_its_promise(measured, word):
+    row, cases = measured["words"][word], measured["random"]["cases"]
+    chaotic = row["regimes"].get("chaotic", 0)
+    assert row["silent"] == 0
+    assert row["kept"] + chaotic + sum(row["refused"].values()) == cases
+    assert row["chaotic_confirmed"] == chaotic
+    assert len(measured["broken"][word]) == row["broken"]
+    assert row["nine"]["kept"] == 9
+    assert row["nine"]["error"] <= row["nine"]["told"] <= row["promise"]
+
+
+@pytest.mark.parametrize("word", JUDGED)
+def test_a_promise_is_kept_in_99_of_100_runs_that_say_so(measured, word):
+    row = measured["words"][word]
+    assert row["broken"] <= 0.01 * row["kept"]
+    assert sum(row["refused"].values()) < 0.03 * measured["random"]["cases"]
+
+
+def test_a_check_costs_what_is_said(measured):
+    row = measured["words"]["standard"]
+    assert row["cost"]["mean"] <= 3.0
+    assert row["cost"]["median"] <= 2.1
+    assert row["nine"]["cost"] <= 2.1
+
+
+@pytest.mark.parametrize("word", ACCURACY)
+@pytest.mark.parametrize("name", METRICS)
+def test_bars_are_true_and_short(measured, word, name):
+    row = measured["bars"][word][name]
+    assert row["within"] >= 0.95
+    assert row["tightness"] is None or row["tightness"] <= 6.0
+
+
+@pytest.mark.parametrize("values", SAMPLE)
+def test_a_stranger_s_case_keeps_its_promise(values):
+    found = simulate(Case.from_values(values))
+    assert (found["status"].item(), found.attrs["promise"]) == ("ok", "kept")
+    best = run(values, rtol=TRUTH)
+    error = apart(settled(found), settled(best))
+    assert error <= found["acceleration_error"] <= ACCURACY["standard"].promise
+    away = abs(found["rms_acceleration"] - best["rms_acceleration"])
+    assert away <= found["rms_acceleration_error"]
+
+
+def test_the_figure_shows_runs_that_say_kept():
+    row = {"seconds": 0.01, "error": 1e-4, "promise": "kept"}
+    refused = {**row, "error": 0.5, "promise": "none"}
+    cases = [{"words": dict.fromkeys(ACCURACY, one)} for one in (row, row, refused)]
+    (panel,) = drawing(cases).axes
+    clouds = [line for line in panel.lines if line.get_marker() == "o"]
+    assert [len(line.get_xdata()) for line in clouds] == [2] * len(ACCURACY)
+    medians = [line for line in panel.lines if line.get_marker() == "D"]
+    assert [line.get_label() for line in medians] == list(ACCURACY)
+    np.testing.assert_allclose([line.get_ydata()[0] for line in medians], 1e-4)
+    dashed = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "--"]
+    assert dashed == [tier.promise for tier in ACCURACY.values()]

@@ -1,0 +1,227 @@
+"""Regimes: found without being asked, within a budget, and never where a promise is kept."""
+
+import itertools
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compressor.cases.case import Case
+from compressor.metrics import METRICS, SERIES
+from compressor.outcome import Regime
+from compressor.physics import COLUMNS, Column
+from compressor.solve import regime
+from compressor.solve.horizon import Parting, predictability_horizon
+from compressor.solve.regime import BUDGET, CLOSE, RTOL, SHORT, SURE, Search, repeats
+from compressor.solve.series import a_turn, compared_times
+from compressor.solve.simulate import measure
+
+PAPER = {"joint": "big_end", "clearance_mm": 0.2}
+CHAOTIC = {
+    "joint": "big_end",
+    "clearance_mm": 0.3,
+    "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
+    "contact": {"damping_N_s_per_mm": 0},
+}
+NO_ERRORS = dict.fromkeys(SERIES, 0.0)
+
+
+def case(values=PAPER, **solve):
+    return Case.from_values({**values, "solve": solve, "output": {"keep": "metrics"}})
+
+
+@pytest.fixture(scope="module")
+def chaotic():
+    return measure(case(CHAOTIC, duration_rev=14))
+
+
+def test_chaos_is_found_without_being_asked(chaotic):
+    assert (chaotic.status, chaotic.attributes["regime"]) == ("ok", "chaotic")
+    assert chaotic.attributes["promise"] == "none"
+    horizon = chaotic.numbers["predictability_horizon"]
+    twins = predictability_horizon(case(CHAOTIC), close=CLOSE)
+    assert horizon == pytest.approx(twins, rel=0.05)
+    assert chaotic.numbers["revolutions"] == 13
+    assert chaotic.numbers["revolutions_to_one_percent"] > 13
+
+
+def test_single_peaks_of_chaos_have_no_digits_and_averages_do(chaotic):
+    for name, row in METRICS.items():
+        value, bar = chaotic.numbers[name], chaotic.numbers[f"{name}_error"]
+        if row.kind == "greatest":
+            assert np.isinf(bar[value != 0]).all(), name
+        else:
+            assert np.isfinite(bar).all(), name
+    assert 0 < chaotic.numbers["rms_acceleration_error"] < chaotic.numbers["rms_acceleration"]
+    assert np.isinf(chaotic.numbers["acceleration_error"])
+    low, high = chaotic.numbers["peak_acceleration_quantile"]
+    assert low < high <= chaotic.numbers["peak_acceleration"]
+
+
+def test_accuracy_by_number_is_kept_by_averages_of_chaos_alone():
+    """Of a single peak no number can be promised; of an average, what its bar allows."""
+    long = {"duration_rev": 30}
+    met = measure(case(CHAOTIC, accuracy={"rms_acceleration": 0.4}, **long))
+    assert (met.status, met.attributes["regime"]) == ("ok", "chaotic")
+    for unmet in ({"rms_acceleration": 1e-4}, {"peak_acceleration": 0.4}):
+        found = measure(case(CHAOTIC, accuracy=unmet, **long))
+        assert (found.status, found.reason) == ("failed", "accuracy_not_reached"), unmet
+        assert "chaotic" in found.detail
+
+
+@pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
+def test_the_paper_s_cases_are_periodic_and_not_searched(joint, monkeypatch):
+    monkeypatch.setattr(Search, "look", None)
+    values = {"joint": joint} | ({} if joint == "none" else {"clearance_mm": 0.2})
+    found = measure(case(values, duration_rev=8))
+    assert (found.attributes["promise"], found.attributes["regime"]) == ("kept", "periodic")
+    assert found.numbers["period_rev"] == 1
+    assert 1 <= found.numbers["settled_rev"] <= 3
+    assert math.isnan(found.numbers["predictability_horizon"])
+    assert math.isnan(found.numbers["revolutions"])
+
+
+def test_a_run_without_errors_has_no_regime_unless_its_horizon_is_asked_for():
+    plain = measure(case(CHAOTIC, error_bars=False))
+    assert plain.attributes["regime"] == ""
+    asked = measure(case(CHAOTIC, error_bars=False, horizon=True))
+    assert asked.attributes["regime"] == "chaotic"
+    assert math.isnan(asked.numbers["revolutions"])
+    assert math.isnan(asked.numbers["rms_acceleration_error"])
+
+
+def test_a_tolerance_promises_nothing_and_is_searched_by_its_bars():
+    found = measure(case(CHAOTIC, rtol=1e-6))
+    assert (found.status, found.attributes["regime"]) == ("ok", "chaotic")
+    found = measure(case(rtol=1e-6))
+    assert found.attributes["regime"] == "periodic"
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that goes on only as it is told to."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    return now
+
+
+def followed(clock, monkeypatch, *found, seconds=1.0):
+    """Twins that end as they are told to, and take their time or what they are given."""
+    asked, ends = [], itertools.chain(found, itertools.repeat(found[-1]))
+
+    def part(of, span, rtol, close, timeout):
+        if timeout == math.inf:  # machine code is loaded
+            return None
+        asked.append((span / of.turn, rtol, timeout))
+        clock[0] += min(seconds, timeout)
+        return next(ends) if seconds <= timeout else Parting(0.0, False, False)
+
+    monkeypatch.setattr(regime, "part", part)
+    return asked
+
+
+def test_a_short_span_is_looked_at_first(clock, monkeypatch):
+    of = case()
+    parted = Parting(0.1 * of.turn, True, False)
+    asked = followed(clock, monkeypatch, parted)
+    search = Search(of)
+    clock[0] += 10.0
+    assert search.look(whole=True)
+    assert search.horizon == parted.time
+    assert [row[:2] for row in asked] == [(SHORT, RTOL), (pytest.approx(0.15), RTOL / SURE)]
+
+
+def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(clock, monkeypatch):
+    of = case()
+    together = Parting(of.duration, False, True)
+    asked = followed(clock, monkeypatch, Parting(0.1 * of.turn, True, False), together)
+    search = Search(of)
+    clock[0] += 10.0
+    assert not search.look(whole=True)
+    assert search.horizon == math.inf
+    tight = pytest.approx(RTOL / SURE)
+    expected = [(SHORT, RTOL), (pytest.approx(0.15), tight), (SHORT, tight), (4.0, tight)]
+    assert [row[:2] for row in asked] == expected
+
+
+def test_twins_that_part_at_no_two_tolerances_leave_it_open(clock, monkeypatch):
+    of = case()
+    parted, together = Parting(0.1 * of.turn, True, False), Parting(of.duration, False, True)
+    asked = followed(clock, monkeypatch, *[parted, together] * 20, seconds=0.1)
+    search = Search(of)
+    clock[0] += 100.0
+    assert not search.look(whole=False)
+    assert math.isnan(search.horizon)
+    assert search.seen == 0.0
+    assert min(rtol for _, rtol, _ in asked) >= 0.99e-12
+
+
+@pytest.mark.parametrize("seconds", [0.5, 2.0, 100.0])
+def test_the_search_takes_no_more_than_its_share(clock, monkeypatch, seconds):
+    of = case()
+    asked = followed(clock, monkeypatch, Parting(0.0, False, True), seconds=seconds)
+    search = Search(of)
+    for _ in range(4):  # a run of a second, and a look
+        clock[0] += 1.0
+        search.look(whole=True)
+        assert search.spent <= BUDGET * (search.taken - search.spent) + 1e-9
+        assert search.spent + 1.0 <= search.taken + 1e-9
+    assert asked
+    assert search.horizon == math.inf or seconds > 2.0
+
+
+def test_a_search_ends_with_the_job_s_time(clock, monkeypatch):
+    asked = followed(clock, monkeypatch, Parting(0.0, False, True), seconds=100.0)
+    search = Search(case(timeout_s=3.0))
+    clock[0] += 2.5
+    search.look(whole=True)
+    assert asked[0][2] == pytest.approx(0.5)
+    assert search.left == pytest.approx(0.0)
+    search.look(whole=True)
+    assert len(asked) == 1
+
+
+def test_what_cannot_be_told_in_the_time_is_undecided(monkeypatch):
+    monkeypatch.setattr(Search, "look", lambda self, whole: False)
+    found = measure(case(CHAOTIC, rtol=1e-6))
+    assert (found.status, found.attributes["regime"]) == ("ok", Regime.UNDECIDED)
+    found = measure(case(CHAOTIC, accuracy="reference"))
+    assert (found.reason, found.attributes["regime"]) == ("accuracy_not_reached", "undecided")
+
+
+def samples(of, shape):
+    """Rows of a motion whose acceleration has a value at each time."""
+    times = compared_times(of)
+    rows = np.ones((times.size, COLUMNS))
+    rows[:, Column.ACCELERATION] = shape(times / of.turn)
+    return rows
+
+
+@pytest.mark.parametrize("period", [1, 2, 3])
+def test_a_period_is_found_in_revolutions(period):
+    of = case(duration_rev=8)
+    rows = samples(of, lambda turns: np.sin(2 * np.pi * turns / period) + 2)
+    assert repeats(of, rows, NO_ERRORS) == (period, 1.0)
+
+
+def test_a_motion_repeats_itself_from_where_it_has_settled():
+    of = case(duration_rev=8)
+    decay = samples(of, lambda turns: np.cos(2 * np.pi * turns) + 10.0 ** (-2 * turns))
+    assert repeats(of, decay, NO_ERRORS | {"acceleration": 1e-6}) == (1, 3.0)
+    assert repeats(of, decay, NO_ERRORS | {"acceleration": 1e-2}) == (1, 1.0)
+    drift = samples(of, lambda turns: np.cos(2 * np.pi * turns) + 0.1 * turns)
+    period, since = repeats(of, drift, NO_ERRORS | {"acceleration": 1e-3})
+    assert period is None
+    assert math.isnan(since)
+
+
+@pytest.mark.parametrize(("duration", "settle"), [(0.5, 0), (1.5, 1), (2.9, 1)])
+def test_less_than_two_revolutions_tell_no_period(duration, settle):
+    of = case(duration_rev=duration, settle_rev=settle)
+    rows = samples(of, np.ones_like)
+    assert repeats(of, rows, NO_ERRORS)[0] is None
+    whole = replace(of, solve=replace(of.solve, duration_rev=settle + 2.0))
+    assert a_turn(whole)
+    assert repeats(whole, samples(whole, np.ones_like), NO_ERRORS) == (1, settle)

@@ -1,0 +1,106 @@
+"""Time series of two runs: where they are compared, and how far apart they are."""
+
+import numpy as np
+import pytest
+
+from compressor.cases.case import Case
+from compressor.metrics import SERIES, SERIES_ERRORS
+from compressor.physics import COLUMNS, Column
+from compressor.solve.attempts import attempt
+from compressor.solve.series import (
+    A_TURN,
+    FEWEST,
+    MOST,
+    a_turn,
+    block,
+    compared_times,
+    distances,
+    journal_distance,
+    rows_of,
+    take_samples,
+)
+from compressor.solve.simulate import simulate
+
+BOTH = {"joint": "both", "clearance_mm": 0.2}
+
+
+def case(**solve):
+    return Case.from_values({**BOTH, "solve": {"duration_rev": 1, "settle_rev": 0.5, **solve}})
+
+
+@pytest.mark.parametrize(
+    ("duration", "settle", "count"),
+    [
+        (4, 1, 3 * A_TURN),
+        (0.01, 0, FEWEST),
+        (0.01, 0.005, FEWEST),
+        (1000, 0, MOST),
+        (2.5, 1, 1.5 * A_TURN),
+    ],
+)
+def test_runs_are_compared_evenly_from_settling_to_the_end(duration, settle, count):
+    of = case(duration_rev=duration, settle_rev=settle)
+    times = compared_times(of)
+    assert times.size == count
+    step = (of.duration - of.settle) / count
+    np.testing.assert_allclose(np.diff(times), step, rtol=1e-6)
+    np.testing.assert_allclose(times[[0, -1]], [of.settle + step / 2, of.duration - step / 2])
+
+
+def test_revolutions_are_compared_at_the_same_angles():
+    of = case(duration_rev=3.7, settle_rev=0.6)
+    angles = np.mod(compared_times(of)[: 3 * a_turn(of)] / of.turn, 1.0).reshape(3, -1)
+    np.testing.assert_allclose(angles[1:], angles[:1].repeat(2, axis=0), atol=1e-12)
+
+
+def test_the_times_do_not_depend_on_what_is_stored():
+    np.testing.assert_array_equal(compared_times(case()), compared_times(case(output_step_deg=7.2)))
+
+
+def test_samples_are_those_of_a_run_at_these_times():
+    """The run keeps its own, as if nothing else had been asked for."""
+    of = case(duration_rev=0.25, settle_rev=0.1)
+    run = attempt(of, 1e-5, 60.0, True)
+    whole, states = run.trajectory.times, run.trajectory.states.copy()
+    rows = rows_of(run.p, run.trajectory)
+    taken = take_samples(run.p, run.trajectory, whole[5:9], whole[::30])
+    np.testing.assert_array_equal(taken, rows[5:9])
+    np.testing.assert_array_equal(run.trajectory.times, whole[::30])
+    np.testing.assert_array_equal(run.trajectory.states, states[::30])
+
+
+def test_distances_are_relative_and_by_joint():
+    ours, theirs = np.zeros((4, COLUMNS)), np.zeros((4, COLUMNS))
+    ours[:, Column.ACCELERATION] = [3, 0, 4, 0]
+    theirs[:, Column.ACCELERATION] = [3, 0, 4, 0.5]
+    ours[:, Column.FORCE + 2] = [0, 2, 0, 0]  # of the small end, along x
+    theirs[:, Column.FORCE + 2] = [0, 2, 0.3, 0]
+    theirs[:, Column.FORCE + 3] = [0, 0.4, 0, 0]  # and y
+    found = distances(ours, theirs)
+    assert found.keys() == SERIES.keys()
+    assert found["acceleration"] == pytest.approx(0.1)
+    assert found["contact_force"].tolist() == pytest.approx([0.0, 0.25])
+    assert found["velocity"] == 0.0
+    for name, value in found.items():
+        joint = (2,) if "joint" in SERIES_ERRORS[f"{name}_error"][0] else ()
+        assert np.shape(value) == joint, name
+
+
+def test_a_block_is_what_is_stored():
+    of = case(duration_rev=0.25, settle_rev=0)
+    stored, run = simulate(of), attempt(of, of.rtol, 60.0, True)
+    rows = rows_of(run.p, run.trajectory)
+    for name in SERIES:
+        np.testing.assert_array_equal(stored[name].values, block(name, rows))
+
+
+def test_journals_part_by_their_distance_over_their_room():
+    p = np.array((np.array([1e-4, 0.0]),), dtype=[("clearance", "f8", 2)])[()]
+    ours, theirs = np.zeros((3, COLUMNS)), np.zeros((3, COLUMNS))
+    big, small = Column.ECCENTRICITY, Column.ECCENTRICITY + 2
+    assert journal_distance(p, ours, theirs) == 0.0
+    theirs[1, big : big + 2] = 3e-5, 4e-5
+    theirs[1, small : small + 2] = 1.0  # of a joint without clearance
+    assert journal_distance(p, ours, theirs) == pytest.approx(0.5)
+    ours[2, big : big + 2] = theirs[2, big : big + 2] = 0.0, 2e-4  # as far as it came
+    assert journal_distance(p, ours, theirs) == pytest.approx(0.25)

@@ -1,0 +1,136 @@
+"""Where metrics begin to count, and where a run ends, when that is left to the program."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.cases.case import Case, CaseError
+from compressor.cases.table import MOST_REV
+from compressor.metrics import METRICS
+from compressor.solve.settling import MEASURED, agree, least_promise, steady
+from compressor.solve.simulate import measure, simulate
+
+PAPER = {"joint": "big_end", "clearance_mm": 0.2}
+AUTO = {"settle_rev": "auto", "duration_rev": "auto"}
+SLOW = {  # takes revolutions to settle: little damping and friction
+    "joint": "big_end",
+    "clearance_mm": 0.1,
+    "load": "none",
+    "contact": {"damping_N_s_per_mm": 30},
+}
+
+
+def case(values=PAPER, **solve):
+    return Case.from_values({**values, "solve": solve, "output": {"keep": "metrics"}})
+
+
+def turn(**more):
+    """Metrics of a revolution."""
+    made = {name: np.ones([2] * len(row.dims)) for name, row in METRICS.items()}
+    return made | {name: np.asarray(value) for name, value in more.items()}
+
+
+def test_a_case_settles_where_its_revolutions_agree():
+    found = measure(case(**AUTO))
+    assert (found.status, found.attributes["promise"]) == ("ok", "kept")
+    settled = found.numbers["settled_rev"]
+    of = case()
+    assert settled == pytest.approx(found.attributes["settle"] / of.turn)
+    assert settled in (0, 1)
+    same = measure(case(settle_rev=settled, duration_rev=settled + MEASURED))
+    for name in METRICS:
+        np.testing.assert_array_equal(found.numbers[name], same.numbers[name])
+    assert found.key != same.key
+
+
+@pytest.mark.parametrize("values", [PAPER, SLOW])
+def test_metrics_of_the_settled_part_do_not_change_when_it_goes_on(values):
+    found = measure(case(values, **AUTO, accuracy="fine"))
+    assert found.status == "ok"
+    settled = found.numbers["settled_rev"]
+    later = measure(case(values, settle_rev=settled + 5, duration_rev=settled + 8, accuracy="fine"))
+    for name, row in METRICS.items():
+        if row.bar.relative and "axis" not in row.dims:
+            np.testing.assert_allclose(found.numbers[name], later.numbers[name], rtol=1e-3)
+
+
+def test_the_time_series_end_with_the_run():
+    found = simulate(Case.from_values({**PAPER, "solve": {**AUTO, "output_step_deg": 3.6}}))
+    turns = float(found["time"][-1]) / case().turn
+    assert turns == pytest.approx(float(found["settled_rev"]) + MEASURED)
+    assert found.sizes["time"] == 100 * round(turns) + 1
+
+
+def test_the_ideal_machine_is_settled_at_once():
+    found = measure(case({"joint": "none"}, **AUTO))
+    assert found.status == "ok"
+    assert found.numbers["settled_rev"] == 0
+
+
+def test_a_duration_alone_follows_where_settling_is_given():
+    found = measure(case(settle_rev=0.5, duration_rev="auto"))
+    same = measure(case(settle_rev=0.5, duration_rev=3.5))
+    assert found.numbers["rms_acceleration"] == same.numbers["rms_acceleration"]
+    assert math.isfinite(found.numbers["settled_rev"])
+
+
+def test_a_motion_that_does_not_settle_says_so_with_its_numbers():
+    found = measure(case(SLOW, settle_rev="auto", duration_rev=3, accuracy="fine"))
+    assert (found.status, found.reason) == ("failed", "not_settled")
+    assert found.detail == "in 3 revolutions no 3 agree within 0.0001"
+    assert np.isfinite(found.numbers["rms_acceleration_error"])
+
+
+def test_a_chaotic_motion_never_settles_and_is_measured_by_its_second_half():
+    wild = {**PAPER, "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
+            "contact": {"damping_N_s_per_mm": 0}}  # fmt: skip
+    found = measure(case(wild, **AUTO))
+    assert (found.status, found.attributes["regime"]) == ("ok", "chaotic")
+    assert found.numbers["revolutions"] == MOST_REV / 2
+    assert math.isnan(found.numbers["settled_rev"])
+
+
+def test_revolutions_agree_by_every_relative_metric():
+    assert agree(turn(), turn(peak_acceleration=1.009), 0.01)
+    for name, row in METRICS.items():
+        other = turn(**{name: 1.02 * np.ones([2] * len(row.dims))})
+        assert agree(turn(), other, 0.01) is not row.bar.relative
+
+
+def test_forces_along_an_axis_count_by_the_joint_s():
+    small = np.array([[100.0, 0.1], [100.0, 0.1]])
+    other = small + np.array([0.0, 0.5])
+    one, two = (turn(peak_contact_force_axis=forces) for forces in (small, other))
+    assert agree(one, two, 0.01)
+    assert not agree(one, two, 0.001)
+
+
+def test_a_period_of_more_than_one_revolution_is_settled_too():
+    def turns(*peaks):
+        return [turn(peak_acceleration=peak) for peak in peaks]
+
+    assert steady(turns(1, 1, 1), 0.01) == (0, 1)
+    assert steady(turns(5, 1, 1, 1), 0.01) == (1, 1)
+    assert steady(turns(1, 2, 1), 0.01) is None
+    assert steady(turns(9, 1, 2, 1, 2), 0.01) == (1, 2)
+    assert steady(turns(1, 2, 3, 1, 2, 3), 0.01) == (0, 3)
+    assert steady(turns(1, 2, 3, 4, 5, 6, 7, 8), 0.01) is None
+
+
+def test_agreement_is_what_accuracy_promises():
+    assert least_promise(case(accuracy="draft")) == 2e-2
+    assert least_promise(case(rtol=1e-9)) == least_promise(case())
+    wanted = {"peak_acceleration": 1e-2, "rms_acceleration": 1e-3}
+    assert least_promise(case(accuracy=wanted)) == 1e-3
+
+
+@pytest.mark.parametrize("key", ["settle_rev", "duration_rev"])
+def test_other_words_and_steps_that_do_not_fit_are_refused(key):
+    with pytest.raises(CaseError, match="needs auto or a number"):
+        case(**{key: "automatic"})
+    with pytest.raises(CaseError, match=r"a revolution is 3\.33333 output steps"):
+        case(**{"settle_rev": "auto", "duration_rev": "auto", "output_step_deg": 108})
+    asked = case(**AUTO)
+    assert Case.from_values(asked.values()) == asked
+    assert case(**{key: "auto"}).key != case().key

@@ -1,0 +1,117 @@
+"""Statistics of a chaotic motion: standard errors that hold, on draws whose mean is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.metrics import METRICS, QUANTILES, STATISTICS
+from compressor.physics import new_record, new_tally
+from compressor.solve.statistics import (
+    LEAST_SECTION,
+    MOST_BATCHES,
+    chaotic_bars,
+    of_peaks,
+    parts,
+    standard_error,
+    statistics,
+    sure,
+)
+from compressor.solve.tallied import metrics
+from compressor.solve.turns import merged
+
+
+def turns(rng, count, pull=0.0):
+    """Tallies of revolutions whose mean square acceleration follows a walk about 100."""
+    level, found = 0.0, []
+    for _ in range(count):
+        level = pull * level + math.sqrt(1 - pull**2) * rng.normal()
+        tally = new_tally()
+        tally.seconds = 0.1
+        tally.square_acceleration = 0.1 * (100.0 + 10.0 * level)
+        tally.square_deviation = 0.1 * 25.0
+        tally.peak[:] = rng.exponential(size=tally.peak.shape)
+        tally.max_penetration[:] = 1e-6
+        tally.loss_seconds[:] = 0.1 * (0.3 + 0.02 * rng.normal())
+        tally.impacts[:] = rng.poisson(20.0)
+        found.append(tally)
+    return found
+
+
+@pytest.fixture
+def record():
+    p = new_record()
+    p["clearance"][:] = 1e-4
+    return p
+
+
+@pytest.mark.parametrize(("count", "pull"), [(30, 0.0), (300, 0.0), (300, 0.5)])
+def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
+    rng = np.random.default_rng(1)
+    exact = {"rms_acceleration": 10.0, "contact_loss_fraction": 0.3, "impact_count": 20.0 * count}
+    held = dict.fromkeys(exact, 0)
+    for _ in range(400):
+        each = turns(rng, count, pull)
+        found, numbers = statistics(record, each), metrics(record, merged(each))
+        bars = chaotic_bars(found, numbers)
+        for name, value in exact.items():
+            held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
+    assert all(370 <= number <= 396 for number in held.values()), held
+
+
+def test_revolutions_to_one_percent_are_as_many_as_it_takes(record):
+    rng = np.random.default_rng(2)
+    found = [statistics(record, turns(rng, 120))["revolutions_to_one_percent"] for _ in range(50)]
+    # of the root of 100 +- 10: 5 % each
+    assert np.median(found) == pytest.approx(25, rel=0.2)
+
+
+def test_quantiles_and_their_errors_are_those_of_the_draw():
+    """Of exponential draws: median log 2, 95 % quantile log 20, errors sqrt(q/(1-q)/n)."""
+    rng = np.random.default_rng(3)
+    rows = [of_peaks("x", rng.exponential(size=(600, 2))) for _ in range(100)]
+    expected = -np.log(1 - np.array(QUANTILES))
+    errors = np.sqrt(np.array(QUANTILES) / (1 - np.array(QUANTILES)) / 600)
+    mean = np.mean([row["x_quantile"] for row in rows], axis=0)
+    np.testing.assert_allclose(mean, [expected] * 2, rtol=0.02)
+    told = np.median([row["x_quantile_standard_error"] for row in rows], axis=0)
+    np.testing.assert_allclose(told, [errors] * 2, rtol=0.25)
+    np.testing.assert_allclose(np.mean([row["x_mean"] for row in rows], axis=0), 1.0, rtol=0.01)
+
+
+def test_a_single_revolution_tells_no_error(record):
+    each = turns(np.random.default_rng(4), 1)
+    found = statistics(record, each)
+    assert found.keys() == STATISTICS.keys()
+    for name, value in found.items():
+        if name.endswith("error") or name == "revolutions_to_one_percent":
+            assert np.isposinf(value).all(), name
+    bars = chaotic_bars(found, metrics(record, merged(each)))
+    assert bars.keys() == METRICS.keys()
+    assert all(np.isposinf(bar).all() for bar in bars.values())
+
+
+def test_greatest_values_have_no_bar_but_an_ideal_joint_has_none_to_err_in(record):
+    record["clearance"][1] = 0.0
+    each = turns(np.random.default_rng(5), 40)
+    bars = chaotic_bars(statistics(record, each), metrics(record, merged(each)))
+    assert np.isposinf(bars["peak_acceleration"])
+    assert bars["max_penetration"].tolist() == [math.inf, 0.0]
+    assert 0 < bars["rms_acceleration"] < 1
+
+
+@pytest.mark.parametrize("count", [1, 2, 29, 30, 31, 59, 60, 100, 1000])
+def test_batches_are_alike_and_few(count):
+    batches = parts(range(count), MOST_BATCHES, 1)
+    assert len({len(batch) for batch in batches}) == 1
+    assert len(batches) <= MOST_BATCHES
+    assert batches[-1][-1] == count - 1  # what is left out is the beginning
+    assert sum(map(len, batches)) > count / 2
+    assert all(len(s) >= min(count, LEAST_SECTION) for s in parts(range(count), 30, LEAST_SECTION))
+
+
+def test_the_error_of_a_mean():
+    assert standard_error(np.array([1.0, 3.0])) == pytest.approx(1.0)
+    assert np.isposinf(standard_error(np.ones((1, 2)))).all()
+    assert sure(1.0, 2) == pytest.approx(12.706, rel=1e-3)  # Student's t of one freedom
+    assert sure(1.0, 30_000) == pytest.approx(2.045, rel=1e-3)  # of 29

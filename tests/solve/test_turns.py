@@ -1,0 +1,82 @@
+"""A tally cut into revolutions, and put together again."""
+
+import numpy as np
+import pytest
+
+from compressor.cases.case import Case
+from compressor.metrics import METRICS
+from compressor.solve.attempts import attempt
+from compressor.solve.tallied import metrics
+from compressor.solve.turns import Cuts, merged, revolutions
+
+TALLIED = ("seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts")
+
+
+def case(joint, method, **solve):
+    solve = {"duration_rev": 2.7, "settle_rev": 0.3, "method": method, "error_bars": False} | solve
+    return Case.from_values({"joint": joint, "clearance_mm": 0.2, "solve": solve})
+
+
+def run(of, cuts=None):
+    return attempt(of, 1e-8, 60.0, False, cuts)
+
+
+def ends(of):
+    return revolutions(of.settle, of.duration, of.turn)
+
+
+@pytest.mark.parametrize("method", ["auto", "RODAS", "LSODA"])
+@pytest.mark.parametrize("joint", ["big_end", "both"])
+def test_revolutions_add_up_to_the_whole_run(joint, method):
+    of = case(joint, method)
+    cuts = Cuts(ends(of))
+    whole, parted = run(of), run(of, cuts)
+    assert len(parted.turns) == 2
+    for turn in parted.turns:
+        assert turn["seconds"] == pytest.approx(of.turn, rel=1e-9)
+    tally = parted.trajectory.tally
+    assert tally["seconds"] == pytest.approx(of.duration - of.settle, rel=1e-9)
+    for name in METRICS:
+        np.testing.assert_allclose(parted.metrics[name], whole.metrics[name], rtol=1e-4, atol=1e-9)
+    for name in ("crank_work", "damping_loss", "energy", "peak_kinetic"):
+        assert tally[name] == pytest.approx(whole.trajectory.tally[name], rel=1e-5)
+
+
+def test_a_revolution_has_its_own_peaks():
+    """The start-up's are greater than those of a settled one."""
+    of = case("big_end", "auto", settle_rev=0)
+    cuts = Cuts(ends(of))
+    run(of, cuts)
+    each = [metrics(run(of).p, turn) for turn in cuts.turns]
+    assert each[0]["peak_acceleration"] > 1.01 * each[1]["peak_acceleration"]
+    alone = run(case("big_end", "auto", settle_rev=1, duration_rev=2))
+    for name in METRICS:
+        np.testing.assert_allclose(each[1][name], alone.metrics[name], rtol=1e-4, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["auto", "LSODA"])
+def test_a_run_ends_where_enough_is_known(method):
+    of = case("big_end", method, settle_rev=0)
+    found = run(of, Cuts(ends(of), lambda turns: len(turns) == 1))
+    assert not found.reason
+    assert len(found.turns) == 1
+    assert found.trajectory.tally["seconds"] == pytest.approx(of.turn, rel=1e-9)
+    assert found.trajectory.steps < 0.6 * run(of).trajectory.steps
+
+
+def test_cuts_are_whole_revolutions_from_settling_on():
+    np.testing.assert_allclose(revolutions(0.1, 0.56, 0.12), [0.22, 0.34, 0.46])
+    np.testing.assert_allclose(revolutions(0.12, 0.48, 0.12), [0.24, 0.36, 0.48])
+    assert revolutions(0.4, 0.48, 0.12).size == 0
+
+
+def test_tallies_are_merged_by_sums_and_greatest_values():
+    of = case("both", "auto")
+    cuts = Cuts(ends(of))
+    run(of, cuts)
+    one, two = cuts.turns
+    both = merged(cuts.turns)
+    for name in TALLIED:
+        np.testing.assert_allclose(both[name], one[name] + two[name])
+    np.testing.assert_array_equal(both["peak"], np.maximum(one["peak"], two["peak"]))
+    assert both["crank_work"] == two["crank_work"]

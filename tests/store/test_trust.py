@@ -1,0 +1,134 @@
+"""How far results are to be trusted, as the store keeps and tells it: promises and regimes."""
+
+import io
+import json
+
+import h5py
+import numpy as np
+import pytest
+from compsim import cli
+from conftest import keep
+
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.metrics import METRICS, NUMBERS, QUANTILES, STATISTICS
+from compressor.solve.simulate import measure, simulate
+from compressor.store.export import export
+from compressor.store.reader import open_study, read_store
+from compressor.store.rows import LATER, decode, encode, of_outcomes
+from compressor.store.status import standings
+from compressor.store.studies import write_study
+
+BRIEF = {"duration_rev": 1.2, "settle_rev": 0.2, "output_step_deg": 0.9}
+RING = {
+    "joint": "big_end",
+    "clearance_mm": 0.3,
+    "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
+    "contact": {"damping_N_s_per_mm": [0, 336]},
+    "solve": {**BRIEF, "duration_rev": 3.2, "max_steps": [5, 10**6]},
+    "output": {"keep": "metrics"},
+}
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory):
+    """A folder with a study of four jobs: one is chaotic, one is kept, two failed."""
+    folder = tmp_path_factory.mktemp("ring")
+    (folder / "ring.yaml").write_text(json.dumps(RING))
+    (study,) = load_studies(folder / "ring.yaml")
+    write_study(folder / "results", study, "by hand")
+    keep(folder / "results", *map(simulate, study.cases))
+    return folder / "results"
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """The outcome of a job that is not chaotic."""
+    values = {"joint": "big_end", "clearance_mm": 0.3, "solve": BRIEF}
+    return measure(Case.from_values({**values, "output": {"keep": "metrics"}}))
+
+
+def test_promise_and_regime_of_each_job_are_kept(ring):
+    study = open_study(ring)
+    assert study["regime"].values.tolist() == [["", "chaotic"], ["", "periodic"]]
+    assert study["promise"].values.tolist() == [["none", "none"], ["none", "kept"]]
+    for key, regime in zip(study["key"].values.flat, study["regime"].values.flat, strict=True):
+        assert read_store(ring).job(key).attrs["regime"] == regime
+
+
+def test_results_of_before_are_read_without_either(plain, tmp_path):
+    data = encode(of_outcomes([plain], 1))
+    with io.BytesIO(data) as stream:
+        with h5py.File(stream, "r+") as file:
+            for name in LATER:
+                del file[name]
+        older = decode(stream.getvalue(), tmp_path / "rows/000000001-0.h5")
+    newer = decode(data, tmp_path / "rows/000000001-0.h5")
+    for name in LATER:
+        assert older.columns[name].tolist() == [b""]
+        assert newer.columns[name].tolist() != [b""]
+    for name in NUMBERS:
+        np.testing.assert_array_equal(older.numbers[name], newer.numbers[name])
+
+
+def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring):
+    with h5py.File(io.BytesIO(encode(of_outcomes([plain], 1)))) as file:
+        assert not STATISTICS.keys() & file.keys()
+        assert NUMBERS.keys() - STATISTICS.keys() <= file.keys()
+    assert not STATISTICS.keys() & {*plain.table({}).variables}
+    assert "quantile" not in plain.table({}).variables
+    study = open_study(ring)
+    assert STATISTICS.keys() <= {*study.variables}
+    assert study["quantile"].values.tolist() == list(QUANTILES)
+    chaotic = study["regime"] == "chaotic"
+    assert (study["revolutions"].notnull() == chaotic).all()
+    assert float(study["revolutions"].where(chaotic).max()) == 3
+
+
+def test_what_is_not_known_can_be_masked(ring):
+    every, known = open_study(ring), open_study(ring, trusted=True)
+    for name, row in METRICS.items():
+        kept = known[name].notnull()
+        bar, value = every[f"{name}_error"], abs(every[name])
+        vouched = bar < value if row.bar.relative else np.isfinite(bar)
+        vouched |= bar == 0
+        assert (kept == (vouched & (every["status"] == "ok"))).all(), name
+        assert known[name].where(kept).equals(every[name].where(kept)), name
+        assert (known[f"{name}_error"].notnull() == kept).all(), name
+    chaotic = every["regime"] == "chaotic"
+    assert known["peak_acceleration"].where(chaotic).isnull().all()
+    assert known["peak_acceleration"].where(every["promise"] == "kept").notnull().sum() == 1
+    assert known["rms_acceleration"].attrs == every["rms_acceleration"].attrs
+
+
+def test_numbers_without_bars_are_not_known(tmp_path):
+    values = {**RING, "contact": {}, "solve": {**BRIEF, "error_bars": False}}
+    (tmp_path / "bare.yaml").write_text(json.dumps(values))
+    (study,) = load_studies(tmp_path / "bare.yaml")
+    write_study(tmp_path / "results", study, "by hand")
+    keep(tmp_path / "results", *map(simulate, study.cases))
+    assert open_study(tmp_path / "results")["rms_acceleration"].notnull().all()
+    assert open_study(tmp_path / "results", trusted=True)["rms_acceleration"].isnull().all()
+
+
+def test_status_counts_by_promise_and_by_regime(ring, capsys):
+    (one,) = standings(ring)
+    assert one.promises == {"none": 1, "kept": 1}
+    assert one.regimes == {"chaotic": 1, "periodic": 1}
+    assert cli.main(["status", "-i", str(ring)]) == 0
+    out = capsys.readouterr().out
+    assert "of those ok: 1 promise nothing, 1 keep what accuracy promises\n" in out
+    assert "of those ok: 1 chaotic (averages hold, single peaks do not), 1 periodic\n" in out
+
+
+def test_a_table_for_others_has_all_digits(ring, tmp_path):
+    export(ring, ["ring"], tmp_path / "ring.csv")
+    head, *rows = (tmp_path / "ring.csv").read_text().splitlines()
+    columns = head.split(",")
+    study = open_study(ring)
+    at = columns.index("rms_acceleration [m/s2]")
+    for row, value in zip(rows, study["rms_acceleration"].values.flat, strict=True):
+        text = row.split(",")[at]
+        assert (float(text) if text else np.nan) == pytest.approx(value, rel=0, nan_ok=True)
+    assert "regime" in columns
+    assert "promise" in columns
