@@ -45,18 +45,18 @@ def record():
     return p
 
 
-@pytest.mark.parametrize(("count", "pull"), [(30, 0.0), (300, 0.0), (300, 0.5)])
+@pytest.mark.parametrize(("count", "pull"), [(30, 0.0), (90, 0.0), (90, 0.3)])
 def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     rng = np.random.default_rng(1)
     exact = {"rms_acceleration": 10.0, "contact_loss_fraction": 0.3, "impact_count": 20.0 * count}
     held = dict.fromkeys(exact, 0)
-    for _ in range(400):
+    for _ in range(200):
         each = turns(rng, count, pull)
         found, numbers = statistics(record, each), metrics(record, merged(each))
         bars = chaotic_bars(found, numbers)
         for name, value in exact.items():
             held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
-    assert all(370 <= number <= 396 for number in held.values()), held
+    assert all(180 <= number <= 198 for number in held.values()), held
 
 
 def test_revolutions_to_one_percent_are_as_many_as_it_takes(record):
