@@ -98,16 +98,17 @@ def scale_lines(joint: "JointScales") -> Iterator[str]:
     name = joint.joint.replace("_", " ")
     yield (
         f"{name}: {joint.force:.0f} N at most in the ideal machine press "
-        f"{joint.penetration * 1e6:.0f} µm deep; there it rings at {joint.frequency:.0f} Hz "
-        f"({1e3 / joint.frequency:.2f} ms),"
+        f"{joint.penetration * 1e6:.0f} µm deep;"
     )
+    along = "does not ring" if joint.damping_ratio >= 1.0 else "rings"
     yield (
-        f"an undamped fall through the clearance ends at {joint.impact_speed:.2g} m/s, "
-        f"{joint.impact_penetration * 1e6:.0f} µm deep, in {joint.contact_time * 1e3:.2g} ms;"
+        f"held there it {along} along the force (damping ratio {joint.damping_ratio:.2g}), and "
+        f"swings across it in its bore at about {joint.swing_frequency:.0f} Hz "
+        f"({1e3 / joint.swing_frequency:.2f} ms);"
     )
     yield (
         f"{joint.limited_by} holds explicit steps to about {joint.explicit_step * 1e6:.3g} µs, "
-        f"the ringing implicit ones to {joint.implicit_step * 1e6:.3g} µs"
+        f"the contact's stiffness implicit ones to {joint.implicit_step * 1e6:.3g} µs"
     )
 
 

@@ -33,10 +33,8 @@ class JointScales:
     clearance: float  # m
     force: float  # N
     penetration: float  # m, at rest under the force
-    impact_speed: float  # m/s, after falling through the clearance under the force
-    impact_penetration: float  # m, undamped
-    contact_time: float  # s, of that impact
-    frequency: float  # Hz, of the lighter body on the contact's stiffness at rest
+    damping_ratio: float  # of the lighter body on the contact at rest; above 1 it does not ring
+    swing_frequency: float  # Hz, of the journal swinging about the line of the force in its bore
     friction_rate: float  # 1/s: 1.5 mu_s F / (m v_s)
     explicit_step: float  # s, the stability limit by the fastest of stiffness, damping, friction
     limited_by: str
@@ -58,7 +56,13 @@ def greatest_force(p: np.record, joint: str) -> float:
 
 
 def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
-    """The scales of a joint with clearance under a force (N)."""
+    """The scales of a joint with clearance under a force (N).
+
+    A journal that the force holds against its bore can roll to and fro on the wall, on a circle of
+    radius e, clearance and penetration. It swings like a pendulum, at sqrt(F / (m e)); m is what
+    the rod's end weighs across the force, the other end being held: (J + m_r l^2) / L^2, l from
+    the mass centre to the other end.
+    """
     number = JOINTS.index(joint)
     clearance, stiffness = p["clearance"][number].item(), p["stiffness"][number].item()
     contact, mass = elastic_form(stiffness, p), min(p["rod_mass"], p["reciprocating_mass"]).item()
@@ -73,13 +77,19 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
         "friction": friction,
     }
     fastest = max(rates, key=rates.__getitem__)
-    speed = math.sqrt(2.0 * force / mass * clearance)
-    impact = float(contact.impact_depth(mass, speed))
+    swing = math.sqrt(force / (across(p, joint) * (clearance + depth)))
     return JointScales(
-        joint, clearance, force, depth, speed, impact,
-        float(contact.impact_time(impact, speed)), natural / (2 * math.pi), friction,
-        STABILITY_LIMIT / rates[fastest], fastest, 1.0 / natural,
+        joint, clearance, force, depth, contact.damping(depth) / (2.0 * mass * natural),
+        swing / (2.0 * math.pi), friction, STABILITY_LIMIT / rates[fastest], fastest,
+        1.0 / natural,
     )  # fmt: skip
+
+
+def across(p: np.record, joint: str) -> float:
+    """Mass (kg) that moves with an end of the rod across the rod, the other end being held."""
+    centre, length = p["rod_centre"].item(), p["rod_length"].item()
+    lever = length - centre if joint == "big_end" else centre
+    return (p["rod_inertia"].item() + p["rod_mass"].item() * lever**2) / length**2
 
 
 def contact_scales(case: Case) -> Iterator[JointScales]:
