@@ -81,6 +81,28 @@ class Cam:
         """Cam angle (rad) at which the follower begins to fall as printed (the gas's corner)."""
         return float(printed_corners_of_gas(record_of(self.run))[2])
 
+    @property
+    def gas_corners(self) -> np.ndarray:
+        """Crank angles (rad) at which the ideal gas's phases change, (3,)."""
+        return np.array(printed_corners_of_gas(record_of(self.run)))
+
+    @property
+    def printed_heights(self) -> tuple[float, float]:
+        """How far (m) the follower rises and falls by Eq. 10 taken literally."""
+        p = record_of(self.run)
+        expansion, _, compression = self.gas_corners
+        at = np.array([expansion, compression])
+        before, after = exact_motion(at, p.crank_radius, p.rod_length, p.omega)[0]
+        return float(before - p.rod_length + p.crank_radius), float(
+            p.rod_length + p.crank_radius - after
+        )
+
+    @property
+    def height(self) -> float:
+        """How far (m) the closed cam's follower rises and falls."""
+        p = record_of(self.run)
+        return float(2.0 * p.crank_radius - p.spring_stroke)
+
     def contour(self, angles, base_radius):
         """`contour` of the closed cam around a base circle (m)."""
         return contour(record_of(self.run), angles, base_radius)

@@ -9,5 +9,5 @@ from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
 from compressor.cases.shorthands import row_of, value_in
 from compressor.cases.study import Study, points
 from compressor.cases.swept import design
-from compressor.cases.table import METHODS, Friction, Output, table
+from compressor.cases.table import METHODS, Output, table
 from compressor.cases.yaml_reader import printable

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import ACCURACY, Case, Friction, Output
+from compressor.cases import ACCURACY, Case, Output
 from compressor.measure.work_precision import (
     Progress,
     complete,
@@ -104,7 +104,7 @@ FEATURES = (
         "friction",
         lambda case: bool(case.friction and (case.friction.static or case.friction.dynamic)),
         lambda case: replace(case, friction=None),
-        lambda case: replace(case, friction=Friction()),
+        lambda case: replace(case, friction=Case().friction),
         "no friction",
         "friction",
         "friction: false",

@@ -8,6 +8,7 @@ import contextlib
 import sys
 from pathlib import Path
 
+from compressor.analysis import caption
 from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures.style import render
 from compressor.report.figures.sweep_metric import draw_metrics, measures, swept
@@ -89,8 +90,8 @@ def remove_stale(report: Path, drawn: set[str]) -> None:
 def draw_paper(paper: PaperRuns) -> list[Plate]:
     """Every figure of the paper whose cases are there."""
     return [
-        draw(f"figure-{item.number:02d}", f"Figure {item.number}: {item.title}", item.caption,
-             item.draw(paper.usable))
+        draw(f"figure-{item.number:02d}", f"Figure {item.number}: {item.title}",
+             caption(item.number, paper.usable), item.draw(paper.usable))
         for item in FIGURES
         if paper.usable.keys() >= {*item.needs}
     ]  # fmt: skip

@@ -1,0 +1,236 @@
+"""Captions of the paper's figures: sentences that follow from what the drawn runs measure.
+
+A sentence is chosen by numbers, and says them.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis.cam import Cam
+from compressor.analysis.course import Course, course
+from compressor.analysis.paper_cases import CLEARANCES, SPOKEN, faulty_joints, label
+from compressor.analysis.runs import force_relation, ideal_motion, load_corners, settled
+
+Runs = Mapping[str, xr.Dataset]
+
+ENLARGED = "Left, all of it; right, the part in the black rectangle, where the curves differ most."
+ON_TOP = "The smallest clearance is drawn on top."
+SERIES = ("displacement", "velocity", "acceleration")
+SAME = 1e-9  # of a curve's range: what cannot be seen, and is rounding
+LEAST_ANGLE, LEAST_GAP = 0.005, 1e-6  # degrees, m: what the captions can tell
+
+
+def pressure_volume(runs: Runs) -> str:
+    """Of the gas cycle, and of the angles at which it changes."""
+    cam = Cam(runs["typical"])
+    used, exact = np.degrees(load_corners(runs["typical"])), np.degrees(cam.gas_corners)
+    away = float(np.abs(used - exact).max())
+    which = f", up to {away:.1g}° off the exact ones" if away > LEAST_ANGLE else ""
+    return (
+        "Cylinder pressure over gas volume in the typical model, made from the stored piston force "
+        "and displacement; arrows point in the direction of time. Suction and discharge keep their "
+        "pressures, compression and expansion are isentropic. The phases change at "
+        f"{in_degrees(used)}{which}."
+    )
+
+
+def cam(runs: Runs) -> str:
+    """Of the cam: whether it closes as printed, and what ours does."""
+    found = Cam(runs["design"])
+    rise, fall = found.printed_heights
+    closes = abs(rise - fall) < LEAST_GAP
+    printed = "so that the cam closes" if closes else "so that the cam does not close"
+    return (
+        "(a) The path of the roller's centre around the base circle, at rest while the gas would "
+        "expand or be compressed, moving with the piston in between. (b) The follower's "
+        "displacement. As printed, with the ideal gas's corner angles, Eq. 10 rises by "
+        f"{1e3 * rise:.1f} mm and falls by {1e3 * fall:.1f} mm, {printed}. The closed cam, our "
+        f"reconstruction, rises and falls by {1e3 * found.height:.1f} mm. From "
+        f"{np.degrees(found.printed_fall):.0f}° on the two are the same."
+    )
+
+
+def load_response(runs: Runs) -> str:
+    """Of both ideal machines: how far apart they move."""
+    one, other = runs["design"], runs["typical"]
+    away = max(
+        float(np.abs(one[name].values - other[name].values).max() / np.ptp(other[name].values))
+        for name in SERIES
+    )
+    how = "coincide, as they must" if away <= SAME else f"differ by up to {100 * away:.2g} %"
+    return (
+        f"Without clearance, both models. The curves {how}: ideal joints and a crank of prescribed "
+        "speed leave the load no say in the motion. Right, the part in the black rectangle, at a "
+        "peak."
+    )
+
+
+def piston_force(runs: Runs) -> str:
+    """Of both loads: their peaks and corners."""
+    design, typical = (float(runs[load]["piston_force"].max()) for load in ("design", "typical"))
+    higher = "higher than" if design > typical else "no higher than"
+    corners = (np.degrees(load_corners(runs[load])) for load in ("design", "typical"))
+    return (
+        f"The spring's force peaks at {design / 1e3:.2f} kN, {higher} the gas's "
+        f"{typical / 1e3:.2f} kN. It turns at {in_degrees(next(corners))}, the gas's at "
+        f"{in_degrees(next(corners))}. Steps of the spring's force are its damping, which acts "
+        "only while the follower rests."
+    )
+
+
+def in_degrees(found: np.ndarray) -> str:
+    """Angles, one after the other."""
+    return ", ".join(f"{angle:.2f}°" for angle in found)
+
+
+def response(runs: Runs, fault: str) -> str:
+    """Of displacement, velocity and acceleration with one fault at three clearances."""
+    of = [runs[label(fault, c)] for c in CLEARANCES]
+    sentences = [ENLARGED, deviations(of)]
+    for joint in faulty_joints(fault):
+        courses = [course(run, joint) for run in of]
+        sentences.append(motion(courses))
+        if fault != "both":  # of two joints the acceleration does not tell which one rings
+            sentences += rings(courses)
+    sentences.append(peaks(of))
+    if fault != "big_end":
+        sentences.append(ON_TOP)
+    return " ".join(sentences)
+
+
+def deviations(of: Sequence[xr.Dataset]) -> str:
+    """How far the motion leaves that of the machine without clearance."""
+    greatest = np.zeros(3)
+    for run in of:
+        kept = settled(run)
+        ideal = ideal_motion(kept)
+        for number, name in enumerate(SERIES):
+            away = np.abs(kept[name].values - ideal[number]).max() / np.ptp(ideal[number])
+            greatest[number] = max(greatest[number], away)
+    shares = [f"{share:.2g} %" if share < 99.5 else f"{share:.0f} %" for share in 100 * greatest]
+    return (
+        f"From the machine without clearance displacement differs by at most {shares[0]} of its "
+        f"range, velocity by {shares[1]}, acceleration by {shares[2]}."
+    )
+
+
+def motion(courses: Sequence[Course]) -> str:
+    """How the journal moves in its bearing."""
+    joint = SPOKEN[courses[0].joint]
+    apart = [one.apart for one in courses]
+    turns = [f"{angles(one)}" for one in courses]
+    same_count = len({len(one.turns) for one in courses}) == 1
+    at = between(courses) if same_count else "; ".join(turns)
+    reverses = (
+        f"The horizontal force at the {joint} changes its sign near {at}."
+        if at
+        else (f"The horizontal force at the {joint} does not change its sign.")
+    )
+    if max(apart) == 0.0:
+        least = min(one.least for one in courses)
+        runs_round = all(abs(abs(one.laps) - 1.0) < 0.05 for one in courses)
+        how = "goes round on its wall once a revolution" if runs_round else "moves along its wall"
+        stays = (
+            f"The journal never leaves its bearing there: it {how}, always pressed in by "
+            f"{1e6 * least:.2g} µm or more."
+        )
+    else:
+        shares = ", ".join(f"{100 * share:.2g} %" for share in apart)
+        stays = f"The journal is without contact for {shares} of the time."
+    return f"{reverses} {stays}"
+
+
+def rings(courses: Sequence[Course]) -> list[str]:
+    """The frequencies after the first change of sign, where there is one in every run."""
+    found = [one.rings for one in courses]
+    if not np.isfinite(found).all():
+        return []
+    return [f"After the first change acceleration rings at {listed(found, '{:.0f}')} Hz."]
+
+
+def peaks(of: Sequence[xr.Dataset]) -> str:
+    """The greatest accelerations, and whether they grow with clearance."""
+    found = [float(run["peak_acceleration"]) for run in of]
+    grows = all(b > a for a, b in itertools.pairwise(found))
+    how = "grows with clearance" if grows else "does not always grow with clearance"
+    return f"Its greatest value {how}: {listed(found, '{:.0f}')} m/s²."
+
+
+def contact_force(runs: Runs, fault: str, joint: str) -> str:
+    """Of the contact force at one joint at three clearances."""
+    of = [runs[label(fault, c)] for c in CLEARANCES]
+    along, across = (
+        [float(run["peak_contact_force_axis"].sel(joint=joint, axis=axis)) for run in of]
+        for axis in "xy"
+    )
+    sentences = [
+        "Force on the rod: (a) along the cylinder, positive away from the crank, and (b) vertical, "
+        "on a scale of its own. Right, the part in the black rectangle, where the horizontal "
+        "forces differ most.",
+        f"Greatest: {listed(np.array(along) / 1e3, '{:.2f}')} kN along the cylinder, "
+        f"{listed(np.array(across) / 1e3, '{:.2f}')} kN across it.",
+    ]
+    slopes = [force_relation(run, joint).slope for run in of]
+    if max(slopes) < 0:
+        sentences.append("The force opposes the acceleration: here the crosshead holds the rod.")
+    elif min(slopes) > 0:
+        sentences.append("The force goes with the acceleration: here the crank drives the rod.")
+    if fault != "big_end":
+        sentences.append(ON_TOP)
+    return " ".join(sentences)
+
+
+def relation(runs: Runs, joint: str) -> str:
+    """Of acceleration against the horizontal force at one joint."""
+    found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
+    return (
+        "A dot for each stored sample. The line is the least-squares fit of force on acceleration; "
+        f"its slope is a mass: {listed([one.slope for one in found], '{:.2f}')} kg, with r² "
+        f"{listed([one.r2 for one in found], '{:.3f}')}. What is left of a loop is the load, which "
+        "acts beside the inertia."
+    )
+
+
+def between(courses: Sequence[Course]) -> str:
+    """The angles of all runs, each from the least to the greatest."""
+    spans = []
+    for same in zip(*(one.turns for one in courses), strict=True):
+        low, high = f"{min(same):.0f}", f"{max(same):.0f}"
+        spans.append(f"{low}°" if low == high else f"{low}–{high}°")
+    return " and ".join(spans)
+
+
+def angles(one: Course) -> str:
+    """The angles of one run."""
+    return ", ".join(f"{turn:.0f}°" for turn in one.turns)
+
+
+def listed(values: Sequence[float] | np.ndarray, form: str) -> str:
+    """Numbers of 0.1, 0.2 and 0.3 mm, in this order."""
+    return ", ".join(form.format(value) for value in values)
+
+
+CAPTIONS: dict[int, Callable[[Runs], str]] = {
+    3: pressure_volume,
+    4: cam,
+    6: load_response,
+    7: piston_force,
+    8: partial(response, fault="big_end"),
+    9: partial(contact_force, fault="big_end", joint="big_end"),
+    10: partial(relation, joint="big_end"),
+    11: partial(response, fault="small_end"),
+    12: partial(contact_force, fault="small_end", joint="small_end"),
+    13: partial(relation, joint="small_end"),
+    14: partial(response, fault="both"),
+    15: partial(contact_force, fault="both", joint="big_end"),
+    16: partial(contact_force, fault="both", joint="small_end"),
+}
+
+
+def caption(number: int, runs: Runs) -> str:
+    """The caption of a figure, by its number in the paper, of the runs that it is drawn from."""
+    return CAPTIONS[number](runs)
