@@ -85,8 +85,12 @@ METRICS = {
             Bar(1.5, 0.01, False), Shown("time without contact", "%", 1e2), True,
         ),
         Metric(
-            "impact_count", ("joint",), "1", "times that contact began", "penetration",
-            Bar(1.0, 0.0, False), Shown("times contact began", ""), True, "count",
+            "impact_count", ("joint",), "1", "contacts that began after flight", "penetration",
+            Bar(1.0, 0.0, False), Shown("impacts after flight", ""), True, "count",
+        ),
+        Metric(
+            "release_count", ("joint",), "1", "contacts that began while pressed in", "penetration",
+            Bar(1.0, 0.0, False), Shown("releases while pressed in", ""), True, "count",
         ),
     )
 }  # fmt: skip

@@ -169,14 +169,16 @@ def continuity(runs: Runs) -> Verdict:
     for c in CLEARANCES:
         big, small = (active_share(runs[label(fault, c)]) for fault in ("big_end", "small_end"))
         held = held and big >= 0.5 and small < 0.5 and big >= 1.5 * small
-        impacts = [
-            float(runs[label(joint, c)]["impact_count"].sel(joint=joint)) for joint in JOINTS
-        ]
+        impacts, releases = (
+            [float(runs[label(joint, c)][name].sel(joint=joint)) for joint in JOINTS]
+            for name in ("impact_count", "release_count")
+        )
         rows.append(
             (
                 f"{c:g} mm",
                 f"active: big end {big:.0%}, small end {small:.0%}; "
-                f"contact begun {impacts[0]:.0f} and {impacts[1]:.0f} times",
+                f"impacts {impacts[0]:.0f} and {impacts[1]:.0f}, "
+                f"releases {releases[0]:.0f} and {releases[1]:.0f}",
             )
         )
     return held, rows

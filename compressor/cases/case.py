@@ -17,7 +17,7 @@ from compressor.cases.shorthands import expanded
 from compressor.cases.table import GROUPS, OF_JOINTS, Settings, outside_identity, table
 from compressor.metrics import JOINTS
 
-MODEL_VERSION = "1"  # of the equations and the meaning of what is stored; part of a job's identity
+MODEL_VERSION = "2"  # of the equations and the meaning of what is stored; part of a job's identity
 
 
 @dataclass(frozen=True)

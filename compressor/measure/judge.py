@@ -15,7 +15,7 @@ statistics, at a tenth of the tolerance: rms values within 50 %, time without co
 quarter of the span, or ten bars again. Where no judge reaches the end within its budget, the first
 quarter or sixteenth is judged instead.
 
-The number of impacts is not judged: contact that grazes begins any number of times.
+The numbers of impacts and releases are not judged: contact that grazes begins any number of times.
 """
 
 import math
@@ -42,7 +42,7 @@ EXPECTED, MOST_EXPECTED = 1e3, 0.05  # times rtol: the relative error that nobod
 TIGHTER, TENTH = 1e-2, 0.1  # a judge's tolerance, of statistics
 PARTS = 16  # of a span, in which horizons are counted
 LENGTHS = (PARTS, PARTS // 4, 1)  # parts that are judged where the whole is too much
-JUDGED = tuple(name for name in METRICS if name != "impact_count")
+JUDGED = tuple(name for name, row in METRICS.items() if row.kind != "count")
 ABSOLUTE = ("contact_loss_fraction",)  # is a share: errors are not relative
 RESOLVED = 1e-4  # of the span: steps tell the time without contact no better
 STATISTICS = {

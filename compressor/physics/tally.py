@@ -43,8 +43,10 @@ TALLY = np.dtype(
         ("top", "f8", (PEAKED,)),  # the same at the present step's nodes
         ("max_penetration", "f8", (2,)),
         ("loss_seconds", "f8", (2,)),
-        ("impacts", "i8", (2,)),
+        ("impacts", "i8", (2,)),  # contacts that began after flight, the journal being off its bore
+        ("releases", "i8", (2,)),  # and those that began inside the penetration
         ("touching", "i8", (2,)),
+        ("flown", "i8", (2,)),  # whether the journal was off its bore since the last contact
         ("deepest", "f8"),  # penetration over the whole run
         ("energy", "f8"),  # at the start
         ("crank_work", "f8"),
@@ -196,12 +198,17 @@ def contact_within(rows, joint):
 
 @inlined
 def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
-    """Add a step's contact loss, impacts and penetration at one joint."""
+    """Add a step's contact loss, impacts, releases and penetration at one joint."""
     for i in range(0, nodes.size, every):
         touching = in_contact(rows[i, NORMAL + joint])
+        if rows[i, PENETRATION + joint] < 0.0:
+            tally.flown[joint] = 1
         if measured and touching and not tally.touching[joint]:
-            tally.impacts[joint] += 1
+            tally.impacts[joint] += tally.flown[joint]
+            tally.releases[joint] += 1 - tally.flown[joint]
         tally.touching[joint] = touching
+        if touching:
+            tally.flown[joint] = 0
         tally.deepest = max(tally.deepest, rows[i, PENETRATION + joint])
     if measured:
         known = tally.max_penetration[joint]

@@ -24,6 +24,7 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
         "max_penetration": np.where(ideal, 0.0, tally["max_penetration"]),
         "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
         "impact_count": np.where(ideal, 0.0, tally["impacts"]),
+        "release_count": np.where(ideal, 0.0, tally["releases"]),
     }
 
 

@@ -8,7 +8,9 @@ import numpy as np
 from compressor.physics import new_tally
 
 Turns = list[np.record]  # tallies, of one revolution each
-SUMS = ("seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts")
+SUMS = (
+    "seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts", "releases",
+)  # fmt: skip
 GREATEST = ("peak", "max_penetration")  # the others go on from the start of the run
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 

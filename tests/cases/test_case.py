@@ -281,8 +281,8 @@ EVERYTHING = {
 @pytest.mark.parametrize(
     ("values", "key", "physics"),
     [
-        ({"solve": {"rtol": 5e-5}}, "2b525255a703a4ce7c25", "b51063b44b7443eabcd1"),
-        (EVERYTHING, "05dcc40c7ce60f4369be", "45bdc4aa8489c4087e69"),
+        ({"solve": {"rtol": 5e-5}}, "f4b09c23defcc1b92ed4", "0042f95fa02116dace18"),
+        (EVERYTHING, "8faca78ab5b0fbfc9690", "238d30805736f64ac48b"),
     ],
 )
 def test_keys_stay_as_they_are_stored(values, key, physics):

@@ -60,9 +60,26 @@ def test_tally_of_a_known_step():
     tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, True, tally, p)
     assert tally.seconds == pytest.approx(1e-4)
     assert tally.square_acceleration == pytest.approx(9e-4)
-    assert tally.impacts.tolist() == [1, 0]
+    assert (tally.impacts.tolist(), tally.releases.tolist()) == ([1, 0], [0, 0])
     assert tally.max_penetration[0] == pytest.approx(0.5)
     assert tally.loss_seconds.tolist() == [pytest.approx(0.25e-4), 0.0]
+
+
+@pytest.mark.parametrize(
+    ("penetration", "impacts", "releases"),
+    [((1, -1, -1, 1, 1), 1, 0), ((1, 1, 1, 1, 1), 0, 1), ((-1, 1, 1, 1, 1), 0, 1)],
+)
+def test_contact_begins_after_flight_or_inside_the_penetration(penetration, impacts, releases):
+    """F_N goes to 0 and comes back; a gap that lies before an earlier contact does not count."""
+    p = record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2}))
+    nodes, weights = lobatto(5)
+    rows = np.zeros((5, COLUMNS))
+    rows[:, Column.NORMAL] = [10.0, 10.0, 0.0, 10.0, 10.0]
+    rows[:, Column.PENETRATION] = 1e-6 * np.array(penetration)
+    tally = new_tally()
+    tally_step(1e-4, nodes, weights, rows, 1, APART, True, tally, p)
+    assert (tally.impacts[0], tally.releases[0]) == (impacts, releases)
+    assert not tally.flown.any()
 
 
 @pytest.mark.parametrize(

@@ -372,7 +372,7 @@ def test_units_of_sweeps():
 
 def test_contact_in_an_ideal_joint_is_not_shown():
     names = titled(sweep_metric.draw_metrics(study(), "clearance_mm"))
-    assert "times contact began, big end" in names
+    assert "impacts after flight, big end" in names
     assert not {"times contact began, small end", "greatest penetration, small end (µm)"} & {*names}
 
 
