@@ -24,6 +24,8 @@ def conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     yield from _choice_conflicts(given)
     yield from _load_conflicts(case)
     yield from _time_conflicts(case)
+    if case.output.signals and case.output.keep != "series":
+        yield Problem("output.signals", "are time series: they need output.keep: series")
     if case.contact.materials is not None and case.contact.exponent != 1.5:
         yield Problem("contact.exponent", "Eq. 15's stiffness from materials needs exponent 1.5")
     friction = case.friction

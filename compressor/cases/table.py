@@ -214,6 +214,10 @@ class Output:
         "of the time series; time and crank angle are double",
         identity=False,
     )
+    signals: bool = choice(
+        False, (), "ours", "forces on frame, bearing and guide, torque and rod load beside the "
+        "time series", kind="boolean", identity=False,
+    )  # fmt: skip
     compress: bool = choice(
         False, (), "ours", "time series shuffled and gzipped", kind="boolean", identity=False
     )

@@ -16,6 +16,7 @@ from compressor.solve.attempts import Solution
 from compressor.solve.request import NONE, Trajectory
 from compressor.solve.series import block, rows_of
 from compressor.solve.si_record import scene
+from compressor.solve.signals import SIGNALS, signals
 from compressor.solve.solution import solve
 from compressor.solve.tallied import ledger
 
@@ -48,7 +49,8 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
     """The `Outcome` of a solution and what its Dataset is made of."""
     kept = case.output.keep == "series"
     found = outcome(case, solution)
-    return found, found.table(series(solution.p, solution.trajectory) if kept else {})
+    more = series(solution.p, solution.trajectory, case.output.signals) if kept else {}
+    return found, found.table(more)
 
 
 def measure(case: Case) -> Outcome:
@@ -61,8 +63,8 @@ def refused(case: Case) -> Outcome:
     return without_run(case.attributes(), Reason.INVALID_INPUT, str(CaseError([*case.problems])))
 
 
-def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
-    """The time series as xarray variables."""
+def series(p: np.record, trajectory: Trajectory, more: bool) -> dict[str, tuple]:
+    """The time series as xarray variables; `more`: also the signals."""
     rows = rows_of(p, trajectory)
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
     variables: dict[str, tuple] = {
@@ -72,6 +74,9 @@ def series(p: np.record, trajectory: Trajectory) -> dict[str, tuple]:
     for name, (dims, unit, phrase) in SERIES.items():
         attrs = {"units": unit, "long_name": phrase}
         variables[name] = (("time", *dims), np.ascontiguousarray(block(name, rows)), attrs)
+    for name, values in (signals(p, rows) if more else {}).items():
+        dims, unit, phrase = SIGNALS[name]
+        variables[name] = (("time", *dims), values, {"units": unit, "long_name": phrase})
     return variables
 
 
@@ -103,6 +108,7 @@ def attributes(case: Case, solution: Solution) -> dict[str, object]:
         "settle": solution.settle,
         "rtol": solution.rtol,
         "error_bars": int(case.wants_bars),
+        "signals": int(case.output.signals),
         "promise": solution.promise,
         "regime": solution.regime,
         "method": case.solve.method,

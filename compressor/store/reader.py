@@ -47,6 +47,7 @@ class JobStatus:
     detail: str
     samples: int  # of the time series; 0 where only metrics are kept
     precision: str  # of the time series: double | single
+    signals: bool  # whether they are kept beside the time series
     numbers: np.void  # dtype schema.ROW
 
     @property
@@ -71,6 +72,8 @@ class JobStatus:
             return False
         if case.output.keep == "metrics":
             return True
+        if case.output.signals and not self.signals:
+            return False
         return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
 
 
@@ -117,6 +120,7 @@ class Stored:
             rows.detail(position) if words["status"] != "ok" else "",
             int(rows.columns["samples"][position]),
             words["precision"],
+            words["signals"] == "yes",
             rows.numbers[position],
         )
 

@@ -34,6 +34,7 @@ WORDS = {  # columns -> what their texts look like
     "precision": re.compile(rb"(single|double)?"),
     "promise": re.compile(rb"(kept|none)?"),
     "regime": re.compile("|".join(["", *Regime]).encode()),
+    "signals": re.compile(rb"(yes)?"),
     "digest": re.compile(f"({HEX20})?".encode()),
 }
 FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
@@ -52,8 +53,9 @@ COLUMNS = {
     "digest": ("S20", "of the file with the series"),
     "promise": ("S", "kept, or none given; empty in files of before 2026-11-22"),
     "regime": ("S", "how far the motion can be foretold; empty where that is not known"),
+    "signals": ("S", "yes where signals are kept beside the time series"),
 }
-LATER = ("promise", "regime")  # columns that older files do not have
+LATER = ("promise", "regime", "signals")  # columns that older files do not have
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,7 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
         "digest": [item.digest for item in series],
         "promise": [str(outcome.attributes.get("promise", "")) for outcome in outcomes],
         "regime": [str(outcome.attributes.get("regime", "")) for outcome in outcomes],
+        "signals": ["yes" if has_signals(outcome) else "" for outcome in outcomes],
     }
     columns = {name: _text_column(name, values) for name, values in words.items()}
     columns["serial"] = np.full(len(outcomes), serial)
@@ -106,6 +109,11 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
     numbers = np.array([outcome.numbers for outcome in outcomes], ROW)
     texts = _packed(_line(outcome.attributes) for outcome in outcomes)
     return Segment(Path(), columns, numbers, texts, _packed(_line(o.detail) for o in outcomes))
+
+
+def has_signals(outcome: Outcome) -> bool:
+    """Whether signals are kept of a job."""
+    return outcome.series is not None and bool(outcome.attributes.get("signals"))
 
 
 def _text_column(name: str, values: Sequence[str]) -> np.ndarray:
@@ -242,9 +250,13 @@ def _lines(segment: Segment) -> list[bytes]:
 
 
 def worth(columns: dict[str, np.ndarray]) -> np.ndarray:
-    """How much rows of one job tell: failed 0, ok 1, with time series 2, in double precision 3."""
-    series = columns["samples"] > 0
-    return (columns["status"] == b"ok") * (1 + series * (1 + (columns["precision"] == b"double")))
+    """How much rows of one job tell: failed 0, ok 1, with time series 3, in double precision 5.
+
+    One more with signals.
+    """
+    series, double = columns["samples"] > 0, columns["precision"] == b"double"
+    told = 1 + series * (2 + 2 * double + (columns["signals"] == b"yes"))
+    return (columns["status"] == b"ok") * told
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,8 +308,8 @@ class Rows:
 
     @cached_property
     def words(self) -> dict[str, np.ndarray]:
-        """Status, reason, precision, promise and regime of every job as text."""
-        names = ("status", "reason", "precision", "promise", "regime")
+        """Status, reason, precision, promise, regime and signals of every job as text."""
+        names = ("status", "reason", "precision", "promise", "regime", "signals")
         return {name: np.char.decode(self.columns[name], "utf-8", "replace") for name in names}
 
     def detail(self, position: int) -> str:

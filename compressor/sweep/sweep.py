@@ -228,8 +228,10 @@ def serving_both(first: Case, second: Case) -> Case:
     output = first.output
     if keeping:
         precision = max("single", *(o.precision for o in keeping), key=("single", "double").index)
-        compress = all(o.compress for o in keeping)
-        output = replace(output, keep="series", precision=precision, compress=compress)
+        compress, signals = all(o.compress for o in keeping), any(o.signals for o in keeping)
+        output = replace(
+            output, keep="series", precision=precision, compress=compress, signals=signals
+        )
     solve = replace(
         first.solve,
         error_bars=first.solve.error_bars or second.solve.error_bars,
@@ -253,7 +255,10 @@ def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
             if end.serves(case) and store.rows.intact(position):
                 found[key] = End(end.status, end.reason, end.detail)
             elif end.samples and (case.output.keep == "metrics" or end.precision == "double"):
-                output = replace(case.output, keep="series", precision=end.precision)
+                signals = end.signals or case.output.signals
+                output = replace(
+                    case.output, keep="series", precision=end.precision, signals=signals
+                )
                 cases[key] = replace(case, output=output)
     return found
 

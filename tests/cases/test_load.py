@@ -548,7 +548,7 @@ CASES = st.fixed_dictionaries(
         | st.just({"materials": ["steel", "copper"]}),
         "friction": st.just(False) | group("friction"),
         "solve": st.sampled_from([a | b for a in TIMES for b in SOLVES]),
-        "output": group("output"),
+        "output": group("output", "signals") | st.just({"keep": "series", "signals": True}),
     },
 )
 JOINTS = st.just({}) | st.fixed_dictionaries(

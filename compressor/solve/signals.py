@@ -1,0 +1,46 @@
+"""Forces that the machine puts on its frame, recomputed from observed rows.
+
+With F_b and F_s the joint forces on the rod at the big and the small end, F_load the piston force,
+positive towards the crank, and g gravity against y:
+
+- the crank has no mass, so that what acts on the rod's big end acts on the main bearing: -F_b;
+- the crosshead does not move along y: the guide bears -F_sy - m_p g;
+- the gas, or the spring, pushes the cylinder as it pushes the piston: F_load along x;
+- so the frame feels X = -F_bx + F_load and Y = -F_by - F_sy - m_p g. Both are the loss of momentum
+  of all moving parts a second, less their weight;
+- the crank is driven by the torque that the rod asks for: the power at its pin over its speed.
+"""
+
+import numpy as np
+
+from compressor.physics import Column
+from compressor.solve.series import block
+
+# over time and these dimensions: (dimensions, unit, long name)
+SIGNALS = {
+    "shaking_force": (("axis",), "N", "force of the machine on its foundation"),
+    "bearing_force": (("axis",), "N", "force on the main bearing"),
+    "guide_force": ((), "N", "force of the crosshead on its guide, upwards"),
+    "guide_moment": ((), "N m", "moment of guide_force about the crank centre, counter-clockwise"),
+    "crank_torque": ((), "N m", "torque that drives the crank, along its rotation"),
+    "rod_load": ((), "N", "force of the crosshead pin on the rod along x, positive in tension"),
+}
+
+
+def signals(p: np.record, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """The `SIGNALS` by name from observed rows, (m, COLUMNS); SI."""
+    big, small = np.moveaxis(block("contact_force", rows), 1, 0)
+    weight = p["reciprocating_mass"] * p["gravity"]
+    bearing = -big
+    guide = -small[:, 1] - weight
+    shaking = bearing.copy()
+    shaking[:, 0] += block("piston_force", rows)
+    shaking[:, 1] += guide
+    return {
+        "shaking_force": shaking,
+        "bearing_force": bearing,
+        "guide_force": guide,
+        "guide_moment": guide * block("displacement", rows),
+        "crank_torque": rows[:, Column.CRANK_POWER] / p["omega"],
+        "rod_load": small[:, 0].copy(),
+    }
