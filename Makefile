@@ -47,10 +47,10 @@ format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-calibration: install  ## measure what estimates of errors are worth, on cases that judge nothing
+calibration: install  ## measure what estimates of errors are worth, on cases that judge nothing (8 minutes)
 	$(CAMPAIGN)/calibrate_errors.py tests/results/calibration.json
 
-accuracy: install  ## judge promises and error bars on 1,000 other random cases
+accuracy: install  ## judge promises and error bars on 1,000 other random cases (7 minutes)
 	$(CAMPAIGN)/measure_accuracy.py tests/results/accuracy.json
 
 claims: install  ## measure the paper's claims over a range of masses (seconds)
@@ -80,7 +80,7 @@ tradeoff: install  ## measure speed against accuracy, and what the model's featu
 ladders: install  ## measure error against tolerance, and the limit of no clearance (a minute)
 	$(CAMPAIGN)/measure_ladders.py tests/results/ladders.json
 
-chaotic: install  ## compare two chaotic scenes' statistics by two integrators (a minute)
+chaotic: install  ## compare chaotic motions' statistics by two integrators (a quarter of an hour)
 	$(CAMPAIGN)/measure_chaotic.py tests/results/chaotic.json
 
 stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
@@ -92,7 +92,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: calibration accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers pages  ## all of these (25 minutes)
+measurements: calibration accuracy claims tradeoff ladders chaotic store-bench scale throughput sweep-bench peers pages  ## all of these (about an hour)
 
 pages: install  ## write the generated tables of the README pages
 	$(BIN)/python tests/page_tables.py

@@ -24,6 +24,12 @@ from compressor.store.writer import Writer
 hypothesis.settings.register_profile("untimed", deadline=None)  # other work shares the machine
 hypothesis.settings.load_profile("untimed")
 
+CHAOTIC = {  # light, fast and without damping: it can be foretold for half a revolution
+    "joint": "big_end",
+    "clearance_mm": 0.3,
+    "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
+    "contact": {"damping_N_s_per_mm": 0},
+}
 CONFIGS = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))
 
 

@@ -19,6 +19,10 @@ Runs = Mapping[str, xr.Dataset]
 
 ENLARGED = "Left, all of it; right, the part in the black rectangle, where the curves differ most."
 ON_TOP = "The smallest clearance is drawn on top."
+LOOP = {
+    "big_end": "What is left of a loop is the load, and the rod, which moves otherwise.",
+    "small_end": "What is left of a loop is the load; without it the force is all inertia.",
+}
 SERIES = ("displacement", "velocity", "acceleration")
 SAME = 1e-9  # of a curve's range: what cannot be seen, and is rounding
 LEAST_ANGLE, LEAST_GAP = 0.005, 1e-6  # degrees, m: what the captions can tell
@@ -157,7 +161,7 @@ def peaks(of: Sequence[xr.Dataset]) -> str:
     found = [float(run["peak_acceleration"]) for run in of]
     grows = all(b > a for a, b in itertools.pairwise(found))
     how = "grows with clearance" if grows else "does not always grow with clearance"
-    return f"Its greatest value {how}: {listed(found, '{:.0f}')} m/s²."
+    return f"The greatest acceleration {how}: {listed(found, '{:.0f}')} m/s²."
 
 
 def contact_force(runs: Runs, fault: str, joint: str) -> str:
@@ -190,8 +194,7 @@ def relation(runs: Runs, joint: str) -> str:
     return (
         "A dot for each stored sample. The line is the least-squares fit of force on acceleration; "
         f"its slope is a mass: {listed([one.slope for one in found], '{:.2f}')} kg, with r² "
-        f"{listed([one.r2 for one in found], '{:.3f}')}. What is left of a loop is the load, which "
-        "acts beside the inertia."
+        f"{listed([one.r2 for one in found], '{:.3f}')}. {LOOP[joint]}"
     )
 
 

@@ -18,7 +18,7 @@ LEAST_RING = 100.0  # Hz: below it a motion is the machine's
 class Course:
     """A journal's motion in its bearing after settling.
 
-    `apart`: share of time without contact; `least`, `most`: penetration (m) of the samples, least
+    `apart`: share of time without contact; `least`: least penetration (m) of the samples,
     negative where there is a gap; `laps`: how often the journal goes round its bearing in a
     revolution, counter-clockwise positive; `turns`: crank angles (degrees) at which the horizontal
     force changes its sign; `rings` (Hz): the strongest frequency of the acceleration's deviation
@@ -28,7 +28,6 @@ class Course:
     joint: str
     apart: float
     least: float
-    most: float
     laps: float
     turns: tuple[float, ...]
     rings: float
@@ -47,7 +46,6 @@ def course(run: xr.Dataset, joint: str) -> Course:
         joint,
         float(run["contact_loss_fraction"].sel(joint=joint)),
         float(depth.min()),
-        float(depth.max()),
         float((contact[-1] - contact[0]) / np.radians(angle[-1] - angle[0])),
         turns,
         ringing(kept, turns[0]) if turns else float("nan"),

@@ -14,6 +14,7 @@ IN_PLACE_OF = (
     ("solve.rtol", "solve.accuracy"),
     ("contact.materials", "contact.stiffness_N_per_mm15"),
 )
+SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
 def conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
@@ -147,6 +148,9 @@ def _time_conflicts(case: Settings) -> Iterator[Problem]:
         yield Problem(
             step_key, f"the duration is {case.steps:.6g} output steps, not a whole number of them"
         )
+    if solve.settle_rev == "auto" and case.duration < SETTLING_REV * case.turn * (1 - 1e-12):
+        text = f"auto compares {SETTLING_REV:g} revolutions; lengthen {span_key}"
+        yield Problem("solve.settle_rev", text)
     if solve.duration_rev == "auto" or (solve.settle_rev == "auto" and solve.duration_s is None):
         each = case.steps * case.turn / case.duration
         if abs(each - round(each)) > 1e-6:

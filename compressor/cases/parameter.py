@@ -112,12 +112,12 @@ class Parameter:
             return self._check_materials(value)
         if isinstance(value, str) and value in self.choices:
             return None
-        words = "".join(f"{word}, " for word in self.choices)
         if self.kind == "boolean":
+            words = ", ".join([*self.choices, "true"])
             good = isinstance(value, bool)
-            return None if good else f"needs {words}true or false, not {shown(value)}"
+            return None if good else f"needs {words} or false, not {shown(value)}"
         if isinstance(value, bool) or not isinstance(value, int | float):
-            return f"needs {words}a number, not {shown(value)}".replace("auto, a", "auto or a")
+            return f"needs {' or '.join([*self.choices, 'a number'])}, not {shown(value)}"
         if not _is_finite(value):
             return "must be finite"
         if self.kind == "integer" and value != int(value):

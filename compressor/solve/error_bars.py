@@ -6,7 +6,7 @@ that; of the difference from a looser run, which is mostly the looser one's erro
 that it is taken from stands beside it. The energy residual is a floor.
 
 Shares stand in `compressor.metrics`; those and the ones below were chosen on random cases that
-judge nothing (tests/results/README.md, "Accuracy").
+judge nothing (tests/results/README.md, "Calibration").
 """
 
 from collections.abc import Mapping, Sequence

@@ -92,6 +92,20 @@ def test_slopes_are_those_of_the_fits(paper_runs):
         assert f" {slope:.2f}, " in caption(number, paper_runs)
 
 
+def test_what_is_left_of_the_loops_is_what_the_captions_say(paper_runs):
+    """Without the load the small end's force is all inertia; the big end's nearly."""
+    for joint, least in (("big_end", 0.99), ("small_end", 1 - 1e-9)):
+        kept = paper_runs[label(joint, 0.2)].isel(time=slice(1200, None))
+        a, load = kept["acceleration"].values, kept["piston_force"].values
+        force = kept["contact_force"].sel(joint=joint, axis="x").values
+        inertia = force + (load if joint == "small_end" else -load)
+        before, after = (np.corrcoef(a, values)[0, 1] ** 2 for values in (force, inertia))
+        assert before < 0.98
+        assert after > least
+    assert "and the rod" in caption(10, paper_runs)
+    assert "and the rod" not in caption(13, paper_runs)
+
+
 def test_loads_are_compared_by_their_numbers(paper_runs):
     text = caption(7, paper_runs)
     assert "3.35 kN, higher than the gas's 3.09 kN" in text

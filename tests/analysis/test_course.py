@@ -51,7 +51,6 @@ def test_the_paper_s_journals_run_round_their_bearings(paper_runs, joint, cleara
     found = course(run, joint)
     assert found.apart == 0.0
     assert 5e-6 < found.least < 20e-6
-    assert found.most == pytest.approx(float(run["max_penetration"].sel(joint=joint)), rel=1e-2)
     assert found.laps == pytest.approx(1.0 if joint == "big_end" else -1.0, abs=0.02)
     assert len(found.turns) == 2
 

@@ -23,39 +23,34 @@ def rounded(value):
     return float(f"{value:.4g}")
 
 
+def drawn(load, joint, clearance, rod, mass, rpm):
+    """A case, as values of a case file without `solve`, from numbers in [0, 1) and a speed."""
+    return {
+        "load": LOADS[int(3 * load)],
+        "joint": JOINTS[int(3 * joint)],
+        "clearance_mm": rounded(10 ** (2 * clearance - 2)),
+        "machine": {
+            "rod_mass_kg": rounded(2 + 6 * rod),
+            "reciprocating_mass_kg": rounded(4 + 21 * mass),
+            "speed_rpm": rounded(rpm),
+        },
+    }
+
+
 def random_cases(count=200):
-    """The first cases of the sequence, as values of a case file without `solve`."""
+    """The first cases of the sequence."""
     points = qmc.Sobol(6, seed=SEED).random(256)[:count]
     return [
-        {
-            "load": LOADS[int(3 * load)],
-            "joint": JOINTS[int(3 * joint)],
-            "clearance_mm": rounded(10 ** (2 * clearance - 2)),
-            "machine": {
-                "rod_mass_kg": rounded(2 + 6 * rod),
-                "reciprocating_mass_kg": rounded(4 + 21 * mass),
-                "speed_rpm": rounded(100 + 1400 * speed),
-            },
-        }
+        drawn(load, joint, clearance, rod, mass, 100 + 1400 * speed)
         for clearance, rod, mass, speed, load, joint in points
     ]
 
 
 def strangers(seed, count):
-    """Cases as a stranger would draw them, as values of a case file without `solve`."""
-    drawn = np.random.default_rng(seed).random((count, 6))
+    """Cases as a stranger would draw them."""
     return [
-        {
-            "load": LOADS[int(3 * load)],
-            "joint": JOINTS[int(3 * joint)],
-            "clearance_mm": rounded(10 ** (2 * clearance - 2)),
-            "machine": {
-                "rod_mass_kg": rounded(2 + 6 * rod),
-                "reciprocating_mass_kg": rounded(4 + 21 * mass),
-                "speed_rpm": rounded(100 * 15**speed),
-            },
-        }
-        for load, joint, clearance, rod, mass, speed in drawn
+        drawn(*numbers, 100 * 15**speed)
+        for *numbers, speed in np.random.default_rng(seed).random((count, 6))
     ]
 
 

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 from compsim import cli
-from conftest import keep
+from conftest import CHAOTIC, keep
 
 from compressor.cases.case import Case
 from compressor.metrics import ERRORS, METRICS
@@ -26,12 +26,6 @@ from compressor.store.reader import read_store
 from compressor.sweep.sweep import serving_both
 
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
-CHAOTIC = {
-    "joint": "big_end",
-    "clearance_mm": 0.3,
-    "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
-    "contact": {"damping_N_s_per_mm": 0},
-}
 QUICK = {"duration_rev": 1.2, "settle_rev": 0}
 
 

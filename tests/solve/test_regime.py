@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import CHAOTIC
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS, SERIES
@@ -19,12 +20,6 @@ from compressor.solve.series import a_turn, compared_times
 from compressor.solve.simulate import measure
 
 PAPER = {"joint": "big_end", "clearance_mm": 0.2}
-CHAOTIC = {
-    "joint": "big_end",
-    "clearance_mm": 0.3,
-    "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
-    "contact": {"damping_N_s_per_mm": 0},
-}
 NO_ERRORS = dict.fromkeys(SERIES, 0.0)
 
 

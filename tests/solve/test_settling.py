@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import CHAOTIC
 
 from compressor.cases.case import Case, CaseError
 from compressor.cases.table import MOST_REV
@@ -83,9 +84,7 @@ def test_a_motion_that_does_not_settle_says_so_with_its_numbers():
 
 
 def test_a_chaotic_motion_never_settles_and_is_measured_by_its_second_half():
-    wild = {**PAPER, "machine": {"rod_mass_kg": 1, "speed_rpm": 1000},
-            "contact": {"damping_N_s_per_mm": 0}}  # fmt: skip
-    found = measure(case(wild, **AUTO))
+    found = measure(case(CHAOTIC, **AUTO))
     assert (found.status, found.attributes["regime"]) == ("ok", "chaotic")
     assert found.numbers["revolutions"] == MOST_REV / 2
     assert math.isnan(found.numbers["settled_rev"])
@@ -131,6 +130,9 @@ def test_other_words_and_steps_that_do_not_fit_are_refused(key):
         case(**{key: "automatic"})
     with pytest.raises(CaseError, match=r"a revolution is 3\.33333 output steps"):
         case(**{"settle_rev": "auto", "duration_rev": "auto", "output_step_deg": 108})
+    for short in ({"duration_rev": 0.5}, {"duration_rev": 2.9}, {"duration_s": 0.3}):
+        with pytest.raises(CaseError, match=r"auto compares 3 revolutions; lengthen solve\.dura"):
+            case(settle_rev="auto", **short)
     asked = case(**AUTO)
     assert Case.from_values(asked.values()) == asked
     assert case(**{key: "auto"}).key != case().key
