@@ -35,8 +35,9 @@ MAY_IMPORT = {
 PACKAGES = ("cases", "physics", "solve", "store", "sweep", "analysis", "report", "measure")
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
-    # its designs, its integrators, its Student's t
+    # its designs, its integrators, its Student's t, its splines and root finder
     "scipy": {
+        "compressor.analysis.impacts",
         "compressor.cases.swept",
         "compressor.solve.scipy_driver",
         "compressor.solve.statistics",

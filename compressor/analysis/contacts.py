@@ -1,0 +1,101 @@
+"""Where the contacts of a joint begin and end, in a run with time series.
+
+In contact means F_N > 0, as everywhere in the program (physics/README.md, Contact). The force on
+the rod is F_N n - F_t t with n along the eccentricity, so that F_N is its part along n.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis.runs import record_of
+from compressor.metrics import JOINTS
+
+
+@dataclass(frozen=True)
+class ContactSeries:
+    """One joint's motion and force at the m samples of a run; SI.
+
+    `time`, `angle` (crank angle, rad), `depth` (penetration) and `normal` (F_N) have the shape
+    (m,), `place` (eccentricity) has (m, 2).
+    """
+
+    joint: str
+    clearance: float
+    time: np.ndarray
+    angle: np.ndarray
+    place: np.ndarray
+    depth: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True)
+class Span:
+    """A contact: the samples `first` to `last`, and `gap` of them without contact before it.
+
+    `after_flight`: the journal was off its bore within that gap, as `impact_count` has it.
+    """
+
+    first: int
+    last: int
+    gap: int
+    after_flight: bool
+
+
+def joints_with_clearance(run: xr.Dataset) -> tuple[str, ...]:
+    """The joints of a run that have clearance.
+
+    Raises ValueError where the run has no time series or no joint has clearance.
+    """
+    if "penetration" not in run or "time" not in run.dims:
+        raise ValueError("the run has no time series (output.keep: series)")
+    clearances = record_of(run)["clearance"]
+    found = tuple(joint for joint, c in zip(JOINTS, clearances, strict=True) if c > 0)
+    if not found:
+        raise ValueError("no joint of the run has clearance")
+    return found
+
+
+def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
+    """A joint's samples, up to where the run stopped."""
+    kept = run.isel(time=np.isfinite(run["penetration"].sel(joint=joint).values))
+    one = kept.sel(joint=joint)
+    place = one["eccentricity"].transpose("time", "axis").values.astype(float)
+    force = one["contact_force"].transpose("time", "axis").values
+    distance = np.linalg.norm(place, axis=1)
+    along = (force * place).sum(axis=1)
+    normal = np.divide(along, distance, out=np.zeros_like(distance), where=distance > 0)
+    return ContactSeries(
+        joint,
+        float(record_of(run)["clearance"][JOINTS.index(joint)]),
+        kept["time"].values,
+        kept["crank_angle"].values,
+        place,
+        one["penetration"].values.astype(float),
+        normal,
+    )
+
+
+def contact_spans(series: ContactSeries) -> list[Span]:
+    """The contacts of a joint in order of time; one between two samples is not seen."""
+    touching = series.normal > 0
+    edges = np.flatnonzero(np.diff(touching, prepend=False, append=False)).reshape(-1, 2)
+    found, before = [], 0
+    for first, beyond in edges.tolist():
+        flown = bool((series.depth[before:first] < 0).any())
+        found.append(Span(first, beyond - 1, first - before, flown))
+        before = beyond
+    return found
+
+
+def flights(series: ContactSeries) -> np.ndarray:
+    """Which samples are in flight, (m,) booleans: no contact until the next, and once off the bore.
+
+    A contact that is lost and found again within the penetration leaves no flight.
+    """
+    flying = series.normal <= 0
+    edges = np.flatnonzero(np.diff(flying, prepend=False, append=False)).reshape(-1, 2)
+    for begin, beyond in edges.tolist():
+        flying[begin:beyond] = (series.depth[begin:beyond] < 0).any()
+    return flying

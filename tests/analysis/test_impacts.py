@@ -1,0 +1,114 @@
+"""The table of impacts: closed forms of bounces, and what a run says of itself."""
+
+import numpy as np
+import pytest
+from bouncing import CONTACT, FLIGHT, IMPULSE, LOST, SPEED, bounce, pressed, run_of, times
+
+from compressor.analysis.impacts import COLUMNS, impacts, impacts_of
+from compressor.cases.case import Case
+from compressor.solve.simulate import simulate
+
+LIGHT = {"joint": "big_end", "clearance_mm": 0.3, "machine": {"speed_rpm": 1500},
+         "contact": {"damping_N_s_per_mm": 1}}  # fmt: skip
+
+
+def simulated(step_deg, **more):
+    solve = {"duration_rev": 2, "accuracy": "fine", "output_step_deg": step_deg}
+    return simulate(Case.from_values({**LIGHT, **more, "solve": solve}))
+
+
+@pytest.fixture(scope="module")
+def fine():
+    return simulated(0.03)
+
+
+@pytest.mark.parametrize(
+    ("step", "error"),
+    [
+        (0.3, {"approach_speed": 5e-5, "impulse": 6e-4, "duration": 0.05, "lost_energy": 0.02}),
+        (0.03, {"approach_speed": 2e-7, "impulse": 5e-6, "duration": 5e-3, "lost_energy": 2e-4}),
+    ],
+)
+def test_known_bounces(step, error):
+    """Times are multiples of a bounce's period, at odds with the sampling; the first begins at 0
+    and follows no flight; the last is cut off."""
+    time = times(step)
+    found = impacts(run_of(time, {"big_end": bounce(time), "small_end": pressed(time)}))
+    begins = np.arange(1, time[-1] // (CONTACT + FLIGHT) + 1) * (CONTACT + FLIGHT)
+    assert found.sizes["impact"] == begins.size
+    assert set(found["joint"].values) == {"big_end"}
+    np.testing.assert_allclose(found["time"], begins, atol=2e-9 if step == 0.3 else 2e-12)
+    np.testing.assert_allclose(found["crank_angle"], begins * 3000.0 % 360.0, atol=1e-5)
+    assert found["revolution"].values.tolist() == (begins // 0.12 + 1).astype(int).tolist()
+    whole = found.isel(impact=slice(0, -1))
+    assert whole["released"].all()
+    known = {"approach_speed": SPEED, "impulse": IMPULSE, "duration": CONTACT, "lost_energy": LOST}
+    for name, value in known.items():
+        np.testing.assert_allclose(whole[name], value, rtol=error[name], err_msg=name)
+    np.testing.assert_array_equal(whole["impact_duration"], whole["duration"])
+
+
+def test_start_up_is_left_out_and_columns_are_labelled():
+    time = times(0.3)
+    found = impacts(run_of(time, {"big_end": bounce(time)}, settle=0.12))
+    assert found["time"].values[0] == pytest.approx(30 * (CONTACT + FLIGHT))
+    assert found["revolution"].values.min() == 2
+    for name, (unit, _) in COLUMNS.items():
+        assert found[name].attrs.get("units", "") == unit
+        assert found[name].attrs["long_name"]
+
+
+def test_a_release_while_pressed_in_is_no_impact():
+    time = times(0.3)
+    depth, force = pressed(time)
+    force[100:110] = 0.0
+    assert impacts(run_of(time, {"big_end": (depth, force)})).sizes["impact"] == 0
+    depth[105] = -1e-9
+    assert impacts(run_of(time, {"big_end": (depth, force)})).sizes["impact"] == 1
+
+
+def test_a_flight_of_few_samples_has_its_approach_speed():
+    """Two samples without contact: through them and the first in contact goes a parabola."""
+    time = times(0.3)
+    depth = 2e-5 * np.cos(2 * np.pi * (time - 0.01) / 2e-2) ** 2 - 2.9e-7
+    run = run_of(time, {"big_end": (depth, np.where(depth > 0, 5e7 * depth, 0.0))})
+    found = impacts(run)
+    zero = np.arcsin(np.sqrt(2.9e-7 / 2e-5))
+    assert found["approach_speed"].values == pytest.approx(
+        2e-5 * np.sin(2 * zero) * np.pi / 1e-2, rel=0.15
+    )
+
+
+@pytest.mark.parametrize(
+    ("joint", "speed"), [("big_end", 1500), ("small_end", 1500), ("both", 1000)]
+)
+def test_impacts_are_as_many_as_the_run_counted(joint, speed):
+    run = simulated(0.03, joint=joint, machine={"speed_rpm": speed})
+    found = impacts(run)
+    counts = [int((found["joint"] == name).sum()) for name in run["joint"].values]
+    assert counts == run["impact_count"].values.astype(int).tolist()
+    assert sum(counts) >= 3
+    assert (found["approach_speed"] > 0).all()
+    assert (found["lost_energy"] > 0).all()
+
+
+def test_what_the_impacts_lose_is_the_run_s_own_loss(fine):
+    """The journal starts off its bore, so that every contact of this run follows a flight."""
+    lost = sum(one.lost_energy for one in impacts_of(fine, "big_end"))
+    assert lost == pytest.approx(float(fine["contact_damping_loss"]), rel=1e-4)
+
+
+def test_sampling_errs_by_little(fine):
+    """What is promised at 0.3 degrees, by impacts whose contact has ten samples or fewer."""
+    coarse, exact = impacts(simulated(0.3)), impacts(fine)
+    assert coarse.sizes == exact.sizes
+    allowed = {"time": 1e-8, "approach_speed": 5e-5, "duration": 0.03, "impulse": 1e-3,
+               "lost_energy": 0.02}  # fmt: skip
+    for name, error in allowed.items():
+        np.testing.assert_allclose(coarse[name], exact[name], rtol=error, err_msg=name)
+
+
+def test_the_paper_s_runs_have_no_impacts(paper_runs):
+    found = impacts(paper_runs["both 0.2"])
+    assert found.sizes["impact"] == 0
+    assert set(found) == set(COLUMNS)
