@@ -17,7 +17,7 @@ from compressor.cases.keys import SWEEP, Leaves, covers, suggestion
 from compressor.cases.parameter import Problem, shown
 from compressor.cases.shorthands import row_of, single, stands_for
 from compressor.cases.swept import SAMPLED, Sweep, design, is_swept, sweep_of
-from compressor.cases.table import OF_JOINTS, outside_identity, table
+from compressor.cases.table import OF_JOINTS, WORDS, outside_identity, table
 from compressor.cases.yaml_reader import FileProblem, Node
 
 MAX_EXCLUSIONS = 20
@@ -156,8 +156,8 @@ def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
 
 def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
     """A node with its value as the case holds it; None if that is wrong, which joins `problems`."""
-    if node.value is None or key == "friction":  # told when it was read; or false, which is valid
-        return node if node.value is False else None
+    if node.value is None or key in WORDS:  # told when it was read; or its word, which is valid
+        return node if key in WORDS and node.value is WORDS[key] else None
     if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
         return None
     found: list[Problem] = []

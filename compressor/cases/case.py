@@ -14,7 +14,7 @@ from compressor.cases.checked import checked_part, keys_given
 from compressor.cases.conflicts import conflicts
 from compressor.cases.parameter import CaseError, Problem
 from compressor.cases.shorthands import expanded
-from compressor.cases.table import GROUPS, OF_JOINTS, Settings, outside_identity, table
+from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "2"  # of the equations and the meaning of what is stored; part of a job's identity
@@ -84,6 +84,8 @@ class Case(Settings):
         plain: dict[str, Any] = {"name": self.name, "load": self.load, "joint": self.joint}
         for name in GROUPS:
             group = getattr(self, name)
+            if group is None and WORDS[name]:
+                continue
             # `vars` has the fields in their order, since a group has nothing but fields
             plain[name] = (
                 {key: value for key, value in vars(group).items() if value is not None}

@@ -7,7 +7,7 @@ from typing import Any
 
 from compressor.cases.accuracy import checked_targets
 from compressor.cases.parameter import Problem, shown
-from compressor.cases.table import GROUPS, table
+from compressor.cases.table import GROUPS, WORDS, table
 
 
 def checked(key: str, value: Any, problems: list[Problem]) -> Any:
@@ -34,8 +34,8 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
     What is wrong with its value joins `problems`.
     """
     if key in GROUPS:
-        if key == "friction" and value is False:
-            return None
+        if key in WORDS and value is WORDS[key]:
+            return GROUPS[key]() if value else None
         if not isinstance(value, Mapping):
             problems.append(Problem(key, f"needs a mapping of keys, not {shown(value)}"))
             return None

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Iterator
 
+from compressor.cases.one_way import back_action, moving_mass
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
 from compressor.cases.table import Settings, table
-from compressor.metrics import JOINTS
+from compressor.metrics import AXES, JOINTS
 
 # One key, and the other whose place it takes; a case gives one of the two.
 IN_PLACE_OF = (
@@ -14,6 +15,8 @@ IN_PLACE_OF = (
     ("solve.rtol", "solve.accuracy"),
     ("contact.materials", "contact.stiffness_N_per_mm15"),
 )
+HEAVIEST = 0.1  # the moving parts' share of a body's mass
+MOST_BACK = 0.3  # of a force that a body's motion may change at the speed's first two orders
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
@@ -25,6 +28,7 @@ def conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     yield from _choice_conflicts(given)
     yield from _load_conflicts(case)
     yield from _time_conflicts(case)
+    yield from _body_conflicts(case)
     if case.output.signals and case.output.keep != "series":
         yield Problem("output.signals", "are time series: they need output.keep: series")
     if case.contact.materials is not None and case.contact.exponent != 1.5:
@@ -34,6 +38,54 @@ def conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         yield Problem(
             "friction.friction_velocity_mm_per_s", "must exceed the stiction_velocity_mm_per_s"
         )
+
+
+def _body_conflicts(case: Settings) -> Iterator[Problem]:
+    """What a body and its sensor need; one that would move the machine back is refused."""
+    body, sensor = case.body, case.sensor
+    if sensor is not None and body is None:
+        yield Problem("sensor", "stands on a body: write body: true, or give its keys")
+    if body is None:
+        return
+    if case.output.keep != "series":
+        yield Problem("body", "moves in time series: it needs output.keep: series")
+    share = moving_mass(case) / body.mass_kg
+    if share > HEAVIEST:
+        yield Problem(
+            "body.mass_kg",
+            f"the moving parts have {100 * share:.2g} % of the body's mass; it is driven one way, "
+            f"which holds up to {100 * HEAVIEST:g} %: give a heavier body",
+        )
+    for axis in sorted({*body.freedoms[:2]} & {*AXES}):
+        yield from _resonance_conflicts(case, axis)
+    span = (case.duration - case.settle) / case.turn
+    if body.start == "steady" and (case.settles_itself or abs(span - round(span)) > 1e-9):
+        yield Problem(
+            "body.start",
+            "steady repeats whole settled revolutions: give duration_rev and settle_rev as whole "
+            "numbers, or set start: rest",
+        )
+    if sensor is None:
+        return
+    if body.start == "rest" and sensor.length_rev is not None:
+        yield Problem("sensor.length_rev", "repeats a steady motion: set body.start: steady")
+    if sensor.low_pass_Hz is not None and sensor.low_pass_Hz >= sensor.rate_Hz / 2:
+        yield Problem("sensor.low_pass_Hz", "must be less than half of rate_Hz")
+
+
+def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
+    """The first two orders of the speed carry most of the shaking force."""
+    for order in (1, 2):
+        frequency = order * case.machine.speed_rpm / 60.0
+        back = abs(back_action(case, axis, frequency))
+        if back > MOST_BACK:
+            key = f"frequency_{axis}_Hz"
+            yield Problem(
+                f"body.{key}",
+                f"order {order} of the speed, {frequency:.3g} Hz, is so near that the "
+                f"body would change the force that drives it by {100 * back:.2g} %; "
+                f"move {key}, or give a heavier body",
+            )
 
 
 def _inertia_conflicts(case: Settings) -> Iterator[Problem]:

@@ -13,7 +13,7 @@ from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, Parameter
 from compressor.cases.shorthands import SHORTHANDS, row_of
 from compressor.cases.swept import FORMS, SAMPLED, is_number
-from compressor.cases.table import GROUPS, outside_identity, table
+from compressor.cases.table import GROUPS, WORDS, outside_identity, table
 from compressor.metrics import METRICS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -52,8 +52,8 @@ def _group(name: str) -> Schema:
         inner = ([key.removeprefix(f"{name}.") for key in pair] for pair in rivals)
         mapping["allOf"] = [{"not": {"required": pair}} for pair in inner]
     about = (GROUPS[name].__doc__ or "").partition("\n")[0]
-    if name == "friction":
-        return {"description": about, "anyOf": [{"const": False}, mapping]}
+    if name in WORDS:
+        return {"description": about, "anyOf": [{"const": WORDS[name]}, mapping]}
     row = row_of(name)
     if row:
         short = _value(row)["anyOf"]

@@ -5,14 +5,14 @@ An unknown key is told what was probably meant.
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import shown
 from compressor.cases.shorthands import SHORTHANDS, stands_for
 from compressor.cases.swept import FORMS
-from compressor.cases.table import GROUPS, OF_JOINTS, Settings, table
+from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, table
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shortened
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
@@ -38,14 +38,17 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
     for name, node in _known("", root, problems):
         found.places[name] = node.key_place
         mapping = isinstance(node.value, dict)
-        if (name in GROUPS or name == "sample") and mapping and not _is_sweep(name, node):
+        if mapping and not node.value and WORDS.get(name):
+            found.values[name] = replace(node, value=True)  # all of its defaults
+        elif (name in GROUPS or name == "sample") and mapping and not _is_sweep(name, node):
             for inner, item in _known(name, node, problems):
                 found.values[f"{name}.{inner}"] = item
                 found.places[f"{name}.{inner}"] = item.key_place
-        elif name == "friction" and node.value is not False:
-            message = f"needs false or a mapping of keys, not {shown(node.plain())}"
+        elif name in WORDS and node.value is not WORDS[name]:
+            word = shown(WORDS[name])
+            message = f"needs {word} or a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
-        elif (name in GROUPS or name == "sample") and name not in ("friction", *SHORTHANDS):
+        elif (name in GROUPS or name == "sample") and name not in (*WORDS, *SHORTHANDS):
             message = f"needs a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
         else:

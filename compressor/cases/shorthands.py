@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from compressor.cases.parameter import Parameter
-from compressor.cases.table import Settings, table
+from compressor.cases.table import WORDS, Settings, table
 from compressor.metrics import JOINTS
 
 
@@ -55,8 +55,8 @@ def single(values: Iterable[Any]) -> Any:
 
 def value_of(case: Settings, key: str) -> Any:
     """A case's value of a dotted key; None where it has none, or no single one."""
-    if key == "friction":
-        return case.friction is not None
+    if key in WORDS:
+        return getattr(case, key) is not None
     if key in SHORTHANDS:
         return single(size for part in stands_for(key) if (size := value_of(case, part)) > 0)
     value: Any = case

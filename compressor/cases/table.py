@@ -13,6 +13,7 @@ from functools import cache
 
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.parameter import Parameter, choice, parameter
+from compressor.cases.vibration import Body, Sensor
 
 # those that `compressor.solve` has compiled, and then SciPy's
 MOST_REV = 50.0  # with `duration_rev: auto`
@@ -231,9 +232,13 @@ GROUPS: dict[str, type] = {
     "spring": Spring,
     "contact": Contact,
     "friction": Friction,
+    "body": Body,
+    "sensor": Sensor,
     "solve": Solve,
     "output": Output,
 }
+# groups that a word may stand for: `false` leaves one out, `true` is one with its defaults
+WORDS = {"friction": False, "body": True, "sensor": True}
 # groups that no joint reads with `joint: none`
 OF_JOINTS = ("clearance_mm",)
 
@@ -259,6 +264,8 @@ class Settings:
     spring: Spring = Spring()
     contact: Contact = Contact()
     friction: Friction | None = Friction()
+    body: Body | None = None
+    sensor: Sensor | None = None
     solve: Solve = Solve()
     output: Output = Output()
 
@@ -285,6 +292,11 @@ class Settings:
         """Time from which metrics count, s; with `settle_rev: auto` 0, until that is known."""
         given = self.solve.settle_rev
         return 0.0 if given == "auto" else float(given) * self.turn
+
+    @property
+    def settles_itself(self) -> bool:
+        """Whether a run finds out by itself where it settles, or how long it is."""
+        return "auto" in (self.solve.duration_rev, self.solve.settle_rev)
 
     @property
     def steps(self) -> float:

@@ -15,6 +15,7 @@ from compressor.solve.request import Request, Trajectory
 from compressor.solve.series import (
     compared_times,
     distances,
+    finer,
     journal_distance,
     take_samples,
 )
@@ -75,7 +76,7 @@ def attempt(
     without. `cuts`: into revolutions; metrics are of all of them.
     """
     p = record(case)
-    samples = round(case.steps) if sampled else 1
+    samples = finer(case) * round(case.steps) if sampled else 1
     times = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else times[:0]
     grid = np.union1d(times, compared)

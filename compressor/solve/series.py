@@ -25,6 +25,7 @@ COLUMN = {
     "penetration": Column.PENETRATION,
 }
 A_TURN = 150  # times a revolution at which two runs are compared
+OF_A_PERIOD = 24  # samples of the forces in one of the body's fastest motion
 FEWEST, MOST = 64, 20_000  # of these times over a settled part
 
 
@@ -34,6 +35,20 @@ def rows_of(p: np.record, run: Trajectory) -> np.ndarray:
     observe_all(run.times, run.states, run.phases, p, rows)
     rows[np.isnan(run.states).any(axis=1)] = math.nan
     return rows
+
+
+def finer(case: Case) -> int:
+    """How many times finer than the output grid forces are sampled for the body and its sensor."""
+    body = case.body
+    if body is None:
+        return 1
+    natural = (body.frequency_x_Hz, body.frequency_y_Hz, body.frequency_rocking_Hz)
+    rate = OF_A_PERIOD * max(natural)
+    if case.sensor is not None:
+        from compressor.vibration import analogue_rate
+
+        rate = max(rate, analogue_rate(body, case.sensor))
+    return max(1, math.ceil(rate * case.duration / round(case.steps) * (1 - 1e-12)))
 
 
 def block(name: str, rows: np.ndarray) -> np.ndarray:

@@ -13,8 +13,9 @@ from compressor.physics import FLOWS, STATE_NAMES
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
 from compressor.solve.attempts import Solution
+from compressor.solve.foundation import foundation
 from compressor.solve.request import NONE, Trajectory
-from compressor.solve.series import block, rows_of
+from compressor.solve.series import block, finer, rows_of
 from compressor.solve.si_record import scene
 from compressor.solve.signals import SIGNALS, signals
 from compressor.solve.solution import solve
@@ -49,8 +50,7 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
     """The `Outcome` of a solution and what its Dataset is made of."""
     kept = case.output.keep == "series"
     found = outcome(case, solution)
-    more = series(solution.p, solution.trajectory, case.output.signals) if kept else {}
-    return found, found.table(more)
+    return found, found.table(series(case, solution) if kept else {})
 
 
 def measure(case: Case) -> Outcome:
@@ -63,21 +63,23 @@ def refused(case: Case) -> Outcome:
     return without_run(case.attributes(), Reason.INVALID_INPUT, str(CaseError([*case.problems])))
 
 
-def series(p: np.record, trajectory: Trajectory, more: bool) -> dict[str, tuple]:
-    """The time series as xarray variables; `more`: also the signals."""
-    rows = rows_of(p, trajectory)
+def series(case: Case, solution: Solution) -> dict[str, tuple]:
+    """The time series as xarray variables, with signals, body and sensor where they are wanted."""
+    p, every = solution.p, finer(case)
+    whole = rows_of(p, solution.trajectory)
+    rows, times = whole[::every], solution.trajectory.times[::every]
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
     variables: dict[str, tuple] = {
-        "time": (("time",), trajectory.times, {"units": "s", "long_name": "time"}),
-        "crank_angle": (("time",), p.omega * trajectory.times, angle),
+        "time": (("time",), times, {"units": "s", "long_name": "time"}),
+        "crank_angle": (("time",), p.omega * times, angle),
     }
     for name, (dims, unit, phrase) in SERIES.items():
         attrs = {"units": unit, "long_name": phrase}
         variables[name] = (("time", *dims), np.ascontiguousarray(block(name, rows)), attrs)
-    for name, values in (signals(p, rows) if more else {}).items():
+    for name, values in (signals(p, rows) if case.output.signals else {}).items():
         dims, unit, phrase = SIGNALS[name]
         variables[name] = (("time", *dims), values, {"units": unit, "long_name": phrase})
-    return variables
+    return variables | (foundation(case, solution, whole) if case.body else {})
 
 
 def outcome(case: Case, solution: Solution) -> Outcome:

@@ -1,0 +1,85 @@
+"""The groups of a case file that say what stands on the foundation, and what listens to it."""
+
+from dataclasses import dataclass
+
+from compressor.cases.parameter import choice, parameter
+
+OURS = "ours"
+
+
+@dataclass(frozen=True)
+class Body:
+    """The compressor's body on its foundation, driven one way; absent unless a case asks."""
+
+    freedoms: str = choice(
+        "xy", ("x", "y", "xy", "xy_rocking"), OURS, "how the rigid body may move"
+    )
+    mass_kg: float = parameter(500.0, "kg", (0, 1e7), OURS, "mass of the body", above=True)
+    inertia_kg_m2: float = parameter(
+        40.0, "kg m2", (0, 1e9), OURS, "its inertia about its mass centre", above=True
+    )
+    centre_x_mm: float = parameter(300.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's")
+    centre_y_mm: float = parameter(-200.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's")
+    frequency_x_Hz: float = parameter(
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency along x", above=True
+    )
+    frequency_y_Hz: float = parameter(
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency along y", above=True
+    )
+    frequency_rocking_Hz: float = parameter(
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency of rocking", above=True
+    )
+    damping_ratio: float = parameter(0.03, "", (0, 0.99), OURS, "of the foundation", above=True)
+    casing: bool = choice(
+        True, (), OURS, "a casing mode at the guide and one at the main bearing, heard by sensors",
+        kind="boolean",
+    )  # fmt: skip
+    casing_mass_kg: float = parameter(
+        20.0, "kg", (0, 1e6), OURS, "modal mass of a casing mode", above=True
+    )
+    casing_frequency_Hz: float = parameter(
+        2000.0, "Hz", (0, 1e5), OURS, "natural frequency of a casing mode", above=True
+    )
+    casing_damping_ratio: float = parameter(
+        0.02, "", (0, 0.99), OURS, "damping ratio of a casing mode", above=True
+    )
+    start: str = choice(
+        "steady", ("steady", "rest"), OURS,
+        "steady: as if the settled revolutions had always repeated; rest: at rest at time 0",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """An accelerometer on the body, with a tacho once a turn; absent unless a case asks."""
+
+    place: str = choice(
+        "guide", ("guide", "bearing", "body"), OURS,
+        "crosshead guide at mid-stroke, main bearing, or the body's mass centre",
+    )  # fmt: skip
+    direction: str = choice("y", ("x", "y"), OURS, "what it measures along")
+    rate_Hz: float = parameter(25600.0, "Hz", (0, 1e6), OURS, "sampling rate", above=True)
+    low_pass_Hz: float | None = parameter(
+        None, "Hz", (0, 1e6), "usual: rate_Hz / 2.56", "anti-aliasing filter's corner",
+        above=True, optional=True,
+    )  # fmt: skip
+    mounting_Hz: float = parameter(
+        25000.0, "Hz", (0, 1e6), "usual: on a stud", "mounting resonance", above=True
+    )
+    mounting_damping_ratio: float = parameter(
+        0.03, "", (0, 0.99), OURS, "damping ratio of the mounting", above=True
+    )
+    range_m_per_s2: float = parameter(
+        490.0, "m/s2", (0, 1e6), "usual: 50 g", "beyond it the signal is clipped", above=True
+    )
+    noise_m_per_s2: float = parameter(
+        0.0015, "m/s2", (0, 1e6), "usual: piezoelectric", "rms of white noise up to half the rate"
+    )
+    speed_jitter: float = parameter(
+        0.0, "", (0, 0.1), OURS, "rms of the speed's relative deviation, slow over a revolution"
+    )
+    seed: int = parameter(1, "", (0, 2**31), OURS, "of noise and jitter", kind="integer")
+    length_rev: int | None = parameter(
+        None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
+        kind="integer", optional=True,
+    )  # fmt: skip

@@ -1,0 +1,5 @@
+"""What a frame does with the forces on it, and how its signals are read."""
+
+from compressor.vibration.accelerometer import Record, analogue_rate, listen
+from compressor.vibration.body import Forces, body_motion
+from compressor.vibration.spectra import line_amplitudes

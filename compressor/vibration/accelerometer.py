@@ -1,0 +1,119 @@
+"""What an accelerometer on the body records: mounting, filter, range, noise, sampling, tacho."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfilt
+
+from compressor.cases import Body, Sensor
+from compressor.vibration.body import Forces, body_motion, casing_acceleration, centre
+from compressor.vibration.linear import oscillate
+
+AXES = ("x", "y")
+POLES = 8  # of the anti-aliasing filter, Butterworth
+FINER = 8.0  # times the sampling rate, and the highest resonance, at which the analogue side runs
+USUAL = 2.56  # sampling rate over the highest frequency of interest
+LEAD_IN = 1  # revolutions before the record, in which filters forget their start
+
+
+@dataclass(frozen=True)
+class Record:
+    """Samples (m/s2) of an accelerometer at `times` (s) from the record's begin, (n,).
+
+    `tacho`: times (s) at which the crank passes top dead centre, within the record; `clipped`: the
+    share of samples beyond the range.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    tacho: np.ndarray
+    clipped: float
+
+
+def analogue_rate(body: Body, sensor: Sensor) -> float:
+    """The least rate (Hz) at which forces are to be known for a record."""
+    casing = body.casing_frequency_Hz if body.casing else 0.0
+    return FINER * max(sensor.rate_Hz, sensor.mounting_Hz, casing)
+
+
+def point_of(body: Body, sensor: Sensor, guide: float) -> tuple[float, float]:
+    """Where a sensor sits, m from the body's mass centre; guide: mid-stroke from the crank, m."""
+    x, y = centre(body)
+    return {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]
+
+
+def listen(body: Body, sensor: Sensor, forces: Forces, turn: float, guide: float) -> Record:
+    """The record of a sensor.
+
+    forces: with a first and last sample a whole number of revolutions of `turn` s apart where the
+    body is steady, in any case from top dead centre on; guide: mid-stroke from the crank, m.
+
+    A steady motion is repeated as often as the record is long, with each revolution at its own
+    pace where the speed jitters; the force at an angle stays what it is.
+    """
+    steady = body.start == "steady"
+    rng = np.random.default_rng(sensor.seed)
+    span = forces.step * (len(forces.shaking) - 1)
+    revolutions = sensor.length_rev or max(1, int(span / turn * (1 + 1e-9)))
+    length = revolutions * turn if steady else span
+    before = LEAD_IN * turn if steady else 0.0
+    count = round((before + length) / forces.step)
+    times = forces.step * np.arange(count + 1) - before
+    pace = paces(sensor, rng, times, turn)
+    rigid = body_motion(body, forces, steady)
+    heard = rigid.acceleration(sensor.direction, point_of(body, sensor, guide))
+    heard = repeated(heard, forces.step, pace) if steady else heard
+    if body.casing and sensor.place != "body":
+        force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
+        force = repeated(force, forces.step, pace) if steady else force
+        heard = heard + casing_acceleration(body, force, forces.step)
+    return recorded(sensor, heard, times, pace / turn, rng)
+
+
+def repeated(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
+    """A sampled curve that repeats itself at any times (s), by a cubic spline."""
+    where = step * np.arange(len(values))
+    spline = CubicSpline(where, np.append(values[:-1], values[0]), bc_type="periodic")
+    return spline(times % where[-1])
+
+
+def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: float) -> np.ndarray:
+    """The time (s) of the undisturbed course at which the crank is as far as at each of `times`.
+
+    The speed's deviation is a Gaussian course of `speed_jitter` rms through one point a revolution.
+    """
+    if not sensor.speed_jitter:
+        return times
+    knots = np.arange(np.floor(times[0] / turn) - 1, np.ceil(times[-1] / turn) + 2)
+    drawn = rng.normal(0.0, sensor.speed_jitter, knots.size)
+    course = CubicSpline(knots * turn, drawn).antiderivative()
+    return times + course(times) - course(0.0)
+
+
+def recorded(
+    sensor: Sensor,
+    heard: np.ndarray,
+    times: np.ndarray,
+    turns: np.ndarray,
+    rng: np.random.Generator,
+) -> Record:
+    """The chain from the acceleration at a sensor's foot to its samples.
+
+    heard: m/s2 at `times`, s, (n,), the record being what is not before 0; turns: revolutions.
+    """
+    step = times[1] - times[0]
+    omega = 2.0 * np.pi * sensor.mounting_Hz
+    how = sensor.mounting_Hz, sensor.mounting_damping_ratio
+    mounted = omega**2 * oscillate(heard, step, *how).displacement
+    corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
+    filtered = sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), mounted)
+    taken = np.arange(int(times[-1] * sensor.rate_Hz * (1 + 1e-12))) / sensor.rate_Hz
+    values = CubicSpline(times, filtered)(taken)
+    values += rng.normal(0.0, sensor.noise_m_per_s2, values.size)
+    beyond = np.abs(values) > sensor.range_m_per_s2
+    values = np.clip(values, -sensor.range_m_per_s2, sensor.range_m_per_s2)
+    passes = np.arange(np.ceil(max(turns[0], 0.0) - 1e-9), np.floor(turns[-1]) + 1)
+    tacho = np.interp(passes, turns, times)
+    tacho = tacho[(tacho > -0.5 * step) & (tacho <= taken[-1])]
+    return Record(taken, values, tacho, float(beyond.mean()))

@@ -1,0 +1,178 @@
+"""The body in a case: what a run stores of it, and how wrong it is to be driven one way."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from conftest import keep
+from scipy.integrate import solve_ivp
+
+from compressor.cases.case import Case, CaseError
+from compressor.physics import COLUMNS, derivative_with_flows, observe
+from compressor.solve.foundation import BODY
+from compressor.solve.si_record import record
+from compressor.solve.simulate import measure, simulate
+from compressor.store.reader import open_study, read_store
+
+TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
+LOOSE = {"joint": "big_end", "clearance_mm": 0.2, "solve": TURN}
+RECORDED = {"sensor_time", "sensor_acceleration", "tacho_time", "clipped_share"}
+
+
+def run(**values):
+    return simulate(Case.from_values({**LOOSE, **values}))
+
+
+def coupled(case, revolutions):
+    """Velocities of a body coupled both ways, by SciPy on machine and body together, (m, 2).
+
+    In the frame of the body the machine feels -m a on each of its parts. Contact forces follow
+    from the state alone, so that nothing but the crosshead's weight is implicit.
+    """
+    p, body = record(case), case.body
+    stiffness, damping = [
+        np.array([what(2 * math.pi * getattr(body, f"frequency_{axis}_Hz")) for axis in "xy"])
+        for what in (lambda w: w**2, lambda w: 2 * body.damping_ratio * w)
+    ]
+    row, rate = np.zeros(COLUMNS), np.zeros(12)
+    masses = body.mass_kg + np.array([0.0, case.machine.reciprocating_mass_kg])
+
+    def accelerations(t, z):
+        observe(t, z[:8], 0, p, row)
+        shaking = np.array([-row[9] + row[3], -row[10] - row[12]])
+        return (shaking - body.mass_kg * (stiffness * z[8:10] + damping * z[10:])) / masses
+
+    def slope(t, z):
+        moved = accelerations(t, z)
+        derivative_with_flows(t, np.append(z[:8], np.zeros(4)), 0, p, rate)
+        felt = np.array([moved[0], moved[0], moved[1], 0.0])
+        return np.concatenate([rate[:4], rate[4:8] - felt, z[10:], moved])
+
+    times = np.linspace(0, revolutions * case.turn, 1201)
+    start = np.zeros(12)
+    found = solve_ivp(slope, (0, times[-1]), start, "LSODA", times, rtol=1e-6, atol=1e-9)
+    return found.y[10:].T
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mass", [300.0, 1000.0])
+def test_a_body_coupled_both_ways_lies_within_the_stated_bound(mass):
+    """The bound is not idle, either: a tenth of it is reached."""
+    solve = {"duration_rev": 2, "settle_rev": 0, "output_step_deg": 0.6}
+    case = Case.from_values({
+        "joint": "both", "clearance_mm": 0.1, "load": "none", "solve": solve,
+        "body": {"mass_kg": mass, "frequency_x_Hz": 12.0, "frequency_y_Hz": 12.0, "start": "rest"},
+    })  # fmt: skip
+    found = simulate(case)
+    other = coupled(case, 2)
+    ours = found["body_velocity"].values
+    apart = np.linalg.norm(ours - other, axis=0) / np.linalg.norm(other, axis=0)
+    bound = found["one_way_error"].values
+    assert (apart < bound).all()
+    assert (apart > 0.1 * bound).all()
+    assert (bound < 1.2).all()
+
+
+def test_the_body_changes_nothing_of_the_machine():
+    plain, more = run(), run(body=True)
+    assert {*more.variables} - {*plain.variables} == {*BODY, "one_way_error"}
+    for name in plain.variables:
+        if name != "seconds":
+            np.testing.assert_array_equal(plain[name], more[name])
+    assert plain.attrs["key"] != more.attrs["key"]
+
+
+def test_a_steady_body_follows_newton_s_law():
+    """M a + c v + k x is the shaking force, on the settled part."""
+    found = run(body=True, output={"signals": True})
+    kept = slice(1200, None)
+    for axis in ("x", "y"):
+        one = {n: found[f"body_{n}"].sel(axis=axis).values[kept] for n in
+               ("displacement", "velocity", "acceleration")}  # fmt: skip
+        omega = 2 * math.pi * 20.0
+        felt = one["acceleration"] + 2 * 0.03 * omega * one["velocity"]
+        felt += omega**2 * one["displacement"]
+        force = found["shaking_force"].sel(axis=axis).values[kept] / 500.0
+        np.testing.assert_allclose(felt, force, rtol=0, atol=1e-9 * np.abs(force).max())
+        assert one["displacement"][0] == pytest.approx(one["displacement"][-1], rel=1e-6)
+    assert np.isnan(found["body_displacement"].values[:1200]).all()
+
+
+def test_a_body_from_rest_is_there_from_the_start():
+    found = run(
+        body={"start": "rest"}, solve={**TURN, "settle_rev": "auto", "duration_rev": "auto"}
+    )
+    assert not found["body_displacement"].values[0].any()
+    assert np.isfinite(found["body_displacement"].values).all()
+
+
+def test_a_finer_grid_says_the_same():
+    """The body is sampled as finely as it needs, whatever is stored."""
+    sensor = {"noise_m_per_s2": 0}
+    coarse, fine = (
+        run(body=True, sensor=sensor, solve={**TURN, "output_step_deg": step})
+        for step in (0.6, 0.005)
+    )
+    one, other = coarse["sensor_acceleration"].values, fine["sensor_acceleration"].values
+    assert one.size == other.size == 3072
+    assert np.linalg.norm(one - other) < 0.01 * np.linalg.norm(other)
+
+
+def test_a_sensor_hears_the_fault():
+    """At the guide, healthy against a worn big end."""
+    healthy = simulate(Case.from_values({"solve": TURN, "body": True, "sensor": True}))
+    worn = run(body=True, sensor=True)
+    assert {*RECORDED} <= {*worn.variables}
+    levels = [float(one["sensor_acceleration"].std()) for one in (healthy, worn)]
+    assert levels[1] > 5 * levels[0]
+
+
+def test_a_run_that_stops_has_a_body_of_nan():
+    found = run(body=True, sensor=True, solve={**TURN, "max_steps": 50})
+    assert np.isnan(found["body_displacement"].values).all()
+    assert "sensor_acceleration" not in found
+
+
+def test_bodies_and_sensors_are_stored_and_read(tmp_path):
+    case = Case.from_values({**LOOSE, "body": True, "sensor": {"length_rev": 3, "seed": 4}})
+    keep(tmp_path, simulate(case))
+    stored = read_store(tmp_path).job(case.key)
+    assert stored["sensor_acceleration"].dims == ("sensor_time",)
+    assert stored["sensor_acceleration"].size == round(3 * 0.12 * 25600)
+    assert stored["tacho_time"].size == 3
+    assert Case.from_attribute(stored.attrs["case"]) == case
+    assert measure(case).attributes["key"] == case.key
+
+
+def test_a_study_of_bodies_opens(tmp_path, monkeypatch):
+    from compsim import cli
+
+    monkeypatch.chdir(tmp_path)
+    text = {**LOOSE, "body": {"mass_kg": [500, 800]}, "sensor": {}}
+    (tmp_path / "s.yaml").write_text(json.dumps(text))
+    assert cli.main(["run", "s.yaml", "-j", "1"]) == 0
+    study = open_study(tmp_path / "results")
+    motion = study["body_displacement"].values[:, 1200:, 0]
+    ratio = np.abs(motion[0]).max() / np.abs(motion[1]).max()
+    assert ratio == pytest.approx(1.6, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"sensor": True}, "sensor: stands on a body: write body: true"),
+        ({"body": {"mass_kg": 100}}, "moving parts have 19 % of the body's mass"),
+        ({"body": {"frequency_x_Hz": 16.5}}, r"order 2 of the speed, 16\.7 Hz, is so near"),
+        ({"body": True, "output": {"keep": "metrics"}}, "it needs output.keep: series"),
+        ({"body": True, "solve": {"duration_rev": 2.5}}, "whole settled revolutions"),
+        ({"body": True, "solve": {"settle_rev": "auto"}}, "whole settled revolutions"),
+        ({"body": {"start": "rest"}, "sensor": {"length_rev": 3}}, "repeats a steady motion"),
+        ({"body": True, "sensor": {"low_pass_Hz": 20000}}, "less than half of rate_Hz"),
+        ({"body": {"mass_kg": -1}}, r"body.mass_kg: -1 is outside"),
+    ],
+)
+def test_what_a_body_needs_is_told(values, message):
+    solve = TURN | values.get("solve", {})
+    with pytest.raises(CaseError, match=message):
+        Case.from_values({**LOOSE, **values, "solve": solve})

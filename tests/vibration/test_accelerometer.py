@@ -1,0 +1,108 @@
+"""The sensor's chain, on forces whose record is known."""
+
+import numpy as np
+import pytest
+
+from compressor.cases.vibration import Body, Sensor
+from compressor.vibration.accelerometer import analogue_rate, listen, paces
+from compressor.vibration.body import Forces
+
+TURN = 0.12
+QUIET = {"noise_m_per_s2": 0.0, "rate_Hz": 5000.0, "mounting_Hz": 5000.0, "place": "body"}
+BODY = Body(casing=False, centre_x_mm=0.0, centre_y_mm=0.0)
+
+
+def shaken(order, height=5000.0, turns=1, body=BODY, **sensor):
+    """A record of the body's y under one order of the speed; the sensor's gain is 1 well below."""
+    sensor = Sensor(**{**QUIET, **sensor})
+    count = round(turns * TURN * analogue_rate(body, sensor))
+    angle = 2 * np.pi * turns * np.arange(count + 1) / count
+    y = height * np.sin(order * angle)
+    still = np.zeros_like(y)
+    given = Forces(turns * TURN / count, np.stack([still, y], axis=1), still,
+                   np.stack([still, y], axis=1), np.stack([still, still], axis=1))  # fmt: skip
+    return listen(body, sensor, given, TURN, 0.6)
+
+
+def amplitude(record, frequency):
+    """Of a frequency in a record, by least squares."""
+    phase = 2 * np.pi * frequency * record.times
+    basis = np.stack([np.sin(phase), np.cos(phase)], axis=1)
+    return np.linalg.norm(np.linalg.lstsq(basis, record.values, rcond=None)[0])
+
+
+@pytest.mark.parametrize("order", [1, 4, 20])
+def test_the_record_is_the_body_s_acceleration(order):
+    """|H| = w^2 / |w0^2 - w^2 + 2 i zeta w w0| / M; mounting and filter add less than 1e-3."""
+    record = shaken(order)
+    w, w0 = 2 * np.pi * order / TURN, 2 * np.pi * 20.0
+    expected = 5000 / 500 * w**2 / abs(w0**2 - w**2 + 2j * 0.03 * w * w0)
+    resonance = 1 / (1 - (order / TURN / 5000.0) ** 2)
+    assert amplitude(record, order / TURN) == pytest.approx(expected * resonance, rel=1e-5)
+
+
+def test_the_mounting_resonance_amplifies_and_the_filter_cuts():
+    """At half its resonance a sensor reads 4/3; beyond the corner next to nothing is left."""
+    rate = {"rate_Hz": 20000.0, "low_pass_Hz": 8000.0, "mounting_Hz": 4000.0}
+    order = 240  # 2 kHz
+    plain = shaken(order, **{**rate, "mounting_Hz": 40000.0})
+    raised = shaken(order, **rate)
+    ratio = amplitude(raised, 2000.0) / amplitude(plain, 2000.0)
+    assert ratio == pytest.approx(4 / 3 * (1 - 0.05**2), rel=2e-3)
+    cut = shaken(1200, rate_Hz=20000.0, low_pass_Hz=2500.0, mounting_Hz=40000.0)
+    whole = shaken(1200, rate_Hz=40000.0, low_pass_Hz=18000.0, mounting_Hz=40000.0)
+    assert np.abs(cut.values).max() < 2e-5 * np.abs(whole.values).max()
+
+
+def test_noise_is_white_of_its_size_and_by_seed():
+    noisy = {"noise_m_per_s2": 0.5, "length_rev": 60}
+    record, again, other = (shaken(1, 0.0, seed=seed, **noisy) for seed in (7, 7, 8))
+    assert record.values.std() == pytest.approx(0.5, rel=0.02)
+    assert np.array_equal(record.values, again.values)
+    assert not np.array_equal(record.values, other.values)
+    near = np.corrcoef(record.values[1:], record.values[:-1])[0, 1]
+    assert abs(near) < 0.02
+
+
+def test_what_is_beyond_the_range_is_clipped():
+    loud = shaken(20, range_m_per_s2=5.0)
+    assert np.abs(loud.values).max() == 5.0
+    assert loud.clipped == pytest.approx(2 / np.pi * np.arccos(5.0 / 10.147), abs=0.01)
+    assert shaken(20).clipped == 0.0
+
+
+def test_the_tacho_gives_top_dead_centres():
+    record = shaken(1, length_rev=5)
+    np.testing.assert_allclose(record.tacho, TURN * np.arange(5), atol=1e-9)
+    assert record.values.size == round(5 * TURN * 5000)
+    late = shaken(1, length_rev=40, speed_jitter=0.01)
+    assert 0.001 < np.diff(late.tacho).std() / TURN < 0.02
+
+
+def test_a_record_repeats_the_revolution_where_nothing_jitters():
+    record = shaken(3, length_rev=4)
+    size = round(TURN * 5000)
+    for turn in range(1, 4):
+        later = record.values[turn * size : (turn + 1) * size]
+        np.testing.assert_allclose(later, record.values[:size], atol=1e-6 * record.values.max())
+
+
+def test_synchronous_samples_take_the_jitter_out():
+    """By the tacho's angle an order is a line again; by time it is not."""
+    record = shaken(20, length_rev=40, speed_jitter=0.01, seed=3)
+    pulses = np.append(record.tacho, record.tacho[-1] + np.diff(record.tacho).mean())
+    turns = np.interp(record.times, pulses, np.arange(pulses.size))
+    held = record.times < record.tacho[-1]
+    basis = np.stack([np.sin(2 * np.pi * 20 * turns), np.cos(2 * np.pi * 20 * turns)], axis=1)[held]
+    fit = np.linalg.norm(np.linalg.lstsq(basis, record.values[held], rcond=None)[0])
+    assert fit > 0.9 * np.sqrt(2) * record.values[held].std()
+    assert amplitude(record, 20 / TURN) < 0.5 * fit
+
+
+def test_the_speed_s_deviation_has_its_rms():
+    sensor = Sensor(**QUIET, speed_jitter=0.01)
+    times = np.linspace(0, 2000 * TURN, 200_001)
+    course = paces(sensor, np.random.default_rng(1), times, TURN)
+    rate = np.gradient(course, times) - 1.0
+    assert 0.007 < rate.std() < 0.011  # a spline through points of 1 % is smaller between them
+    assert abs(course[-1] / times[-1] - 1) < 0.002

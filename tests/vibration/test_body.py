@@ -1,0 +1,88 @@
+"""The body on its foundation: closed forms, and a machine that is coupled both ways."""
+
+import numpy as np
+import pytest
+
+from compressor.cases.vibration import Body
+from compressor.vibration.body import Forces, body_motion, casing_acceleration
+
+STEP, COUNT = 1e-4, 4001
+TIMES = STEP * np.arange(COUNT)
+
+
+def forces(x=0.0, y=0.0, moment=0.0, guide=0.0):
+    """Forces that are constant, or given over time."""
+    full = [np.broadcast_to(np.asarray(one, float), COUNT) for one in (x, y, moment, guide)]
+    still = np.zeros(COUNT)
+    return Forces(STEP, np.stack(full[:2], axis=1), full[2], np.stack([still, full[3]], axis=1),
+                  np.stack([full[0], still], axis=1))  # fmt: skip
+
+
+def stepped(height, frequency, damping):
+    """The displacement under a force that comes at time 0 and stays."""
+    omega = 2 * np.pi * frequency
+    damped = omega * np.sqrt(1 - damping**2)
+    swing = np.cos(damped * TIMES) + damping * omega / damped * np.sin(damped * TIMES)
+    return height / omega**2 * (1 - np.exp(-damping * omega * TIMES) * swing)
+
+
+def test_a_step_moves_each_freedom_by_its_closed_form():
+    body = Body(freedoms="xy_rocking", frequency_y_Hz=12.0, frequency_rocking_Hz=7.0,
+                centre_x_mm=0.0, centre_y_mm=0.0)  # fmt: skip
+    found = body_motion(body, forces(1000.0, -500.0, 80.0), steady=False)
+    for motion, height, frequency in (
+        (found.x, 2.0, 20.0), (found.y, -1.0, 12.0), (found.rocking, 2.0, 7.0)
+    ):  # fmt: skip
+        expected = stepped(height, frequency, 0.03)
+        np.testing.assert_allclose(
+            motion.displacement, expected, rtol=0, atol=1e-10 * np.abs(expected).max()
+        )
+
+
+def test_only_the_freedoms_that_are_named_move():
+    found = body_motion(Body(freedoms="y"), forces(1000.0, 1000.0, 50.0), steady=False)
+    assert not found.x.displacement.any()
+    assert found.y.displacement.any()
+    assert not found.rocking.displacement.any()
+
+
+def test_the_moment_is_taken_about_the_mass_centre():
+    """A force through the mass centre does not rock the body."""
+    body = Body(freedoms="xy_rocking", centre_x_mm=300.0, centre_y_mm=-200.0)
+    x, y = 1000.0, -400.0
+    through = 0.3 * y - (-0.2) * x  # its moment about the crank's centre
+    found = body_motion(body, forces(x, y, through), steady=False)
+    assert np.abs(found.rocking.displacement).max() < 1e-15
+    other = body_motion(body, forces(x, y, through + 40.0), steady=False)
+    expected = stepped(1.0, 20.0, 0.03)
+    np.testing.assert_allclose(other.rocking.displacement, expected, atol=1e-10 * expected.max())
+
+
+def test_a_point_off_the_centre_moves_with_rocking():
+    body = Body(freedoms="xy_rocking", centre_x_mm=0.0, centre_y_mm=0.0)
+    found = body_motion(body, forces(moment=80.0), steady=False)
+    turning = found.rocking.acceleration
+    np.testing.assert_allclose(found.acceleration("y", (0.6, 0.2)), 0.6 * turning)
+    np.testing.assert_allclose(found.acceleration("x", (0.6, 0.2)), -0.2 * turning)
+
+
+def test_a_casing_mode_answers_the_force_at_its_place():
+    body = Body(casing_mass_kg=10.0, casing_frequency_Hz=50.0, casing_damping_ratio=0.02)
+    given = forces(x=30.0, guide=20.0)
+    omega = 2 * np.pi * 50.0
+    rate = omega * np.sqrt(1 - 0.02**2)
+    decay = np.exp(-0.02 * omega * TIMES)
+    shape = decay * (np.cos(rate * TIMES) - 0.02 * omega / rate * np.sin(rate * TIMES))
+    for force, height in ((given.guide[:, 1], 2.0), (given.bearing[:, 0], 3.0)):
+        found = casing_acceleration(body, force, STEP)
+        np.testing.assert_allclose(found, height * shape, atol=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [3.0, 20.0, 33.0])
+def test_a_steady_body_repeats_itself(frequency):
+    body = Body(frequency_x_Hz=frequency)
+    turns = TIMES / TIMES[-1]
+    shape = 800 * np.sin(2 * np.pi * turns) + 90 * np.cos(14 * np.pi * turns)
+    once = body_motion(body, forces(shape), steady=True).x
+    np.testing.assert_allclose(once.displacement[-1], once.displacement[0], rtol=1e-9)
+    np.testing.assert_allclose(once.velocity[-1], once.velocity[0], rtol=1e-9)
