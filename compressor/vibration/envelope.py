@@ -1,0 +1,147 @@
+"""Envelopes: what modulates a band of high frequencies, and which band is worth looking at.
+
+An impact rings at a frequency of the structure and comes back at one of the machine. The spectrum
+of the envelope shows the latter (Randall and Antoni, Mechanical Systems and Signal Processing 25,
+2011). Both functions take the signal as periodic: best are whole revolutions of a settled motion,
+at equal times or equal crank angles.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import ifft, irfft, rfft
+from scipy.signal import hilbert
+
+from compressor.vibration.checks import (
+    SignalError,
+    checked_count,
+    checked_positive,
+    checked_signal,
+)
+from compressor.vibration.spectra import line_amplitudes
+
+LEAST_BAND = 64  # lines in the narrowest band, and so independent samples of its envelope
+EDGE = 0.25  # of a band's width: how far its gain falls off on either side of its edge
+ENDS = 4  # samples of an envelope left out at either end, where it feels a jump from end to start
+SILENT = 1e-10  # share of the signal's rms: a band below it holds rounding
+
+
+@dataclass(frozen=True)
+class Kurtogram:
+    """Spectral kurtosis of n bands, widest first.
+
+    `frequency`: centres, `bandwidth`: widths, in the unit of the rate; `kurtosis`: of the complex
+    envelope, 0 of stationary Gaussian noise, -1 of a sine, positive of impulses, nan of a band
+    200 dB below the signal; `scatter`: its standard deviation for stationary Gaussian noise; each
+    (n,). `best`: lower and upper edge of the band with the greatest kurtosis.
+    """
+
+    frequency: np.ndarray
+    bandwidth: np.ndarray
+    kurtosis: np.ndarray
+    scatter: np.ndarray
+    best: tuple[float, float]
+
+
+def band_envelope(values: np.ndarray, rate: float, band: tuple[float, float]) -> np.ndarray:
+    """The magnitude of the analytic signal in a band, (m,), in the unit of the signal.
+
+    values: (m,) at a rate of samples a second (or a revolution); band: lower and upper edge in Hz
+    (or orders), both included. Lines outside are removed without a shift of phase; then Hilbert's
+    transform. Raises SignalError if the band does not lie within 0 and rate / 2, or holds no line.
+    """
+    found, rate = checked_signal(values), checked_positive(rate, "the rate")
+    low, high = band
+    if not 0.0 <= low < high <= rate / 2:
+        edges = f"the band from {low} to {high} is not between 0 and half the rate, {rate / 2:g}"
+        raise SignalError(f"{edges}: choose another, or sample faster")
+    lines = rfft(found)
+    frequency = np.arange(lines.size) * rate / found.size
+    kept = (frequency >= low) & (frequency <= high)
+    if not kept.any():
+        text = f"no line lies between {low} and {high}, which are {rate / found.size:g} apart"
+        raise SignalError(f"{text}: choose a wider band, or pass a longer signal")
+    return np.abs(hilbert(irfft(np.where(kept, lines, 0.0), found.size)))
+
+
+def envelope_spectrum(
+    values: np.ndarray,
+    rate: float,
+    band: tuple[float, float],
+    squared: bool = False,
+    speed: float | None = None,
+    window: str = "rectangular",
+) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitude spectrum of the envelope in a band: (frequencies, amplitudes).
+
+    values: (m,) at a rate of samples a second, band in Hz (`band_envelope`). Frequencies are in Hz,
+    or orders if a speed in revolutions a second is given; with a rate of samples a revolution, band
+    and frequencies are in orders anyway. Amplitudes are single-sided peak values in the unit of the
+    signal, or its square if squared; the line at zero is the mean envelope.
+
+    A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and A d at f; squared, A^2 (1 + d^2/2) at 0,
+    2 A^2 d at f and A^2 d^2/2 at 2 f. Raises SignalError as `band_envelope` does, or for a speed
+    that is not positive or an unknown window.
+    """
+    envelope = band_envelope(values, rate, band)
+    if squared:
+        envelope = envelope**2
+    amplitudes = line_amplitudes(envelope, envelope.size, window, rms=False)
+    unit = 1.0 if speed is None else checked_positive(speed, "the speed")
+    return np.arange(amplitudes.size) * (rate / envelope.size / unit), amplitudes
+
+
+def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
+    """Spectral kurtosis over the bands of a 1/3-binary tree.
+
+    values: (m,) at a rate of samples a second, or a revolution. The range from 0 to rate / 2 is
+    divided by 1, 2, 3, 4, 6, 8, 12, ... 2^levels, as by Antoni's fast kurtogram (Mechanical Systems
+    and Signal Processing 21, 2007). The kurtosis is <|c|^4> / <|c|^2>^2 - 2 of the complex envelope
+    c of a band. Instead of a tree of filters, each envelope comes from its lines in the spectrum of
+    the signal, with a gain that falls off as a cosine over a quarter of the width beyond and within
+    each edge; neighbours share the power. The mean is taken off first.
+
+    The scatter is 2 sqrt(sum r^4 / n) of n samples of c, whose autocorrelation r follows from the
+    gain; 2 / sqrt(n) of independent ones. Noise alone has a greatest kurtosis of 2.5 to 4.5 times
+    its scatter over the 220 bands of 6 levels, in 80 % of records.
+
+    Large slow motion reaches into the lowest bands alone, but a jump from the end to the start
+    of a signal that is not periodic is an impulse; the samples about it are left out. Raises
+    SignalError if the narrowest band has less than `LEAST_BAND` lines, or the signal is constant.
+    """
+    found, rate = checked_signal(values), checked_positive(rate, "the rate")
+    levels = checked_count(levels, 1, "the number of levels")
+    half = found.size // 2
+    if half < LEAST_BAND * 2**levels:
+        need = f"{levels} levels need {2 * LEAST_BAND * 2**levels} samples, and there are"
+        raise SignalError(f"{need} {found.size}: choose fewer levels, or pass a longer signal")
+    if np.ptp(found) == 0.0:
+        raise SignalError("the signal is constant, so that it has no kurtosis: pass another one")
+    lines = rfft(found - found.mean())[: half + 1]
+    parts = [1] + [n for level in range(1, levels) for n in (2**level, 3 * 2 ** (level - 1))]
+    parts = sorted({*parts, 2**levels})
+    kurtosis, scatter = np.hstack([_kurtosis_of_parts(lines, n) for n in parts])
+    width = np.concatenate([np.full(n, rate / 2 / n) for n in parts])
+    centre = np.concatenate([(np.arange(n) + 0.5) * (rate / 2 / n) for n in parts])
+    one = int(np.nanargmax(kurtosis))
+    best = (float(centre[one] - width[one] / 2), float(centre[one] + width[one] / 2))
+    return Kurtogram(centre, width, kurtosis, scatter, best)
+
+
+def _kurtosis_of_parts(lines: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """Kurtosis and its scatter of as many equal bands, (parts,) each; lines: (k,)."""
+    width = (lines.size - 1) / parts
+    reach = math.ceil(width * (0.5 + EDGE)) + 1
+    centre = ((np.arange(parts) + 0.5) * width)[:, None]
+    index = np.floor(centre).astype(int) + np.arange(-reach, reach)
+    past = np.clip((np.abs(index - centre) / width - 0.5) / EDGE, -1.0, 1.0)  # 0 at an edge
+    gain = np.cos((past + 1.0) * (math.pi / 4))
+    gain[(index < 0) | (index >= lines.size)] = 0.0
+    envelope = ifft(np.pad(lines, reach)[index + reach] * gain, axis=1)[:, ENDS:-ENDS]
+    power = np.abs(envelope) ** 2
+    mean, fourth = np.mean(power, axis=1), np.mean(power**2, axis=1)
+    silent = mean <= SILENT**2 * np.sum(np.abs(lines) ** 2) / index.shape[1] ** 2
+    alike = np.abs(ifft(gain**2, axis=1))
+    scatter = 2.0 * np.sqrt(np.sum((alike / alike[:, :1]) ** 4, axis=1) / power.shape[1])
+    return np.where(silent, np.nan, fourth / np.where(silent, 1.0, mean**2) - 2.0), scatter

@@ -1,0 +1,162 @@
+"""Envelopes and the kurtogram: against modulated carriers, noise and impulses that are known."""
+
+import numpy as np
+import pytest
+
+from compressor.vibration.checks import SignalError
+from compressor.vibration.envelope import band_envelope, envelope_spectrum, kurtogram
+
+RATE, SIZE = 10_000.0, 30_000  # samples a second; 3 s
+TIME = np.arange(SIZE) / RATE
+BAND = (1500.0, 2500.0)
+
+
+def modulated(amplitude: float = 1.6, depth: float = 0.5) -> np.ndarray:
+    swell = 1.0 + depth * np.cos(2 * np.pi * 10 * TIME + 0.2)
+    return amplitude * swell * np.sin(2 * np.pi * 2000 * TIME)
+
+
+def rings(rate: float, size: int, carrier: float, every: float) -> np.ndarray:
+    """Decaying sines of 1 at the begin, 2 ms long, `every` so many seconds."""
+    since = (np.arange(size) / rate + 0.3 * every) % every
+    return np.exp(-since / 2e-3) * np.sin(2 * np.pi * carrier * since)
+
+
+def noise(size: int, seed: int = 5) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(size)
+
+
+def test_the_envelope_of_a_modulated_carrier_is_its_modulation():
+    slow = 40.0 * np.cos(2 * np.pi * 5 * TIME) + 7.0  # outside of the band
+    found = band_envelope(modulated() + slow, RATE, BAND)
+    swell = 1.6 * (1.0 + 0.5 * np.cos(2 * np.pi * 10 * TIME + 0.2))
+    assert found == pytest.approx(swell, abs=1e-9)
+
+
+@pytest.mark.parametrize("window", ["rectangular", "hann", "flattop"])
+@pytest.mark.parametrize(
+    ("squared", "lines"),
+    [
+        (False, {0: 1.6, 10: 0.8, 20: 0.0}),
+        (True, {0: 1.6**2 * 1.125, 10: 1.6**2, 20: 1.6**2 / 8, 30: 0.0}),
+    ],
+)
+def test_lines_of_the_envelope(squared, lines, window):
+    frequency, found = envelope_spectrum(modulated(), RATE, BAND, squared, window=window)
+    for at, amplitude in lines.items():
+        one = found[np.argmin(np.abs(frequency - at))]
+        assert one == pytest.approx(amplitude, abs=1e-9)
+    assert frequency[-1] == RATE / 2
+    if window == "rectangular":
+        assert np.sum(found > 1e-9) == (3 if squared else 2)
+
+
+def test_frequencies_may_be_orders():
+    hertz, one = envelope_spectrum(modulated(), RATE, BAND)
+    orders, other = envelope_spectrum(modulated(), RATE, BAND, speed=5.0)
+    assert orders == pytest.approx(hertz / 5.0)
+    assert other == pytest.approx(one)
+    # the same samples at 2000 a revolution: carrier of order 400, modulation of order 2
+    orders, found = envelope_spectrum(modulated(), 2000.0, (300.0, 500.0))
+    assert orders[1 + np.argmax(found[1:])] == pytest.approx(2.0)
+
+
+def test_rings_come_back_at_their_rate():
+    values = rings(RATE, SIZE, 3000.0, 0.05) + 0.1 * noise(SIZE)
+    frequency, found = envelope_spectrum(values, RATE, (2500.0, 3500.0), squared=True)
+    low = (frequency > 1.0) & (frequency < 200.0)
+    first = frequency[low][np.argsort(found[low])[-3:]]
+    assert sorted(first) == pytest.approx([20.0, 40.0, 60.0], abs=0.4)
+
+
+def test_bands_divide_the_range():
+    found = kurtogram(noise(2**12), 2000.0, 3)
+    parts = [1, 2, 3, 4, 6, 8]
+    assert found.frequency.size == found.kurtosis.size == found.scatter.size == sum(parts)
+    for parts_here in parts:
+        here = np.isclose(found.bandwidth, 1000.0 / parts_here)
+        assert np.sum(here) == parts_here
+        lower = found.frequency[here] - found.bandwidth[here] / 2
+        assert lower == pytest.approx(np.arange(parts_here) * 1000.0 / parts_here)
+
+
+def test_stationary_noise_has_none_and_scatters_as_foretold():
+    each = [kurtogram(noise(2**12, seed), 1.0, 4) for seed in range(100)]
+    found, scatter = np.array([one.kurtosis for one in each]), each[0].scatter
+    assert np.mean(found / scatter) == pytest.approx(0.0, abs=0.1)
+    assert np.std(found / scatter) == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_mean_does_not_matter():
+    values = noise(2**12)
+    found, other = kurtogram(values, 1.0, 4), kurtogram(values + 1e3, 1.0, 4)
+    assert found.kurtosis == pytest.approx(other.kurtosis, abs=1e-9)
+
+
+def test_bands_at_the_ends_of_the_range_scatter_more_than_others():
+    """The gain of the others reaches beyond their edges."""
+    scatter = kurtogram(noise(2**12), 1.0, 2).scatter[-4:]
+    assert scatter[0] > 1.01 * scatter[1]
+    assert scatter == pytest.approx(scatter[::-1], rel=0.01)
+
+
+def test_neighbours_share_the_power_of_a_line_between_them():
+    """Two lines a and b in a band have 2 a^2 b^2 / (a^2 + b^2)^2 - 1."""
+    size = 2**14
+    count = 2 * np.pi * np.arange(size)
+    values = np.sin(0.1875 * count) + np.sqrt(2) * np.sin(0.25 * count)
+    found = kurtogram(values, 1.0, 2)
+    assert found.frequency[-4:] == pytest.approx([0.0625, 0.1875, 0.3125, 0.4375])
+    assert found.kurtosis[-3] == pytest.approx(-0.5, abs=0.01)
+    assert found.kurtosis[-2] == pytest.approx(-1.0, abs=1e-9)
+
+
+def test_a_sine_has_minus_one_in_its_bands_and_the_rest_is_silent():
+    found = kurtogram(np.sin(2 * np.pi * 0.3 * np.arange(10_000)), 1.0, 5)
+    own = np.abs(found.frequency - 0.3) < found.bandwidth / 2
+    assert found.kurtosis[own] == pytest.approx(-1.0, abs=1e-9)
+    far = np.abs(found.frequency - 0.3) > found.bandwidth
+    assert np.isnan(found.kurtosis[far]).all()
+
+
+@pytest.mark.parametrize("carrier", [2300.0, 4700.0, 8100.0])
+def test_the_best_band_holds_the_carrier_of_impulses_in_noise(carrier):
+    rate, size = 20_480.0, 2**16
+    values = 2.0 * rings(rate, size, carrier, 0.1) + 0.3 * noise(size)
+    found = kurtogram(values, rate, 6)
+    low, high = found.best
+    assert low - 200.0 < carrier < high + 200.0
+    assert high - low < 4000.0
+    one = np.nanargmax(found.kurtosis)
+    assert found.kurtosis[one] > 10 * found.scatter[one]
+    frequency, spectrum = envelope_spectrum(values, rate, found.best)
+    near = (frequency > 2.0) & (frequency < 50.0)
+    assert frequency[near][np.argmax(spectrum[near])] % 10.0 == pytest.approx(0.0, abs=0.4)
+
+
+def test_a_jump_from_end_to_begin_is_no_impulse():
+    size = 2**14
+    slow = 100.0 * np.sin(2 * np.pi * 3.25 * np.arange(size) / size)
+    found = kurtogram(slow + noise(size), 1.0, 5)
+    high = found.frequency - found.bandwidth / 2 > 0.05
+    assert np.max(np.abs(found.kurtosis[high] / found.scatter[high])) < 5.0
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: band_envelope(TIME, RATE, (3000.0, 2000.0)), "choose another"),
+        (lambda: band_envelope(TIME, RATE, (3000.0, 6000.0)), "sample faster"),
+        (lambda: band_envelope(TIME, RATE, (np.nan, 6000.0)), "choose another"),
+        (lambda: band_envelope(TIME, RATE, (20.1, 20.2)), "choose a wider band"),
+        (lambda: band_envelope(TIME, 0.0, BAND), "above 0"),
+        (lambda: envelope_spectrum(TIME, RATE, BAND, speed=-1.0), "the speed is -1.0"),
+        (lambda: envelope_spectrum(TIME, RATE, BAND, window="no"), "choose one of"),
+        (lambda: kurtogram(TIME, RATE, 8), "32768 samples, and there are 30000: choose fewer"),
+        (lambda: kurtogram(TIME, RATE, 0), "pass at least 1"),
+        (lambda: kurtogram(np.full(SIZE, 0.1), RATE, 3), "constant"),
+    ],
+)
+def test_bad_input_is_told_with_a_remedy(call, told):
+    with pytest.raises(SignalError, match=told):
+        call()
