@@ -23,6 +23,7 @@ MAY_IMPORT = {
     "cases": {"metrics"},
     "physics": set(),
     "vibration": {"cases"},
+    "diagnosis": {"cases", "store", "vibration"},
     "solve": {"cases", "physics", "vibration", "outcome", "metrics", "reasons"},
     "store": {"cases", "outcome", "metrics", "reasons", "digits"},
     "sweep": {"cases", "solve", "store", "outcome", "reasons"},
@@ -35,6 +36,7 @@ MAY_IMPORT = {
 }  # fmt: skip
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "measure",
+    "diagnosis",
 )  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},

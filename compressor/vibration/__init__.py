@@ -2,4 +2,14 @@
 
 from compressor.vibration.accelerometer import Record, analogue_rate, listen
 from compressor.vibration.body import Forces, body_motion
+from compressor.vibration.envelope import band_envelope
+from compressor.vibration.indicators import (
+    crest_factor,
+    energy_angle,
+    gini,
+    high_pass_orders,
+    kurtosis,
+    rms,
+)
+from compressor.vibration.orders import resampled
 from compressor.vibration.spectra import line_amplitudes

@@ -1,0 +1,155 @@
+"""What is told of a record by numbers: the one table of features for data sets and diagnosis.
+
+A record is an accelerometer's samples with the times at which the crank passes top dead centre. The
+level is one feature; all others are shares and shapes, which say nothing of the machine's size.
+Whole revolutions count alone, from the first tacho pulse to the last.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from compressor.program import CompsimError
+from compressor.vibration import (
+    band_envelope,
+    crest_factor,
+    energy_angle,
+    gini,
+    high_pass_orders,
+    kurtosis,
+    line_amplitudes,
+    resampled,
+    rms,
+)
+
+SWING = 12.0  # order up to which a machine without clearance shakes
+SECTORS = 24  # of crank angle, 15 degrees each
+BANDS = (0.0, 200.0, 400.0, 700.0, 1100.0, 1700.0, 2300.0, 4000.0, 7000.0)  # edges, Hz
+ENVELOPE = (1700.0, 2300.0)  # Hz: the casing's mode; of another machine give its own
+BEATS = (1, 2, 3, 4)  # orders of the envelope
+FEWEST = 2  # whole revolutions of a record
+SMALLEST = 1e-6  # share that the logarithm of a share is taken of at least
+
+
+class RecordError(CompsimError):
+    """A record that tells nothing: too short, without tacho, or not finite."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature's name, unit and phrase."""
+
+    name: str
+    unit: str
+    phrase: str
+
+
+def _table() -> dict[str, Feature]:
+    rows = [
+        Feature("level", "", "log10 of the rms in m/s2"),
+        Feature("speed", "", "log10 of the speed in rev/s"),
+        Feature("crest_factor", "1", "greatest magnitude over rms"),
+        Feature("kurtosis", "1", "fourth central moment over the square of the second"),
+        Feature("gini", "1", "Gini index of magnitudes"),
+        Feature(
+            "energy_angle", "1", f"share of angle with 90 % of the energy above order {SWING:g}"
+        ),
+        Feature("above_swing", "", f"log10 of the share of the energy above order {SWING:g}"),
+        Feature(
+            "synchronous", "1", f"of the energy above order {SWING:g}, that every turn repeats"
+        ),
+    ]
+    for low, high in zip(BANDS, (*BANDS[1:], math.inf), strict=True):
+        reach = f"{low:g} to {high:g} Hz" if high < math.inf else f"above {low:g} Hz"
+        rows.append(Feature(f"band_{low:g}", "", f"log10 of the share of the energy, {reach}"))
+    for k in range(SECTORS):
+        begin, end = 360 * k // SECTORS, 360 * (k + 1) // SECTORS
+        rows.append(Feature(
+            f"sector_{begin}", "",
+            f"log10 of the share of the energy above order {SWING:g}, {begin} to {end} degrees",
+        ))  # fmt: skip
+    for beat in BEATS:
+        rows.append(Feature(f"envelope_{beat}", "1", f"order {beat} of the envelope over its mean"))
+    return {row.name: row for row in rows}
+
+
+FEATURES = _table()
+
+
+def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[str, float]:
+    """The `FEATURES` of a record by name.
+
+    times: s, (m,), equally spaced; values: m/s2, (m,); tacho: times (s) of top dead centre, (k,)
+    with k - 1 whole revolutions. Raises RecordError for fewer than two, or values that are no
+    numbers.
+    """
+    whole = len(tacho) - 1
+    if whole < FEWEST:
+        text = (
+            f"{len(tacho)} tacho pulses are too few: at least {FEWEST + 1}, for whole revolutions"
+        )
+        raise RecordError(text)
+    turns = turned(times, tacho)
+    first, last = np.searchsorted(turns, [0.0, whole])
+    inside = slice(first, last + 1)
+    if not np.isfinite(values).all() or not np.any(values[inside]):
+        raise RecordError("the record's values are not all numbers, or all zero")
+    rate = 1.0 / (times[1] - times[0])
+    speed = whole / (tacho[-1] - tacho[0])
+    a_turn = SECTORS * math.ceil(rate / speed / SECTORS)
+    even = resampled(2.0 * math.pi * turns[inside], values[inside], a_turn)[: whole * a_turn]
+    found = {"level": math.log10(rms(even)), "speed": math.log10(speed)}
+    found |= {"crest_factor": crest_factor(even), "kurtosis": kurtosis(even), "gini": gini(even)}
+    high = high_pass_orders(even, a_turn, SWING)
+    each = high.reshape(-1, a_turn)
+    energy = float(np.mean(high**2))
+    found["energy_angle"] = energy_angle(high) if energy else math.nan
+    found["above_swing"] = log_share(energy, float(np.mean(even**2)))
+    found["synchronous"] = float(np.mean(each.mean(axis=0) ** 2)) / energy if energy else math.nan
+    found |= bands(values[inside], rate)
+    sectors = (each**2).mean(axis=0).reshape(SECTORS, -1).sum(axis=1)
+    for k, part in enumerate(sectors):
+        found[f"sector_{360 * k // SECTORS}"] = log_share(float(part), float(sectors.sum()))
+    found |= envelope(even, a_turn, speed)
+    return {name: float(found[name]) for name in FEATURES}
+
+
+def turned(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
+    """Revolutions since the first pulse at each time, at the nearest one's pace beyond pulses."""
+    turns = np.interp(times, tacho, np.arange(len(tacho)))
+    turns += np.minimum(times - tacho[0], 0.0) / (tacho[1] - tacho[0])
+    return turns + np.maximum(times - tacho[-1], 0.0) / (tacho[-1] - tacho[-2])
+
+
+def bands(values: np.ndarray, rate: float) -> dict[str, float]:
+    """The log10 of each band's share of the energy."""
+    amplitudes = line_amplitudes(values - values.mean(), values.size, "rectangular", True)
+    frequency = np.arange(amplitudes.size) * rate / values.size
+    power = amplitudes**2
+    place = np.searchsorted(BANDS, frequency, side="right") - 1
+    sums = np.bincount(place, power, len(BANDS))
+    total = float(sums.sum())
+    return {
+        f"band_{low:g}": log_share(float(one), total) for low, one in zip(BANDS, sums, strict=True)
+    }
+
+
+def envelope(even: np.ndarray, a_turn: int, speed: float) -> dict[str, float]:
+    """Amplitudes of the envelope's first orders over its mean, in the `ENVELOPE` band."""
+    top = a_turn / 2.0
+    low, high = (min(edge / speed, top) for edge in ENVELOPE)
+    if not low < high:
+        return {f"envelope_{beat}": math.nan for beat in BEATS}
+    found = band_envelope(even, float(a_turn), (low, high))
+    block = found.size
+    lines = line_amplitudes(found, block, "rectangular", False)
+    revolutions = block // a_turn
+    return {f"envelope_{beat}": lines[beat * revolutions] / lines[0] for beat in BEATS}
+
+
+def log_share(part: float, whole: float) -> float:
+    """log10 of a share of an energy, at least of `SMALLEST`."""
+    return math.log10(max(part / whole, SMALLEST)) if whole > 0.0 else math.nan
