@@ -94,6 +94,20 @@ METRICS = {
         ),
     )
 }  # fmt: skip
+# of a run with `output: {signals: true}`; nan of any other (`compressor.solve.rod_load`)
+ROD_LOAD = {
+    row.name: row
+    for row in (
+        Metric(
+            "rod_load_reversal_angle", (), "rad",
+            "crank angle a revolution on the smaller side of the rod load", "contact_force",
+        ),
+        Metric(
+            "rod_load_reversal_share", (), "1",
+            "peak of the smaller side of the rod load over that of the other", "contact_force",
+        ),
+    )
+}  # fmt: skip
 # what is stored of a job, by name: (dimensions, unit, long name)
 Rows = dict[str, tuple[tuple[str, ...], str, str]]
 # how far a metric may be from the exact one: inf where that is unknown, as beyond the horizon, nan
@@ -160,3 +174,8 @@ LEDGER: Rows = {
 }
 NUMBERS: Rows = {row.name: (row.dims, row.unit, row.phrase) for row in METRICS.values()}
 NUMBERS |= ERRORS | SERIES_ERRORS | LEDGER | STATISTICS
+SOMETIMES: Rows = dict(STATISTICS)  # absent where no job has them
+for row in ROD_LOAD.values():
+    SOMETIMES[row.name] = (row.dims, row.unit, row.phrase)
+    SOMETIMES[f"{row.name}_error"] = (row.dims, row.unit, f"error bar of {row.name}")
+NUMBERS |= SOMETIMES

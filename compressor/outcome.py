@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SIZES, STATISTICS
+from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SIZES, SOMETIMES
 from compressor.program import PROGRAM
 
 # a job's numbers as one structured scalar: what workers send home and segments hold
@@ -83,14 +83,14 @@ class Outcome:
     def variables(self) -> dict[str, tuple]:
         """Status, reason and numbers as xarray variables: (dims, values, attributes).
 
-        Statistics of a chaotic motion are absent from any other.
+        Statistics of a chaotic motion are absent from any other, rod-load numbers without signals.
         """
         named: dict[str, tuple] = {
             "status": ((), self.status, {"long_name": "ok or failed"}),
             "reason": ((), self.reason, {"long_name": "why a run failed, by a stable name"}),
         }
         for name, (dims, unit, phrase) in NUMBERS.items():
-            if name in STATISTICS and np.isnan(self.numbers[name]).all():
+            if name in SOMETIMES and np.isnan(self.numbers[name]).all():
                 continue
             named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
         return named

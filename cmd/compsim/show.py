@@ -18,19 +18,28 @@ SPREAD = "_standard_error"
 
 @click.command()
 @click.argument("job")
+@click.option(
+    "--reversal",
+    default="15,3",
+    show_default=True,
+    metavar="DEG,PERCENT",
+    help="Least reversal of the rod load: degrees, and its smaller side's share.",
+)
 @results
 @as_json
-def show(job: str, folder: str, as_json: bool) -> int:
+def show(job: str, reversal: str, folder: str, as_json: bool) -> int:
     """Tell what is known of a job, named by its key or the beginning of it.
 
     Which studies it belongs to and where in them, how it ended and why, its numbers with their
     error bars, in SI, and what it was run with. Of one that stopped, where, in which state, driven
-    by which number of it, and its last steps.
+    by which number of it, and its last steps. Of a job with signals, whether the rod load at the
+    crosshead pin changes its side as API 618 asks: 15 degrees and 3 percent, or as a maker does.
     """
     from compressor.cases import printable
     from compressor.reasons import remedy
     from compressor.store import report_job
 
+    limits = reversal_limits(reversal)
     found = report_job(folder, job)
     if as_json:
         click.echo(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
@@ -41,7 +50,13 @@ def show(job: str, folder: str, as_json: bool) -> int:
         click.echo(f"  in {study}{printable(values)}")
     if found.status == "failed":
         click.echo(f"  what to do: {remedy(found.reason)}")
-    for line in (*stop(found), *numbers(found), *cautions(found), *facts(found)):
+    for line in (
+        *stop(found),
+        *numbers(found),
+        *reversal_verdict(found, *limits),
+        *cautions(found),
+        *facts(found),
+    ):
         click.echo(f"  {printable(line)}")
     if found.status == "missing":
         for command in run_commands(found.again, folder):
@@ -81,23 +96,56 @@ def stop(found: "JobReport") -> list[str]:
 
 def numbers(found: "JobReport") -> list[str]:
     """A job's numbers, a line each, to the digits that their errors allow."""
-    from compressor.metrics import METRICS, NUMBERS
+    from compressor.metrics import METRICS, NUMBERS, ROD_LOAD
 
     lines = []
+    barred = METRICS | ROD_LOAD
     for name, value in found.numbers.items():
-        beside = name.endswith(SPREAD) or name.removesuffix("_error") in {*METRICS} - {name}
+        beside = name.endswith(SPREAD) or name.removesuffix("_error") in {*barred} - {name}
         if beside or (blank(value) and name not in METRICS):
             continue
         unit = "" if NUMBERS[name][1] == "1" else NUMBERS[name][1]
         relative, error, said = True, found.numbers.get(name + SPREAD), "(standard error)"
-        if name in METRICS:
-            relative, error, said = METRICS[name].bar.relative, found.numbers[f"{name}_error"], ""
+        if name in barred:
+            relative, error, said = barred[name].bar.relative, found.numbers[f"{name}_error"], ""
         if error is None or blank(error):
             text, said = plain(value), ""
         else:
             text = measured(value, error, relative)
         lines.append(" ".join(filter(None, (f"{name:<28} {text}", unit, said))))
     return lines
+
+
+def reversal_limits(text: str) -> tuple[float, float]:
+    """Least angle (degrees) and share (percent) of a reversal, from the option's text."""
+    try:
+        degrees, percent = (float(part) for part in text.split(","))
+    except ValueError:
+        degrees = percent = math.nan
+    if not (0.0 <= degrees <= 180.0 and 0.0 <= percent <= 100.0):
+        raise click.BadParameter(f"{text!r}: give degrees and percent, such as 30,25",
+                                 param_hint="--reversal")  # fmt: skip
+    return degrees, percent
+
+
+def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[str]:
+    """Whether the rod load changes its side for long and far enough; none without signals."""
+    from compressor.digits import by_bar
+
+    worst, told = math.inf, []
+    for name, unit, least in (("angle", math.degrees(1.0), degrees), ("share", 100.0, percent)):
+        value = unit * found.numbers.get(f"rod_load_reversal_{name}", math.nan)
+        bar = unit * found.numbers.get(f"rod_load_reversal_{name}_error", math.nan)
+        if math.isnan(value):
+            return []
+        bar = 0.0 if math.isnan(bar) else bar
+        told.append(by_bar(value, bar) if bar else f"{value:.4g}")
+        clear = value - least
+        worst = min(worst, clear / abs(clear) if abs(clear) >= bar and clear else 0.0)
+    word = {1.0: "passes", 0.0: "cannot be told apart from", -1.0: "fails"}[worst]
+    kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
+    return [f"{'rod load':<28} reversal of {told[0]} degrees and {told[1]} %: {word} {kind} "
+            f"{degrees:g} degrees and {percent:g} %"]  # fmt: skip
 
 
 def cautions(found: "JobReport") -> list[str]:

@@ -32,7 +32,7 @@ ACCURACY = {
     "reference": Tier(5e-11, 1e-6),
 }
 LOOSEST, TIGHTEST = 2e-4, 1e-12  # of first runs for accuracy by number, and of any run for it
-FIRST = 0.01  # of the error asked for: the first tolerance. Bars are some 60 rtol in the median
+FIRST = 0.01  # of the error asked for: the first tolerance. Bars are some 26 rtol in the median
 
 TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")
 

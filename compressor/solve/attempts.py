@@ -6,12 +6,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from compressor.cases import TIGHTEST, Case
-from compressor.physics import FREEDOMS, Scene, start
+from compressor.physics import COLUMNS, FREEDOMS, Scene, start
 from compressor.solve.energy_audit import energy_residual
 from compressor.solve.error_bars import Companion, Metrics, bars, series_errors
 from compressor.solve.ideal_scene import closed_form
 from compressor.solve.integrate import integrate
 from compressor.solve.request import Request, Trajectory
+from compressor.solve.rod_load import reversal, reversal_bars, reversal_times
 from compressor.solve.series import (
     compared_times,
     distances,
@@ -41,7 +42,8 @@ class Solution:
     accuracy promises was `kept`, or `none` was given; `horizon` (s): nan where none was looked for;
     `settle` (s): from where metrics count; `turns`: tallies of the settled revolutions, where they
     were asked for; `statistics`: of a chaotic motion; `regime`: of `Regime`, or "" where nothing is
-    known; `period`, `settled` (rev): of a periodic motion, nan of others.
+    known; `period`, `settled` (rev): of a periodic motion, nan of others; `loads`: observed rows
+    for the `reversal` of the rod load, none without signals, with its `reversal_bars`.
     """
 
     p: np.record
@@ -61,6 +63,9 @@ class Solution:
     regime: str = ""
     period: float = math.nan
     settled: float = math.nan
+    loads: np.ndarray = field(default_factory=lambda: np.empty((0, COLUMNS)))
+    reversal: Metrics = field(default_factory=dict)
+    reversal_bars: Metrics = field(default_factory=dict)
 
     def journals_apart(self, other: "Solution") -> float:
         """Greatest distance of the journals of two runs of a case, over their room."""
@@ -79,7 +84,9 @@ def attempt(
     samples = finer(case) * round(case.steps) if sampled else 1
     times = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else times[:0]
-    grid = np.union1d(times, compared)
+    loaded = reversal_times(case)
+    stay = np.union1d(times, compared)
+    grid = np.union1d(stay, loaded)
     if scene(case) == Scene.IDEAL:
         pieces = round(PIECES * (case.rtol / rtol) ** FINER)
         trajectory = closed_form(p, grid, case.settle, pieces, timeout)
@@ -93,10 +100,14 @@ def attempt(
     turns = cuts.turns if cuts else []
     if turns:
         trajectory.tally = merged([*turns, trajectory.tally])
+    loads = take_samples(p, trajectory, loaded, stay) if loaded.size else np.empty((0, COLUMNS))
     taken = take_samples(p, trajectory, compared, times)
     found = {} if trajectory.reason else metrics(p, trajectory.tally)
     reason, detail = trajectory.reason, trajectory.detail
-    return Solution(p, trajectory, rtol, case.settle, found, taken, reason, detail, turns=turns)
+    made = Solution(p, trajectory, rtol, case.settle, found, taken, reason, detail, turns=turns)
+    made.loads = loads
+    made.reversal = {} if reason else reversal(loads)
+    return made
 
 
 def companion(case: Case, solution: Solution, timeout: float) -> Solution:
@@ -122,3 +133,5 @@ def estimate_errors(solution: Solution, other: Solution | None) -> None:
     residual = energy_residual(solution.trajectory.tally)
     solution.bars = bars(solution.metrics, by, residual)
     solution.series_errors = series_errors(by)
+    loads = solution.loads[:0] if other is None else other.loads
+    solution.reversal_bars = reversal_bars(solution.loads, by, loads)

@@ -117,6 +117,7 @@ def unbalanced(case: Case, best: Solution, detail: str, reason: str = "") -> Sol
     residual = energy_residual(best.trajectory.tally)
     most = allowed(case.rtol, case.duration / case.turn)
     best.metrics, best.bars, best.series_errors = {}, {}, {}
+    best.reversal, best.reversal_bars = {}, {}
     timed_out = reason == Reason.BUDGET_SECONDS
     best.reason = reason if timed_out else Reason.ENERGY_AUDIT_FAILED
     best.detail = f"energy residual {residual:.2g}, more than {most:.2g}; {detail}"

@@ -85,8 +85,8 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
 def outcome(case: Case, solution: Solution) -> Outcome:
     """What is kept of a solution without its series."""
     numbers = np.full(1, math.nan, dtype=ROW)[0]
-    known = {**solution.metrics, **ledger(solution.trajectory)}
-    errors = solution.bars | solution.series_errors
+    known = solution.metrics | solution.reversal | ledger(solution.trajectory)
+    errors = solution.bars | solution.series_errors | solution.reversal_bars
     known |= {f"{name}_error": error for name, error in errors.items()}
     known |= solution.statistics
     known |= {

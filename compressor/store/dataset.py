@@ -15,7 +15,7 @@ from xarray.core import indexing
 
 from compressor.cases import points, table, value_in
 from compressor.digits import is_known
-from compressor.metrics import METRICS, NUMBERS, STATISTICS
+from compressor.metrics import METRICS, NUMBERS, SOMETIMES
 from compressor.outcome import coordinates
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
@@ -177,7 +177,7 @@ def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.
     for name, (dims, unit, phrase) in NUMBERS.items():
         values = np.array(rows.numbers[name][positions])
         values[positions < 0] = np.nan
-        if name in STATISTICS and np.isnan(values).all():
+        if name in SOMETIMES and np.isnan(values).all():
             continue
         attrs = {"units": unit, "long_name": phrase}
         found[name] = xr.Variable((*layout.dims, *dims), values, attrs)

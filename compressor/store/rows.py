@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.metrics import NUMBERS, STATISTICS
+from compressor.metrics import NUMBERS, SOMETIMES
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
 from compressor.store.files import HEX20
 from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
@@ -165,7 +165,7 @@ def encode(segment: Segment) -> bytes:
         variables[name] = (("row",), columns[name], {"long_name": phrase})
     for name, (dims, unit, phrase) in NUMBERS.items():
         values = segment.numbers[name]
-        if name not in STATISTICS or not np.isnan(values).all():
+        if name not in SOMETIMES or not np.isnan(values).all():
             variables[name] = (("row", *dims), values, {"units": unit, "long_name": phrase})
     for name, packed in (("attributes", segment.texts), ("details", segment.notes)):
         data = np.frombuffer(packed, np.uint8)

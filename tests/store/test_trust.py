@@ -11,7 +11,7 @@ from conftest import keep
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.metrics import METRICS, NUMBERS, QUANTILES, STATISTICS
+from compressor.metrics import METRICS, NUMBERS, QUANTILES, SOMETIMES, STATISTICS
 from compressor.solve.simulate import measure, simulate
 from compressor.store.export import export
 from compressor.store.reader import open_study, read_store
@@ -73,9 +73,9 @@ def test_results_of_before_are_read_without_either(plain, tmp_path):
 
 def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring):
     with h5py.File(io.BytesIO(encode(of_outcomes([plain], 1)))) as file:
-        assert not STATISTICS.keys() & file.keys()
-        assert NUMBERS.keys() - STATISTICS.keys() <= file.keys()
-    assert not STATISTICS.keys() & {*plain.table({}).variables}
+        assert not SOMETIMES.keys() & file.keys()
+        assert NUMBERS.keys() - SOMETIMES.keys() <= file.keys()
+    assert not SOMETIMES.keys() & {*plain.table({}).variables}
     assert "quantile" not in plain.table({}).variables
     study = open_study(ring)
     assert STATISTICS.keys() <= {*study.variables}

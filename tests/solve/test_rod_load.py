@@ -1,0 +1,89 @@
+"""Rod-load reversal: closed forms, the ideal machine, error bars, and the verdict."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from compsim import cli
+from conftest import store
+
+from compressor.cases.case import Case
+from compressor.physics import COLUMNS
+from compressor.solve.rod_load import SMALL_END, reversal
+from compressor.solve.simulate import measure
+
+SIGNALLED = {"output": {"signals": True}}
+TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.9}
+
+
+def loads(values):
+    rows = np.zeros((len(values), COLUMNS))
+    rows[:, SMALL_END] = values
+    return rows
+
+
+@pytest.mark.parametrize("shift", [-0.7, -0.2, 0.0, 0.5])
+def test_of_a_shifted_sine(shift):
+    """sin + s is negative for pi - 2 arcsin(s) of 2 pi; its peaks are 1 + s and 1 - s."""
+    angle = 2 * math.pi * (np.arange(3600) + 0.5) / 3600
+    found = reversal(loads(800 * (np.sin(angle) + shift)))
+    expected = math.pi - 2 * math.asin(abs(shift))
+    assert found["rod_load_reversal_angle"] == pytest.approx(expected, rel=1e-3)
+    share = (1 - abs(shift)) / (1 + abs(shift))
+    assert found["rod_load_reversal_share"] == pytest.approx(share, rel=1e-5)
+
+
+def test_of_a_load_that_keeps_its_side():
+    for load in (np.full(100, 3.0), np.full(100, -3.0), np.zeros(100)):
+        found = reversal(loads(load))
+        assert set(found.values()) == {0.0}
+    assert reversal(loads([])) == {}
+
+
+@pytest.mark.parametrize(
+    ("load", "degrees", "share"), [("design", 108.6, 0.49), ("typical", 117.3, 0.73)]
+)
+def test_of_the_ideal_machine(load, degrees, share):
+    numbers = measure(Case.from_values({"load": load, "solve": TURN, **SIGNALLED})).numbers
+    assert math.degrees(numbers["rod_load_reversal_angle"]) == pytest.approx(degrees, abs=0.1)
+    assert numbers["rod_load_reversal_share"] == pytest.approx(share, abs=0.01)
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end"])
+@pytest.mark.parametrize("load", ["design", "typical"])
+def test_bars_hold_the_error(joint, load):
+    """Against a run at rtol 1e-11, whose own samples are as dense."""
+    values = {"joint": joint, "clearance_mm": 0.2, "load": load, **SIGNALLED}
+    ours = measure(Case.from_values({**values, "solve": {**TURN, "accuracy": "draft"}})).numbers
+    exact = measure(Case.from_values({**values, "solve": {**TURN, "rtol": 1e-11}})).numbers
+    for name in ("rod_load_reversal_angle", "rod_load_reversal_share"):
+        away = abs(ours[name] - exact[name])
+        assert away <= ours[f"{name}_error"] < 0.2 * ours[name], name
+
+
+def test_a_run_without_signals_or_with_a_stop_has_none():
+    plain = measure(Case.from_values({"solve": TURN})).numbers
+    short = {**TURN, "max_steps": 40}
+    stopped = {"joint": "big_end", "clearance_mm": 0.2, "solve": short, **SIGNALLED}
+    for numbers in (plain, measure(Case.from_values(stopped)).numbers):
+        assert math.isnan(numbers["rod_load_reversal_angle"])
+        assert math.isnan(numbers["rod_load_reversal_share_error"])
+
+
+def test_show_judges_the_reversal(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.yaml").write_text(json.dumps({"solve": TURN, **SIGNALLED}))
+    (study,) = store(tmp_path / "results", tmp_path / "s.yaml")
+    key = study.cases[0].key
+
+    def told(*words):
+        capsys.readouterr()
+        assert cli.main(["show", key, *words]) == 0
+        return capsys.readouterr().out
+
+    assert "%: passes API 618's 15 degrees and 3 %" in told()
+    assert "%: passes the maker's 30 degrees and 25 %" in told("--reversal", "30,25")
+    assert "%: fails the maker's 30 degrees and 60 %" in told("--reversal", "30,60")
+    assert cli.main(["show", key, "--reversal", "many"]) == 2
+    assert "give degrees and percent, such as 30,25" in capsys.readouterr().err
