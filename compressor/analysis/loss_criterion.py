@@ -1,16 +1,18 @@
 """Where a joint is expected to lose contact, from the forces of the machine with ideal joints.
 
 Earles and Wu (1973 and later) expect it where the joint force of the machine without clearance
-turns fast while it is small, by an empirical formula. That there is one, from an analysis without
-clearance, is said in Proc. IMechE 199 (1985), doi 10.1243/PIME_PROC_1985_199_106_02 (abstract).
-Its form here, the root included, was not checked against their papers:
+turns fast while it is small, by the empirical ratio
 
-    |d alpha / dt| / sqrt(|F|)        rad s^-1 N^-1/2
+    |d alpha / dt| / |F|              rad s^-1 N^-1
 
-with the direction alpha of the joint force F. It is given as `earles_wu`. It has a unit, so that
-a limit to it belongs to one machine; none is set here.
+with the direction alpha of the joint force F. It is given as `earles_wu`. Their papers were not at
+hand: that there is such a formula is said in Proc. IMechE 199 (1985), doi
+10.1243/PIME_PROC_1985_199_106_02 (abstract), and that it is gamma over R in the abstract of "Design
+Guidelines for Predicting Contact Loss in Revolute Joints of Planar Linkage Mechanisms"; that gamma
+is the rate of turn and R the force is our reading. It has a unit, so that a limit to it belongs to
+one machine; none is set here.
 
-Ours is the same measure over a scale of the machine, without a unit:
+Ours is a measure over a scale of the machine, without a unit:
 
     index = |d alpha / dt| / sqrt(|F| / (m c))
 
@@ -39,7 +41,7 @@ INDICES = {  # over angle and joint: unit, long name
     "force": ("N", "size of the ideal machine's joint force"),
     "direction": ("rad", "direction of the ideal machine's joint force on the rod, unwrapped"),
     "turn_rate": ("rad/s", "rate of turn of the direction"),
-    "earles_wu": ("rad s-1 N-0.5", "rate of turn over the root of the force"),
+    "earles_wu": ("rad s-1 N-1", "rate of turn over the force"),
     "index": ("1", "rate of turn over the journal's swing rate in its bore"),
 }
 
@@ -105,13 +107,14 @@ def indices_of(time: np.ndarray, force: np.ndarray, inertia: float) -> dict[str,
     across = force[:, 0] * rate[:, 1] - force[:, 1] * rate[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = np.where(size > 0, across / size**2, np.inf)
-        measure = np.where(size > 0, np.abs(turn) / np.sqrt(size), np.inf)
+        rate = np.where(size > 0, np.abs(turn), np.inf)
+        swing = np.sqrt(size / inertia)
     return {
         "force": size,
         "direction": np.unwrap(np.arctan2(force[:, 1], force[:, 0])),
         "turn_rate": turn,
-        "earles_wu": measure,
-        "index": measure * np.sqrt(inertia),
+        "earles_wu": rate / size,
+        "index": rate / swing,
     }
 
 

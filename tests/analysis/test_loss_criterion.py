@@ -31,7 +31,7 @@ def test_a_force_that_turns_evenly():
     found = indices_of(time, force, 4.7e-4)
     np.testing.assert_allclose(found["force"], 400.0)
     np.testing.assert_allclose(found["turn_rate"], -rate, rtol=1e-5)
-    np.testing.assert_allclose(found["earles_wu"], rate / 20.0, rtol=1e-5)
+    np.testing.assert_allclose(found["earles_wu"], rate / 400.0, rtol=1e-5)
     np.testing.assert_allclose(found["index"], rate / np.sqrt(400.0 / 4.7e-4), rtol=1e-5)
     assert found["direction"][-1] == pytest.approx(-6 * np.pi)
 
