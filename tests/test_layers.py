@@ -40,8 +40,9 @@ PACKAGES = (
 )  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
-    # its designs, its integrators, its Student's t, its splines and root finder
+    # its designs, its integrators, its Student's t, its splines and root finder, its spectra
     "scipy": {
+        "compressor.analysis.course",
         "compressor.analysis.impacts",
         "compressor.cases.swept",
         "compressor.solve.scipy_driver",

@@ -10,6 +10,7 @@ from compressor.analysis.runs import ideal_motion, settled
 
 APART = 20.0  # degrees: changes of sign nearer to each other are one turn
 AFTER, SPAN = 5.0, 90.0  # degrees after a turn, and how long its ringing is looked at
+PADDED = 16  # times longer with zeros, so that the lines of its spectrum lie close
 DRIFT = 5  # degree of the polynomial that is taken off what rings
 LEAST_RING = 100.0  # Hz: below it a motion is the machine's
 
@@ -73,6 +74,8 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
 
 def ringing(kept: xr.Dataset, turn: float) -> float:
     """The strongest frequency (Hz) of the acceleration's deviation after a turn (degrees)."""
+    from scipy.signal import periodogram
+
     angle = np.degrees(kept["crank_angle"].values)
     begin = angle[0] + (turn + AFTER - angle[0]) % 360.0
     seen = (angle >= begin) & (angle < begin + SPAN)
@@ -80,10 +83,10 @@ def ringing(kept: xr.Dataset, turn: float) -> float:
     if rest.size < 2 * DRIFT:
         return float("nan")
     count = np.linspace(-1.0, 1.0, rest.size)
-    rest = (rest - np.polyval(np.polyfit(count, rest, DRIFT), count)) * np.hanning(rest.size)
+    rest = rest - np.polyval(np.polyfit(count, rest, DRIFT), count)
     time = kept["time"].values
-    padded = 16 * rest.size
-    frequency = np.fft.rfftfreq(padded, time[1] - time[0])
-    power = np.abs(np.fft.rfft(rest, padded))
+    rate = 1.0 / (time[1] - time[0])
+    how = {"nfft": PADDED * rest.size, "detrend": False}
+    frequency, power = periodogram(rest, rate, np.hanning(rest.size), **how)
     power[frequency < LEAST_RING] = 0.0
     return float(frequency[np.argmax(power)])
