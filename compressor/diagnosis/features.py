@@ -83,20 +83,17 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     """The `FEATURES` of a record by name.
 
     times: s, (m,), equally spaced; values: m/s2, (m,); tacho: times (s) of top dead centre, (k,)
-    with k - 1 whole revolutions. Raises RecordError for fewer than two, or values that are no
-    numbers.
+    with k - 1 whole revolutions. A crank angle is known to a sample. Raises RecordError for fewer
+    than two revolutions, pulses that do not increase or lie beyond the samples, and values that are
+    not all numbers, or all zero.
     """
-    whole = len(tacho) - 1
-    if whole < FEWEST:
-        text = (
-            f"{len(tacho)} tacho pulses are too few: at least {FEWEST + 1}, for whole revolutions"
-        )
-        raise RecordError(text)
+    whole = checked(times, values, tacho)
     turns = turned(times, tacho)
-    first, last = np.searchsorted(turns, [0.0, whole])
-    inside = slice(first, last + 1)
-    if not np.isfinite(values).all() or not np.any(values[inside]):
-        raise RecordError("the record's values are not all numbers, or all zero")
+    # from the last sample that is not after the first pulse: the rest then reach over all turns
+    first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
+    inside = slice(first, int(np.searchsorted(turns, whole)) + 1)
+    if not np.any(values[inside]):
+        raise RecordError("the record's values are all zero: nothing can be told by them")
     rate = 1.0 / (times[1] - times[0])
     speed = whole / (tacho[-1] - tacho[0])
     a_turn = SECTORS * math.ceil(rate / speed / SECTORS)
@@ -115,6 +112,25 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
         found[f"sector_{360 * k // SECTORS}"] = log_share(float(part), float(sectors.sum()))
     found |= envelope(even, a_turn, speed)
     return {name: float(found[name]) for name in FEATURES}
+
+
+def checked(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
+    """The whole revolutions of a record. Raises RecordError for one that tells nothing."""
+    whole = len(tacho) - 1
+    if whole < FEWEST:
+        text = f"{len(tacho)} tacho pulses are too few: at least {FEWEST + 1}"
+        raise RecordError(f"{text}, for whole revolutions")
+    if len(times) != len(values):
+        raise RecordError(f"{len(times)} times and {len(values)} values: pass one for each")
+    if not (np.diff(tacho) > 0.0).all():
+        raise RecordError("the tacho pulses do not increase: sort them, and drop double ones")
+    step = times[1] - times[0] if len(times) > 1 else math.nan
+    if not (tacho[0] > times[0] - step and tacho[-1] < times[-1] + step):
+        text = f"tacho pulses lie beyond the samples, {times[0]:g} to {times[-1]:g} s"
+        raise RecordError(f"{text}: pass those within")
+    if not np.isfinite(values).all():
+        raise RecordError("the record's values are not all numbers: fill or cut the gaps")
+    return whole
 
 
 def turned(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
