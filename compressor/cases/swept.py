@@ -133,7 +133,11 @@ def _ranged(
         refuse(message, node.value[word])
         return None
     if word in SAMPLED:
-        return Sweep(key, node, word, 0, spread=_spread(float(first), float(last), log))
+        spread = _spread(float(first), float(last), log)
+        row = row_of(key)
+        if row and row.kind == "integer":
+            return Sweep(key, node, word, 0, spread=lambda share: round(spread(share)))
+        return Sweep(key, node, word, 0, spread=spread)
     return Sweep(key, node, word, count, make=_values(word, first, last, count))
 
 

@@ -242,6 +242,16 @@ def test_a_design_draws_its_keys_together(plan, kind):
     assert rows(plan(SAMPLED % (kind, kind), overrides=["sample.seed=6"])) != found
 
 
+@pytest.mark.parametrize("kind", ["random", "lhs", "sobol"])
+def test_whole_numbers_are_drawn_as_such(plan, kind):
+    text = f"{ONE}clearance_mm: 0.2\nbody: true\nsensor: {{seed: {{{kind}: [1, 900]}}}}\n"
+    study = plan(text + "solve: {duration_rev: 4, settle_rev: 1}\nsample: {n: 8, seed: 5}\n")
+    drawn = [round(1 + 899 * share) for (share,) in design(kind, 8, 1, 5)]
+    assert [case.sensor.seed for case in study.cases] == drawn
+    assert len({*drawn}) > 4
+    assert all(isinstance(case.sensor.seed, int) for case in study.cases)
+
+
 @pytest.mark.parametrize("kind", ["lhs", "sobol"])
 def test_designs_fill_every_eighth_of_every_key(kind):
     for column in np.array(design(kind, 8, 3, 1)).T:
