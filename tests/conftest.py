@@ -1,6 +1,7 @@
 """Fixtures that several test modules share; what is slow is made once for all test processes."""
 
 import fcntl
+import json
 import os
 import shutil
 import subprocess
@@ -137,3 +138,36 @@ def paper_runs(paper_store):
     stored = read_store(paper_store)
     runs = [stored.job(key) for key in sorted(stored.keys())]
     return {labels[run.attrs["physics_key"]]: run for run in runs}
+
+
+WORN_SENSOR = {"length_rev": 11, "rate_Hz": 6400, "mounting_Hz": 6000, "speed_jitter": 0.002}
+WORN = {
+    "name": "worn",
+    "body": {"frequency_x_Hz": 30, "frequency_y_Hz": 30},
+    "sensor": WORN_SENSOR,
+    "machine": {"speed_rpm": [400, 600]},
+    "solve": {"duration_rev": 3, "settle_rev": 1, "output_step_deg": 3.6, "accuracy": "draft"},
+    "blocks": [
+        {"joint": "none"},
+        {"joint": "big_end", "clearance_mm": [0.1, 0.2, 0.4]},
+        {"joint": "big_end", "clearance_mm": 0.3, "solve": {"max_steps": 1}},  # fails
+        {"joint": "both", "clearance_mm": {"big_end": 0.1, "small_end": 0.3}},
+        {"joint": "big_end", "clearance_mm": 0.2, "sensor": {"length_rev": 3}},  # too short
+    ],
+}
+DEAF = {"name": "deaf", "joint": "big_end", "clearance_mm": 0.1, "solve": WORN["solve"]}
+
+
+@pytest.fixture(scope="session")
+def worn(once):
+    """A folder with the studies `worn`, of seven cases at two speeds each, and `deaf`."""
+
+    def fill(folder):
+        folder.mkdir(parents=True)
+        paths = []
+        for case in (WORN, DEAF):
+            paths.append(folder / f"{case['name']}.yaml")
+            paths[-1].write_text(json.dumps(case), encoding="utf-8")
+        store(folder / "results", *paths)
+
+    return once("worn", fill) / "results"

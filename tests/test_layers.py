@@ -31,8 +31,8 @@ MAY_IMPORT = {
     "report": {"analysis", "cases", "store", "outcome", "metrics", "reasons", "digits"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
-    "compsim": {"analysis", "cases", "digits", "measure", "metrics", "reasons", "report", "solve",
-                "store", "sweep"},
+    "compsim": {"analysis", "cases", "diagnosis", "digits", "measure", "metrics", "reasons",
+                "report", "solve", "store", "sweep"},
 }  # fmt: skip
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "measure",
@@ -56,6 +56,8 @@ LIBRARIES = {  # library -> the modules that may import it
     "jinja2": {"compressor.report.page"},
     "matplotlib": {"compressor.report.figures"},
     "click": {"compsim"},
+    "pyarrow": {"compressor.diagnosis"},
+    "sklearn": set(),  # of campaigns alone
 }
 MOST_NAMES = 22.5  # that cross a wall between two rooms, a package
 MOST_LINES, MOST_FUNCTION, MOST_PARAMETERS = 350, 60, 6

@@ -19,6 +19,7 @@ import click
 
 from compressor.program import VERSION, CompsimError, CompsimWarning
 from compsim import (
+    dataset,
     explain,
     export,
     plan,
@@ -62,6 +63,7 @@ for verb in (
     status.status,
     show.show,
     export.export,
+    dataset.dataset,
     verify.verify,
     schema.schema,
     explain.explain,
