@@ -99,6 +99,11 @@ class Window:
     values: np.ndarray
     tacho: np.ndarray
 
+    def slim(self, signals: bool) -> "Window":
+        """What a data set keeps: no view of the record, two times, and samples where asked for."""
+        values = self.values.astype(np.float32) if signals else np.empty(0, np.float32)
+        return Window(self.first, self.times[:2].copy(), values, self.tacho.copy())
+
 
 def windows(record: dict[str, np.ndarray], revolutions: int, hop: int) -> Iterator[Window]:
     """The windows of a record, by the names of `RECORD` (`features`); `hop` revolutions apart."""
@@ -162,7 +167,8 @@ def make_data_set(
     window's end) with `samples`, `rate` (Hz) and `tacho` (s). Failed and missing jobs, and records
     that are too short, are left out and counted in the attribute `left_out`; chaotic ones stay.
 
-    Jobs are read one by one; what stays in memory are the windows, 4 bytes a sample. Raises
+    Jobs are read one by one. What stays in memory are the windows, 4 bytes a sample, at the end
+    twice, and twice again while they are written; without signals 1 kB a window. Raises
     DataSetError where nothing is left, StoreError where the store cannot be read.
     """
     options = options or DataSetOptions()
@@ -247,7 +253,7 @@ def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str
     try:
         for window in windows(record, options.revolutions, hop):
             found = features_by_noise(window, int(key, 16), options)
-            rows.append({**base, "window": window, "features": found})
+            rows.append({**base, "window": window.slim(options.signals), "features": found})
     except RecordError:
         return "silent_record"
     return rows or "too_short"

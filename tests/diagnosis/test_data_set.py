@@ -11,6 +11,7 @@ from compressor.diagnosis.data_set import (
     LABELS,
     DataSetError,
     DataSetOptions,
+    job_rows,
     labels_of,
     machine_of,
     make_data_set,
@@ -44,6 +45,18 @@ def test_windows_reach_from_pulse_to_pulse():
         assert one.values == pytest.approx(np.sin(one.times + since), abs=1e-12)
     assert [*windows(record, 12, 1)] == []
     assert len([*windows(record, 11, 1)]) == 1
+
+
+def test_no_record_is_kept_in_memory(worn):
+    """A view would keep the whole record, in double precision."""
+    stored = read_store(worn)
+    key = make_data_set(worn, "worn")["key"].values[0]
+    for signals in (True, False):
+        for row in job_rows(stored, key, replace(OPTIONS, signals=signals)):
+            kept = row["window"]
+            assert all(part.base is None for part in (kept.times, kept.values, kept.tacho))
+            assert kept.values.dtype == np.float32
+            assert (kept.values.size > 0) == signals
 
 
 def test_every_job_that_can_gives_windows(made):
