@@ -64,7 +64,7 @@ def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
         found["one_way_error"] = (("axis",), one_way_errors(case, spectra, step), attrs)
     if whole and case.sensor is not None:
         guide = case.machine.rod_length_mm / 1e3
-        record = listen(body, case.sensor, forces, case.turn, guide)
+        record = listen(body, case.sensor, forces, case.turn, guide, motion)
         found |= sensor_variables(record)
     return found
 

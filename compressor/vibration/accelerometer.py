@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt
 
 from compressor.cases import Body, Sensor
-from compressor.vibration.body import Forces, body_motion, casing_acceleration, centre
+from compressor.vibration.body import BodyMotion, Forces, body_motion, casing_acceleration, centre
 from compressor.vibration.linear import oscillate
 
 AXES = ("x", "y")
@@ -43,11 +43,19 @@ def point_of(body: Body, sensor: Sensor, guide: float) -> tuple[float, float]:
     return {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]
 
 
-def listen(body: Body, sensor: Sensor, forces: Forces, turn: float, guide: float) -> Record:
+def listen(
+    body: Body,
+    sensor: Sensor,
+    forces: Forces,
+    turn: float,
+    guide: float,
+    motion: BodyMotion | None = None,
+) -> Record:
     """The record of a sensor.
 
     forces: with a first and last sample a whole number of revolutions of `turn` s apart where the
-    body is steady, in any case from top dead centre on; guide: mid-stroke from the crank, m.
+    body is steady, in any case from top dead centre on; guide: mid-stroke from the crank, m;
+    motion: of the body under these forces, where it is known already.
 
     A steady motion is repeated as often as the record is long, with each revolution at its own
     pace where the speed jitters; the force at an angle stays what it is.
@@ -61,7 +69,7 @@ def listen(body: Body, sensor: Sensor, forces: Forces, turn: float, guide: float
     count = round((before + length) / forces.step)
     times = forces.step * np.arange(count + 1) - before
     pace = paces(sensor, rng, times, turn)
-    rigid = body_motion(body, forces, steady)
+    rigid = motion or body_motion(body, forces, steady)
     heard = rigid.acceleration(sensor.direction, point_of(body, sensor, guide))
     heard = repeated(heard, forces.step, pace) if steady else heard
     if body.casing and sensor.place != "body":

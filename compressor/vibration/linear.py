@@ -44,7 +44,7 @@ def oscillate(
     root = omega * complex(-damping_ratio, np.sqrt(1.0 - damping_ratio**2))
     held = pieces(force, step, steady)
     whole, shares = one_step(root, step)
-    driven = held.T @ shares
+    driven = shares.real @ held + 1j * (shares.imag @ held)
     start = 0.0j
     if steady:
         start = final(whole, driven) / (1.0 - np.exp(root * step * (len(force) - 1)))
