@@ -54,9 +54,10 @@ def dataset(
     Writes windows.nc, features.parquet and README.md, a card of what was simulated and what is not
     in it, and replaces those of an earlier data set. The study needs a body and a sensor.
     """
-    from compressor.diagnosis import DataSetOptions, make_data_set, write_data_set
+    from compressor.diagnosis import DataSetOptions, make_data_set, refuse_foreign, write_data_set
     from compressor.store import make_folder
 
+    refuse_foreign(output)
     make_folder(Path(output))  # before the minutes that are lost if it cannot be made
     options = DataSetOptions(revolutions, hop, noise, test_share, seed, not no_signals)
     screen = Screen(quiet)

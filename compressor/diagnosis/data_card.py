@@ -26,6 +26,8 @@ ABSENT = (
     "the machine drives the body, and the body's motion does not come back.",
     "**Flexible parts.** The rod is rigid. The casing has one mode at the guide and one at the "
     "main bearing, or none.",
+    "**Sound joints with a clearance.** A joint that `joint` does not name is ideal, while a sound "
+    "bearing has a working clearance: to tell faults from sound joints is easier here.",
     "**Oil.** No film carries, damps or separates the journals.",
     "**Other faults.** Valves, rings, pistons, bearings and couplings are sound. Other machines on "
     "the same floor are absent. Noise is white: neighbours, flow and gear meshes are not.",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compressor.diagnosis.data_card import data_card
-from compressor.diagnosis.data_set import LABELS, WORDS
+from compressor.diagnosis.data_set import LABELS, WORDS, DataSetError
 from compressor.program import PROGRAM
 from compressor.store import Folder, publish, write_dataset
 
@@ -37,8 +37,10 @@ class Written:
 def write_data_set(folder: Folder, dataset: "xr.Dataset") -> Written:
     """Write a data set (`make_data_set`) into a folder; files of an earlier one are replaced.
 
-    Each file is whole or absent. Raises StoreError where the disk refuses.
+    Each file is whole or absent. Raises StoreError where the disk refuses,
+    DataSetError as `refuse_foreign` does.
     """
+    refuse_foreign(folder)
     place = Path(folder)
     write_dataset(place / WINDOWS, dataset)
     table = parquet(columns(dataset))
@@ -50,6 +52,14 @@ def write_data_set(folder: Folder, dataset: "xr.Dataset") -> Written:
     names = [WINDOWS, *([FEATURES_FILE] if table is not None else []), CARD]
     files = {name: (place / name).stat().st_size for name in names}
     return Written(files, NO_PARQUET if table is None else "")
+
+
+def refuse_foreign(folder: Folder) -> None:
+    """Raises DataSetError where a folder has a README.md that is no data set's card."""
+    place = Path(folder)
+    if (place / CARD).exists() and not (place / WINDOWS).exists():
+        text = f"{place} has a {CARD} of something else, which the card would replace"
+        raise DataSetError(f"{text}: choose another folder, such as {place / 'faults'}")
 
 
 def columns(dataset: "xr.Dataset") -> dict[str, np.ndarray]:

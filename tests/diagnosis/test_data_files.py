@@ -10,7 +10,7 @@ from compsim import cli
 
 from compressor.diagnosis.data_card import ABSENT, counts, escaped
 from compressor.diagnosis.data_files import write_data_set
-from compressor.diagnosis.data_set import LABELS, WORDS, DataSetOptions, make_data_set
+from compressor.diagnosis.data_set import LABELS, WORDS, DataSetError, DataSetOptions, make_data_set
 from compressor.diagnosis.features import FEATURES
 
 
@@ -91,6 +91,24 @@ def test_without_pyarrow_the_rest_is_written(made, tmp_path, without_pyarrow):
     assert {path.name for path in tmp_path.iterdir()} == {*written.files}
     assert "pip install 'compsim[dataset]'" in written.remark
     assert "No Parquet file" in (tmp_path / "README.md").read_text(encoding="utf-8")
+
+
+def test_a_readme_of_something_else_is_not_replaced(worn, made, tmp_path, capsys):
+    card = tmp_path / "README.md"
+    card.write_text("mine")
+    assert cli.main(["dataset", "worn", "-i", str(worn), "-o", str(tmp_path)]) == 2
+    assert "choose another folder" in capsys.readouterr().err
+    with pytest.raises(DataSetError, match=r"README\.md of something else"):
+        write_data_set(tmp_path, made)
+    assert [*tmp_path.iterdir()] == [card]
+    assert card.read_text() == "mine"
+
+
+def test_an_earlier_data_set_is_replaced(made, tmp_path):
+    write_data_set(tmp_path, made)
+    write_data_set(tmp_path, made.isel(window=slice(0, 4)))
+    with xr.open_dataset(tmp_path / "windows.nc", engine="h5netcdf") as found:
+        assert found.sizes["window"] == 4
 
 
 def test_the_command(worn, tmp_path, capsys):
