@@ -406,6 +406,109 @@ def chaotic_cases_table():
     return markdown(["", ""], lines)
 
 
+def joint_name(joint):
+    """A joint as a sentence has it."""
+    return joint.replace("_", " ")
+
+
+def diagnosis_table():
+    found = kept("diagnosis.json")
+    joints = found["joints"]
+    head = ["added noise, m/s²", "accuracy", "balanced",
+            *(f"{joint_name(joint)} found" for joint in joints), "faults missed", "false alarms",
+            "without the level", "trained without noise"]  # fmt: skip
+    rows = []
+    for level in found["levels"]:
+        row = level["classifier"]
+        shares = [row["balanced_accuracy"], *row["recall"].values()]
+        shares += [row[n] for n in ("missed", "false_alarms", "without_level")]
+        rows.append([
+            f"{level['noise']:g}", f"{row['accuracy']:.1%} ± {row['standard_error']:.1%}",
+            *(f"{share:.1%}" for share in [*shares, row["trained_without_noise"]]),
+        ])  # fmt: skip
+    return markdown(head, rows) + "\n" + " ".join(diagnosis_sentences(found)) + "\n"
+
+
+def confused_pairs(pairs):
+    """Which joint is taken for which, in words."""
+    words = [f"{joint_name(p['joint'])} as {joint_name(p['told'])} {p['share']:.0%}" for p in pairs]
+    return ", ".join(words) or "none"
+
+
+def diagnosis_sentences(found):
+    """What follows from the scores, with the numbers that it follows from."""
+    first, last = found["levels"][0], found["levels"][-1]
+    machines, left = found["machines"], sum(found["left_out"].values())
+    dummy = first["classifier"]["most_frequent"]
+    yield (
+        f"{found['jobs'] - left:,} machines, {left or 'none'} left out: {machines['train']:,} to "
+        f"train on, {machines['test']:,} to test on, with {found['windows']['test']:,} windows. "
+        f"Always naming the most frequent joint would be right in {dummy:.1%}."
+    )
+    told = [confused_pairs(level["classifier"]["confused"]) for level in (first, last)]
+    yield (
+        f"Taken for another in more than {found['confused_from']:.0%} of the windows, without "
+        f"added noise: {told[0]}. With {last['noise']:g} m/s² of it: {told[1]}."
+    )
+    second = found["levels"][1]
+    yield (
+        f"A forest that saw no noise in training falls from "
+        f"{first['classifier']['trained_without_noise']:.1%} to "
+        f"{second['classifier']['trained_without_noise']:.1%} at {second['noise']:g} m/s²: noise "
+        "belongs into the training."
+        if second["classifier"]["trained_without_noise"] < second["classifier"]["accuracy"] - 0.1
+        else "Training without noise costs less than 10 points at the first level of it."
+    )
+    rms = ", ".join(f"{joint_name(j)} {row[1]:.2g} m/s²" for j, row in found["rms"].items())
+    yield f"The median rms of the windows is: {rms}."
+
+
+def confusion_table():
+    found = kept("diagnosis.json")
+    joints, levels = found["joints"], found["levels"]
+    head = ["added noise, m/s²", "joint with clearance",
+            *(f"told: {joint_name(joint)}" for joint in joints)]  # fmt: skip
+    rows = []
+    for level in (levels[0], levels[len(levels) // 2], levels[-1]):
+        first = f"{level['noise']:g}"
+        for joint, counts in zip(joints, level["classifier"]["confusion"], strict=True):
+            rows.append([first, joint_name(joint), *map(str, counts)])
+            first = ""
+    return markdown(head, rows)
+
+
+def clearance_bins_table():
+    found = kept("diagnosis.json")
+    bins = found["levels"][0]["classifier"]["bins"]
+    names = ["{:g} to {:g} mm".format(*one["clearance_mm"]) for one in bins]
+    head = ["added noise, m/s²", *(f"{name}: right joint, missed" for name in names)]
+    rows = [
+        [f"{level['noise']:g}"]
+        + [f"{one['accuracy']:.1%}, {one['missed']:.1%}" for one in level["classifier"]["bins"]]
+        for level in found["levels"]
+    ]
+    text = ", ".join(f"{one['windows']}" for one in bins)
+    return markdown(head, rows) + f"\nWindows of test machines: {text}.\n"
+
+
+def clearance_table():
+    found = kept("diagnosis.json")
+    ends = [(end, joint) for end, row in found["levels"][0]["regressor"].items() for joint in row]
+    names = [
+        f"{joint_name(end)}{' alone' if joint == end else ', both worn'}" for end, joint in ends
+    ]
+    rows = []
+    for level in found["levels"]:
+        scores = [level["regressor"][end][joint] for end, joint in ends]
+        rows.append([f"{level['noise']:g}"] + [
+            f"{one['median_error']:.0%}, {one['error_90']:.0%}, {one['r2_log']:.2f}"
+            for one in scores
+        ])  # fmt: skip
+    dummy = [found["levels"][0]["regressor"][e][j]["median_error_of_the_median"] for e, j in ends]
+    rows.append(["always the median", *(f"{value:.0%}" for value in dummy)])
+    return markdown(["added noise, m/s²", *names], rows)
+
+
 def unit(name, row):
     """A drawn parameter with its unit."""
     what = {"damping": "times the paper's", "rtol": "", "friction": "", "exponent": ""}
@@ -576,6 +679,10 @@ PAGES = {
         "limit": limit_table,
         "chaotic": chaotic_table,
         "chaotic-cases": chaotic_cases_table,
+        "diagnosis": diagnosis_table,
+        "confusion": confusion_table,
+        "clearance-bins": clearance_bins_table,
+        "clearances": clearance_table,
         "ranges": ranges_table,
         "stress": stress_table,
         "worst": worst_table,
