@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "solve": {"cases", "physics", "vibration", "outcome", "metrics", "reasons"},
     "store": {"cases", "outcome", "metrics", "reasons", "digits"},
     "sweep": {"cases", "solve", "store", "outcome", "reasons"},
-    "analysis": {"cases", "physics", "solve", "metrics"},
+    "analysis": {"cases", "physics", "solve", "vibration", "metrics"},
     "report": {"analysis", "cases", "store", "outcome", "metrics", "reasons", "digits"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},

@@ -23,6 +23,7 @@ from compsim import (
     explain,
     export,
     plan,
+    plot,
     report,
     run,
     schema,
@@ -59,6 +60,7 @@ def cli() -> None:
 for verb in (
     run.run,
     report.report,
+    plot.plot,
     plan.plan,
     status.status,
     show.show,

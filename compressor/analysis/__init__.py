@@ -3,5 +3,24 @@
 from compressor.analysis.cam import Cam, comparisons
 from compressor.analysis.captions import caption
 from compressor.analysis.claims import claims
+from compressor.analysis.contact_modes import MODES, angle_modes
+from compressor.analysis.contacts import clearance_of, joints_with_clearance
+from compressor.analysis.diagnosis_captions import diagnosis_caption
+from compressor.analysis.frame_forces import (
+    NoSeriesError,
+    frame_forces,
+    healthy_twin,
+    last_revolution,
+)
+from compressor.analysis.impacts import impacts
 from compressor.analysis.paper_cases import CLEARANCES, FAULTS, SPOKEN, label, paper_cases
+from compressor.analysis.plot_captions import PLOT_CAPTIONS
 from compressor.analysis.runs import case_of, force_relation, load_phases, settled
+from compressor.analysis.shaking import (
+    ORDER,
+    Shaking,
+    deviation_spectrum,
+    sensor_envelope,
+    shaking,
+)
+from compressor.analysis.swept_rows import SweptRow, rows_modes

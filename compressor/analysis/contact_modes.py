@@ -84,6 +84,11 @@ def mode_shares(modes: xr.Dataset) -> xr.Dataset:
     return found
 
 
+def angle_modes(run: xr.Dataset) -> xr.Dataset:
+    """`mode_map` of a run's `contact_modes`, in bins of 1 degree; raises ValueError as they do."""
+    return mode_map(contact_modes(run))
+
+
 def mode_map(modes: xr.Dataset, width_deg: float = 1.0) -> xr.Dataset:
     """What `contact_modes` gives over the crank angle, all revolutions together.
 

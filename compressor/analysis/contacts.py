@@ -57,6 +57,11 @@ def joints_with_clearance(run: xr.Dataset) -> tuple[str, ...]:
     return found
 
 
+def clearance_of(run: xr.Dataset, joint: str) -> float:
+    """Radial clearance (m) of a joint of a run."""
+    return float(record_of(run)["clearance"][JOINTS.index(joint)])
+
+
 def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
     """A joint's samples, up to where the run stopped."""
     kept = run.isel(time=np.isfinite(run["penetration"].sel(joint=joint).values))
@@ -68,7 +73,7 @@ def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
     normal = np.divide(along, distance, out=np.zeros_like(distance), where=distance > 0)
     return ContactSeries(
         joint,
-        float(record_of(run)["clearance"][JOINTS.index(joint)]),
+        clearance_of(run, joint),
         kept["time"].values,
         kept["crank_angle"].values,
         place,

@@ -9,6 +9,12 @@ import sys
 from pathlib import Path
 
 from compressor.analysis import caption
+from compressor.report.diagnosis_section import (
+    TITLES,
+    diagnosis_drawings,
+    diagnosis_sections,
+    shakings,
+)
 from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures.style import render
 from compressor.report.figures.sweep_metric import draw_metrics, measures, swept
@@ -54,9 +60,12 @@ def compose(results: Folder, command: str) -> tuple[list[Plate], str]:
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     of_paper = draw_paper(paper)
+    found = shakings(paper)
+    of_faults = [draw(*parts) for parts in diagnosis_drawings(found, paper)]
     shown = {run.attrs["key"] for run in paper.stored.values()}
     drawn = [drawn_study(stored, s) for s in studies if not shown.issuperset(s.keys)]
     about_paper = [*paper_sections(paper, of_paper)]
+    about_paper[1:1] = diagnosis_sections(found, of_faults)
     about_studies = [section for section, _ in drawn]
     sections = [
         Section("assumptions", "What to keep in mind", "assumptions.html"),
@@ -64,7 +73,7 @@ def compose(results: Folder, command: str) -> tuple[list[Plate], str]:
         *missing_sections(paper, results),
         provenance_section(studies, results, command),
     ]
-    plates = of_paper + [plate for _, more in drawn for plate in more]
+    plates = of_paper + of_faults + [plate for _, more in drawn for plate in more]
     return plates, document(sections)
 
 
@@ -81,7 +90,8 @@ def drawn_study(stored: Stored, study: StoredStudy) -> tuple[Section, list[Plate
 
 def remove_stale(report: Path, drawn: set[str]) -> None:
     """Remove an earlier report's drawings of the paper's figures that this one could not draw."""
-    for name in {f"figure-{item.number:02d}" for item in FIGURES} - drawn:
+    names = {f"figure-{item.number:02d}" for item in FIGURES}
+    for name in (names | {f"diagnosis-{name}" for name in TITLES}) - drawn:
         for kind in ("png", "svg"):
             with contextlib.suppress(OSError):
                 (report / f"{name}.{kind}").unlink()

@@ -29,18 +29,29 @@ SIGNALS = {
 
 def signals(p: np.record, rows: np.ndarray) -> dict[str, np.ndarray]:
     """The `SIGNALS` by name from observed rows, (m, COLUMNS); SI."""
-    big, small = np.moveaxis(block("contact_force", rows), 1, 0)
-    weight = p["reciprocating_mass"] * p["gravity"]
+    series = (block(name, rows) for name in ("contact_force", "piston_force", "displacement"))
+    found = forces_on_frame(p, *series)
+    found["crank_torque"] = rows[:, Column.CRANK_POWER] / p["omega"]
+    return {name: found[name] for name in SIGNALS}
+
+
+def forces_on_frame(
+    p: np.record, contact_force: np.ndarray, piston_force: np.ndarray, displacement: np.ndarray
+) -> dict[str, np.ndarray]:
+    """The `SIGNALS` that follow from time series, all but the crank's torque; SI.
+
+    contact_force: on the rod, (m, joint, axis); piston_force and displacement: (m,).
+    """
+    big, small = np.moveaxis(contact_force, 1, 0)
     bearing = -big
-    guide = -small[:, 1] - weight
+    guide = -small[:, 1] - p["reciprocating_mass"] * p["gravity"]
     shaking = bearing.copy()
-    shaking[:, 0] += block("piston_force", rows)
+    shaking[:, 0] += piston_force
     shaking[:, 1] += guide
     return {
         "shaking_force": shaking,
         "bearing_force": bearing,
         "guide_force": guide,
-        "guide_moment": guide * block("displacement", rows),
-        "crank_torque": rows[:, Column.CRANK_POWER] / p["omega"],
+        "guide_moment": guide * displacement,
         "rod_load": small[:, 0].copy(),
     }

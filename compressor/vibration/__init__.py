@@ -2,7 +2,7 @@
 
 from compressor.vibration.accelerometer import Record, analogue_rate, listen
 from compressor.vibration.body import Forces, body_motion
-from compressor.vibration.envelope import band_envelope
+from compressor.vibration.envelope import band_envelope, envelope_spectrum, kurtogram
 from compressor.vibration.indicators import (
     crest_factor,
     energy_angle,
@@ -11,5 +11,5 @@ from compressor.vibration.indicators import (
     kurtosis,
     rms,
 )
-from compressor.vibration.orders import resampled
+from compressor.vibration.orders import order_spectrum, resampled, rms_above
 from compressor.vibration.spectra import line_amplitudes

@@ -13,6 +13,7 @@ from jinja2 import UndefinedError
 
 from compressor.analysis.claims import Claim
 from compressor.report import page
+from compressor.report.diagnosis_section import DiagnosisContent
 from compressor.report.page import Plate, Section, document, templates
 from compressor.report.paper_sections import MissingFigures
 from compressor.report.provenance import Provenance
@@ -23,7 +24,7 @@ from compressor.store.studies import StoredStudy
 ROOT = Path(__file__).parents[2]
 HOME = Path(page.__file__).parent
 MODULES = ("page", "tables", "provenance", "paper_runs", "paper_sections", "study_section",
-           "report")  # fmt: skip
+           "diagnosis_section", "plots", "report")  # fmt: skip
 SOURCES = [*(HOME / f"{name}.py" for name in MODULES), *(HOME / "figures").glob("*.py")]
 KINDS = ("word", "number", "code")
 
@@ -74,6 +75,7 @@ def contents(evil):
         "assumptions.html": None,
         "cases.html": table(evil),
         "claims.html": claims,
+        "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         "printed.html": table(evil),

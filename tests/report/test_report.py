@@ -17,6 +17,7 @@ from compressor.cases.case import Case
 from compressor.cases.load import load_cases
 from compressor.reasons import Reason
 from compressor.report import report, tables
+from compressor.report.diagnosis_section import TITLES
 from compressor.report.figures import FIGURES
 from compressor.report.paper_runs import find_paper_runs, paper_candidates
 from compressor.report.report import write_report
@@ -114,9 +115,10 @@ def replace_jobs(folder, *jobs):
 def test_every_figure_is_drawn_and_shown(full):
     numbers = [figure.number for figure in FIGURES]
     names = {f"figure-{n:02d}.{kind}" for n in numbers for kind in ("png", "svg")}
-    assert {path.name for path in full.iterdir()} == names | {"index.html"}
+    more = {f"diagnosis-{name}.{kind}" for name in TITLES for kind in ("png", "svg")}
+    assert {path.name for path in full.iterdir()} == names | more | {"index.html"}
     found = read(full)
-    assert len(found.sources) == len(numbers)
+    assert len(found.sources) == len(numbers) + len(TITLES)
     for number in numbers:
         assert f"Figure {number}:" in found.text
         assert f"figure-{number:02d}" in found.ids

@@ -1,0 +1,58 @@
+"""`compsim plot`: figures of one job or of a study, as files."""
+
+import click
+
+from compsim.screen import DONE, results
+
+FIGURES = ("signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map")
+KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
+
+
+def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
+    """The names of a list with commas; () for all. Raises BadParameter."""
+    names = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
+    wrong = [name for name in names if name not in (*FIGURES, "all")]
+    if wrong:
+        raise click.BadParameter(f"{wrong[0]!r} is none of {', '.join(FIGURES)}, all")
+    return () if "all" in names else names
+
+
+@click.command()
+@click.argument("target", metavar="JOB|STUDY")
+@click.option(
+    "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
+    help="Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map.",
+)  # fmt: skip
+@results
+@click.option("-o", "--output", default="plots", show_default=True, help="Folder of the figures.")
+@click.option("--format", "form", type=click.Choice([*KINDS]), default="png", show_default=True)
+@click.option(
+    "--over", default="", metavar="AXIS",
+    help="The axis of a study's rows; by default a clearance, else the speed.",
+)  # fmt: skip
+@click.option(
+    "--at", multiple=True, metavar="KEY=VALUE",
+    help="The value of another axis; by default its first.",
+)  # fmt: skip
+def plot(
+    target: str,
+    what: tuple[str, ...],
+    folder: str,
+    output: str,
+    form: str,
+    over: str,
+    at: tuple[str, ...],
+) -> int:
+    """Draw one job, named by its key or the beginning of it, or a study; prints files and captions.
+
+    A job's signals over crank angle, spectra, orbits, contact modes and impacts, beside the same
+    machine without clearance; a study's order spectra and contact modes over a swept axis. Nothing
+    but the time series is needed.
+    """
+    from compressor.report import PlotChoice, write_plots
+
+    choice = PlotChoice(what, over, at, KINDS[form])
+    for found in write_plots(folder, output, target, choice):
+        click.echo(" ".join(map(str, found.paths)))
+        click.echo(f"  {found.caption}")
+    return DONE

@@ -1,0 +1,191 @@
+"""Captions of `compsim plot`: sentences that say the numbers of what is drawn."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis.contact_modes import MODES, contact_modes, mode_shares
+from compressor.analysis.contacts import clearance_of, joints_with_clearance
+from compressor.analysis.frame_forces import frame_forces, last_revolution, whole_revolutions
+from compressor.analysis.impacts import impacts
+from compressor.analysis.orbit import orbit
+from compressor.analysis.paper_cases import SPOKEN
+from compressor.analysis.shaking import ORDER, deviation_spectrum, sensor_envelope, shaking
+from compressor.analysis.swept_rows import SweptRow, rows_modes
+
+Twin = xr.Dataset | None  # the same machine without clearance
+
+CHAOTIC = (
+    " The motion is chaotic: another correct solution has other peaks and lines; more settled "
+    "revolutions (solve.duration_rev) make averages that hold."
+)
+LEAST = 0.05  # N: below it a force is told as less than 0.1
+
+
+def caution(run: xr.Dataset) -> str:
+    """What is added to the captions of a chaotic run."""
+    return CHAOTIC if run.attrs.get("regime") == "chaotic" else ""
+
+
+def signals(run: xr.Dataset, twin: Twin) -> str:
+    """Of the last revolution: the greatest and least of what is drawn."""
+    _, kept = last_revolution(run)
+    _, count = whole_revolutions(run)
+    forces = frame_forces(kept)
+    x, y = 1e-3 * forces["shaking_force"].T
+    torque, rod = forces["crank_torque"], 1e-3 * forces["rod_load"]
+    peak = np.abs(kept["acceleration"].values).max()
+    beside, ideal_joints = "", " No joint has clearance: there is no contact to draw."
+    if twin is not None:
+        ideal_joints = ""
+        _, ideal = last_revolution(twin)
+        beside = f" ({np.abs(ideal['acceleration'].values).max():.0f} without clearance)"
+    return (
+        f"The last of {plural(count, 'settled revolution')} over crank angle, at stored samples. "
+        f"Acceleration reaches {peak:.0f} m/s²{beside}, X {span(x)} kN, Y {span(y)} kN, the "
+        f"guide's force {span(1e-3 * forces['guide_force'])} kN, the torque "
+        f"{span(torque, '.0f')} N m, the rod load {span(rod)} kN.{ideal_joints}{caution(run)}"
+    )
+
+
+def spectra(run: xr.Dataset, twin: Twin) -> str:
+    """Of the order spectra: what lies above `ORDER`."""
+    found = shaking(run)
+    sentences = [
+        f"Peak amplitudes, mean squares over {plural(found.revolutions, 'settled revolution')}.",
+        f"rms of X above order {ORDER}: {newtons(found.spectrum.above)}",
+    ]
+    if twin is not None:
+        sentences[-1] += f"; without clearance {newtons(shaking(twin).spectrum.above)}"
+    deviation = deviation_spectrum(run).above
+    text = f"{deviation:.1f}" if deviation >= LEAST else "less than 0.1"
+    sentences[-1] += f". Of the crosshead's deviation above it: {text} m/s²."
+    envelope = sensor_envelope(run)
+    if envelope is not None:
+        low, high = envelope.band
+        sentences.append(
+            f"The sensor's band from {low:.0f} to {high:.0f} Hz has the greatest spectral "
+            f"kurtosis, {envelope.kurtosis:.1f}."
+        )
+    else:
+        sentences.append("No sensor record: a case with body and sensor has one.")
+    return " ".join(sentences) + caution(run)
+
+
+def orbits(run: xr.Dataset, twin: Twin) -> str:
+    """Of the orbits: how far out the journals are, and whether they leave the wall."""
+    found = orbit(run)
+    _, kept = last_revolution(run)
+    sentences = ["Journal centres in their bores to scale, last revolution."]
+    for joint in joints_with_clearance(run):
+        depth = 1e6 * float(kept["penetration"].sel(joint=joint).max())
+        one = found.sel(joint=joint)
+        off = 100.0 * float(one["off_wall_share"])
+        leaves = f"is off its wall for {off:.2g} % of the time" if off else "never leaves its wall"
+        size = 1e3 * clearance_of(run, joint)
+        sentences.append(
+            f"At the {SPOKEN[joint]}, clearance {size:.3g} mm, the journal {leaves} and sinks in "
+            f"by up to {depth:.0f} µm; it goes round {float(one['laps']):+.2f} times a revolution, "
+            "counter-clockwise positive."
+        )
+    return " ".join(sentences) + caution(run)
+
+
+def modes(run: xr.Dataset, twin: Twin) -> str:
+    """Of the contact modes: their shares of the time."""
+    shares = mode_shares(contact_modes(run))["share"]
+    sentences = []
+    for joint in joints_with_clearance(run):
+        each = [100.0 * float(shares.sel(joint=joint, mode=mode)) for mode in MODES]
+        if each[MODES.index("following")] == 100.0:
+            said = "following contact throughout, no flight and no impact"
+        else:
+            said = ", ".join(f"{mode} {x:.3g} %" for mode, x in zip(MODES, each, strict=True))
+        sentences.append(f"At the {SPOKEN[joint]}: {said}.")
+    return " ".join(["Shares of the settled time.", *sentences]) + caution(run)
+
+
+def struck(run: xr.Dataset, twin: Twin) -> str:
+    """Of the impacts: how many, the hardest, and what they lost."""
+    found = impacts(run)
+    if not found.sizes["impact"]:
+        return f"No impacts: after settling no journal came back from flight.{caution(run)}"
+    sentences = []
+    for joint in joints_with_clearance(run):
+        mine = found.isel(impact=found["joint"].values == joint)
+        if not mine.sizes["impact"]:
+            sentences.append(f"None at the {SPOKEN[joint]}.")
+            continue
+        lost = float(mine["lost_energy"].sum())
+        hardest = mine.isel(impact=int(np.argmax(mine["approach_speed"].values)))
+        sentences.append(
+            f"{plural(mine.sizes['impact'], 'impact')} at the {SPOKEN[joint]}; the hardest at "
+            f"{float(hardest['approach_speed']):.3g} m/s and {float(hardest['crank_angle']):.0f}°"
+            + (f"; together they lost {lost:.3g} J." if lost > 0.0 else ".")
+        )
+    return " ".join(["Contacts after flight, all settled revolutions.", *sentences]) + caution(run)
+
+
+def waterfall(rows: Sequence[SweptRow], axis: str) -> str:
+    """Of the order spectra along an axis: where the rms above `ORDER` is least and greatest."""
+    known = [(row.shaking.spectrum.above, row.value) for row in rows if row.shaking]
+    least, greatest = min(known), max(known)
+    return (
+        f"Order spectra of X, a row for each value of {axis}. The rms of X above order {ORDER} is "
+        f"least, {newtons(least[0])}, at {least[1]}, and greatest, {newtons(greatest[0])}, at "
+        f"{greatest[1]}.{left_out(rows)}"
+    )
+
+
+def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
+    """Of the mode map: the share of angles whose most frequent mode is flight."""
+    sentences = [f"The most frequent contact mode in each degree, a row for each value of {axis}."]
+    for joint, table in rows_modes(rows).items():
+        flight = 100.0 * (table == MODES.index("flight")).mean(axis=1)
+        if flight.max() == 0.0:
+            sentences.append(f"At the {SPOKEN[joint]} it is nowhere flight.")
+        else:
+            at = rows[int(np.argmax(flight))].value
+            sentences.append(
+                f"At the {SPOKEN[joint]} it is flight over at most {flight.max():.2g} % of the "
+                f"revolution, at {at}."
+            )
+    return " ".join(sentences) + left_out(rows)
+
+
+def left_out(rows: Sequence[SweptRow]) -> str:
+    """The rows that could not be drawn, and those of chaotic motion."""
+    gone, wild = sum(bool(row.problem) for row in rows), sum(row.chaotic for row in rows)
+    said = f" {plural(gone, 'job')} of {len(rows)} without series to draw." if gone else ""
+    return said + (f" {plural(wild, 'job')} chaotic: their lines change." if wild else "")
+
+
+def span(values: np.ndarray, form: str = ".2f") -> str:
+    """From the least to the greatest of some values."""
+    return f"{values.min():{form}} to {values.max():{form}}"
+
+
+def newtons(force: float) -> str:
+    """A force (N) in words."""
+    if force < LEAST:
+        return "less than 0.1 N"
+    return f"{force:.0f} N" if force >= 9.95 else f"{force:.1f} N"
+
+
+def plural(count: int, thing: str) -> str:
+    """A number of things in words."""
+    return f"{count} {thing}" + ("s" if count != 1 else "")
+
+
+# of a job: functions of its run and its twin; of a study: of its rows and its axis
+PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
+    "job": {
+        "signals": signals,
+        "spectra": spectra,
+        "orbits": orbits,
+        "modes": modes,
+        "impacts": struck,
+    },
+    "study": {"waterfall": waterfall, "map": mode_rows},
+}

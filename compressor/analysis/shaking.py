@@ -1,0 +1,175 @@
+"""How joints with clearance shake the frame: orders of the force along the cylinder, and when.
+
+A worn joint puts its force on the frame in high orders of the crank speed, where the ideal machine
+has next to none. The part above `ORDER` is split by crank angle. One share lies about the changes
+of direction of a joint's force, where the journal crosses its bore and swings on the other side;
+the other lies elsewhere.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis.contacts import joints_with_clearance
+from compressor.analysis.course import turning_points
+from compressor.analysis.frame_forces import frame_forces, whole_revolutions
+from compressor.analysis.runs import case_of, ideal_motion
+
+ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing
+BEFORE, AFTER = 10.0, 50.0  # degrees about a change of direction that count as belonging to it
+SILENT = 1e-9  # of the greatest force: what lies below is rounding
+LEVELS = 5  # of the kurtogram that chooses a sensor's band, at most
+LEAST_SHARE = 0.01  # of the record's energy that this band has
+LEAST_LINES = 128  # samples that a level of it needs, twice over for each further one
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Lines over orders of the crank speed, (k,) each: peak amplitudes in the signal's unit.
+
+    Blocks are revolutions, whose mean squares are averaged. `above`: rms of what lies above
+    `ORDER` over all of them, in the signal's unit.
+    """
+
+    orders: np.ndarray
+    amplitudes: np.ndarray
+    above: float
+
+    @property
+    def lines(self) -> tuple[np.ndarray, np.ndarray]:
+        """Orders and amplitudes."""
+        return self.orders, self.amplitudes
+
+
+@dataclass(frozen=True)
+class Shaking:
+    """The force X on the frame along the cylinder, over `revolutions` settled ones.
+
+    `turns`: crank angles (degrees) at which a force along the cylinder at a joint with clearance
+    changes its sign. `angle` (degrees) and `mean_square` (N^2), (a_turn,): of the part of X above
+    `ORDER`, a mean over revolutions. The rms of this part has two shares, N, whose squares add up
+    to its own: `near_turns`, from `BEFORE` to `AFTER` a turn, and `elsewhere`. `ring`: the
+    strongest order of the latter, nan where the part above `ORDER` is rounding.
+    """
+
+    revolutions: int
+    spectrum: Spectrum
+    turns: tuple[float, ...]
+    angle: np.ndarray
+    mean_square: np.ndarray
+    near_turns: float
+    elsewhere: float
+    ring: float
+
+    def near(self, angle: np.ndarray) -> np.ndarray:
+        """Which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn."""
+        return near_a_turn(angle, self.turns)
+
+
+def shaking(run: xr.Dataset) -> Shaking:
+    """What `Shaking` says of a run with time series; of ideal joints there are no turns.
+
+    Raises NoSeriesError where the series hold no whole settled revolution, SignalError where they
+    are too coarse for `ORDER`.
+    """
+    from compressor.vibration import high_pass_orders, line_amplitudes, resampled
+
+    kept, revolutions = whole_revolutions(run)
+    crank = kept["crank_angle"].values
+    force = frame_forces(kept)["shaking_force"][:, 0]
+    a_turn = (crank.size - 1) // revolutions // 2 * 2
+    high = high_pass_orders(resampled(crank, force, a_turn), a_turn, ORDER)
+    angle = (np.degrees(crank[0]) + 360.0 * np.arange(a_turn) / a_turn) % 360.0
+    mean_square = (high.reshape(-1, a_turn) ** 2).mean(axis=0)
+    turns = directions_change(kept)
+    near = near_a_turn(angle, turns)
+    rest = np.where(np.tile(near, high.size // a_turn), 0.0, high)
+    lines = line_amplitudes(rest, a_turn, "rectangular", True)
+    lines[: ORDER + 1] = 0.0
+    rings = lines.max() > SILENT * np.abs(force).max()
+    return Shaking(
+        revolutions,
+        order_lines(kept, force),
+        turns,
+        angle,
+        mean_square,
+        math.sqrt(float(mean_square[near].sum()) / a_turn),
+        math.sqrt(float(mean_square[~near].sum()) / a_turn),
+        float(np.argmax(lines)) if rings else math.nan,
+    )
+
+
+def order_lines(kept: xr.Dataset, values: np.ndarray) -> Spectrum:
+    """The order spectrum of a signal, (m,), at the samples of `whole_revolutions`."""
+    from compressor.vibration import order_spectrum, rms_above
+
+    crank = kept["crank_angle"].values
+    orders, amplitudes = order_spectrum(crank, values, turns=1)
+    fine, roots = order_spectrum(crank, values, rms=True)
+    return Spectrum(orders, amplitudes, rms_above(fine, roots, ORDER))
+
+
+def deviation_spectrum(run: xr.Dataset) -> Spectrum:
+    """The order spectrum of the crosshead's acceleration less the ideal machine's, m/s2."""
+    kept, _ = whole_revolutions(run)
+    return order_lines(kept, kept["acceleration"].values - ideal_motion(kept)[2])
+
+
+def directions_change(kept: xr.Dataset) -> tuple[float, ...]:
+    """Crank angles (degrees) at which forces along the cylinder change sign, of all worn joints."""
+    try:
+        joints = joints_with_clearance(kept)
+    except ValueError:
+        return ()
+    crank = np.degrees(kept["crank_angle"].values)
+    forces = (kept["contact_force"].sel(joint=joint, axis="x").values for joint in joints)
+    return tuple(sorted(turn for force in forces for turn in turning_points(crank, force)))
+
+
+def near_a_turn(angle: np.ndarray, turns: tuple[float, ...]) -> np.ndarray:
+    """Which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` one of the turns."""
+    near = np.zeros(angle.size, bool)
+    for turn in turns:
+        near |= (angle - turn + BEFORE) % 360.0 < BEFORE + AFTER
+    return near
+
+
+@dataclass(frozen=True)
+class SensorEnvelope:
+    """The envelope spectrum of a sensor's record: orders and amplitudes (m/s2), (k,) each.
+
+    `band`: in Hz, the one with the greatest `kurtosis` of those bands of the kurtogram that hold
+    `LEAST_SHARE`; beyond the sensor's filter there is rounding alone.
+    """
+
+    orders: np.ndarray
+    amplitudes: np.ndarray
+    band: tuple[float, float]
+    kurtosis: float
+
+
+def sensor_envelope(run: xr.Dataset) -> SensorEnvelope | None:
+    """The envelope spectrum of a run's sensor; None where it has none, or too short a record."""
+    from compressor.vibration import envelope_spectrum, kurtogram, line_amplitudes
+
+    if "sensor_acceleration" not in run:
+        return None
+    values, time = run["sensor_acceleration"].values, run["sensor_time"].values
+    if values.size < 4 * LEAST_LINES or not np.isfinite(values).all() or not np.ptp(values):
+        return None
+    rate = (time.size - 1) / (time[-1] - time[0])
+    levels = min(LEVELS, int(math.log2(values.size // LEAST_LINES)))
+    found = kurtogram(values, rate, levels)
+    power = line_amplitudes(values, values.size, "rectangular", True) ** 2
+    lines = np.arange(power.size) * rate / values.size
+    edges = found.frequency - found.bandwidth / 2, found.frequency + found.bandwidth / 2
+    held = np.append(0.0, np.cumsum(power))
+    low, high = (np.searchsorted(lines, edge) for edge in edges)
+    strong = held[high] - held[low] >= LEAST_SHARE * power.sum()
+    best = int(np.nanargmax(np.where(strong, found.kurtosis, np.nan)))
+    band = float(edges[0][best]), float(edges[1][best])
+    speed = 1.0 / case_of(run).turn
+    orders, amplitudes = envelope_spectrum(values, rate, band, speed=speed)
+    return SensorEnvelope(orders, amplitudes, band, float(found.kurtosis[best]))

@@ -1,0 +1,268 @@
+"""`compsim plot`: figures of one job, or of a study along one of its axes, as files."""
+
+import difflib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from compressor.analysis import (
+    PLOT_CAPTIONS,
+    NoSeriesError,
+    SweptRow,
+    angle_modes,
+    healthy_twin,
+    joints_with_clearance,
+    shaking,
+)
+from compressor.cases import points
+from compressor.program import CompsimError
+from compressor.reasons import remedy
+from compressor.report.figures import Drawing
+from compressor.report.figures.contact import draw_impacts, draw_modes, draw_orbits
+from compressor.report.figures.job import draw_signals, draw_spectra
+from compressor.report.figures.study_maps import draw_map, draw_waterfall
+from compressor.report.figures.style import render
+from compressor.report.study_section import file_name
+from compressor.store import Folder, Stored, StoredStudy, publish, read_store, read_studies
+
+JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
+OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
+MOST_ROWS = 200  # of a map
+MOST_NAMES = 5
+SHORT = 10  # digits of a key in the name of a file
+KEEP = "run it again with --set output.keep=series"
+
+
+class PlotError(CompsimError):
+    """What cannot be drawn: why, and what to do about it."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class PlotChoice:
+    """What to draw: names of figures, all by default; of a study the axis and the other values.
+
+    over: the axis by its key or the end of it; at: `key=value` of other axes, else their first.
+    """
+
+    what: tuple[str, ...] = ()
+    over: str = ""
+    at: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ("png",)
+
+
+@dataclass(frozen=True)
+class Plotted:
+    """A figure that was written, one file a kind."""
+
+    paths: tuple[Path, ...]
+    caption: str
+
+
+def write_plots(
+    results: Folder, output: Folder, target: str, choice: PlotChoice
+) -> Iterator[Plotted]:
+    """Draw a study by its name or a job by the beginning of its key; yields what was written.
+
+    Raises PlotError where there is no such study or job, or it cannot be drawn; StoreError where
+    the store cannot be read or the files not be written.
+    """
+    stored, studies = read_store(results).warned(), read_studies(results)
+    named = {study.name: study for study in studies}
+    if target in named:
+        drawn = study_figures(stored, named[target], choice)
+        stem = target
+    else:
+        key = job_key(stored, studies, target)
+        drawn = job_figures(stored, studies, key, choice)
+        stem = key[:SHORT]
+    for name, caption, drawing in drawn:
+        paths = []
+        for kind in choice.kinds:
+            path = Path(output) / f"{file_name(stem, name)}.{kind}"
+            publish(path, render(drawing, kind))
+            paths.append(path)
+        yield Plotted(tuple(paths), caption)
+
+
+def job_key(stored: Stored, studies: Sequence[StoredStudy], target: str) -> str:
+    """The one job whose key begins so; PlotError with the nearest names where there is none."""
+    keys = stored.keys().union(*(study.keys for study in studies))
+    like = sorted(key for key in keys if target and key.startswith(target))
+    if len(like) == 1:
+        return like[0]
+    some = ", ".join(like[:MOST_NAMES]) + (", …" if len(like) > MOST_NAMES else "")
+    if like:
+        raise PlotError(f"{len(like)} jobs' keys begin with {target!r}: {some}; give more digits")
+    names = [study.name for study in studies]
+    near = difflib.get_close_matches(target, names, MOST_NAMES, 0.4) or names[:MOST_NAMES]
+    problem = f"{stored.folder} has no study {target!r}, and no job's key begins so"
+    raise PlotError(f"{problem}: near to it are the studies {', '.join(near) or 'none'}")
+
+
+def chosen(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
+    """The figures that are wanted; PlotError where one is none of this thing."""
+    wrong = [name for name in what if name not in known]
+    if wrong:
+        raise PlotError(f"{thing} has no figure {wrong[0]!r}: it has {', '.join(known)}")
+    return tuple(what) or tuple(known)
+
+
+def job_figures(
+    stored: Stored, studies: Sequence[StoredStudy], key: str, choice: PlotChoice
+) -> Iterator[tuple[str, str, Drawing]]:
+    """Names, captions and drawings of a job that has time series."""
+    wanted = chosen(choice.what, [*JOB], f"job {key}")
+    if choice.over or choice.at:
+        raise PlotError(f"{key} is one job: --over and --at are for studies")
+    run = drawable(stored, studies, key)
+    try:
+        worn = joints_with_clearance(run)
+    except ValueError:
+        worn = ()
+    for name in (one for one in wanted if one in OF_CONTACT and choice.what and not worn):
+        raise PlotError(f"job {key} has ideal joints, so that there is no figure {name!r} of it")
+    twin = healthy_twin(run) if worn else None
+    try:
+        for name in wanted:
+            if name in OF_CONTACT and not worn:
+                continue
+            if name in OF_CONTACT:
+                drawing = OF_CONTACT[name](run)
+            else:
+                drawing = (draw_signals if name == "signals" else draw_spectra)(run, twin)
+            yield name, JOB[name](run, twin), drawing
+    except NoSeriesError as error:
+        raise PlotError(f"job {key}: {error}") from error
+
+
+def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dataset:
+    """The job's Dataset with time series; PlotError says what to do where there are none."""
+    status = stored.status(key)
+    if status is None:
+        files = " ".join(study.case_file for study in studies if key in study.keys)
+        raise PlotError(f"job {key} was not run yet: compsim run {files} -o {stored.folder}")
+    if status.status != "ok":
+        cure = remedy(status.reason)
+        raise PlotError(f"job {key} failed: {status.reason}: {status.detail}; {cure}")
+    if not status.samples:
+        raise PlotError(f"job {key} kept no time series: {KEEP}")
+    return stored.job(key)
+
+
+def study_figures(
+    stored: Stored, study: StoredStudy, choice: PlotChoice
+) -> Iterator[tuple[str, str, Drawing]]:
+    """Names, captions and drawings of a study along one axis."""
+    if choice.what and {*choice.what} <= {*JOB}:
+        first = study.keys[0][:SHORT]
+        raise PlotError(
+            f"{study.name} is a study: for {choice.what[0]} name a job, such as {first}"
+        )
+    wanted = chosen(choice.what, [*STUDY], f"study {study.name}")
+    over = axis_of(study, choice.over)
+    jobs, where = selected(study, over, choice.at)
+    if len(jobs) > MOST_ROWS:
+        where += f" {MOST_ROWS} of {len(jobs)} jobs, evenly chosen."
+        jobs = [jobs[n * len(jobs) // MOST_ROWS] for n in range(MOST_ROWS)]
+    rows = [swept_row(stored, value, key) for value, key in jobs]
+    if not any(row.shaking for row in rows):
+        raise PlotError(nothing_to_draw(stored, study, rows))
+    for name in wanted:
+        if name == "map" and not any(row.modes is not None for row in rows):
+            if choice.what:
+                raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
+            continue
+        drawing = (draw_waterfall if name == "waterfall" else draw_map)(rows, over)
+        yield name, STUDY[name](rows, over) + where, drawing
+
+
+def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]) -> str:
+    """Why no job of a study can be drawn, and what to do about it."""
+    problems = {row.problem for row in rows}
+    cures = {
+        "failed": f"compsim status -i {stored.folder} tells why",
+        "not run": f"compsim run {study.case_file} -o {stored.folder}",
+        "no series": KEEP,
+        "too short": "run it with a longer solve.duration_rev",
+    }
+    told = "; ".join(f"{problem}: {cures[problem]}" for problem in sorted(problems))
+    return f"no job of {study.name} can be drawn: {told}"
+
+
+def axis_of(study: StoredStudy, wanted: str) -> str:
+    """The key of the axis that is meant; by default a clearance, then the speed, then the first."""
+    keys = [axis.key for axis in study.axes]
+    if not wanted:
+        ranked = [key for word in ("clearance", "speed") for key in keys if word in key]
+        return (ranked or keys or ["job"])[0]
+    found = [key for key in keys if key == wanted or key.endswith(f".{wanted}")]
+    if len(found) != 1:
+        problem = f"{study.name} has no axis {wanted!r}" if not found else f"{wanted!r} is several"
+        raise PlotError(f"{problem}: its axes are {', '.join(keys) or 'none'}")
+    return found[0]
+
+
+def selected(study: StoredStudy, over: str, at: Sequence[str]) -> tuple[list[tuple[Any, str]], str]:
+    """(value, key) of the jobs along an axis in its order, and what of the others is told."""
+    fixed = {}
+    for text in at:
+        name, _, value = text.partition("=")
+        key = axis_of(study, name)
+        if not value or key == over:
+            raise PlotError(f"--at {text}: needs key=value of an axis other than {over}")
+        fixed[key] = value_of(study, key, value)
+    if study.is_grid:
+        first = {axis.key: axis.values[0] for axis in study.axes if axis.key != over}
+        fixed = first | fixed
+    jobs = [
+        (point.get(over, ""), key)
+        for point, key in zip(points(study), study.keys, strict=True)
+        if all(point.get(name) == value for name, value in fixed.items())
+    ]
+    if not jobs:
+        raise PlotError(f"no job of {study.name} has {', '.join(at)}")
+    numbers = all(isinstance(value, int | float) for value, _ in jobs)
+    jobs.sort(key=lambda job: job[0] if numbers else 0)
+    told = ", ".join(f"{name} {shown(value)}" for name, value in fixed.items())
+    where = f" Here {told}." if told else ""
+    varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
+    return jobs, where + (f" Along with it vary {', '.join(varied)}." if varied else "")
+
+
+def value_of(study: StoredStudy, key: str, text: str) -> Any:
+    """The value of an axis that a text means; PlotError lists them."""
+    (values,) = (axis.values for axis in study.axes if axis.key == key)
+    for value in values:
+        if text in (str(value), shown(value)):
+            return value
+    listed = ", ".join(shown(value) for value in dict.fromkeys(values))
+    raise PlotError(f"--at {key}={text}: the axis has {listed}")
+
+
+def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
+    """What one job tells, or why it tells nothing."""
+    name, status = shown(value) if value != "" else key[:SHORT], stored.status(key)
+    if status is None or status.status != "ok" or not status.samples:
+        problem = "not run" if status is None else "failed" if status.reason else "no series"
+        return SweptRow(name, problem=problem)
+    run = stored.job(key)
+    chaotic = run.attrs.get("regime") == "chaotic"
+    try:
+        found = shaking(run)
+    except NoSeriesError:
+        return SweptRow(name, problem="too short")
+    try:
+        return SweptRow(name, found, angle_modes(run), chaotic=chaotic)
+    except ValueError:  # ideal joints
+        return SweptRow(name, found, chaotic=chaotic)
+
+
+def shown(value: Any) -> str:
+    """A swept value in few characters."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{value:g}" if number else str(value)

@@ -1,0 +1,51 @@
+"""Forces on the frame from stored series: those that the equations of motion give."""
+
+import numpy as np
+import pytest
+
+from compressor.analysis.frame_forces import (
+    NoSeriesError,
+    frame_forces,
+    healthy_twin,
+    whole_revolutions,
+)
+from compressor.cases.case import Case
+from compressor.solve.signals import SIGNALS
+from compressor.solve.simulate import simulate
+
+DRAFT = {"accuracy": "draft", "duration_rev": 2.5, "error_bars": False}
+
+
+@pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
+def test_forces_are_the_signals_of_the_run(joint):
+    clearance = {} if joint == "none" else {"clearance_mm": 0.2}
+    machine = {"gravity_m_per_s2": 9.81}
+    case = {"joint": joint, **clearance, "machine": machine, "output": {"signals": True}}
+    run = simulate(Case.from_values({**case, "solve": DRAFT}))
+    found = frame_forces(run)
+    assert found.keys() == SIGNALS.keys()
+    for name, values in found.items():
+        size = np.abs(run[name].values).max()
+        np.testing.assert_allclose(values, run[name].values, rtol=0, atol=1e-9 * size)
+
+
+def test_whole_revolutions_leave_the_rest():
+    run = simulate(Case.from_values({"solve": {**DRAFT, "duration_rev": 3.7}}))
+    kept, count = whole_revolutions(run)
+    assert count == 2
+    assert np.ptp(kept["crank_angle"].values) == pytest.approx(4 * np.pi)
+    with pytest.raises(NoSeriesError, match="no whole settled revolution"):
+        whole_revolutions(run.isel(time=slice(None, 1800)))
+    with pytest.raises(NoSeriesError, match="no time series"):
+        whole_revolutions(run.isel(time=0))
+    with pytest.raises(NoSeriesError, match="no time series"):
+        frame_forces(run.isel(time=0))
+
+
+def test_the_healthy_twin_has_ideal_joints_on_the_same_grid():
+    values = {"joint": "both", "clearance_mm": 0.2, "load": "typical", "solve": DRAFT}
+    run = simulate(Case.from_values(values))
+    twin = healthy_twin(run)
+    assert np.array_equal(twin["time"].values, run["time"].values)
+    assert not twin["eccentricity"].values.any()
+    assert Case.from_attribute(twin.attrs["case"]).load == "typical"

@@ -1,0 +1,196 @@
+"""`compsim plot`: files and captions of jobs and studies, and what is said where there is none."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compsim import cli
+from conftest import store
+
+from compressor.analysis.frame_forces import frame_forces
+from compressor.analysis.plot_captions import PLOT_CAPTIONS
+from compressor.store.reader import read_store
+from compressor.store.studies import read_studies
+
+SOLVE = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "output_step_deg": 0.5,
+         "error_bars": False}  # fmt: skip
+CASES = {
+    "worn": {"joint": "big_end", "clearance_mm": [0.1, 0.3], "friction": False,
+             "contact": {"damping_N_s_per_mm": 10},
+             "machine": {"speed_rpm": [400, 500], "rod_mass_kg": 1}},
+    "listed": {"joint": "big_end", "clearance_mm": [0.2, 0.25],
+               "machine": {"speed_rpm": [450, 500]},
+               "zip": [["clearance_mm", "machine.speed_rpm"]]},
+    "ideal": {"load": "typical"},
+    "halted": {"joint": "big_end", "clearance_mm": 0.1, "solve": {"max_steps": 100}},
+    "bare": {"joint": "big_end", "clearance_mm": 0.1, "output": {"keep": "metrics"}},
+    "short": {"joint": "big_end", "clearance_mm": 0.15,
+              "solve": {"duration_rev": 0.4, "settle_rev": 0}},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A store of short studies, one of them failed, one without series, one not run."""
+    home = tmp_path_factory.mktemp("plots")
+    files = []
+    for name, values in CASES.items():
+        values = {**values, "solve": SOLVE | values.get("solve", {})}
+        files.append(home / f"{name}.yaml")
+        files[-1].write_text(json.dumps(values))
+    store(home / "results", *files)
+    return home / "results"
+
+
+@pytest.fixture
+def plot(folder, tmp_path, monkeypatch, capsys):
+    """Runs the command; gives code, the captions by file's name, stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        code = cli.main(["plot", *words, "-i", str(folder)])
+        out, err = capsys.readouterr()
+        lines = out.splitlines()
+        paths, captions = lines[::2], [line.strip() for line in lines[1::2]]
+        for path in " ".join(paths).split():
+            head = Path(path).read_bytes()[:5]
+            assert head == (b"<?xml" if path.endswith("svg") else b"\x89PNG\r")
+        return code, dict(zip(paths, captions, strict=True)), err
+
+    return run
+
+
+def key(folder, name, place=0):
+    return {study.name: study for study in read_studies(folder)}[name].keys[place]
+
+
+def job(folder, name, place=0):
+    return read_store(folder).job(key(folder, name, place))
+
+
+def test_a_job_is_drawn_with_its_numbers(plot, folder):
+    mine = key(folder, "worn", 3)  # 0.3 mm, 500 rpm
+    code, found, err = plot(mine[:8])
+    assert (code, err) == (0, "")
+    names = [f"plots/{mine[:10]}-{name}.png" for name in PLOT_CAPTIONS["job"]]
+    assert [*found] == names
+    run = job(folder, "worn", 3)
+    signals, spectra, orbits, modes, impacts = found.values()
+    force = frame_forces(run)
+    last = slice(2 * 720, None)
+    x = force["shaking_force"][last, 0] / 1e3
+    assert f"X {x.min():.2f} to {x.max():.2f} kN" in signals
+    torque = force["crank_torque"][last]
+    assert f"torque {torque.min():.0f} to {torque.max():.0f} N m" in signals
+    assert f"reaches {np.abs(run['acceleration'].values[last]).max():.0f} m/s²" in signals
+    lines = np.fft.rfft(force["shaking_force"][720:2160, 0]) / 1440
+    above = np.sqrt(2 * (np.abs(lines[25:]) ** 2).sum())
+    told = float(re.search(r"above order 12: (\d+) N; without clearance less", spectra)[1])
+    assert told == pytest.approx(above, rel=0.01)
+    assert f"up to {1e6 * run['penetration'].values[last, 0].max():.0f} µm" in orbits
+    shares = [float(one) for one in re.findall(r"([\d.]+) %", modes)]
+    assert sum(shares) == pytest.approx(100, abs=0.3)
+    off = (run["penetration"].values[720:, 0] < 0).mean()
+    assert shares[0] == pytest.approx(100 * off, abs=2)
+    assert f"{int(run['impact_count'].values[0])} impacts at the big end" in impacts
+
+
+def test_chosen_figures_in_both_formats(plot, folder):
+    mine = key(folder, "worn")
+    code, found, _ = plot(mine, "--what", "orbits,impacts", "--format", "both", "-o", "some")
+    assert code == 0
+    stems = [f"some/{mine[:10]}-{name}" for name in ("orbits", "impacts")]
+    assert [*found] == [f"{stem}.png {stem}.svg" for stem in stems]
+
+
+def test_a_study_is_drawn_along_an_axis(plot, folder):
+    code, found, _ = plot("worn", "--over", "speed_rpm", "--at", "clearance_mm=0.3")
+    assert code == 0
+    waterfall, modes = found.values()
+    assert [*found] == ["plots/worn-waterfall.png", "plots/worn-map.png"]
+    assert "each value of machine.speed_rpm" in waterfall
+    assert "Here clearance_mm 0.3." in waterfall
+    above = {}
+    for speed, place in ((400, 2), (500, 3)):
+        x = frame_forces(job(folder, "worn", place))["shaking_force"][720:2160, 0]
+        above[speed] = np.sqrt(2 * (np.abs(np.fft.rfft(x)[25:] / 1440) ** 2).sum())
+    least, greatest = sorted(above, key=above.get)
+    told = re.search(r"least, (\d+) N, at (\d+), and greatest, (\d+) N, at (\d+)", waterfall)
+    assert (int(told[2]), int(told[4])) == (least, greatest)
+    assert float(told[1]) == pytest.approx(above[least], rel=0.01)
+    assert float(told[3]) == pytest.approx(above[greatest], rel=0.01)
+    assert "of the revolution" in modes
+    default, _ = plot("worn")[1].values()
+    assert "each value of clearance_mm" in default
+    assert "Here machine.speed_rpm 400." in default
+
+
+def test_a_study_that_is_no_grid_says_what_else_varies(plot):
+    code, found, _ = plot("listed", "--what", "waterfall")
+    assert code == 0
+    assert "Along with it vary machine.speed_rpm." in next(iter(found.values()))
+
+
+def test_ideal_joints_have_no_contacts_to_draw(plot, folder):
+    mine = key(folder, "ideal")
+    code, found, _ = plot(mine)
+    assert code == 0
+    assert [name[-11:] for name in found] == ["signals.png", "spectra.png"]
+    assert "No joint has clearance" in next(iter(found.values()))
+    code, found, err = plot(mine, "--what", "orbits")
+    assert (code, found) == (2, {})
+    assert "ideal joints" in err
+    code, found, _ = plot("ideal")
+    assert (code, len(found)) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["wron"], "no study 'wron', and no job's key begins so: near to it are the studies worn"),
+        (["worn", "--what", "orbits"], "worn is a study: for orbits name a job, such as"),
+        (["worn", "--what", "noise"], "'noise' is none of signals"),
+        (["worn", "--over", "mass"], "worn has no axis 'mass': its axes are clearance_mm,"),
+        (["worn", "--at", "speed_rpm=450"], "--at machine.speed_rpm=450: the axis has 400, 500"),
+        (["worn", "--at", "clearance_mm=0.1"], "needs key=value of an axis other than"),
+        (["bare"], "no job of bare can be drawn: no series: run it again with --set output.keep"),
+        (["short"], "too short: run it with a longer solve.duration_rev"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(plot, words, told):
+    code, found, err = plot(*words)
+    assert (code, found) == (2, {})
+    assert told in " ".join(err.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("halted", "failed: budget_steps"), ("bare", "kept no time series: run it again"),
+     ("short", "no whole settled revolution")],
+)  # fmt: skip
+def test_jobs_that_cannot_be_drawn_say_what_to_do(plot, folder, name, told):
+    code, _, err = plot(key(folder, name))
+    assert code == 2
+    assert told in err
+
+
+def test_a_job_named_by_too_little_or_as_a_study(plot, folder):
+    keys = read_store(folder).keys()
+    first = next(c for c in "0123456789abcdef" if sum(k.startswith(c) for k in keys) > 1)
+    code, _, err = plot(first)
+    assert code == 2
+    assert f"jobs' keys begin with '{first}'" in err
+    code, _, err = plot(key(folder, "worn"), "--over", "clearance_mm")
+    assert code == 2
+    assert "--over and --at are for studies" in err
+    assert "has no figure 'map'" in plot(key(folder, "worn"), "--what", "map")[2]
+
+
+def test_a_chaotic_job_is_drawn_and_said_to_be_chaotic(folder, paper_runs):
+    run = job(folder, "worn", 3)
+    calm = PLOT_CAPTIONS["job"]["orbits"](run, None)
+    run.attrs["regime"] = "chaotic"
+    assert "The motion is chaotic" in PLOT_CAPTIONS["job"]["orbits"](run, None)
+    assert "chaotic" not in calm

@@ -1,0 +1,157 @@
+"""The report's diagnosis: captions say what the runs measure, and figures draw it."""
+
+import re
+
+import numpy as np
+import pytest
+
+from compressor.analysis import diagnosis_captions
+from compressor.analysis.diagnosis_captions import course_of, diagnosis_caption
+from compressor.analysis.frame_forces import frame_forces
+from compressor.analysis.paper_cases import CLEARANCES, FAULTS, label
+from compressor.report.diagnosis_section import (
+    NEEDS,
+    TITLES,
+    diagnosis_drawings,
+    diagnosis_sections,
+    force_table,
+    shakings,
+)
+from compressor.report.figures.diagnosis import BIN
+from compressor.report.paper_runs import PaperRuns
+
+KEPT = slice(1200, 4800)  # three settled revolutions
+
+
+@pytest.fixture(scope="module")
+def paper(paper_runs):
+    return PaperRuns(paper_runs, paper_runs, {})
+
+
+@pytest.fixture(scope="module")
+def found(paper):
+    return shakings(paper)
+
+
+@pytest.fixture(scope="module")
+def drawn(found, paper):
+    """Captions and drawings by name."""
+    return {name: (text, figure)
+            for name, _, text, figure in diagnosis_drawings(found, paper)}  # fmt: skip
+
+
+def high(run):
+    """X above order 12, by numpy's Fourier transform."""
+    lines = np.fft.rfft(frame_forces(run)["shaking_force"][KEPT, 0])
+    lines[: 12 * 3 + 1] = 0.0
+    return np.fft.irfft(lines)
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def newtons(text):
+    return [float(number) for number in re.findall(r"([\d.]+) N\b", text)]
+
+
+def test_the_force_above_order_12_is_told_and_drawn(drawn, paper_runs):
+    text, figure = drawn["diagnosis-spectra"]
+    assert "12 (dashed) the rms is less than 0.1 N without clearance" in text
+    expected = {f: [rms(high(paper_runs[label(f, c)])) for c in CLEARANCES] for f in FAULTS}
+    for fault, words in (("big_end", "the big end's clearance"),
+                         ("small_end", "the small end's clearance"),
+                         ("both", "clearance at both joints")):  # fmt: skip
+        (sentence,) = re.findall(rf"With {words} from 0.1 to 0.3 mm ([^.]*)\.", text)
+        first, _, last = expected[fault]
+        assert newtons(sentence) == pytest.approx([first, last], abs=0.51)
+        assert ("rises" if first < last else "falls") in sentence
+    trend = figure.axes[1]
+    for line, fault in zip(trend.lines, FAULTS, strict=False):
+        assert line.get_xdata() == pytest.approx(CLEARANCES)
+        assert line.get_ydata() == pytest.approx(expected[fault], rel=1e-3)
+    lines = figure.axes[0].lines
+    for line, name in ((lines[0], "big_end 0.3"), (lines[2], "small_end 0.3")):
+        orders, amplitudes = line.get_data()
+        force = frame_forces(paper_runs[name])["shaking_force"][KEPT, 0]
+        whole = 2 * np.abs(np.fft.rfft(force)[::3]) / force.size
+        assert amplitudes[orders == 1] == pytest.approx(whole[1], rel=1e-3)
+        assert amplitudes[orders == 47] == pytest.approx(whole[47], rel=0.05)
+
+
+def test_both_shares_are_told(drawn, paper_runs, found):
+    text, figure = drawn["diagnosis-angles"]
+    for joint, words in (("big_end", "big end"), ("small_end", "small end")):
+        (sentence,) = re.findall(
+            rf"At the {words} the force turns at (.*? N, the one elsewhere .*?)\.", text
+        )
+        turns = [float(one) for one in re.findall(r"(\d+)°", sentence)]
+        assert turns == pytest.approx(found[f"{joint} 0.3"].turns, abs=0.51)
+        shares = []
+        for clearance in ("0.1", "0.3"):
+            run, one = paper_runs[f"{joint} {clearance}"], found[f"{joint} {clearance}"]
+            angle = np.degrees(run["crank_angle"].values[KEPT]) % 360
+            near = np.zeros(angle.size, bool)
+            for turn in one.turns:
+                near |= ((angle - turn + 10) % 360) < 60
+            square = high(run) ** 2
+            shares += [np.sqrt(square[part].sum() / square.size) for part in (near, ~near)]
+        near_first, rest_first, near_last, rest_last = shares
+        told = newtons(sentence)
+        expected = [near_first, near_last, rest_first, rest_last]
+        assert told[:4] == pytest.approx(expected, rel=0.01, abs=1)
+    assert "rings at order 7" in text
+    assert "no flight and no impact" in text
+    profile = figure.axes[0].lines[0].get_ydata()
+    whole = np.sqrt(np.mean(profile[:-1] ** 2))
+    assert profile.size == 360 / BIN + 1
+    assert whole == pytest.approx(rms(high(paper_runs["big_end 0.1"])), rel=5e-3)
+
+
+def test_orbits_are_told_and_drawn_to_scale(drawn, paper_runs):
+    text, figure = drawn["diagnosis-orbits"]
+    assert "No journal leaves its wall" in text
+    assert "big end it goes round 1.0 times a revolution, counter-clockwise" in text
+    assert "small end it goes round 1.0 times a revolution, clockwise" in text
+    for panel, clearance in zip(figure.axes[:3], CLEARANCES, strict=True):
+        (circle,) = panel.patches
+        assert circle.radius == pytest.approx(1e3 * clearance)
+        place = paper_runs[label("big_end", clearance)]["eccentricity"].sel(joint="big_end")
+        x, y = panel.lines[0].get_data()
+        assert x == pytest.approx(1e6 * place.sel(axis="x").values[-x.size :], rel=1e-6)
+        assert np.hypot(x, y).min() > circle.radius
+        assert panel.get_aspect() == 1
+
+
+def test_captions_follow_the_numbers_and_not_the_names(found, paper_runs):
+    """With the runs of both joints exchanged, what rises falls."""
+    other = dict(found)
+    for clearance in CLEARANCES:
+        one, two = label("big_end", clearance), label("small_end", clearance)
+        other[one], other[two] = found[two], found[one]
+    text = diagnosis_caption("spectra", other, paper_runs)
+    assert re.search(r"With the big end's clearance [^.]*\.1 to 0\.3 mm [^.]* falls", text)
+    assert re.search(r"With the small end's clearance [^.]*\.1 to 0\.3 mm [^.]* rises", text)
+
+
+def test_courses_in_words():
+    assert course_of([1.0, 2.0, 30.0]) == "rises from 1.0 N to 30 N"
+    assert course_of([3.0, 2.0, 0.01]) == "falls from 3.0 N to less than 0.1 N"
+    assert course_of([30.0, 20.0, 40.0]) == "goes from 30 N over 20 N to 40 N"
+    assert diagnosis_captions.CAPTIONS.keys() == TITLES.keys()
+
+
+def test_the_table_has_every_case(found, paper_runs):
+    table = force_table(found)
+    assert len(table.rows) == len(NEEDS) == 10
+    for row, name in zip(table.rows, NEEDS, strict=True):
+        expected = rms(high(paper_runs[name]))
+        assert float(row.cells[2].text) == pytest.approx(expected, rel=1e-3, abs=0.06)
+
+
+def test_nothing_is_drawn_where_a_case_is_missing(paper_runs):
+    some = {name: run for name, run in paper_runs.items() if name != "both 0.2"}
+    paper = PaperRuns(some, some, {"both 0.2": "not stored"})
+    assert shakings(paper) == {}
+    assert not [*diagnosis_drawings({}, paper)]
+    assert not [*diagnosis_sections({}, [])]
