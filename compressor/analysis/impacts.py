@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 from numpy.polynomial import Polynomial
-from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.optimize import brentq
 
 from compressor.analysis.contacts import (
     ContactSeries,
@@ -112,6 +110,8 @@ def touch(series: ContactSeries, span: Span) -> tuple[float, float]:
     contact. First touch is where its length reaches the clearance. The error of the speed falls
     with the cube of the sample step.
     """
+    from scipy.optimize import brentq  # takes 0.2 s, of commands that need no impacts too
+
     first = span.first
     chosen = np.arange(first - min(STENCIL, span.gap), first + (span.gap < STENCIL))
     step = series.time[first] - series.time[first - 1]
@@ -197,6 +197,8 @@ def impulse_and_loss(
     The force is a monotone cubic (Fritsch and Carlson) through the samples in contact and zero at
     both ends; the journal's path is a cubic spline through them and two samples on either side.
     """
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
     inside = slice(span.first, span.last + 1)
     time, normal = series.time[inside], series.normal[inside]
     # an end nearer to a sample would have a slope of rounding alone

@@ -74,13 +74,13 @@ def shaking(run: xr.Dataset) -> Shaking:
     Raises NoSeriesError where the series hold no whole settled revolution, SignalError where they
     are too coarse for `ORDER`.
     """
-    from compressor.vibration import high_pass_orders, line_amplitudes, resampled
+    from compressor.vibration import high_pass_orders, line_amplitudes
 
     kept, revolutions = whole_revolutions(run)
     crank = kept["crank_angle"].values
     force = frame_forces(kept)["shaking_force"][:, 0]
-    a_turn = (crank.size - 1) // revolutions // 2 * 2
-    high = high_pass_orders(resampled(crank, force, a_turn), a_turn, ORDER)
+    even, a_turn = evenly(kept, revolutions, force)
+    high = high_pass_orders(even, a_turn, ORDER)
     angle = (np.degrees(crank[0]) + 360.0 * np.arange(a_turn) / a_turn) % 360.0
     mean_square = (high.reshape(-1, a_turn) ** 2).mean(axis=0)
     turns = directions_change(kept)
@@ -91,7 +91,7 @@ def shaking(run: xr.Dataset) -> Shaking:
     rings = lines.max() > SILENT * np.abs(force).max()
     return Shaking(
         revolutions,
-        order_lines(kept, force),
+        order_lines(even, a_turn),
         turns,
         angle,
         mean_square,
@@ -101,20 +101,30 @@ def shaking(run: xr.Dataset) -> Shaking:
     )
 
 
-def order_lines(kept: xr.Dataset, values: np.ndarray) -> Spectrum:
-    """The order spectrum of a signal, (m,), at the samples of `whole_revolutions`."""
-    from compressor.vibration import order_spectrum, rms_above
+def evenly(kept: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
+    """A signal of `whole_revolutions` at an even number of equal crank angles a turn, and this."""
+    from compressor.vibration import resampled
 
     crank = kept["crank_angle"].values
-    orders, amplitudes = order_spectrum(crank, values, turns=1)
-    fine, roots = order_spectrum(crank, values, rms=True)
-    return Spectrum(orders, amplitudes, rms_above(fine, roots, ORDER))
+    a_turn = (crank.size - 1) // revolutions // 2 * 2
+    return resampled(crank, values, a_turn)[: revolutions * a_turn], a_turn
+
+
+def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
+    """The order spectrum of a signal at a_turn equal crank angles a revolution, whole ones."""
+    from compressor.vibration import line_amplitudes, rms_above
+
+    amplitudes = line_amplitudes(even, a_turn, "rectangular", False)
+    roots = line_amplitudes(even, even.size, "rectangular", True)
+    fine = np.arange(roots.size) * (a_turn / even.size)
+    return Spectrum(np.arange(amplitudes.size), amplitudes, rms_above(fine, roots, ORDER))
 
 
 def deviation_spectrum(run: xr.Dataset) -> Spectrum:
     """The order spectrum of the crosshead's acceleration less the ideal machine's, m/s2."""
-    kept, _ = whole_revolutions(run)
-    return order_lines(kept, kept["acceleration"].values - ideal_motion(kept)[2])
+    kept, revolutions = whole_revolutions(run)
+    deviation = kept["acceleration"].values - ideal_motion(kept)[2]
+    return order_lines(*evenly(kept, revolutions, deviation))
 
 
 def directions_change(kept: xr.Dataset) -> tuple[float, ...]:

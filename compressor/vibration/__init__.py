@@ -11,5 +11,5 @@ from compressor.vibration.indicators import (
     kurtosis,
     rms,
 )
-from compressor.vibration.orders import order_spectrum, resampled, rms_above
+from compressor.vibration.orders import resampled, rms_above
 from compressor.vibration.spectra import line_amplitudes
