@@ -11,6 +11,7 @@ from conftest import store
 
 from compressor.analysis.frame_forces import frame_forces
 from compressor.analysis.plot_captions import PLOT_CAPTIONS
+from compressor.report.figures.job import draw_spectra
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 
@@ -131,6 +132,13 @@ def test_a_study_that_is_no_grid_says_what_else_varies(plot):
     code, found, _ = plot("listed", "--what", "waterfall")
     assert code == 0
     assert "Along with it vary machine.speed_rpm." in next(iter(found.values()))
+
+
+def test_rounding_is_not_drawn_as_a_spectrum(folder):
+    ideal, worn = (draw_spectra(job(folder, name), None).axes[1] for name in ("ideal", "worn"))
+    assert not ideal.lines
+    assert "ideal joints" in ideal.texts[0].get_text()
+    assert worn.lines[0].get_ydata().max() > 0.1
 
 
 def test_ideal_joints_have_no_contacts_to_draw(plot, folder):

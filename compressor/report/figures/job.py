@@ -29,7 +29,8 @@ MARK = Line(RED, (0, (4, 1.5)), 1.0, 2.2)
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MOST_ORDERS = 200  # that are drawn
 MOST_ENVELOPE = 60  # of an envelope
-DECADES = 5  # below the greatest line
+ROUNDING = 1e-6  # m/s2, of an acceleration
+DECADES = 4  # below the greatest line
 ORDERS_AXIS = "order (cycles per revolution)"
 
 
@@ -99,7 +100,7 @@ def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
     force.set_title("force on the frame along the cylinder")
     force.set_ylabel("amplitude of X (N)")
     force.set_xlabel(ORDERS_AXIS)
-    plot_lines(deviation, deviation_spectrum(run).lines, THIS)
+    plot_deviation(deviation, deviation_spectrum(run).lines)
     deviation.set_title("acceleration of the crosshead less that of ideal joints")
     deviation.set_ylabel("amplitude (m/s²)")
     deviation.set_xlabel(ORDERS_AXIS)
@@ -122,6 +123,16 @@ def plot_lines(panel: Axes, lines: tuple[np.ndarray, np.ndarray], line: Line) ->
     panel.set_xlim(0, orders[-1])
     if not panel.texts:
         mark_order(panel)
+
+
+def plot_deviation(panel: Axes, lines: tuple[np.ndarray, np.ndarray]) -> None:
+    """The spectrum of a deviation, m/s2; in words where it is rounding, as of ideal joints."""
+    if lines[1].max() > ROUNDING:
+        plot_lines(panel, lines, THIS)
+        return
+    panel.text(0.5, 0.5, "none: the motion is that of ideal joints", ha="center",
+               transform=panel.transAxes)  # fmt: skip
+    panel.set(yticks=[], xlim=(0, MOST_ORDERS))
 
 
 def mark_order(panel: Axes) -> None:

@@ -49,7 +49,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
     above = [one.spectrum.above if one else np.nan for one in found]
     beside.plot(above, np.arange(len(rows)), color=BLUE, marker="o", markersize=3.5)
     beside.set_xlabel(f"rms of X above\norder {ORDER} (N)")
-    beside.set_xlim(0, 1.08 * np.nanmax(above) or 1.0)
+    beside.set_xlim(0, max(1.0, 1.08 * np.nanmax(above)))
     return figure
 
 
