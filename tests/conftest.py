@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import hypothesis
@@ -171,3 +172,62 @@ def worn(once):
         store(folder / "results", *paths)
 
     return once("worn", fill) / "results"
+
+
+STRUCK = {"none": (), "big_end": (90,), "small_end": (330,), "both": (90, 330)}  # degrees
+WORN_JOBS = 240
+TURN = 0.12  # s
+
+
+def struck(joint, clearances, seed):
+    """A made-up record: a sine, noise, and a ringing as high as its clearance where a joint hits.
+
+    Times, values and pulses of four revolutions.
+    """
+    rng = np.random.default_rng(seed)
+    times = np.arange(round(4.05 * TURN * 8000)) / 8000
+    values = np.sin(2 * np.pi * times / TURN) + rng.normal(0, 0.05, times.size)
+    for degrees, clearance in zip(STRUCK[joint], clearances, strict=True):
+        since = (times - TURN * degrees / 360) % TURN
+        values += 40 * clearance * np.exp(-since / 0.004) * np.sin(2 * np.pi * 2000 * since)
+    return times, values, TURN * np.arange(5)
+
+
+def store_worn(folder):
+    """A study `worn` of made-up records, without simulating more than one of its cases."""
+    folder.mkdir()
+    rng = np.random.default_rng(9)
+    joints = [list(STRUCK)[number % len(STRUCK)] for number in range(WORN_JOBS)]
+    drawn = (0.05 * 10 ** rng.random((WORN_JOBS, 2))).round(5).tolist()
+    ends = {
+        side: [
+            c[k] if joint in (side, "both") else 0 for joint, c in zip(joints, drawn, strict=True)
+        ]
+        for k, side in enumerate(("big_end", "small_end"))
+    }
+    rods = rng.uniform(2, 8, WORN_JOBS).round(4).tolist()
+    together = ["joint", *(f"clearance_mm.{side}" for side in ends), "machine.rod_mass_kg"]
+    path = folder / "worn.yaml"
+    path.write_text(json.dumps({
+        "joint": joints, "clearance_mm": ends, "machine": {"rod_mass_kg": rods},
+        "zip": [together], "body": True, "sensor": True,
+        "solve": {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "error_bars": False},
+    }))  # fmt: skip
+    (study,) = load_studies(path)
+    write_study(folder, study, "compsim run")
+    case = study.cases[0]
+    plain = replace(case, body=None, sensor=None)
+    run, jobs = simulate(plain), []
+    for number, case in enumerate(study.cases):
+        sides = [getattr(case.clearance_mm, side) for side in ends]
+        times, values, tacho = struck(case.joint, [c for c in sides if c], number)
+        heard = {"sensor_time": ("sensor_time", times), "tacho_time": ("pulse", tacho),
+                 "sensor_acceleration": ("sensor_time", values)}  # fmt: skip
+        jobs.append(run.assign(heard).assign_attrs(case.attributes()))
+    keep(folder, *jobs)
+
+
+@pytest.fixture(scope="session")
+def worn_store(once):
+    """A results folder with the study `worn`, which `identify` can read."""
+    return once("struck", store_worn)

@@ -45,6 +45,8 @@ LIBRARIES = {  # library -> the modules that may import it
         "compressor.analysis.course",
         "compressor.analysis.impacts",
         "compressor.cases.swept",
+        "compressor.diagnosis.regression",
+        "compressor.diagnosis.strangeness",
         "compressor.solve.scipy_driver",
         "compressor.solve.statistics",
         "compressor.vibration",

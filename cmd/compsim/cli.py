@@ -22,6 +22,7 @@ from compsim import (
     dataset,
     explain,
     export,
+    identify,
     plan,
     plot,
     report,
@@ -71,6 +72,7 @@ for verb in (
     explain.explain,
     tradeoff.tradeoff,
     stress.stress,
+    identify.identify,
 ):
     cli.add_command(verb)
 

@@ -1,0 +1,98 @@
+"""`compsim identify`: what it prints of files and jobs, and what it refuses."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from compsim import cli
+from conftest import struck
+
+from compressor.store.reader import read_store
+
+
+@pytest.fixture(scope="module")
+def folder(worn_store, tmp_path_factory):
+    place = tmp_path_factory.mktemp("identify") / "worn"
+    shutil.copytree(worn_store, place)
+    return str(place)
+
+
+def written(path, times, values, tacho, wave=True):
+    """A record as CSV, with or without its tacho."""
+    turn = tacho[1] - tacho[0]
+    mark = (((times - tacho[0]) / turn + 0.5 / turn / 8000) % 1 < 0.1).astype(int)
+    header = "time_s,acceleration_m_per_s2" + ",tacho" * wave
+    columns = [times, values, mark][: 2 + wave]
+    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=header, comments="")
+    return str(path)
+
+
+@pytest.fixture
+def record(tmp_path):
+    times, values, tacho = struck("small_end", [0.2], 5001)
+    return written(tmp_path / "record.csv", times + 0.01, values, tacho + 0.01)
+
+
+def test_a_record_is_explained(record, folder, capsys):
+    assert cli.main(["identify", record, "--study", "worn", "-i", folder, "--quiet"]) == 0
+    first, head, best, *_, last = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"{record}: ")
+    assert "revolutions at 500 rpm, 8000 Hz" in first
+    assert head.split()[:3] == ["rank", "joint", "probability"]
+    rank, joint, chance, side, median, low, high = best.replace("[", " ").split()
+    assert (rank, joint, side) == ("1", "small_end", "small_end")
+    assert float(chance) > 0.8
+    assert float(low.strip(",")) < float(median) < float(high.strip("]"))
+    assert abs(float(median) - 0.2) < 0.06
+    assert last.split()[0] == "machine.rod_mass_kg"
+
+
+def test_as_json(record, folder, capsys):
+    assert cli.main(["identify", record, "--study", "worn", "-i", folder, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["jobs"], found["jobs_of_study"], found["fits"]) == (240, 240, True)
+    assert found["candidates"][0]["joint"] == "small_end"
+    assert set(found["candidates"][0]["clearances"]["small_end"]) == {"median", "low", "high"}
+
+
+def test_a_job_is_explained_by_the_others(folder, capsys):
+    key = sorted(read_store(folder).keys())[0]
+    assert cli.main(["identify", key[:12], "--study", "worn", "-i", folder]) == 0
+    assert "rests on 239 of 240 jobs of study worn" in capsys.readouterr().out
+
+
+def test_a_steady_speed_stands_in_for_a_tacho(tmp_path, folder, capsys):
+    path = written(tmp_path / "bare.csv", *struck("big_end", [0.3], 5002), wave=False)
+    steady = ["--rpm", "500", "--tdc", "0.24"]
+    assert cli.main(["identify", path, "--study", "worn", "-i", folder, *steady]) == 0
+    assert capsys.readouterr().out.splitlines()[2].split()[1] == "big_end"
+
+
+def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
+    times, values, tacho = struck("none", [], 5003)
+    values += 30 * np.sin(2 * np.pi * 300 * times)
+    path = written(tmp_path / "hum.csv", times, values, tacho)
+    assert cli.main(["identify", path, "--study", "worn", "-i", folder]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith("NOTHING IN THIS STUDY FITS: ")
+    assert lines[2].startswith("farthest from what other features foretell: ")
+    assert lines[3].startswith("what to do: check units, tacho")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["absent.csv", "--study", "worn"], 2, "absent.csv: cannot be read: No such file"),
+        (["RECORD"], 2, "Missing option '--study'"),
+        (["RECORD", "--study", "torn"], 5, "holds no study 'torn'"),
+        (["RECORD", "--study", "worn", "--rpm", "500"], 2, "--rpm and --tdc belong together"),
+        (["RECORD", "--study", "worn", "--rpm", "500", "--tdc", "0"], 2, "has a tacho column"),
+        (["abcdef", "--study", "worn"], 5, "no job's key begins with 'abcdef'"),
+        (["abcdef", "--study", "worn", "--rpm", "1", "--tdc", "0"], 2, "a stored job has a tacho"),
+    ],
+)
+def test_mistakes_are_named(arguments, code, told, record, folder, capsys):
+    arguments = [record if word == "RECORD" else word for word in arguments]
+    assert cli.main(["identify", *arguments, "-i", folder]) == code
+    assert told in capsys.readouterr().err
