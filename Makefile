@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic diagnosis stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic diagnosis identify stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -86,6 +86,9 @@ chaotic: install  ## compare chaotic motions' statistics by two integrators (a q
 diagnosis: install  ## train on 2,000 simulated machines, and test on some it never saw (half an hour)
 	$(CAMPAIGN)/measure_diagnosis.py tests/results/diagnosis.json
 
+identify: install  ## measure what is identified of other machines, and under another friction law (15 minutes)
+	$(CAMPAIGN)/measure_identify.py tests/results/identify.json
+
 stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
 	$(CAMPAIGN)/measure_stress.py tests/results/stress.json
 
@@ -95,7 +98,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: calibration accuracy claims tradeoff ladders chaotic diagnosis store-bench scale throughput sweep-bench peers pages  ## all of these (about an hour and a half)
+measurements: calibration accuracy claims tradeoff ladders chaotic diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about an hour and a half)
 
 pages: install  ## write the generated tables of the README pages
 	$(BIN)/python tests/page_tables.py

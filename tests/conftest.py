@@ -217,7 +217,7 @@ def store_worn(folder):
     write_study(folder, study, "compsim run")
     case = study.cases[0]
     plain = replace(case, body=None, sensor=None)
-    run, jobs = simulate(plain), []
+    run, jobs = simulate(plain)[["status", "reason", "crank_angle"]], []
     for number, case in enumerate(study.cases):
         sides = [getattr(case.clearance_mm, side) for side in ends]
         times, values, tacho = struck(case.joint, [c for c in sides if c], number)

@@ -509,6 +509,28 @@ def clearance_table():
     return markdown(["added noise, m/s²", *names], rows)
 
 
+def share_cell(found):
+    """A share with its 95 % interval."""
+    if not found["of"]:
+        return "–"
+    return f"{found['share']:.1%} [{found['low']:.0%}, {found['high']:.0%}]"
+
+
+def identify_table():
+    head = ["records of", "joint right", "where one is worn", "clearance in its 90 % interval",
+            "whatever joint is first", "upper / lower end", "false alarms", "missed",
+            "nothing fits", "where one is worn"]  # fmt: skip
+    names = ("right", "right_where_worn", "covered", "covered_all", "factor", "false_alarms",
+             "missed", "nothing_fits", "nothing_fits_where_worn")  # fmt: skip
+    rows = []
+    for model, row in kept("identify.json")["models"].items():
+        cells = [
+            f"{row[name][1]:.1f}" if name == "factor" else share_cell(row[name]) for name in names
+        ]
+        rows.append([model, *cells])
+    return markdown(head, rows)
+
+
 def unit(name, row):
     """A drawn parameter with its unit."""
     what = {"damping": "times the paper's", "rtol": "", "friction": "", "exponent": ""}
@@ -677,6 +699,7 @@ PAGES = {
         "mutants": mutants_table,
         "ladders": ladders_table,
         "limit": limit_table,
+        "identify": identify_table,
         "chaotic": chaotic_table,
         "chaotic-cases": chaotic_cases_table,
         "diagnosis": diagnosis_table,
