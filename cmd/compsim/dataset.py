@@ -2,7 +2,6 @@
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -54,18 +53,14 @@ def dataset(
     Writes windows.nc, features.parquet and README.md, a card of what was simulated and what is not
     in it, and replaces those of an earlier data set. The study needs a body and a sensor.
     """
-    from compressor.diagnosis import DataSetOptions, make_data_set, refuse_foreign, write_data_set
-    from compressor.store import make_folder
+    from compressor.diagnosis import DataSetOptions, build_data_set
 
-    refuse_foreign(output)
-    make_folder(Path(output))  # before the minutes that are lost if it cannot be made
     options = DataSetOptions(revolutions, hop, noise, test_share, seed, not no_signals)
     screen = Screen(quiet)
     try:
-        made = make_data_set(folder, study, options, screen)
+        made, written = build_data_set(folder, study, output, options, screen)
     finally:
         screen.end()
-    written = write_data_set(output, made)
     for line in told(made):
         click.echo(line)
     for name, count in written.files.items():

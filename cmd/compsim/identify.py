@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from compsim.screen import DONE, Screen, as_json, one_thread_each, plural, resul
 if TYPE_CHECKING:
     import numpy as np
 
-    from compressor.diagnosis import Answer, Candidate, Identifier
+    from compressor.diagnosis import Answer, Identifier
 
 
 @click.command()
@@ -44,17 +43,17 @@ def identify(
     Exit code 0 also where nothing fits: that is an answer.
     """
     one_thread_each()  # before numpy loads
-    from compressor.diagnosis import Identifier, open_library, vector
+    from compressor.diagnosis import SteadySpeed, explain_record, find_record
 
-    key, found = read(record, folder, rpm, tdc)
-    row = vector(found)
+    if (rpm is None) != (tdc is None):
+        raise click.UsageError("--rpm and --tdc belong together")
+    steady = None if rpm is None or tdc is None else SteadySpeed(rpm, tdc)
+    key, found = find_record(record, folder, steady)
     screen = Screen(quiet)
     try:
-        library = open_library(folder, study, screen)
+        fitted, answer = explain_record(found, folder, study, key, screen)
     finally:
         screen.end()
-    fitted = Identifier.fit(library.without(key))
-    answer = fitted.identify(row)
     if as_json:
         click.echo(json.dumps(plain(record, fitted, answer), indent=1))
         return DONE
@@ -65,21 +64,6 @@ def identify(
     for line in (*verdict(answer), *ranking(answer), *grounds(fitted, answer, folder)):
         click.echo(line)
     return DONE
-
-
-def read(record: str, folder: str, rpm: float | None, tdc: float | None) -> "tuple[str, Any]":
-    """A record, and the key of its job; "" of a file."""
-    from compressor.diagnosis import SteadySpeed, read_record, stored_record
-
-    if (rpm is None) != (tdc is None):
-        raise click.UsageError("--rpm and --tdc belong together")
-    is_key = len(record) <= 20 and all(letter in "0123456789abcdef" for letter in record)
-    if is_key and not os.path.exists(record):
-        if rpm is not None:
-            raise click.UsageError("a stored job has a tacho: leave --rpm and --tdc out")
-        return stored_record(folder, record)
-    steady = None if rpm is None or tdc is None else SteadySpeed(rpm, tdc)
-    return "", read_record(record, steady)
 
 
 def verdict(answer: "Answer") -> Iterator[str]:
@@ -99,14 +83,14 @@ def ranking(answer: "Answer") -> Iterator[str]:
     """The table of joints."""
     yield f"{'rank':<5} {'joint':<10} {'probability':>11}  clearance, mm: median [90 % interval]"
     for rank, one in enumerate(answer.candidates, 1):
-        yield f"{rank:<5} {one.joint:<10} {one.probability:>11.3f}  {ends(one)}".rstrip()
+        yield f"{rank:<5} {one.joint:<10} {one.probability:>11.3f}  {ends(one.clearances)}".rstrip()
 
 
-def ends(one: "Candidate") -> str:
-    """The clearances of a candidate."""
+def ends(clearances: dict[str, Any]) -> str:
+    """Clearances with their intervals, by end."""
     return "; ".join(
         f"{side} {found.median:.3f} [{found.low:.3f}, {found.high:.3f}]"
-        for side, found in one.clearances.items()
+        for side, found in clearances.items()
     )
 
 

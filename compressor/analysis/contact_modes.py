@@ -31,7 +31,7 @@ def contact_modes(run: xr.Dataset) -> xr.Dataset:
     Integers with their meanings in `flag_values` and `flag_meanings`; `time` has the crank angle
     (rad) as a coordinate. Raises ValueError for a run without time series or clearance.
     """
-    joints = joints_with_clearance(run)
+    joints = [*joints_with_clearance(run)]
     columns = [modes_of(run, joint) for joint in joints]
     one = contact_series(run, joints[0])
     attrs = {

@@ -43,15 +43,15 @@ class Span:
     after_flight: bool
 
 
-def joints_with_clearance(run: xr.Dataset) -> tuple[str, ...]:
-    """The joints of a run that have clearance.
+def joints_with_clearance(run: xr.Dataset) -> dict[str, float]:
+    """The joints of a run that have clearance, with it, m.
 
     Raises ValueError where the run has no time series or no joint has clearance.
     """
     if "penetration" not in run or "time" not in run.dims:
         raise ValueError("the run has no time series (output.keep: series)")
     clearances = record_of(run)["clearance"]
-    found = tuple(joint for joint, c in zip(JOINTS, clearances, strict=True) if c > 0)
+    found = {joint: float(c) for joint, c in zip(JOINTS, clearances, strict=True) if c > 0}
     if not found:
         raise ValueError("no joint of the run has clearance")
     return found

@@ -35,7 +35,7 @@ def orbit(run: xr.Dataset) -> xr.Dataset:
     that `laps` is sure where `least_ratio` is not small. Raises ValueError for a run without time
     series or clearance.
     """
-    joints = joints_with_clearance(run)
+    joints = [*joints_with_clearance(run)]
     kept = settled(run)
     found = [orbit_of(contact_series(kept, joint)) for joint in joints]
     one = contact_series(kept, joints[0])

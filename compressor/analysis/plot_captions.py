@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis.contact_modes import MODES, contact_modes, mode_shares
-from compressor.analysis.contacts import clearance_of, joints_with_clearance
+from compressor.analysis.contacts import joints_with_clearance
 from compressor.analysis.frame_forces import frame_forces, last_revolution, whole_revolutions
 from compressor.analysis.impacts import impacts
 from compressor.analysis.orbit import orbit
@@ -83,7 +83,7 @@ def orbits(run: xr.Dataset, twin: Twin) -> str:
         one = found.sel(joint=joint)
         off = 100.0 * float(one["off_wall_share"])
         leaves = f"is off its wall for {off:.2g} % of the time" if off else "never leaves its wall"
-        size = 1e3 * clearance_of(run, joint)
+        size = 1e3 * joints_with_clearance(run)[joint]
         sentences.append(
             f"At the {SPOKEN[joint]}, clearance {size:.3g} mm, the journal {leaves} and sinks in "
             f"by up to {depth:.0f} µm; it goes round {float(one['laps']):+.2f} times a revolution, "

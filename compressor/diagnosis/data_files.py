@@ -12,9 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compressor.diagnosis.data_card import data_card
-from compressor.diagnosis.data_set import LABELS, WORDS, DataSetError
+from compressor.diagnosis.data_set import (
+    LABELS,
+    WORDS,
+    DataSetError,
+    DataSetOptions,
+    Progress,
+    make_data_set,
+)
 from compressor.program import PROGRAM
-from compressor.store import Folder, publish, write_dataset
+from compressor.store import Folder, make_folder, publish, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +39,19 @@ class Written:
 
     files: dict[str, int]
     remark: str
+
+
+def build_data_set(
+    results: Folder, study: str, folder: Folder, options: DataSetOptions, progress: Progress
+) -> tuple["xr.Dataset", Written]:
+    """Make the data set of a stored study in a folder, that is made where it is missing.
+
+    Raises StoreError and DataSetError, what can be told beforehand before records are read.
+    """
+    refuse_foreign(folder)
+    make_folder(Path(folder))
+    dataset = make_data_set(results, study, options, progress)
+    return dataset, write_data_set(folder, dataset)
 
 
 def write_data_set(folder: Folder, dataset: "xr.Dataset") -> Written:

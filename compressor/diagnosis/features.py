@@ -12,15 +12,12 @@ import numpy as np
 
 from compressor.program import CompsimError
 from compressor.vibration import (
-    band_envelope,
-    crest_factor,
     energy_angle,
-    gini,
+    envelope_spectrum,
     high_pass_orders,
-    kurtosis,
     line_amplitudes,
     resampled,
-    rms,
+    shape,
 )
 
 SWING = 12.0  # order up to which a machine without clearance shakes
@@ -98,8 +95,9 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     speed = whole / (tacho[-1] - tacho[0])
     a_turn = SECTORS * math.ceil(rate / speed / SECTORS)
     even = resampled(2.0 * math.pi * turns[inside], values[inside], a_turn)[: whole * a_turn]
-    found = {"level": math.log10(rms(even)), "speed": math.log10(speed)}
-    found |= {"crest_factor": crest_factor(even), "kurtosis": kurtosis(even), "gini": gini(even)}
+    size, *shapes = shape(even)
+    found = {"level": math.log10(size), "speed": math.log10(speed)}
+    found |= dict(zip(("crest_factor", "kurtosis", "gini"), shapes, strict=True))
     high = high_pass_orders(even, a_turn, SWING)
     each = high.reshape(-1, a_turn)
     energy = float(np.mean(high**2))
@@ -159,10 +157,8 @@ def envelope(even: np.ndarray, a_turn: int, speed: float) -> dict[str, float]:
     low, high = (min(edge / speed, top) for edge in ENVELOPE)
     if not low < high:
         return {f"envelope_{beat}": math.nan for beat in BEATS}
-    found = band_envelope(even, float(a_turn), (low, high))
-    block = found.size
-    lines = line_amplitudes(found, block, "rectangular", False)
-    revolutions = block // a_turn
+    _, lines = envelope_spectrum(even, float(a_turn), (low, high))
+    revolutions = even.size // a_turn
     return {f"envelope_{beat}": lines[beat * revolutions] / lines[0] for beat in BEATS}
 
 

@@ -7,16 +7,28 @@ those of `approximate`. Nothing fits where the record is stranger than all but f
 own jobs, by `strangeness`.
 """
 
+import os
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from compressor.diagnosis.approximate import Interval, Posterior
-from compressor.diagnosis.features import FEATURES
-from compressor.diagnosis.library import SIDES, Library
+from compressor.diagnosis.features import FEATURES, RecordError
+from compressor.diagnosis.library import (
+    SIDES,
+    Library,
+    Progress,
+    open_library,
+    stored_record,
+    vector,
+)
+from compressor.diagnosis.record_file import SteadySpeed, read_record
 from compressor.diagnosis.regression import KernelRidge, Logistic
 from compressor.diagnosis.strangeness import Distance, Strangeness
 from compressor.program import CompsimError
+from compressor.store import Folder
+from compressor.vibration import Record
 
 FEWEST_JOBS = 30  # of one joint, for it to be told
 FEWEST_IN_ALL = 200  # jobs: with fewer, no record can lie as far off as LIMIT asks
@@ -145,3 +157,28 @@ def _ends(joint: str, equal: bool) -> list[int]:
 
 def _sides(joint: str) -> list[str]:
     return [SIDES[k] for k in SHARES[joint]]
+
+
+def find_record(name: str, folder: Folder, steady: SteadySpeed | None) -> tuple[str, Record]:
+    """A record by the name of its CSV file, or by the beginning of a stored job's key.
+
+    With the job's key, "" of a file; steady: of a file without tacho. Raises RecordError and
+    StoreError, RecordError also where a job is given a speed.
+    """
+    if not re.fullmatch("[0-9a-f]{1,20}", name) or os.path.exists(name):
+        return "", read_record(name, steady)
+    if steady is not None:
+        raise RecordError("a stored job has a tacho: leave --rpm and --tdc out")
+    return stored_record(folder, name)
+
+
+def explain_record(
+    record: Record, folder: Folder, study: str, key: str, progress: Progress
+) -> tuple[Identifier, Answer]:
+    """What a stored study tells of a record, and the identifier that does; key: a job left out.
+
+    Raises RecordError, StoreError, and StudyError where the study cannot tell.
+    """
+    row = vector(record)
+    fitted = Identifier.fit(open_library(folder, study, progress).without(key))
+    return fitted, fitted.identify(row)

@@ -123,7 +123,7 @@ def job_figures(
     try:
         worn = joints_with_clearance(run)
     except ValueError:
-        worn = ()
+        worn = {}
     for name in (one for one in wanted if one in OF_CONTACT and choice.what and not worn):
         raise PlotError(f"job {key} has ideal joints, so that there is no figure {name!r} of it")
     twin = healthy_twin(run) if worn else None

@@ -2,14 +2,11 @@
 
 from compressor.vibration.accelerometer import Record, analogue_rate, listen
 from compressor.vibration.body import Forces, body_motion
-from compressor.vibration.envelope import band_envelope, envelope_spectrum, kurtogram
+from compressor.vibration.envelope import envelope_spectrum, kurtogram
 from compressor.vibration.indicators import (
-    crest_factor,
     energy_angle,
-    gini,
     high_pass_orders,
-    kurtosis,
-    rms,
+    shape,
 )
 from compressor.vibration.orders import resampled, rms_above
 from compressor.vibration.spectra import line_amplitudes

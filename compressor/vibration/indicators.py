@@ -5,11 +5,26 @@ about the mean. Where a number is not defined, as of silence, it is nan.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import irfft, rfft
 
 from compressor.vibration.checks import SignalError, checked_signal, whole_revolutions
+
+
+class Shape(NamedTuple):
+    """How large a vibration is, in its unit, and how impulsive, by the functions of these names."""
+
+    rms: float
+    crest_factor: float
+    kurtosis: float
+    gini: float
+
+
+def shape(values: np.ndarray) -> Shape:
+    """The `Shape` of samples at equal intervals, (m,). Raises SignalError as its functions do."""
+    return Shape(rms(values), crest_factor(values), kurtosis(values), gini(values))
 
 
 def rms(values: np.ndarray) -> float:

@@ -13,6 +13,7 @@ from compressor.vibration.indicators import (
     high_pass_orders,
     kurtosis,
     rms,
+    shape,
 )
 
 M = 720
@@ -132,3 +133,10 @@ def test_high_pass_counts_lines_exactly():
 def test_bad_input_is_told_with_a_remedy(call, told):
     with pytest.raises(SignalError, match=told):
         call()
+
+
+def test_a_shape_has_all_four_numbers():
+    values = np.array([3.0, -1.0, 2.0, 0.5])
+    expected = (rms(values), crest_factor(values), kurtosis(values), gini(values))
+    assert shape(values) == expected
+    assert shape(values)._fields == ("rms", "crest_factor", "kurtosis", "gini")

@@ -14,7 +14,6 @@ from compressor.analysis import (
     MODES,
     SPOKEN,
     angle_modes,
-    clearance_of,
     impacts,
     joints_with_clearance,
     last_revolution,
@@ -58,7 +57,7 @@ def plot_orbit(panel: Axes, run: xr.Dataset, joint: str) -> None:
     """One orbit, to scale, in its clearance circle; marks stand at every quarter of the crank."""
     degrees, kept = last_revolution(run)
     place = kept["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
-    clearance = clearance_of(run, joint) * MICROMETRE
+    clearance = joints_with_clearance(run)[joint] * MICROMETRE
     panel.add_patch(Circle((0, 0), clearance, fill=False, linewidth=1.0, color=BLACK))
     panel.plot(*place.T, **PATH.properties())
     for angle, (_, shape) in CORNERS.items():
