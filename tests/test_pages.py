@@ -33,7 +33,7 @@ PAGES = {
     )
 }  # fmt: skip
 TEXT = "\n".join(PAGES.values())
-QUICK = ["--set", "solve.duration_rev=0.25", "--set", "solve.settle_rev=0"]
+QUICK = ["--set", "solve.duration_rev=1", "--set", "solve.settle_rev=0"]
 
 
 def blocks(language):
@@ -121,8 +121,8 @@ def write_case_files(place):
 def test_case_files_have_the_jobs_that_they_say(tmp_path):
     jobs = write_case_files(tmp_path)
     assert [*jobs] == [
-        "bearing-wear.yaml", "grid.yaml", "zipped.yaml", "random.yaml", "latin.yaml",
-        "sampled.yaml", "bounded.yaml", "blocks.yaml",
+        "bearing-wear.yaml", "machines.yaml", "grid.yaml", "zipped.yaml", "random.yaml",
+        "latin.yaml", "sampled.yaml", "bounded.yaml", "blocks.yaml",
     ]  # fmt: skip
     for name, count in jobs.items():
         (study,) = load_studies(tmp_path / name)

@@ -138,6 +138,8 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
         bar = unit * found.numbers.get(f"rod_load_reversal_{name}_error", math.nan)
         if math.isnan(value):
             return []
+        if math.isinf(bar):
+            return [f"{'rod load':<28} its reversal is not known well enough to be judged"]
         bar = 0.0 if math.isnan(bar) else bar
         told.append(by_bar(value, bar) if bar else f"{value:.4g}")
         clear = value - least

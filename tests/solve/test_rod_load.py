@@ -2,10 +2,12 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from compsim import cli
+from compsim.show import reversal_verdict
 from conftest import store
 
 from compressor.cases.case import Case
@@ -69,6 +71,20 @@ def test_a_run_without_signals_or_with_a_stop_has_none():
     for numbers in (plain, measure(Case.from_values(stopped)).numbers):
         assert math.isnan(numbers["rod_load_reversal_angle"])
         assert math.isnan(numbers["rod_load_reversal_share_error"])
+
+
+def test_a_reversal_that_is_not_known_is_not_judged():
+    found = SimpleNamespace(numbers={
+        f"rod_load_reversal_{name}{end}": value
+        for name in ("angle", "share") for end, value in (("", 1.0), ("_error", math.inf))
+    })  # fmt: skip
+    (line,) = reversal_verdict(found, 15.0, 3.0)
+    assert line.endswith("its reversal is not known well enough to be judged")
+    near = {"rod_load_reversal_angle": math.radians(15.2), "rod_load_reversal_share": 0.2,
+            "rod_load_reversal_angle_error": math.radians(0.5),
+            "rod_load_reversal_share_error": 0.01}  # fmt: skip
+    (line,) = reversal_verdict(SimpleNamespace(numbers=near), 15.0, 3.0)
+    assert "cannot be told apart from API 618's 15 degrees and 3 %" in line
 
 
 def test_show_judges_the_reversal(tmp_path, capsys, monkeypatch):
