@@ -32,6 +32,7 @@ from compressor.vibration import Record
 SERIES = ("sensor_time", "sensor_acceleration", "tacho_time")
 SIDES = ("big_end", "small_end")
 
+TOLD = ("joint", "clearance_mm")  # keys of what is asked for; all others are cautions
 Progress = Callable[[int, int, str], None]  # jobs read, jobs in all, a remark or ""
 
 
@@ -162,8 +163,7 @@ def _made(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.D
 def _swept(study: StoredStudy, keys: np.ndarray) -> dict[str, np.ndarray]:
     """Values of the swept keys other than joint and clearance, by key, (n,) each."""
     own: dict[str, dict[str, Any]] = dict(zip(study.keys, points(study), strict=True))
-    names = [axis.key for axis in study.axes]
-    others = [n for n in names if n != "joint" and n.partition(".")[0] != "clearance_mm"]
+    others = [axis.key for axis in study.axes if axis.key.partition(".")[0] not in TOLD]
     return {name: np.array([own[key].get(name) for key in keys.tolist()]) for name in others}
 
 
