@@ -105,14 +105,20 @@ def claims_table():
         row for row in measured["masses"]
         if (row["rod_mass_kg"], row["reciprocating_mass_kg"]) == (4.7, 14.0)
     )  # fmt: skip
-    lines = ["| claim | at the default masses | over the mass sets |", "|---|---|---|"]
-    for claim, held in zip(measured["claims"], default["held"], strict=True):
-        verdict = "held" if held else "not held"
-        lines.append(
-            f"| {claim['claim']}. {claim['statement']} | {verdict} "
-            f"| {claim['held']} of {claim['of']} |"
-        )
-    return "\n".join(lines) + "\n"
+    head = ["claim", "at the default masses", "margin there", "over the mass sets", "least margin",
+            "greatest"]  # fmt: skip
+    rows = []
+    for claim, held, margin in zip(
+        measured["claims"], default["held"], default["margins"], strict=True
+    ):
+        each = [row["margins"][claim["claim"] - 1][0] for row in measured["masses"]]
+        value, error = margin
+        rows.append([
+            f"{claim['claim']}. {claim['statement']}", "held" if held else "not held",
+            f"{100 * value:+.3g} % ± {100 * error:.2g} %", f"{claim['held']} of {claim['of']}",
+            *(f"{100 * one:+.3g} %" for one in (min(each), max(each))),
+        ])  # fmt: skip
+    return markdown(head, rows)
 
 
 def store_table():

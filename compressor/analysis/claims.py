@@ -5,12 +5,23 @@ masses are our assumption, so a claim that fails is a result.
 """
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
 
+from compressor.analysis.margins import (
+    Margin,
+    Measure,
+    above,
+    at_least,
+    at_most,
+    least,
+    metric,
+    series_error,
+)
 from compressor.analysis.paper_cases import (
     CLEARANCES,
     FAULT_LABELS,
@@ -20,6 +31,7 @@ from compressor.analysis.paper_cases import (
     label,
 )
 from compressor.analysis.runs import (
+    ACTIVE,
     active_share,
     case_of,
     force_relation,
@@ -27,7 +39,7 @@ from compressor.analysis.runs import (
     load_corners,
     settled,
 )
-from compressor.metrics import JOINTS
+from compressor.metrics import AXES, JOINTS
 
 Runs = Mapping[str, xr.Dataset]
 
@@ -42,9 +54,12 @@ class Claim:
     held: bool | None
     measured: list[tuple[str, str]] = field(default_factory=list)
     note: str = ""
+    margin: Margin | None = None
 
 
-Verdict = tuple[bool, list[tuple[str, str]]]
+# how far each measure is from its threshold, and what is shown: a claim holds where no margin is
+# negative
+Verdict = tuple[list[Margin], list[tuple[str, str]]]
 
 
 @dataclass(frozen=True)
@@ -63,23 +78,25 @@ def claims(runs: Runs) -> list[Claim]:
     found = []
     for number, rule in enumerate(RULES, 1):
         missing = [name for name in rule.needs if name not in runs]
+        said = (number, rule.statement, rule.threshold)
         if missing:
-            verdict: tuple[bool | None, list] = (None, [("missing", ", ".join(missing))])
-        else:
-            verdict = rule.judge(runs)
-        found.append(Claim(number, rule.statement, rule.threshold, *verdict, rule.note))
+            found.append(Claim(*said, None, [("missing", ", ".join(missing))], rule.note))
+            continue
+        margins, rows = rule.judge(runs)
+        margin = least(margins)
+        found.append(Claim(*said, margin.value >= 0.0, rows, rule.note, margin))
     return found
 
 
 def same_motion(runs: Runs) -> Verdict:
     """Claim 1: both ideal machines move alike."""
-    rows, held = [], True
+    rows, margins = [], []
     for name in ("displacement", "velocity", "acceleration"):
         one, other = runs["design"][name].values, runs["typical"][name].values
         apart = float(np.abs(one - other).max() / np.abs(other).max())
-        held = held and apart <= 1e-12
+        margins.append(at_most(Measure(apart), 1e-12))
         rows.append((name, f"{apart:.1e}"))
-    return held, rows
+    return margins, rows
 
 
 def design_force(runs: Runs) -> Verdict:
@@ -92,59 +109,66 @@ def design_force(runs: Runs) -> Verdict:
         (f"corners, {load}", ", ".join(f"{angle:.2f}°" for angle in angles))
         for load, angles in corners.items()
     ]
-    return bool(peaks["design"] >= 1.01 * peaks["typical"] and apart.min() >= 1.0), rows
+    ratio = Measure(peaks["design"] / peaks["typical"])
+    return [at_least(ratio, 1.01), at_least(Measure(float(apart.min())), 1.0)], rows
 
 
 def acceleration_alone(runs: Runs) -> Verdict:
     """Claim 3: displacement and velocity hardly change with clearance, acceleration does."""
-    rows, held = [], True
+    rows, margins = [], []
     for name in FAULT_LABELS:
         kept = settled(runs[name])
         changes = []
         for series, ideal in zip(
             ("displacement", "velocity", "acceleration"), ideal_motion(kept), strict=True
         ):
-            spread = np.std(ideal)
-            changes.append(float(np.sqrt(np.mean((kept[series].values - ideal) ** 2)) / spread))
-        held = held and changes[0] <= 0.01 and changes[1] <= 0.05 and changes[2] >= 0.10
-        rows.append((name, "x {:.2%}, v {:.2%}, a {:.1%}".format(*changes)))
-    return held, rows
+            values, spread = kept[series].values, np.std(ideal)
+            away = float(np.sqrt(np.mean((values - ideal) ** 2)) / spread)
+            changes.append(Measure(away, series_error(kept, series, values) / float(spread)))
+        margins += [at_most(changes[0], 0.01), at_most(changes[1], 0.05)]
+        margins.append(at_least(changes[2], 0.10))
+        said = "x {:.2%}, v {:.2%}, a {:.1%}".format(*(change.value for change in changes))
+        rows.append((name, said))
+    return margins, rows
 
 
 def growing_peaks(runs: Runs) -> Verdict:
     """Claim 4: peaks of acceleration and contact force grow with clearance."""
-    rows, held = [], True
+    rows, margins = [], []
     for fault in FAULTS:
         line = [runs[label(fault, c)] for c in CLEARANCES]
-        peaks = {"a, m/s²": [float(run["peak_acceleration"]) for run in line]}
+        peaks = {"a, m/s²": [metric(run, "peak_acceleration") for run in line]}
         for joint in faulty_joints(fault):
-            forces = [float(run["peak_contact_force"].sel(joint=joint)) for run in line]
+            forces = [metric(run, "peak_contact_force", joint=joint) for run in line]
             peaks[f"F {SPOKEN[joint]}, N"] = forces
         for what, values in peaks.items():
-            grows = all(b >= 1.01 * a for a, b in itertools.pairwise(values))
-            held = held and grows
-            rows.append((f"{SPOKEN[fault]}, {what}", " → ".join(f"{v:.0f}" for v in values)))
-    return held, rows
+            margins += [at_least(b.over(a), 1.01) for a, b in itertools.pairwise(values)]
+            said = " → ".join(f"{one.value:.0f}" for one in values)
+            rows.append((f"{SPOKEN[fault]}, {what}", said))
+    return margins, rows
 
 
 def horizontal_force(runs: Runs) -> Verdict:
     """Claim 5: the horizontal contact force far exceeds the vertical one."""
-    rows, held = [], True
+    rows, margins = [], []
     for fault in FAULTS:
         for joint in faulty_joints(fault):
             ratios = []
             for c in CLEARANCES:
-                peak = runs[label(fault, c)]["peak_contact_force_axis"].sel(joint=joint)
-                ratios.append(float(peak.sel(axis="x") / peak.sel(axis="y")))
-            held = held and min(ratios) >= 3.0
+                across, up = (
+                    metric(runs[label(fault, c)], "peak_contact_force_axis", joint=joint, axis=axis)
+                    for axis in AXES
+                )
+                ratios.append(across.over(up))
+            margins += [at_least(ratio, 3.0) for ratio in ratios]
             where = SPOKEN[fault] if fault != "both" else f"both, {SPOKEN[joint]}"
-            rows.append((where, ", ".join(f"{ratio:.1f}" for ratio in ratios)))
-    return held, rows
+            rows.append((where, ", ".join(f"{ratio.value:.1f}" for ratio in ratios)))
+    return margins, rows
 
 
 def proportional_force(runs: Runs) -> Verdict:
     """Claim 6: acceleration is proportional to the horizontal contact force."""
-    rows, held = [], True
+    rows, margins = [], []
     for name in FAULT_LABELS:
         fault = name.split()[0]
         machine = case_of(runs[name]).machine
@@ -154,21 +178,35 @@ def proportional_force(runs: Runs) -> Verdict:
         }
         for joint in faulty_joints(fault):
             relation = force_relation(runs[name], joint)
-            held = held and relation.r2 >= 0.9
+            margins.append(at_least(Measure(relation.r2, r2_error(runs[name], joint)), 0.9))
             slope = abs(relation.slope)
             beside = ", ".join(f"{slope / mass - 1:+.0%} of {m}" for m, mass in masses.items())
             rows.append(
                 (f"{name}, {SPOKEN[joint]}", f"r² {relation.r2:.3f}, {slope:.2f} kg ({beside})")
             )
-    return held, rows
+    return margins, rows
+
+
+def r2_error(run: xr.Dataset, joint: str) -> float:
+    """How much r² may change by the errors of acceleration and force.
+
+    A correlation changes by at most the sum of the errors' shares of the standard deviations.
+    """
+    kept = settled(run)
+    a, force = kept["acceleration"].values, kept["contact_force"].sel(joint=joint).values
+    away = series_error(run, "acceleration", a) / float(np.std(a))
+    away += series_error(run, "contact_force", force, joint=joint) / float(np.std(force[:, 0]))
+    return 2.0 * away
 
 
 def continuity(runs: Runs) -> Verdict:
     """Claim 7: nearly continuous impacts at the big end, intermittent ones at the small end."""
-    rows, held = [], True
+    rows, margins = [], []
     for c in CLEARANCES:
-        big, small = (active_share(runs[label(fault, c)]) for fault in ("big_end", "small_end"))
-        held = held and big >= 0.5 and small < 0.5 and big >= 1.5 * small
+        shares = [active(runs[label(fault, c)]) for fault in ("big_end", "small_end")]
+        margins += [at_least(shares[0], 0.5), at_most(shares[1], 0.5)]
+        margins.append(at_least(shares[0].over(shares[1]), 1.5))
+        big, small = (share.value for share in shares)
         impacts, releases = (
             [float(runs[label(joint, c)][name].sel(joint=joint)) for joint in JOINTS]
             for name in ("impact_count", "release_count")
@@ -181,20 +219,30 @@ def continuity(runs: Runs) -> Verdict:
                 f"releases {releases[0]:.0f} and {releases[1]:.0f}",
             )
         )
-    return held, rows
+    return margins, rows
+
+
+def active(run: xr.Dataset) -> Measure:
+    """The active share; its error is what it changes where the level moves by the rms error."""
+    kept = settled(run)
+    error = series_error(run, "acceleration", kept["acceleration"].values)
+    moved = error / float(np.abs(ideal_motion(kept)[2]).max())
+    if math.isnan(moved):
+        return Measure(active_share(run), math.nan)
+    shares = [active_share(run, level=max(ACTIVE + part, 0.0)) for part in (-moved, 0.0, moved)]
+    return Measure(shares[1], max(abs(share - shares[1]) for share in shares))
 
 
 def two_are_worse(runs: Runs) -> Verdict:
     """Claim 8: two clearances are worse than one of the same size."""
-    rows, held = [], True
+    rows, margins = [], []
     for c in CLEARANCES:
         for name, unit in (("peak_acceleration", "peak"), ("rms_acceleration_deviation", "rms")):
-            big, small, both = (float(runs[label(fault, c)][name]) for fault in FAULTS)
-            held = held and both > max(big, small)
-            rows.append(
-                (f"{c:g} mm, {unit}", f"big {big:.0f}, small {small:.0f}, both {both:.0f} m/s²")
-            )
-    return held, rows
+            big, small, both = (metric(runs[label(fault, c)], name) for fault in FAULTS)
+            margins += [above(both.over(one), 1.0) for one in (big, small)]
+            said = f"big {big.value:.0f}, small {small.value:.0f}, both {both.value:.0f} m/s²"
+            rows.append((f"{c:g} mm, {unit}", said))
+    return margins, rows
 
 
 RULES = (

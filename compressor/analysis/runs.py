@@ -10,6 +10,8 @@ from compressor.cases import Case
 from compressor.physics import exact_motion, sample_segments, segments
 from compressor.solve import record
 
+ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibrate
+
 
 def settled(run: xr.Dataset) -> xr.Dataset:
     """The samples from `settle_rev` on: start-up is not the machine."""
@@ -73,7 +75,7 @@ def _record(text: str) -> np.record:
     return record(_case(text))
 
 
-def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = 0.1) -> float:
+def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = ACTIVE) -> float:
     """Share of the settled time in which the machine vibrates.
 
     It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation

@@ -154,8 +154,12 @@ def test_every_case_has_a_row(full, paper_runs):
 def test_every_claim_has_a_verdict(full):
     rows = [cells for _, cells in read(full).rows if cells[0].startswith("(")]
     assert [cells[0][1] for cells in rows] == list("12345678")
-    assert {cells[1] for cells in rows} <= {"held", "not held"}
-    assert rows[0][1] == "held"
+    verdicts = [
+        re.fullmatch(r"(held|not held)margin ([+-]\S+) % \(± \S+ %(?:, undecided)?\)", c[1])
+        for c in rows
+    ]
+    assert all((found[1] == "held") == (float(found[2]) > 0) for found in verdicts)
+    assert verdicts[0][1] == "held"
     assert "by construction" in rows[0][0]
     assert all(cells[2] and cells[3] for cells in rows)
 
