@@ -1,0 +1,89 @@
+"""How continuously joints hit: on series that are known, and on the paper's cases."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from compressor.analysis.continuity import (
+    Continuity,
+    compared,
+    continuity,
+    hit_share,
+    more_continuous,
+)
+from compressor.analysis.frame_forces import whole_revolutions
+from compressor.cases.case import Case
+from compressor.solve.simulate import simulate
+
+
+def table(*rows):
+    """A table of impacts: joint, revolution, crank angle, approach speed."""
+    names = ("joint", "revolution", "crank_angle", "approach_speed")
+    columns = zip(names, zip(*rows, strict=True), strict=True)
+    return xr.Dataset({name: ("impact", list(column)) for name, column in columns})
+
+
+def test_windows_that_are_hit_are_counted_once():
+    found = table(
+        ("big_end", 1, 41.0, 0.3), ("big_end", 1, 49.9, 0.2), ("big_end", 1, 50.1, 0.2),
+        ("big_end", 2, 41.0, 0.3), ("big_end", 2, 200.0, 0.009), ("small_end", 1, 7.0, 0.5),
+    )  # fmt: skip
+    assert hit_share(found, "big_end", 2) == pytest.approx(3 / 72)
+    assert hit_share(found, "small_end", 2) == pytest.approx(1 / 72)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5])
+def test_the_energy_s_angle_is_that_of_a_ringing(paper_runs, share):
+    """Of cos^2 over its half turn pi, 90 % lies within x of it, where x + sin x = 0.9 pi."""
+    run = paper_runs["big_end 0.2"].copy(deep=True)
+    angle = np.degrees(run["crank_angle"].values) % 360
+    ringing = 100 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
+    run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = ringing
+    found = continuity(run, "big_end")
+    assert found.energy_angle == pytest.approx(share * 1.8734 / np.pi, rel=0.03)
+    quiet = continuity(paper_runs["big_end 0.2"], "big_end")
+    assert (quiet.apart, quiet.hit) == (0.0, 0.0)
+
+
+def test_a_short_ringing_is_less_continuous_than_a_long_one(paper_runs):
+    found = []
+    for share in (0.1, 0.3, 0.9):
+        run = paper_runs["big_end 0.2"].copy(deep=True)
+        angle = np.degrees(run["crank_angle"].values) % 360
+        ringing = np.cos(np.radians(60 * angle)) * (angle < 360 * share)
+        run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = ringing
+        found.append(continuity(run, "big_end"))
+    assert [one.gini for one in found] == sorted((one.gini for one in found), reverse=True)
+    assert [one.energy_angle for one in found] == sorted(one.energy_angle for one in found)
+
+
+def test_flight_and_impacts_of_a_machine_that_rattles():
+    loose = {"joint": "big_end", "clearance_mm": 0.3, "machine": {"speed_rpm": 1200}}
+    loose |= {"contact": {"damping_N_s_per_mm": 1}}
+    solve = {"accuracy": "draft", "error_bars": False}
+    run = simulate(Case.from_values({**loose, "solve": solve}))
+    found, whole = continuity(run, "big_end"), continuity(run, "big_end", start_up=True)
+    lost = float(run["contact_loss_fraction"].sel(joint="big_end"))
+    assert lost < found.apart < 0.5
+    revolutions = whole_revolutions(run)[1]
+    most = float(run["impact_count"].sel(joint="big_end")) / (36 * revolutions)
+    assert 0.5 * most < found.hit <= most * (1 + 1e-12)
+    assert whole.apart > found.apart
+
+
+def test_more_continuous_asks_for_all_three():
+    big, small = Continuity(0.2, 0.3, 0.5, 0.4), Continuity(0.1, 0.2, 0.4, 0.6)
+    assert more_continuous(big, small)
+    for name in ("apart", "hit", "energy_angle"):
+        even = Continuity(**{**vars(small), name: getattr(big, name)})
+        assert not more_continuous(big, even), name
+    assert compared(big, small).startswith("flight and impact 20.0% and 10.0% of the angle; 10°")
+
+
+def test_the_paper_s_default_machine_is_not_more_continuous_at_the_big_end(paper_runs):
+    """Nothing flies, and the small end rings over more of the angle at 0.1 mm."""
+    big, small = (
+        continuity(paper_runs[f"{joint} 0.1"], joint) for joint in ("big_end", "small_end")
+    )
+    assert not more_continuous(big, small)
+    assert big.energy_angle < small.energy_angle
