@@ -40,13 +40,15 @@ PACKAGES = (
 )  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
-    # its designs, its integrators, its Student's t, its splines and root finder, its spectra
+    # designs, integrators, Student's t, splines, root finder and minimiser, spectra
     "scipy": {
         "compressor.analysis.course",
         "compressor.analysis.impacts",
         "compressor.cases.swept",
         "compressor.diagnosis.regression",
         "compressor.diagnosis.strangeness",
+        "compressor.measure.find",
+        "compressor.measure.question",
         "compressor.solve.scipy_driver",
         "compressor.solve.statistics",
         "compressor.vibration",

@@ -22,6 +22,7 @@ from compsim import (
     dataset,
     explain,
     export,
+    find,
     identify,
     plan,
     plot,
@@ -73,6 +74,7 @@ for verb in (
     tradeoff.tradeoff,
     stress.stress,
     identify.identify,
+    find.find,
 ):
     cli.add_command(verb)
 

@@ -10,7 +10,7 @@ import click
 from compsim.screen import DONE, SOME_FAILED, caution, limit, plural, say, setting
 
 if TYPE_CHECKING:
-    from compressor.measure import Advice, Explanation
+    from compressor.measure import Explanation
     from compressor.solve import JointScales
 
 INDENT = 12  # columns of a heading
@@ -89,8 +89,8 @@ def lines(told: "Explanation") -> Iterator[str]:
         yield heading("cost", f"unknown: the job failed, {told.reason}: {told.detail}")
         return
     yield from cost_lines(told)
-    for number, advice in enumerate(told.advice):
-        yield heading("" if number else "without", advised(advice, told))
+    for number in range(len(told.advice)):
+        yield heading("" if number else "without", advised(told, number))
 
 
 def scale_lines(joint: "JointScales") -> Iterator[str]:
@@ -125,8 +125,9 @@ def cost_lines(told: "Explanation") -> Iterator[str]:
                       "if all cost the same")  # fmt: skip
 
 
-def advised(advice: "Advice", told: "Explanation") -> str:
-    """What leaving a feature out does, and whether it is worth while."""
+def advised(told: "Explanation", number: int) -> str:
+    """What leaving a feature out does, and whether it is worth while: of one of the advice."""
+    advice = told.advice[number]
     effect = advice.effect
     if effect.reason:
         return f"{advice.name}: the run failed, {effect.reason}"

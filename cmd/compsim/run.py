@@ -4,7 +4,6 @@ import contextlib
 import os
 import shlex
 from collections import Counter
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -27,7 +26,7 @@ from compsim.screen import (
 )
 
 if TYPE_CHECKING:
-    from compressor.sweep import Backend, Failure, Summary
+    from compressor.sweep import Backend, Summary
 
 MOST_FAILURES = 20  # listed one by one
 
@@ -148,13 +147,14 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
         else:
             again = f", {summary.done_before} were stored before" if summary.done_before else ""
             say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
-    report_failures(summary.failed)
+    report_failures(summary)
     if not quiet:
         say(f"next: compsim report -i {shlex.quote(folder)}")
 
 
-def report_failures(failures: Sequence["Failure"]) -> None:
+def report_failures(summary: "Summary") -> None:
     """List failed jobs, and what to do about each kind of failure."""
+    failures = summary.failed
     if not failures:
         return
     from compressor.cases import printable

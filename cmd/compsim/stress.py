@@ -44,7 +44,7 @@ def stress(
     if scene is not None:
         click.echo("\n".join(repeated(scene, seed)))
         return DONE
-    from compressor.measure import FILE, campaign
+    from compressor.measure import campaign
     from compressor.report import draw_outcomes, render
     from compressor.store import make_folder, publish
 
@@ -59,8 +59,8 @@ def stress(
         publish(Path(output, f"stress.{kind}"), render(drawing, kind))
     click.echo("\n".join(summary(study)))
     if not quiet:
-        for name in (FILE, "stress.png"):
-            say(os.path.join(output, name))
+        say(study.encoding["source"])
+        say(os.path.join(output, "stress.png"))
     verdicts = study["verdict"].values.tolist()
     doubtful = verdicts.count("silent_wrong") or verdicts.count("unjudged") > 0.02 * scenes
     return SOME_FAILED if doubtful else DONE

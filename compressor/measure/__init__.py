@@ -1,6 +1,8 @@
 """The trade of speed for accuracy, and the extremes."""
 
-from compressor.measure.explain import Advice, Explanation, explain
+from compressor.measure.explain import Explanation, explain
 from compressor.measure.features import SERIES, trade
-from compressor.measure.stress import FILE, campaign, counts, repeat, slowest, worst
+from compressor.measure.find import Answer, find
+from compressor.measure.question import Question
+from compressor.measure.stress import campaign, counts, repeat, slowest, worst
 from compressor.measure.work_precision import default_cases, fastest, faulty, work_precision

@@ -143,7 +143,9 @@ def campaign(
         running.close()
         if rows:
             write_dataset(path, dataset(rows.values(), seed, budget))
-    return dataset([rows[number] for number in range(count)], seed, budget)
+    found = dataset([rows[number] for number in range(count)], seed, budget)
+    found.encoding["source"] = str(path)  # as xarray names a file that it has read
+    return found
 
 
 def ended(end: Done | Lost) -> Row:

@@ -3,6 +3,6 @@
 from compressor.sweep.cluster import Cluster
 from compressor.sweep.execution import cores
 from compressor.sweep.plan import forecast
-from compressor.sweep.sweep import Backend, Failure, Options, Progress, Summary, run_here, sweep
+from compressor.sweep.sweep import Backend, Options, Progress, Summary, run_here, sweep
 from compressor.sweep.warm_up import Needs
 from compressor.sweep.worker import Done, Lost

@@ -429,7 +429,8 @@ def test_explain_of_an_effect_that_failed():
     from compsim.explain import advised, without_nan
 
     effect = types.SimpleNamespace(reason="non_finite")
-    assert advised(types.SimpleNamespace(name="load", effect=effect), None).endswith("non_finite")
+    told = types.SimpleNamespace(advice=[types.SimpleNamespace(name="load", effect=effect)])
+    assert advised(told, 0).endswith("non_finite")
     assert without_nan({"a": [float("nan"), 1.0]}) == {"a": [None, 1.0]}
 
 

@@ -1,0 +1,246 @@
+"""A question about one case over one of its keys: where a metric first passes a value, or peaks.
+
+What a case file, a range and a metric must be to make a question, and what a finished job says to
+it: a number with its error bar, or why it says nothing.
+"""
+
+import math
+import operator
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from compressor.cases import Study, load_studies, row_of
+from compressor.metrics import AXES, JOINTS, METRICS, NUMBERS, ROD_LOAD
+from compressor.program import CompsimError
+
+SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
+COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^\s<>=]+)\s*")
+OVER = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*")
+WORDS = {"joint": JOINTS, "axis": AXES}
+SURE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
+MOST_BATCHES = 30  # of revolutions, whose means a standard error is taken of
+DIGITS = 12  # of an argument: enough for any tolerance, and short to read
+NAME = 64  # characters that a study's name may have
+
+
+class QuestionError(CompsimError, ValueError):
+    """A question that cannot be asked."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a job says: value and bar in the metric's SI unit; `reason`: why it says nothing.
+
+    averaged: value is a mean over revolutions, and bar half of its 95 % interval, since the motion
+    is chaotic. barred: whether an error bar was made; bar is 0 without.
+    """
+
+    value: float = math.nan
+    bar: float = math.inf
+    reason: str = ""
+    averaged: bool = False
+    barred: bool = True
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A metric's number, by its name and its place, such as peak_contact_force.small_end.
+
+    sign, limit: of a comparison, limit in the metric's SI unit; sign is "greatest" or "least" where
+    an extremum is asked for.
+    """
+
+    metric: str
+    place: tuple[str, ...]
+    sign: str
+    limit: float = math.nan
+
+    @property
+    def name(self) -> str:
+        return ".".join((self.metric, *self.place))
+
+    @property
+    def unit(self) -> str:
+        """The SI unit, "" for a share or a count."""
+        return "" if NUMBERS[self.metric][1] == "1" else NUMBERS[self.metric][1]
+
+    def holds(self, told: Reading) -> bool | None:
+        """Whether the comparison holds; None where the error bar does not let that be told."""
+        compare = SIGNS[self.sign]
+        ends = {bool(compare(told.value + side, self.limit)) for side in (-told.bar, told.bar)}
+        return ends.pop() if not told.reason and len(ends) == 1 else None
+
+    def read(self, numbers: np.void, regime: str) -> Reading:
+        """What the numbers (dtype ROW) of a job that is ok say, moving in a regime.
+
+        A single peak of a chaotic motion has no meaning: the mean over revolutions of each one's
+        counts, with the 95 % interval that its standard error and Student's t give. The bars of
+        other metrics of a chaotic motion are such intervals already.
+        """
+        metric = (METRICS | ROD_LOAD)[self.metric]
+        averaged = regime == "chaotic" and metric.kind == "greatest"
+        if averaged:
+            mean = f"{self.metric}_mean"
+            revolutions = max(1, int(numbers["revolutions"]))
+            batches = revolutions // math.ceil(revolutions / MOST_BATCHES)
+            student = float(stdtrit(max(batches - 1, 1), SURE))
+            value = self._at(numbers, mean)
+            bar = student * self._at(numbers, f"{mean}_standard_error")
+        else:
+            value = self._at(numbers, self.metric)
+            bar = self._at(numbers, f"{self.metric}_error")
+        if math.isnan(value):
+            return Reading(reason=f"the job has no {self.metric}")
+        if math.isinf(bar):
+            few = " and has too few revolutions" if regime == "chaotic" else ""
+            reason = f"its error is not known, as the motion is {regime or 'of unknown kind'}{few}"
+            return Reading(value, reason=reason, averaged=averaged)
+        if math.isnan(bar):
+            return Reading(value, 0.0, averaged=averaged, barred=False)
+        return Reading(value, bar, averaged=averaged)
+
+    def _at(self, numbers: np.void, name: str) -> float:
+        dims = (METRICS | ROD_LOAD)[self.metric].dims
+        place = tuple(WORDS[dim].index(word) for dim, word in zip(dims, self.place, strict=True))
+        return float(np.asarray(numbers[name])[place])
+
+
+def comparison(text: str) -> Goal:
+    """The goal of a comparison such as `peak_acceleration > 600`. Raises QuestionError."""
+    parts = COMPARISON.fullmatch(text)
+    limit = _number(parts[3]) if parts else math.nan
+    if parts is None or math.isnan(limit):
+        raise QuestionError(f"{text!r} is no comparison: write METRIC[.JOINT], one of "
+                            f"{' '.join(SIGNS)}, and a number in SI, such as "
+                            "'contact_loss_fraction.small_end > 0.001'")  # fmt: skip
+    return goal_of(parts[1], parts[2], limit)
+
+
+def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:
+    """The goal of a metric's name, METRIC or METRIC.JOINT. Raises QuestionError."""
+    known = METRICS | ROD_LOAD
+    metric, *place = text.strip().split(".")
+    if metric not in known:
+        near = get_close_matches(metric, known, n=3)
+        hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}"
+        raise QuestionError(f"unknown metric {metric!r}; {hint}")
+    dims = known[metric].dims
+    good = len(place) == len(dims) and all(w in WORDS[d] for w, d in zip(place, dims, strict=True))
+    if not good:
+        words = "".join(f".{'|'.join(WORDS[dim])}" for dim in dims)
+        raise QuestionError(f"{text!r}: write {metric}{words}")
+    return Goal(metric, tuple(place), sign, limit)
+
+
+@dataclass(frozen=True)
+class Question:
+    """Where between low and high of a case file's key (in its unit there) a goal is met.
+
+    logarithmic: evenly in the logarithm of the key; tolerance: of the answer, relative to the
+    range, in the logarithm where that is even; scan: points that are looked at first; overrides:
+    `key=value` of other keys.
+    """
+
+    path: str
+    key: str
+    low: float
+    high: float
+    goal: Goal
+    logarithmic: bool = False
+    tolerance: float = 1e-3
+    scan: int = 9
+    overrides: tuple[str, ...] = ()
+
+    @classmethod
+    def written(
+        cls, path: str, over: str, goal: str, which: str = "first", **more: Any
+    ) -> "Question":
+        """The question of texts: over KEY=LOW:HIGH, a comparison or, of greatest | least, a metric.
+
+        more: other fields. Raises QuestionError.
+        """
+        parts = OVER.fullmatch(over)
+        ends = [_number(text) for text in parts.groups()[1:]] if parts else [math.nan]
+        if parts is None or any(map(math.isnan, ends)):
+            raise QuestionError(f"{over!r} is no range: write KEY=LOW:HIGH, such as "
+                                "clearance_mm=0.01:0.3")  # fmt: skip
+        asked = comparison(goal) if which == "first" else goal_of(goal, which)
+        return cls(path, parts[1], ends[0], ends[1], asked, **more)
+
+    @property
+    def shares(self) -> list[float]:
+        """Where on the range to look first: 0 to 1, evenly."""
+        return [number / (self.scan - 1) for number in range(self.scan)]
+
+    def argument(self, share: float) -> float:
+        """The key's value at a share of the range."""
+        if share in (0.0, 1.0):
+            return self.high if share else self.low
+        if self.logarithmic:
+            value = self.low * (self.high / self.low) ** share
+        else:
+            value = self.low + share * (self.high - self.low)
+        return float(f"{value:.{DIGITS}g}")
+
+    def checked(self) -> Study:
+        """The study of the first look, after a check that the file makes one case a value.
+
+        Raises QuestionError, and CaseFileError with what is wrong in the file.
+        """
+        if not self.low < self.high:
+            raise QuestionError(f"{self.key}={self.low:g}:{self.high:g} is no range: "
+                                "write the lower end first")  # fmt: skip
+        if self.logarithmic and self.low <= 0.0:
+            raise QuestionError(f"a range even in the logarithm needs ends above 0: {self.low:g}")
+        row = row_of(self.key)
+        if row is not None and row.kind != "number":
+            raise QuestionError(f"{self.key} cannot be searched over: it is no continuous number")
+        ends = []
+        for value in (self.low, self.high):
+            texts = [*self.overrides, f"{self.key}={value!r}"]
+            (study,) = load_studies(self.path, overrides=texts)
+            ends.append(study)
+        if row is None:
+            raise QuestionError(f"{self.key} is no single number")
+        if ends[0].jobs > 1:
+            axes = ", ".join(axis.key for axis in ends[0].axes)
+            raise QuestionError(f"{self.path} makes {ends[0].jobs} jobs for one {self.key}, it "
+                                f"sweeps {axes}: choose one case by --set")  # fmt: skip
+        if ends[0].keys == ends[1].keys:
+            raise QuestionError(f"{self.key} changes nothing in the case of {self.path}")
+        return self.study([self.argument(share) for share in self.shares])
+
+    def settings(self, values: Sequence[float]) -> list[str]:
+        """The overrides that make the study of some values of the key; the caller sorts them."""
+        listed = ", ".join(map(repr, values))
+        return [*self.overrides, f"name={self._name()}", f"{self.key}=[{listed}]"]
+
+    def study(self, values: Sequence[float]) -> Study:
+        """The study of some values of the key, its one axis."""
+        (found,) = load_studies(self.path, overrides=self.settings(values))
+        return found
+
+    def _name(self) -> str:
+        (study,) = load_studies(
+            self.path,
+            overrides=[*self.overrides, f"{self.key}={self.low!r}"],
+        )
+        end = f"-find-{self.key}"
+        return study.name[: NAME - len(end)] + end
+
+
+def _number(text: str) -> float:
+    """A finite number, or nan."""
+    try:
+        value = float(text)
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan

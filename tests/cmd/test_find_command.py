@@ -1,0 +1,172 @@
+"""`compsim find`: a real search, confirmed by direct runs on both sides, and what it refuses."""
+
+import contextlib
+import io
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from compsim import cli
+
+from compressor.cases.load import load_cases, load_studies
+from compressor.solve.simulate import simulate
+from compressor.store.reader import finished_keys
+from compressor.store.studies import read_studies
+
+LIMIT = 0.006
+ASKED = [
+    "find", "worn.yaml", "--over", "clearance_mm=0.002:0.2", "--log", "--scan", "5",
+    "--tolerance", "0.04", "--first", f"contact_loss_fraction.small_end > {LIMIT}", "-j", "2",
+]  # fmt: skip
+CASE = {
+    "joint": "small_end",
+    "clearance_mm": 0.1,
+    "contact": {"damping_N_s_per_mm": 20},
+    "solve": {"duration_rev": 1, "settle_rev": 0.25, "accuracy": "draft"},
+}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """A folder with a case file, its store after one search, and the answer as JSON."""
+    place = tmp_path_factory.mktemp("find")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
+        Path("worn.yaml").write_text(json.dumps(CASE))
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            assert cli.main([*ASKED, "--json", "--quiet"]) == 0
+    return place, json.loads(out.getvalue())
+
+
+@pytest.fixture
+def folder(found, tmp_path, monkeypatch):
+    shutil.copytree(found[0], tmp_path / "copy")
+    monkeypatch.chdir(tmp_path / "copy")
+
+
+def direct(clearance, accuracy):
+    """A run of the case alone, outside of any store."""
+    text = CASE | {"clearance_mm": clearance, "solve": CASE["solve"] | {"accuracy": accuracy}}
+    Path("direct.yaml").write_text(json.dumps(text))
+    (case,) = load_cases("direct.yaml")
+    return float(simulate(case).contact_loss_fraction.sel(joint="small_end"))
+
+
+@pytest.mark.parametrize("accuracy", ["draft", "standard"])
+def test_direct_runs_on_both_sides_confirm_the_interval(accuracy, found, folder):
+    answer = found[1]
+    assert answer["kind"] == "found"
+    low, high = answer["low"], answer["high"]
+    assert 1.0 < high["argument"] / low["argument"] <= 100**0.04 * (1 + 1e-6)
+    assert direct(low["argument"], accuracy) <= LIMIT < direct(high["argument"], accuracy)
+    for end in (low, high):
+        difference = abs(direct(end["argument"], accuracy) - end["told"]["value"])
+        assert difference <= end["told"]["bar"] * (1 if accuracy == "standard" else 1e-6)
+
+
+def test_a_second_search_computes_nothing(found, folder, capsys):
+    keys = finished_keys("results")
+    assert found[1]["run_now"] == len(found[1]["points"]) == len(keys)
+    assert cli.main([*ASKED, "--quiet"]) == 0
+    out, err = capsys.readouterr()
+    low, high = (f"{found[1][end]['argument']:.9g}" for end in ("low", "high"))
+    first, no, yes, finer, last = out.splitlines()
+    assert first == (f"contact_loss_fraction.small_end > {LIMIT} first holds between "
+                     f"clearance_mm = {low} and {high}")  # fmt: skip
+    assert re.match(rf"  clearance_mm = {low}: no, 0\.0\d+ ± [\d.]+  job [0-9a-f]{{8}}$", no)
+    assert re.match(rf"  clearance_mm = {high}: yes, 0\.0\d+ ± [\d.]+  job [0-9a-f]{{8}}$", yes)
+    assert finer == "what is finer than the scan, 5 points a factor 3.162 apart, may be missed"
+    assert (
+        last == f"{len(keys)} jobs, 0 of them run now, in study worn-find-clearance_mm of results"
+    )
+    assert finished_keys("results") == keys
+    assert err == ""
+
+
+def test_the_store_is_one_study_that_status_and_run_understand(found, folder, capsys):
+    (study,) = read_studies("results")
+    points = found[1]["points"]
+    assert study.axes[0].values == tuple(point["argument"] for point in points)
+    assert study.keys == tuple(point["key"] for point in points)
+    assert cli.main(["status"]) == 0
+    assert f"{len(points)} ok" in capsys.readouterr().out
+    assert cli.main(["verify"]) == 0
+    again = study.again
+    (same,) = load_studies(again.case_file, overrides=again.overrides)
+    assert same.keys == study.keys
+
+
+def test_another_question_keeps_the_points_of_this_case(found, folder, capsys):
+    ask = ["find", "worn.yaml", "--over", "clearance_mm=0.002:0.2", "--log", "--scan", "5",
+           "--tolerance", "0.4", "--greatest", "peak_acceleration", "--quiet"]  # fmt: skip
+    assert cli.main(ask) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("peak_acceleration is greatest at clearance_mm = 0.2: ")
+    (study,) = read_studies("results")
+    assert {*study.axes[0].values} > {point["argument"] for point in found[1]["points"]}
+    # a changed case has none of these points
+    Path("worn.yaml").write_text(json.dumps(CASE | {"load": "none"}))
+    few = [
+        "--over",
+        "clearance_mm=0.01:0.02",
+        "--scan",
+        "3",
+        "--first",
+        "impact_count.small_end > 1e9",
+    ]
+    assert cli.main(["find", "worn.yaml", *few, "--quiet"]) == 0
+    assert "holds at none of 3 points" in capsys.readouterr().out
+    (study,) = read_studies("results")
+    assert study.axes[0].values == (0.01, 0.015, 0.02)
+
+
+def test_failed_jobs_are_no_answer(folder, capsys):
+    ask = ["find", "worn.yaml", "--over", "clearance_mm=0.01:0.02", "--scan", "3", "--quiet",
+           "--first", "peak_acceleration > 1", "--set", "solve.max_steps=5"]  # fmt: skip
+    assert cli.main(ask) == 3
+    out = capsys.readouterr().out
+    assert "surely holds at none of 3 points" in out
+    assert out.count("the job failed, budget_steps: more than 5 steps") == 3
+
+
+OVER = ["--over", "clearance_mm=0.01:0.3"]
+FIRST = ["--first", "peak_acceleration > 1"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([*OVER, "--first", "peak_accelleration > 1"], "did you mean peak_acceleration"),
+        ([*OVER, "--greatest", "contact_loss_fraction"], "big_end|small_end"),
+        ([*OVER, "--first", "peak_acceleration"], "is no comparison: write METRIC[.JOINT]"),
+        ([*OVER], "give one of --first, --greatest and --least"),
+        ([*OVER, *FIRST, "--least", "peak_acceleration"], "give one of"),
+        (["--over", "clearance_mm=0.3:0.1", *FIRST], "write the lower end first"),
+        (["--over", "clearance_mm", *FIRST], "write KEY=LOW:HIGH"),
+        (["--over", "clearance_mm=0:0.3", "--log", *FIRST], "needs ends above 0"),
+        (["--over", "clearence_mm=0.1:0.3", *FIRST], "unknown key; did you mean clearance_mm?"),
+        (["--over", "load=1:2", *FIRST], "load cannot be searched over"),
+        (["--over", "solve.max_steps=10:20", *FIRST], "solve.max_steps cannot be searched over"),
+        (["--over", "machine.speed_rpm=-5:20", *FIRST], "-5 is outside (0, 100000] rpm"),
+        (["--over", "solve.timeout_s=10:20", *FIRST], "solve.timeout_s changes nothing"),
+        ([*OVER, *FIRST, "--set", "load=[none, design]"], "makes 2 jobs for one clearance_mm"),
+        ([*OVER, *FIRST, "--set", "joint=knee"], "--set joint=knee: joint: 'knee' is none of"),
+    ],
+)  # fmt: skip
+def test_bad_questions(arguments, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("worn.yaml").write_text(json.dumps(CASE))
+    assert cli.main(["find", "worn.yaml", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert told in err
+    assert out == ""
+    assert not Path("results").exists()
+
+
+def test_mistakes_of_the_file_keep_their_place(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("worn.yaml").write_text("joint: small_end\nlod: none\n")
+    assert cli.main(["find", "worn.yaml", *OVER, *FIRST]) == 2
+    assert "worn.yaml:2:1: lod: unknown key; did you mean load?" in capsys.readouterr().err
