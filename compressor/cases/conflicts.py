@@ -69,6 +69,8 @@ def _body_conflicts(case: Settings) -> Iterator[Problem]:
         return
     if body.start == "rest" and sensor.length_rev is not None:
         yield Problem("sensor.length_rev", "repeats a steady motion: set body.start: steady")
+    if body.start == "rest" and sensor.speed_jitter:
+        yield Problem("sensor.speed_jitter", "paces a steady motion: set body.start: steady")
     if sensor.low_pass_Hz is not None and sensor.low_pass_Hz >= sensor.rate_Hz / 2:
         yield Problem("sensor.low_pass_Hz", "must be less than half of rate_Hz")
 

@@ -4,7 +4,6 @@ import hashlib
 import inspect
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import xarray as xr
 
 from compressor.cases import Case, points
 from compressor.diagnosis import features as table
+from compressor.diagnosis.data_set import Progress
 from compressor.diagnosis.features import FEATURES, RecordError, features
 from compressor.store import (
     Folder,
@@ -33,7 +33,6 @@ SERIES = ("sensor_time", "sensor_acceleration", "tacho_time")
 SIDES = ("big_end", "small_end")
 
 TOLD = ("joint", "clearance_mm")  # keys of what is asked for; all others are cautions
-Progress = Callable[[int, int, str], None]  # jobs read, jobs in all, a remark or ""
 
 
 @dataclass(frozen=True)

@@ -128,6 +128,17 @@ def test_a_sensor_hears_the_fault():
     assert levels[1] > 5 * levels[0]
 
 
+def test_a_sensor_hears_a_body_from_rest_over_the_whole_run():
+    """Its record ends with that of the steady body, once the body's start is forgotten."""
+    stiff = {"frequency_x_Hz": 200, "frequency_y_Hz": 200, "damping_ratio": 0.3}
+    sensor = {"noise_m_per_s2": 0}
+    rest = run(body={**stiff, "start": "rest"}, sensor=sensor)["sensor_acceleration"].values
+    steady = run(body=stiff, sensor=sensor)["sensor_acceleration"].values
+    assert rest.size == 2 * steady.size
+    apart = rest[steady.size :] - steady
+    assert np.linalg.norm(apart) < 0.05 * np.linalg.norm(steady)
+
+
 def test_a_run_that_stops_has_a_body_of_nan():
     found = run(body=True, sensor=True, solve={**TURN, "max_steps": 50})
     assert np.isnan(found["body_displacement"].values).all()
@@ -168,6 +179,7 @@ def test_a_study_of_bodies_opens(tmp_path, monkeypatch):
         ({"body": True, "solve": {"duration_rev": 2.5}}, "whole settled revolutions"),
         ({"body": True, "solve": {"settle_rev": "auto"}}, "whole settled revolutions"),
         ({"body": {"start": "rest"}, "sensor": {"length_rev": 3}}, "repeats a steady motion"),
+        ({"body": {"start": "rest"}, "sensor": {"speed_jitter": 0.01}}, "paces a steady motion"),
         ({"body": True, "sensor": {"low_pass_Hz": 20000}}, "less than half of rate_Hz"),
         ({"body": {"mass_kg": -1}}, r"body.mass_kg: -1 is outside"),
     ],
