@@ -44,6 +44,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "scipy": {
         "compressor.analysis.course",
         "compressor.analysis.impacts",
+        "compressor.analysis.margins",
         "compressor.cases.swept",
         "compressor.diagnosis.regression",
         "compressor.diagnosis.strangeness",

@@ -1,6 +1,9 @@
-"""How continuously a joint hits: measures of the literature, beside the paper's words."""
+"""How continuously a joint hits: measures of the literature for the paper's words."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -8,6 +11,7 @@ import xarray as xr
 from compressor.analysis.contact_modes import FOLLOWING, contact_modes
 from compressor.analysis.frame_forces import whole_revolutions
 from compressor.analysis.impacts import impacts
+from compressor.analysis.margins import Measure, by_revolution, is_chaotic, series_error
 from compressor.analysis.shaking import ORDER, evenly
 
 WINDOW = 10.0  # degrees of crank angle that count as hit by one impact or more
@@ -32,26 +36,112 @@ class Continuity:
     gini: float
 
 
+class Shares(NamedTuple):
+    """The shares of crank angle of a `Continuity`, each with its error."""
+
+    apart: Measure
+    hit: Measure
+    energy_angle: Measure
+
+
+class Evidence(NamedTuple):
+    """What is looked at: whole revolutions of a run, a joint's impacts, its force above `ORDER`."""
+
+    kept: xr.Dataset
+    revolutions: int
+    table: xr.Dataset
+    high: np.ndarray  # (m,), N, along the cylinder
+
+
+def evidence(run: xr.Dataset, joint: str) -> Evidence:
+    """The `Evidence` of a joint. Raises as `continuity`."""
+    from compressor.vibration import high_pass_orders
+
+    kept, count = whole_revolutions(run)
+    force = kept["contact_force"].sel(joint=joint, axis="x").values
+    return Evidence(
+        kept, count, impacts(kept), high_pass_orders(*evenly(kept, count, force), ORDER)
+    )
+
+
 def continuity(run: xr.Dataset, joint: str, start_up: bool = False) -> Continuity:
     """The `Continuity` of a joint with clearance, over settled whole revolutions of a run.
 
     `start_up`: over whole revolutions from the run's begin. Raises NoSeriesError where there is
     none, ValueError where the joint has no clearance.
     """
-    from compressor.vibration import energy_angle, high_pass_orders, shape
+    return told_by(evidence(run.assign_attrs(settle=0.0) if start_up else run, joint), joint)
 
-    run = run.assign_attrs(settle=0.0) if start_up else run
-    kept, revolutions = whole_revolutions(run)
-    force = kept["contact_force"].sel(joint=joint, axis="x").values
-    even, a_turn = evenly(kept, revolutions, force)
-    high = high_pass_orders(even, a_turn, ORDER)
-    modes = contact_modes(kept)["mode"].sel(joint=joint).values[:-1]
+
+def told_by(found: Evidence, joint: str) -> Continuity:
+    """The `Continuity` of a joint by its evidence."""
+    from compressor.vibration import energy_angle, shape
+
+    modes = contact_modes(found.kept)["mode"].sel(joint=joint).values[:-1]
     return Continuity(
         float((modes != FOLLOWING).mean()),
-        hit_share(impacts(kept), joint, revolutions),
-        energy_angle(high, ENERGY),
-        shape(high).gini,
+        hit_share(found.table, joint, found.revolutions),
+        energy_angle(found.high, ENERGY),
+        shape(found.high).gini,
     )
+
+
+def measured_shares(run: xr.Dataset, joint: str) -> Shares:
+    """The settled shares of a joint with clearance; errors as far as the run's error bars tell.
+
+    Of `apart`, the error bar of the share of time without contact, and two samples for each impact;
+    of `hit`, a window for each impact that is within the velocity's error of `SLOWEST`, or within a
+    sample of a window's edge; of `energy_angle`, what it changes where the energy changes as much
+    as the force's error allows. Of a chaotic run the scatter of its revolutions. Raises as
+    `continuity`.
+    """
+    by = evidence(run, joint)
+    found = told_by(by, joint)
+    if is_chaotic(run):
+
+        def share(name: str) -> Callable[[xr.Dataset], float]:
+            return lambda turn: getattr(continuity(turn, joint), name)
+
+        errors = [by_revolution(by.kept, share(name)) for name in Shares._fields]
+    else:
+        errors = [apart_error(by, joint), hit_error(by, joint), angle_error(by, joint)]
+    values = (getattr(found, name) for name in Shares._fields)
+    return Shares(*(Measure(*pair) for pair in zip(values, errors, strict=True)))
+
+
+def apart_error(by: Evidence, joint: str) -> float:
+    """The error of the share of crank angle in flight or impact."""
+    count = int((by.table["joint"].values == joint).sum())
+    told = float(by.kept["contact_loss_fraction_error"].sel(joint=joint))
+    return told + 2.0 * count / (by.kept.sizes["time"] - 1)
+
+
+def hit_error(by: Evidence, joint: str) -> float:
+    """The error of the share of windows that are hit."""
+    mine = by.table["joint"].values == joint
+    speed, angle = (by.table[name].values[mine] for name in ("approach_speed", "crank_angle"))
+    doubt = series_error(by.kept, "velocity", by.kept["velocity"].values)
+    if math.isnan(doubt):
+        return math.nan
+    sample = math.degrees(float(by.kept["crank_angle"][1] - by.kept["crank_angle"][0]))
+    unsure = np.abs(angle - WINDOW * np.round(angle / WINDOW)) < sample
+    unsure = (unsure & (speed > SLOWEST - doubt)) | (np.abs(speed - SLOWEST) < doubt)
+    return float(unsure.sum()) * WINDOW / (360.0 * by.revolutions)
+
+
+def angle_error(by: Evidence, joint: str) -> float:
+    """The error of the share of crank angle that holds `ENERGY` of the energy."""
+    from compressor.vibration import energy_angle
+
+    force = by.kept["contact_force"].sel(joint=joint).values
+    error = series_error(by.kept, "contact_force", force, joint=joint)
+    size = math.sqrt(float(np.mean(by.high**2)))
+    if math.isnan(error) or not size:
+        return error
+    away = min(2.0 * error / size, 0.5 * ENERGY)
+    shares = (ENERGY - away, ENERGY, min(ENERGY + away, 1.0))
+    low, found, high = (energy_angle(by.high, share) for share in shares)
+    return max(high - found, found - low)
 
 
 def compared(big: Continuity, small: Continuity) -> str:
@@ -62,11 +152,6 @@ def compared(big: Continuity, small: Continuity) -> str:
         f"F_x above order {ORDER} in {big.energy_angle:.0%} and {small.energy_angle:.0%} of the "
         f"angle; Gini index {big.gini:.2f} and {small.gini:.2f}"
     )
-
-
-def more_continuous(big: Continuity, small: Continuity) -> bool:
-    """Whether a big end hits more continuously than a small end by all three shares of angle."""
-    return big.apart > small.apart and big.hit > small.hit and big.energy_angle > small.energy_angle
 
 
 def hit_share(table: xr.Dataset, joint: str, revolutions: int) -> float:

@@ -1,15 +1,21 @@
 """How far a claim's measure lies from its threshold, with what its error bars allow.
 
 A margin is relative to the threshold: 0 at it, positive where the claim holds, 0.1 where the
-measure could change by a tenth of the threshold.
+measure could change by a tenth of the threshold. That of a difference of shares is in the shares'
+own unit.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from scipy.special import stdtrit
+
+from compressor.analysis.runs import settled
+
+SURE = 0.975  # quantile of Student's t: an error of scatter holds in 95 % of cases
 
 
 class Measure(NamedTuple):
@@ -70,6 +76,58 @@ def least(margins: Sequence[Margin]) -> Margin:
     lowest = min(margin.value - margin.error for margin in margins)
     unknown = any(math.isnan(margin.error) for margin in margins)
     return Margin(smallest, math.nan if unknown else smallest - lowest)
+
+
+def exceeds(one: Measure, other: Measure, by: float) -> Margin:
+    """The margin, in the measures' own unit, of a measure that is to exceed another one by this."""
+    return Margin(one.value - other.value - by, one.error + other.error)
+
+
+def is_chaotic(run: xr.Dataset) -> bool:
+    """Whether the course of a run's motion cannot be foretold, so that averages alone count."""
+    return run.attrs.get("regime") == "chaotic"
+
+
+def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
+    """The whole settled revolutions of a run, both ends included."""
+    kept = settled(run)
+    turns = (kept["crank_angle"].values - kept["crank_angle"].values[0]) / (2.0 * math.pi)
+    for number in range(int(turns[-1] + 1e-6)):
+        inside = (turns >= number - 1e-6) & (turns <= number + 1 + 1e-6)
+        yield kept.isel(time=inside)
+
+
+def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> float:
+    """Half of the 95 % interval of a value's mean over revolutions, by their scatter.
+
+    inf of a single revolution.
+    """
+    each = np.array([value(turn) for turn in revolutions(run)])
+    if each.size < 2:
+        return math.inf
+    error = float(each.std(ddof=1)) / math.sqrt(each.size)
+    return float(stdtrit(each.size - 1, SURE)) * error
+
+
+def measured(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> Measure:
+    """A value of a run's settled part with an error; of a chaotic run by its revolutions."""
+    kept = settled(run)
+    return Measure(value(kept), by_revolution(kept, value) if is_chaotic(run) else error)
+
+
+def peak(run: xr.Dataset, name: str, **where: str) -> Measure:
+    """A greatest value of a run with its error bar; where: its joint.
+
+    Of a chaotic run the mean over revolutions of each one's greatest value, since that of the whole
+    run grows with its length.
+    """
+    if not is_chaotic(run):
+        return metric(run, name, **where)
+    value, error = (
+        float(run[n].sel(where)) for n in (f"{name}_mean", f"{name}_mean_standard_error")
+    )
+    degrees = max(int(run["revolutions"]) - 1, 1)
+    return Measure(value, float(stdtrit(degrees, SURE)) * error)
 
 
 def metric(run: xr.Dataset, name: str, **where: str) -> Measure:

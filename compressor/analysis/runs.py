@@ -15,7 +15,8 @@ ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibra
 
 def settled(run: xr.Dataset) -> xr.Dataset:
     """The samples from `settle_rev` on: start-up is not the machine."""
-    return run.isel(time=run["time"].values >= run.attrs["settle"] * (1 - 1e-12))
+    time, begin = run["time"].values, run.attrs["settle"] * (1 - 1e-12)
+    return run if time[0] >= begin else run.isel(time=time >= begin)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compressor.analysis.claims import RULES, claims, held_share
+from compressor.analysis.claim_rules import RULES, more_continuous
+from compressor.analysis.claims import claim_margins, claims, held_share
+from compressor.analysis.continuity import Shares
+from compressor.analysis.margins import Measure
 from compressor.analysis.paper_cases import CLEARANCES, FAULT_LABELS, paper_cases
 from compressor.analysis.runs import (
     active_share,
@@ -124,12 +127,17 @@ def test_growing_peaks_hold_exactly_when_all_grow(paper_runs):
 
 
 def test_horizontal_force_needs_a_ratio_of_three(paper_runs):
+    """By forces of a known ratio, whose size changes over the samples, up for half of them."""
     for ratio, held in ((3.1, True), (2.9, False)):
         runs = paper_runs
         for label in FAULT_LABELS:
-            peaks = np.array([[ratio, 1.0], [ratio, 1.0]])
-            runs = altered(runs, label, "peak_contact_force_axis", lambda _, p=peaks: p)
-        assert judged(runs, 5).held is held
+            force = np.ones(runs[label]["contact_force"].shape)
+            force[..., 0] *= ratio
+            force *= np.linspace(-1.0, 2.0, len(force))[:, None, None]
+            runs = altered(runs, label, "contact_force", lambda _, f=force: f)
+        claim = judged(runs, 5)
+        assert claim.held is held
+        assert claim.margin.value == pytest.approx(ratio / 3.0 - 1.0)
 
 
 def test_two_clearances_must_exceed_both_single_ones(paper_runs):
@@ -142,17 +150,40 @@ def test_two_clearances_must_exceed_both_single_ones(paper_runs):
     assert not judged(even, 8).held
 
 
-def test_continuity_compares_the_active_shares(paper_runs):
+def test_a_big_end_is_to_exceed_by_every_share():
+    """By 5 % of the revolution; errors of both shares add."""
+    small = Shares(Measure(0.1, 0.01), Measure(0.2), Measure(0.3))
+    big = Shares(Measure(0.2, 0.02), Measure(0.25), Measure(0.31))
+    margins = more_continuous(big, small)
+    assert [one.value for one in margins] == pytest.approx([0.05, 0.0, -0.04])
+    assert margins[0].error == pytest.approx(0.03)
+
+
+def test_continuous_ringing_at_the_big_end_alone_is_seen(paper_runs):
+    """Forces that ring all around at the big end and a tenth of the turn at the small end."""
     runs = dict(paper_runs)
     for clearance in CLEARANCES:
-        for joint, share in (("big_end", 0.8), ("small_end", 0.2)):
+        for joint, share in (("big_end", 1.0), ("small_end", 0.1)):
             run = runs[f"{joint} {clearance:g}"].copy(deep=True)
-            _, _, ideal = ideal_motion(run)
             angle = np.degrees(run["crank_angle"].values) % 360
-            shaking = 100 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
-            run["acceleration"] = run["acceleration"].copy(data=ideal + shaking)
+            ringing = 1000 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
+            run["contact_force"].loc[{"joint": joint, "axis": "x"}] = ringing
+            _, _, ideal = ideal_motion(run)
+            run["acceleration"] = run["acceleration"].copy(data=ideal + ringing)
             runs[f"{joint} {clearance:g}"] = run
-    assert judged(runs, 7).held
+    _, alone = claim_margins(paper_runs)
+    after, alone_after = claim_margins(runs)
+    assert alone["energy_angle"].value < 0.0 < 0.4 < alone_after["energy_angle"].value
+    assert alone_after["active"].value == pytest.approx(1.0 - 0.1 - 0.05, abs=0.03)
+    # flight and impacts come from eccentricities, which are as before
+    assert after[6].value == alone["apart"].value == alone_after["apart"].value
+
+
+def test_margins_of_claims_are_those_of_the_page(paper_runs):
+    each, alone = claim_margins(paper_runs)
+    for margin, claim in zip(each, claims(paper_runs), strict=True):
+        assert margin == pytest.approx(claim.margin)
+    assert each[6].value == min(alone[name].value for name in Shares._fields)
 
 
 def test_held_share_counts_what_was_judged(paper_runs):

@@ -12,7 +12,8 @@ from pathlib import Path
 from joblib import Parallel, delayed
 from measure_accuracy import provenance
 
-from compressor.analysis.claims import RULES, claims, held_share
+from compressor.analysis.claim_rules import RULES
+from compressor.analysis.claims import claims, held_share
 from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.table import Solve
 from compressor.solve.simulate import simulate
