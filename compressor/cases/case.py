@@ -67,6 +67,8 @@ class Case(Settings):
             solve = replace(solve, output_step_deg=None)
         if contact.materials is not None:
             contact = replace(contact, stiffness_N_per_mm15=None)
+        if contact.geometry == "external":  # as without the key
+            contact = replace(contact, geometry=None)
         resolved = {"machine": machine, "solve": solve, "contact": contact}
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}

@@ -33,6 +33,11 @@ def conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         yield Problem("output.signals", "are time series: they need output.keep: series")
     if case.contact.materials is not None and case.contact.exponent != 1.5:
         yield Problem("contact.exponent", "Eq. 15's stiffness from materials needs exponent 1.5")
+    if case.contact.geometry is not None and case.contact.materials is None:
+        yield Problem(
+            "contact.geometry",
+            "is that of the stiffness that contact.materials give: add materials: [steel, steel]",
+        )
     friction = case.friction
     if friction and friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
         yield Problem(

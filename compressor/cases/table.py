@@ -118,6 +118,11 @@ class Contact:
         None, ("steel", "copper"), "Table 2, Eq. 15", "two materials in place of a stiffness",
         kind="materials", optional=True,
     )  # fmt: skip
+    geometry: str | None = choice(
+        None, ("external", "internal"), "Eq. 15",
+        "of the materials' stiffness: radii as of two discs (the paper's), or of a pin in a bore",
+        optional=True,
+    )  # fmt: skip
     exponent: float = parameter(1.5, "", (1, 3), "Table 3", "force exponent p")
     damping_N_s_per_mm: float = parameter(
         336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max"

@@ -45,7 +45,8 @@ def stiffness_of(case: Case, joint: str) -> float:
     contact, pin = case.contact, to_si(case.machine.pin_radius_mm, "mm")
     if contact.materials:
         clearance = to_si(getattr(case.clearance_mm, joint), "mm")
-        return contact_stiffness(*contact.materials, pin, pin + clearance)
+        internal = contact.geometry == "internal" and clearance > 0.0  # an ideal joint has none
+        return contact_stiffness(*contact.materials, pin, pin + clearance, internal)
     return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
 
 

@@ -157,6 +157,7 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
         ({"solve": {"rtol": 1e-5, "accuracy": "standard"}}, "solve.rtol", "in place of"),
         ({"contact": {"materials": ["steel", "steel"], "stiffness_N_per_mm15": 1}},
          "contact.materials", "in place of"),
+        ({"contact": {"geometry": "internal"}}, "contact.geometry", "add materials"),
         ({"contact": {"materials": ["steel", "steel"], "exponent": 2}},
          "contact.exponent", "needs exponent 1.5"),
         ({"friction": {"stiction_velocity_mm_per_s": 100}},
@@ -268,6 +269,12 @@ def test_values_read_back_to_an_equal_case(values):
     assert Case.from_values(plain).key == case.key
 
 
+def test_the_paper_s_geometry_is_the_default():
+    steel = {"materials": ["steel", "steel"]}
+    cases = [Case.from_values({"contact": c}) for c in (steel, steel | {"geometry": "external"})]
+    assert cases[0].key == cases[1].key
+
+
 EVERYTHING = {
     "joint": "both",
     "clearance_mm": {"big_end": 0.1, "small_end": 0.2},
@@ -301,6 +308,7 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "machine.rod_centre_mm": 200.0,
     "machine.rod_inertia_kg_m2": 0.1,
     "contact.materials": ["steel", "copper"],
+    "contact.geometry": "internal",
     "solve.accuracy": "fine",
     "solve.duration_rev": 5,
     "solve.duration_s": 0.6,
@@ -334,6 +342,8 @@ def other_value(key):
 def test_the_table_says_which_values_make_another_job(key):
     base = {"joint": "both", "clearance_mm": CLEARANCES}
     group, _, name = key.rpartition(".")
+    if key == "contact.geometry":
+        base |= {"contact": {"materials": ["steel", "steel"]}}
     if group == "sensor":
         base |= {"body": True, "sensor": True}
     there = base.get(group, {})

@@ -544,8 +544,9 @@ CASES = st.fixed_dictionaries(
         "machine": group("machine"),
         "gas": group("gas", "switching").map(lambda gas: gas | {"switching": "exact"}),
         "spring": group("spring"),
-        "contact": group("contact", "materials", "exponent")
-        | st.just({"materials": ["steel", "copper"]}),
+        "contact": group("contact", "materials", "exponent", "geometry")
+        | st.just({"materials": ["steel", "copper"]})
+        | st.just({"materials": ["steel", "steel"], "geometry": "internal"}),
         "friction": st.just(False) | group("friction"),
         "solve": st.sampled_from([a | b for a in TIMES for b in SOLVES]),
         "output": group("output", "signals") | st.just({"keep": "series", "signals": True}),
