@@ -16,7 +16,14 @@ from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import SWEEP, Leaves, covers, suggestion
 from compressor.cases.parameter import Problem, shown
 from compressor.cases.shorthands import row_of, single, stands_for
-from compressor.cases.swept import SAMPLED, Sweep, design, is_swept, sweep_of
+from compressor.cases.swept import (
+    SAMPLED,
+    Sweep,
+    design,
+    design_size,
+    is_swept,
+    sweep_of,
+)
 from compressor.cases.table import OF_JOINTS, WORDS, outside_identity, table
 from compressor.cases.yaml_reader import FileProblem, Node
 
@@ -80,7 +87,10 @@ class Draft:
         return {" with ".join(keys): self.size(keys[0]) for keys in self.factors}
 
     def size(self, key: str) -> int:
-        return self.sweeps[key].count or self.samples
+        together = next((keys for keys in self.factors if key in keys), (key,))
+        return self.sweeps[key].count or design_size(
+            self.sweeps[key].kind, self.samples, len(together)
+        )
 
     def block(self) -> Block:
         """The block, its values made; wrong ones join `problems`, and leave it without jobs."""

@@ -199,7 +199,7 @@ def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
     """A `sample` of which no key is sampled is a mistake."""
     place = draft.leaves.places.get("sample")
     if place and not any(one.samples and one.is_sampled for one in drafts):
-        message = "samples nothing: give a key {random: [least, greatest]}, lhs or sobol"
+        message = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
         draft.problems.append(FileProblem(place, "sample", message))
 
 

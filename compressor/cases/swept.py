@@ -16,7 +16,8 @@ from compressor.cases.parameter import Parameter
 from compressor.cases.shorthands import row_of
 from compressor.cases.yaml_reader import FileProblem, Node
 
-SAMPLED = ("random", "lhs", "sobol")  # designs of samples, which draw several keys together
+# designs of samples, which draw several keys together
+SAMPLED = ("random", "lhs", "sobol", "saltelli")
 # word -> what stands in its brackets
 FORMS = {
     "linspace": "[first, last, count]",
@@ -175,12 +176,29 @@ def counted(count: int) -> str:
     return str(count) if count < 10**100 else f"over 10^{int(count.bit_length() * 0.30103) - 1}"
 
 
+def design_size(kind: str, count: int, keys: int) -> int:
+    """How many points `design` makes."""
+    return count * (keys + 2) if kind == "saltelli" else count
+
+
 def design(kind: str, count: int, keys: int, seed: int) -> list[list[float]]:
     """Points of a sampling design: `count` of `keys` coordinates in [0, 1).
 
     The same seed gives the same points. `random` is uniform, `lhs` a Latin hypercube, `sobol`
-    Sobol's sequence, scrambled, whose balance is best where `count` is a power of two.
+    Sobol's sequence, scrambled, whose balance is best where `count` is a power of two. `saltelli`
+    has `count` points A and as many B, both of one Sobol's sequence, and then for each coordinate A
+    with that of B in its place: `design_size` points, from which a variance-based sensitivity is
+    estimated (Saltelli et al., Computer Physics Communications 181, 2010, 259-270).
     """
+    if kind == "saltelli":
+        points = design("sobol", count, 2 * keys, seed)
+        a, b = [row[:keys] for row in points], [row[keys:] for row in points]
+        mixed = [
+            [*one[:key], other[key], *one[key + 1 :]]
+            for key in range(keys)
+            for one, other in zip(a, b, strict=True)
+        ]
+        return a + b + mixed
     import numpy as np
 
     generator = np.random.default_rng(seed)

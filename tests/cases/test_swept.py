@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.study import points
-from compressor.cases.swept import design
+from compressor.cases.swept import design, design_size
 from compressor.solve.simulate import simulate
 from compressor.store import reader as store
 from compressor.store.studies import read_studies, write_study
@@ -105,14 +105,14 @@ def test_a_range_is_that_of_decimal_numbers(first, step, count):
         ("{linspace: [1, 1, 2]}", "1:25: rod_mass_kg: linspace needs two different ends"),
         ("{linspace: [0, 1, 2]}", "1:25: rod_mass_kg: 0 is outside (0, 1e+06] kg"),
         ("{linspace: [1, 2, 3], log: true}", "1:41: rod_mass_kg: log is true or false, and for "
-         "random lhs sobol alone"),
+         "random lhs sobol saltelli alone"),
         ("{logspace: [-1, 1, 3]}", "1:25: rod_mass_kg: logspace needs ends above 0"),
         ("{range: [1, 2, 0]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
         ("{range: [1, 2, -1]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
         ("{lnspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of values or a mapping "
-         "with one of linspace logspace range random lhs sobol; did you mean linspace?"),
+         "with one of linspace logspace range random lhs sobol saltelli; did you mean linspace?"),
         ("{range: [1, 2, 1], linspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of "
-         "values or a mapping with one of linspace logspace range random lhs sobol; "
+         "values or a mapping with one of linspace logspace range random lhs sobol saltelli; "
          "did you mean range?"),
         ("{random: [2, 1]}", "1:23: rod_mass_kg: random needs [least, greatest]: 2 exceeds 1"),
         ("{random: [1, 2]}", "1:14: rod_mass_kg: needs a number of samples: add "
@@ -252,6 +252,23 @@ def test_whole_numbers_are_drawn_as_such(plan, kind):
     assert all(isinstance(case.sensor.seed, int) for case in study.cases)
 
 
+def test_saltelli_exchanges_one_key_after_another(plan):
+    """Eight points A, eight B, then A with the first key of B, then A with the second one."""
+    found = np.array([row[:2] for row in rows(plan(SAMPLED % ("saltelli", "saltelli")))[::2]])
+    a, b, first, second = found.reshape(4, 8, 2)
+    assert (a != b).all()
+    assert (first == np.stack([b[:, 0], a[:, 1]], axis=1)).all()
+    assert (second == np.stack([a[:, 0], b[:, 1]], axis=1)).all()
+    assert design_size("saltelli", 8, 2) == 32 == len(design("saltelli", 8, 2, 1))
+
+
+def test_too_large_a_saltelli_design_is_refused_by_all_of_its_points(plan):
+    text = SAMPLED % ("saltelli", "saltelli")
+    with pytest.raises(CaseFileError, match="64 jobs are more than 63"):
+        plan(text, max_jobs=63)
+    assert plan(text, max_jobs=64).jobs == 64
+
+
 @pytest.mark.parametrize("kind", ["lhs", "sobol"])
 def test_designs_fill_every_eighth_of_every_key(kind):
     for column in np.array(design(kind, 8, 3, 1)).T:
@@ -265,7 +282,7 @@ def test_designs_fill_every_eighth_of_every_key(kind):
         (SAMPLED % ("lhs", "lhs") + "zip: [[clearance_mm, machine.speed_rpm]]",
          "zip: sampled keys go together by their design already"),
         ("sample: {n: 3}", "1:1: sample: samples nothing: give a key {random: [least, greatest]}, "
-         "lhs or sobol"),
+         "lhs, sobol or saltelli"),
         ("sample: 3", "sample: needs a mapping of keys, not 3"),
         ("sample: {n: 2.5}", "sample.n: needs a whole number from 1"),
         ("sample: {n: 1, seed: -1}", "sample.seed: needs a whole number from 0"),
