@@ -28,15 +28,18 @@ MAY_IMPORT = {
     "store": {"cases", "outcome", "metrics", "reasons", "digits"},
     "sweep": {"cases", "solve", "store", "outcome", "reasons"},
     "analysis": {"cases", "physics", "solve", "vibration", "metrics"},
-    "report": {"analysis", "cases", "store", "outcome", "metrics", "reasons", "digits"},
+    "machines": {"analysis", "cases", "solve", "store", "sweep"},
+    "report": {"analysis", "cases", "machines", "store", "outcome", "metrics", "reasons",
+               "digits"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
-    "compsim": {"analysis", "cases", "diagnosis", "digits", "measure", "metrics", "reasons",
+    "compsim": {"analysis", "cases", "diagnosis", "digits", "machines", "measure", "metrics",
+                "reasons",
                 "report", "solve", "store", "sweep"},
 }  # fmt: skip
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "measure",
-    "diagnosis",
+    "diagnosis", "machines",
 )  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
@@ -48,6 +51,8 @@ LIBRARIES = {  # library -> the modules that may import it
         "compressor.cases.swept",
         "compressor.diagnosis.regression",
         "compressor.diagnosis.strangeness",
+        "compressor.machines.search",
+        "compressor.machines.sensitivity",
         "compressor.measure.find",
         "compressor.measure.question",
         "compressor.solve.scipy_driver",

@@ -19,6 +19,7 @@ import click
 
 from compressor.program import VERSION, CompsimError, CompsimWarning
 from compsim import (
+    claims,
     dataset,
     explain,
     export,
@@ -75,6 +76,7 @@ for verb in (
     stress.stress,
     identify.identify,
     find.find,
+    claims.claims,
 ):
     cli.add_command(verb)
 

@@ -2,7 +2,8 @@
 
 from compressor.analysis.cam import Cam, comparisons
 from compressor.analysis.captions import caption
-from compressor.analysis.claims import claims
+from compressor.analysis.claim_rules import RULES
+from compressor.analysis.claims import claim_margins, claims
 from compressor.analysis.contact_modes import MODES, angle_modes
 from compressor.analysis.contacts import joints_with_clearance
 from compressor.analysis.diagnosis_captions import diagnosis_caption
@@ -13,7 +14,7 @@ from compressor.analysis.frame_forces import (
     last_revolution,
 )
 from compressor.analysis.impacts import impacts
-from compressor.analysis.paper_cases import CLEARANCES, FAULTS, SPOKEN, label, paper_cases
+from compressor.analysis.paper_cases import CLEARANCES, FAULTS, SPOKEN, cases_of, label, paper_cases
 from compressor.analysis.plot_captions import PLOT_CAPTIONS
 from compressor.analysis.runs import case_of, force_relation, load_phases, settled
 from compressor.analysis.shaking import (

@@ -20,7 +20,17 @@ def faulty_joints(fault: str) -> tuple[str, ...]:
 
 def paper_cases(**machine: float) -> dict[str, Case]:
     """The paper's eleven cases by label; `machine` overrides keys such as rod_mass_kg."""
-    base: dict = {"machine": machine} if machine else {}
+    return cases_of(Case.from_values({"machine": machine}))
+
+
+def cases_of(machine: Case) -> dict[str, Case]:
+    """The paper's eleven cases by label, of the machine, contact and friction of a case.
+
+    The case's own load, joints and clearances are left aside. Raises CaseError where one of the
+    eleven cannot be made.
+    """
+    base = {key: value for key, value in machine.values().items() if key != "clearance_mm"}
+    base["joint"] = "none"
     cases = {load: Case.from_values({**base, "load": load}) for load in ("typical", "design")}
     for fault in FAULTS:
         for clearance in CLEARANCES:

@@ -2,13 +2,14 @@
 
 from compressor.cases.accuracy import ACCURACY, TIGHTEST
 from compressor.cases.case import MODEL_VERSION, Case
+from compressor.cases.examples import example
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import contact_stiffness
 from compressor.cases.one_way import back_action
 from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
 from compressor.cases.shorthands import row_of, value_in
-from compressor.cases.study import Study, points
+from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
 from compressor.cases.table import METHODS, Output, table
 from compressor.cases.vibration import Body, Sensor

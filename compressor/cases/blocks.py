@@ -199,6 +199,10 @@ def _sampled(found: Draft) -> tuple[str, ...]:
         if sweep.kind != kinds[0]:
             message = f"one design draws all sampled keys: {kinds[0]} or {sweep.kind}, not both"
             found.refuse(sweep.node, key, message)
+    if kinds == ["saltelli"] and len(keys) == 1:
+        message = "saltelli exchanges keys one by one: draw two or more, or draw this one by sobol"
+        found.refuse(found.sweeps[keys[0]].node, keys[0], message)
+        found.samples = 0  # their repetition is no second mistake
     if keys and "sample.n" not in found.leaves.values:
         message = "needs a number of samples: add `sample: {n: 64, seed: 1}` to the file"
         found.refuse(found.sweeps[keys[0]].node, keys[0], message)

@@ -23,7 +23,7 @@ from compressor.cases.keys import Leaves, leaves, merged, overridden, read_overr
 from compressor.cases.parameter import CaseError, Problem
 from compressor.cases.shorthands import value_of
 from compressor.cases.study import Axis, Cases, Study
-from compressor.cases.swept import counted
+from compressor.cases.swept import SAMPLED, counted
 from compressor.cases.table import table
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, resolved, shortened
 from compressor.program import CompsimError
@@ -167,7 +167,11 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
         found_columns = zip(*built.rows, strict=True)
-        axes = [Axis(key, column) for key, column in zip(keys, found_columns, strict=False)]
+        spreads = {k: s.spread for d in drafts for k, s in d.sweeps.items() if s.kind in SAMPLED}
+        axes = [
+            Axis(key, column, spreads.get(key))
+            for key, column in zip(keys, found_columns, strict=False)
+        ]
     if draft.problems:
         return Study(draft.name, draft.path, tuple(axes), (), tuple(built.keys), is_grid)
     selected = range(len(cases)) if only is None else cases.where(only)

@@ -2,8 +2,8 @@
 
 import bisect
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, overload
 
 from compressor.cases import blocks
@@ -14,10 +14,15 @@ from compressor.cases.yaml_reader import Node
 
 @dataclass(frozen=True)
 class Axis:
-    """One swept key of a study, such as `machine.rod_mass_kg`, and its values."""
+    """One swept key of a study, such as `machine.rod_mass_kg`, and its values.
+
+    `spread`: where a design drew it, the function that takes shares of its range, 0 to 1, to
+    values.
+    """
 
     key: str
     values: tuple[Any, ...]
+    spread: Callable[[float], float] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)

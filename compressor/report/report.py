@@ -18,6 +18,12 @@ from compressor.report.diagnosis_section import (
 from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures.style import render
 from compressor.report.figures.sweep_metric import draw_metrics, measures, swept
+from compressor.report.machines_section import (
+    Part,
+    machine_drawings,
+    machine_files,
+    machine_sections,
+)
 from compressor.report.page import Plate, Section, document
 from compressor.report.paper_runs import PaperRuns, find_paper_runs
 from compressor.report.paper_sections import missing_sections, paper_sections
@@ -33,6 +39,10 @@ from compressor.store import (
     read_studies,
 )
 
+MACHINES = (
+    "Of a map: blue holds, red does not; lines are where a verdict changes, the ring marks the "
+    "default masses. Of bars: total effects and main effects with their 95 % intervals."
+)
 SWEEP = (
     "A line for each combination of the other axes or, where they are many, a light line for each "
     "and their median; a study that is no grid has a point for each job. A cross: a job failed "
@@ -40,12 +50,14 @@ SWEEP = (
 )
 
 
-def write_report(results: Folder, report: Folder, command: str = "") -> Path:
+def write_report(results: Folder, report: Folder, command: str = "", claims: Folder = "") -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
+
+    claims: the folder of judged machines (`compsim claims`), if there is one.
 
     Raises StoreError where there are no results, or the report's folder cannot be written.
     """
-    plates, page = compose(results, command)
+    plates, page = compose(results, command, claims)
     folder = Path(report)
     for plate in plates:
         publish(folder / f"{plate.name}.png", plate.png)
@@ -55,8 +67,9 @@ def write_report(results: Folder, report: Folder, command: str = "") -> Path:
     return folder / "index.html"
 
 
-def compose(results: Folder, command: str) -> tuple[list[Plate], str]:
+def compose(results: Folder, command: str, claims: Folder) -> tuple[list[Plate], str]:
     """All figures of a report, drawn, and its page."""
+    judged = machine_files(claims) if claims else {}
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     of_paper = draw_paper(paper)
@@ -67,14 +80,25 @@ def compose(results: Folder, command: str) -> tuple[list[Plate], str]:
     about_paper = [*paper_sections(paper, of_paper)]
     about_paper[1:1] = diagnosis_sections(found, of_faults)
     about_studies = [section for section, _ in drawn]
+    about_machines = [drawn_part(*parts) for parts in machine_drawings(judged)]
     sections = [
         Section("assumptions", "What to keep in mind", "assumptions.html"),
         *(about_paper + about_studies if of_paper else about_studies + about_paper),
+        *machine_sections(about_machines),
         *missing_sections(paper, results),
         provenance_section(studies, results, command),
     ]
     plates = of_paper + of_faults + [plate for _, more in drawn for plate in more]
+    plates += [part.plate for part in about_machines if part.plate]
     return plates, document(sections)
+
+
+def drawn_part(name: str, sentences: list[str], heading: str, drawing: Drawing | None) -> Part:
+    """What is said of a file of judged machines, with its figure where it has one."""
+    if drawing is None:
+        return Part(name, sentences, None)
+    plate = draw(file_name("machines", name), heading, MACHINES, drawing)
+    return Part(name, sentences, plate)
 
 
 def drawn_study(stored: Stored, study: StoredStudy) -> tuple[Section, list[Plate]]:

@@ -281,6 +281,8 @@ def test_designs_fill_every_eighth_of_every_key(kind):
         (SAMPLED % ("lhs", "random"), "one design draws all sampled keys: lhs or random, not both"),
         (SAMPLED % ("lhs", "lhs") + "zip: [[clearance_mm, machine.speed_rpm]]",
          "zip: sampled keys go together by their design already"),
+        (ONE + "clearance_mm: {saltelli: [1, 2]}\nsample: {n: 4}", "clearance_mm: saltelli "
+         "exchanges keys one by one: draw two or more, or draw this one by sobol"),
         ("sample: {n: 3}", "1:1: sample: samples nothing: give a key {random: [least, greatest]}, "
          "lhs, sobol or saltelli"),
         ("sample: 3", "sample: needs a mapping of keys, not 3"),
