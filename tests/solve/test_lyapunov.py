@@ -1,0 +1,171 @@
+"""The largest Lyapunov exponent: of maps and oscillators in closed form, and of real machines."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.cases.case import Case
+from compressor.physics.motion import start
+from compressor.physics.record import FREEDOMS
+from compressor.solve import lyapunov
+from compressor.solve.horizon import CLOSE, FAR, predictability_horizon
+from compressor.solve.integrate import integrate
+from compressor.solve.lyapunov import OF_STEPS, growths, largest_exponent, mean_with_error
+from compressor.solve.request import Request
+from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.sizes import natural_sizes
+
+LIGHT = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0.336}}
+
+
+def case(values):
+    return Case.from_values(values)
+
+
+def at_rest(made):
+    y = np.zeros(2 * FREEDOMS[scene(made)])
+    start(offsets(made), y, record(made))
+    return y
+
+
+def settled(made, revolutions=12, rtol=1e-10, begin=None):
+    y = at_rest(made) if begin is None else begin
+    times = np.array([0.0, revolutions * made.turn])
+    return integrate(Request(record(made), y, times, 0.0, rtol)).states[-1]
+
+
+# Known answers
+
+
+def logistic(x):
+    """The logistic map's twins at r = 4, whose exponent is ln 2."""
+
+    def follow(difference):
+        nonlocal x
+        other, x = 4 * (x + difference) * (1 - x - difference), 4 * x * (1 - x)
+        return other - x
+
+    return follow
+
+
+def test_the_logistic_map_has_ln_2():
+    found, lost = growths(logistic(np.array([0.3])), np.array([1e-9]), 8000, 1e-14)
+    assert not lost.any()
+    value, error = mean_with_error(found)
+    assert abs(value - math.log(2)) < error < 0.03
+
+
+@pytest.mark.parametrize(("damping", "expected"), [(0.1, -0.2), (1.25, -1.0), (-0.05, 0.1)])
+def test_a_linear_oscillator_has_its_slowest_decay(damping, expected):
+    """-zeta omega where it rings, -omega (zeta - sqrt(zeta^2 - 1)) where it creeps; omega = 2."""
+    matrix = np.array([[0.0, 1.0], [-4.0, -4.0 * damping]])
+    values, vectors = np.linalg.eig(matrix)
+    period = 0.05 * math.pi / 2.0 / math.sqrt(abs(1 - damping**2))
+    map_ = (vectors @ np.diag(np.exp(values * period)) @ np.linalg.inv(vectors)).real
+    found, lost = growths(lambda difference: map_ @ difference, np.array([1e-6, 1e-6]), 4000, 1e-14)
+    assert not lost.any()
+    value, error = mean_with_error(found[400:] / period)
+    assert value == pytest.approx(expected, abs=1e-6)
+    assert abs(value - expected) <= error + 1e-9
+
+
+def test_a_difference_that_rounding_swallows_gives_a_bound():
+    found, lost = growths(lambda difference: 1e-9 * difference, np.array([1e-7]), 5, 1e-12)
+    assert lost.all()
+    assert found == pytest.approx(math.log(1e-5))
+    found, lost = growths(lambda difference: 0.0 * difference, np.array([1e-7]), 5, 1e-12)
+    assert lost.all()
+    assert found == pytest.approx(math.log(1e-5))
+
+
+def test_batches_hold_whole_periods():
+    """Growths of a motion of period 4 have no scatter; of one revolution there is no error."""
+    value, error = mean_with_error(np.tile([3.0, -1.0, 0.5, -2.0], 16))
+    assert value == pytest.approx(0.125)
+    assert error == pytest.approx(0.0, abs=1e-12)
+    assert mean_with_error(np.ones(7)) == (1.0, math.inf)
+
+
+def test_errors_hold_as_often_as_they_say():
+    draws = np.random.default_rng(4).normal(size=(400, 64))
+    hits = [abs(value) <= error for value, error in map(mean_with_error, draws)]
+    assert 0.91 < np.mean(hits) < 0.985
+
+
+# Machines
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end"])
+def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
+    """By central differences of separate runs over one revolution, each with its own steps."""
+    made = case({"joint": joint, "clearance_mm": 0.2})
+    y, size = settled(made), natural_sizes(record(made))
+    ends = [
+        [settled(made, 1, 1e-12, y + way * 1e-4 * size * unit) for unit in np.eye(y.size)]
+        for way in (1, -1)
+    ]
+    multipliers = np.linalg.eigvals((np.subtract(*ends) / size / 2e-4).T)
+    expected = math.log(np.abs(multipliers).max())
+    found = largest_exponent(made, y, 8, math.inf)
+    assert found.value == pytest.approx(expected, abs=OF_STEPS[0])
+    assert abs(found.value - expected) < found.error < 0.02
+    assert not found.at_most
+
+
+def test_of_a_chaotic_motion_it_is_the_rate_at_which_twins_part():
+    made = case(LIGHT)
+    found = largest_exponent(made, settled(made, 4, 1e-8), 12, math.inf)
+    rate = math.log(FAR / CLOSE) / (predictability_horizon(made) / made.turn)
+    assert found.value - found.error > 0.0
+    assert 0.5 * rate < found.value < 2.0 * rate
+
+
+def test_steps_that_stability_holds_do_not_part_twins(monkeypatch):
+    """Explicit steps of the same tolerance do, of this motion with heavy damping."""
+    heavy = {"damping_N_s_per_mm": 336e2}
+    made = case({"joint": "small_end", "clearance_mm": 0.2, "contact": heavy})
+    y = settled(made, 4, 1e-6)
+    found = largest_exponent(made, y, 4, math.inf)
+    assert -1.1 < found.value < -0.8
+    monkeypatch.setattr(lyapunov, "METHOD", "auto")
+    assert largest_exponent(made, y, 2, math.inf).value > 1.0
+
+
+def test_the_same_call_gives_the_same_bits():
+    made = case({"joint": "small_end", "clearance_mm": 0.2})
+    y = at_rest(made)
+    assert largest_exponent(made, y, 1, math.inf) == largest_exponent(made, y.copy(), 1, 1e3)
+
+
+def test_a_value_is_a_bound_where_rounding_is_reached(monkeypatch):
+    made = case({"joint": "big_end", "clearance_mm": 0.2})
+    y = at_rest(made)
+    plain = largest_exponent(made, y, 1, math.inf)
+    monkeypatch.setattr(lyapunov, "LEAST", 0.5 * lyapunov.CLOSE)
+    found = largest_exponent(made, y, 1, math.inf)
+    assert (plain.at_most, found.at_most) == (False, True)
+    assert found.value > plain.value
+
+
+def test_where_stiff_steps_shrink_to_nothing_looser_ones_go_on():
+    heavy = {"damping_N_s_per_mm": 336e2}
+    made = case({"joint": "big_end", "clearance_mm": 0.2, "contact": heavy})
+    found = largest_exponent(made, at_rest(made), 1, math.inf)
+    assert math.isfinite(found.value)
+
+
+def test_what_has_no_exponent_is_refused():
+    ideal = case({"joint": "none"})
+    with pytest.raises(ValueError, match="all joints are ideal"):
+        largest_exponent(ideal, np.zeros(4), 8, math.inf)
+    made = case(LIGHT)
+    with pytest.raises(ValueError, match="0 revolutions"):
+        largest_exponent(made, at_rest(made), 0, math.inf)
+
+
+def test_a_run_that_stops_has_no_exponent():
+    made = case(LIGHT)
+    late = largest_exponent(made, at_rest(made), 8, 0.0)
+    lost = largest_exponent(made, np.full(4, math.nan), 8, math.inf)
+    assert np.isnan([*late[:2], *lost[:2]]).all()
