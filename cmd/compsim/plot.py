@@ -4,7 +4,10 @@ import click
 
 from compsim.screen import DONE, results
 
-FIGURES = ("signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map")
+FIGURES = (
+    "signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map",
+    "bifurcation", "sections", "periods",
+)  # fmt: skip
 KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
 
 
@@ -21,7 +24,8 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @click.argument("target", metavar="JOB|STUDY")
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
-    help="Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map.",
+    help="Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map; of a study "
+    "of regimes bifurcation, sections, periods.",
 )  # fmt: skip
 @results
 @click.option("-o", "--output", default="plots", show_default=True, help="Folder of the figures.")

@@ -11,8 +11,10 @@ from compressor.analysis.frame_forces import frame_forces, last_revolution, whol
 from compressor.analysis.impacts import impacts
 from compressor.analysis.orbit import orbit
 from compressor.analysis.paper_cases import SPOKEN
+from compressor.analysis.regime_captions import REGIME_CAPTIONS
 from compressor.analysis.shaking import ORDER, deviation_spectrum, sensor_envelope, shaking
 from compressor.analysis.swept_rows import SweptRow, rows_modes
+from compressor.analysis.words import plural
 
 Twin = xr.Dataset | None  # the same machine without clearance
 
@@ -173,12 +175,8 @@ def newtons(force: float) -> str:
     return f"{force:.0f} N" if force >= 9.95 else f"{force:.1f} N"
 
 
-def plural(count: int, thing: str) -> str:
-    """A number of things in words."""
-    return f"{count} {thing}" + ("s" if count != 1 else "")
-
-
-# of a job: functions of its run and its twin; of a study: of its rows and its axis
+# of a job: functions of its run and its twin; of a study: of its rows and its axis; of regimes: as
+# `regime_captions` tells
 PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
     "job": {
         "signals": signals,
@@ -188,4 +186,5 @@ PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
         "impacts": struck,
     },
     "study": {"waterfall": waterfall, "map": mode_rows},
+    "regimes": REGIME_CAPTIONS,
 }

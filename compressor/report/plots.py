@@ -2,8 +2,6 @@
 
 import difflib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -18,15 +16,13 @@ from compressor.analysis import (
     shaking,
 )
 from compressor.cases import points
-from compressor.program import CompsimError
 from compressor.reasons import remedy
 from compressor.report.figures import Drawing
 from compressor.report.figures.contact import draw_impacts, draw_modes, draw_orbits
 from compressor.report.figures.job import draw_signals, draw_spectra
 from compressor.report.figures.study_maps import draw_map, draw_waterfall
-from compressor.report.figures.style import render
-from compressor.report.study_section import file_name
-from compressor.store import Folder, Stored, StoredStudy, publish, read_store, read_studies
+from compressor.report.plot_choice import PlotChoice, PlotError, Plotted, chosen, published
+from compressor.store import Folder, Stored, StoredStudy, read_store, read_studies
 
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
 OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
@@ -34,33 +30,6 @@ MOST_ROWS = 200  # of a map
 MOST_NAMES = 5
 SHORT = 10  # digits of a key in the name of a file
 KEEP = "run it again with --set output.keep=series"
-
-
-class PlotError(CompsimError):
-    """What cannot be drawn: why, and what to do about it."""
-
-    exit_code = 2
-
-
-@dataclass(frozen=True)
-class PlotChoice:
-    """What to draw: names of figures, all by default; of a study the axis and the other values.
-
-    over: the axis by its key or the end of it; at: `key=value` of other axes, else their first.
-    """
-
-    what: tuple[str, ...] = ()
-    over: str = ""
-    at: tuple[str, ...] = ()
-    kinds: tuple[str, ...] = ("png",)
-
-
-@dataclass(frozen=True)
-class Plotted:
-    """A figure that was written, one file a kind."""
-
-    paths: tuple[Path, ...]
-    caption: str
 
 
 def write_plots(
@@ -80,13 +49,7 @@ def write_plots(
         key = job_key(stored, studies, target)
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:SHORT]
-    for name, caption, drawing in drawn:
-        paths = []
-        for kind in choice.kinds:
-            path = Path(output) / f"{file_name(stem, name)}.{kind}"
-            publish(path, render(drawing, kind))
-            paths.append(path)
-        yield Plotted(tuple(paths), caption)
+    yield from published(drawn, output, stem, choice.kinds)
 
 
 def job_key(stored: Stored, studies: Sequence[StoredStudy], target: str) -> str:
@@ -102,14 +65,6 @@ def job_key(stored: Stored, studies: Sequence[StoredStudy], target: str) -> str:
     near = difflib.get_close_matches(target, names, MOST_NAMES, 0.4) or names[:MOST_NAMES]
     problem = f"{stored.folder} has no study {target!r}, and no job's key begins so"
     raise PlotError(f"{problem}: near to it are the studies {', '.join(near) or 'none'}")
-
-
-def chosen(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
-    """The figures that are wanted; PlotError where one is none of this thing."""
-    wrong = [name for name in what if name not in known]
-    if wrong:
-        raise PlotError(f"{thing} has no figure {wrong[0]!r}: it has {', '.join(known)}")
-    return tuple(what) or tuple(known)
 
 
 def job_figures(
