@@ -53,7 +53,7 @@ calibration: install  ## measure what estimates of errors are worth, on cases th
 accuracy: install  ## judge promises and error bars on 1,000 other random cases (7 minutes)
 	$(CAMPAIGN)/measure_accuracy.py tests/results/accuracy.json
 
-claims: install  ## measure the paper's claims over a range of masses (seconds)
+claims: install  ## measure the paper's claims over machines, and what decides them (an hour)
 	$(CAMPAIGN)/measure_claims.py tests/results/claims.json
 
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
@@ -103,6 +103,6 @@ measurements: calibration accuracy claims tradeoff ladders chaotic diagnosis ide
 pages: install  ## write the generated tables of the README pages
 	$(BIN)/python tests/page_tables.py
 
-clean:  ## remove results, report, tradeoff, stress and caches; .venv stays
-	rm -rf results report tradeoff stress .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:  ## remove results, report, claims, tradeoff, stress and caches; .venv stays
+	rm -rf results report claims tradeoff stress .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -101,24 +101,38 @@ def broken_table():
 
 def claims_table():
     measured = kept("claims.json")
-    default = next(
-        row for row in measured["masses"]
-        if (row["rod_mass_kg"], row["reciprocating_mass_kg"]) == (4.7, 14.0)
-    )  # fmt: skip
-    head = ["claim", "at the default masses", "margin there", "over the mass sets", "least margin",
-            "greatest"]  # fmt: skip
+    default, plane, drawn = measured["default"], measured["map"], measured["assumptions"]
+    head = ["claim", "at the defaults", "map: held", "neighbours that differ", "margin in between",
+            "assumptions: held", "decided most by"]  # fmt: skip
     rows = []
-    for claim, held, margin in zip(
-        measured["claims"], default["held"], default["margins"], strict=True
-    ):
-        each = [row["margins"][claim["claim"] - 1][0] for row in measured["masses"]]
-        value, error = margin
+    for place, statement in enumerate(measured["statements"]):
+        claim = str(place + 1)
+        value, error = default["margin"][place], default["error"][place]
+        one, inside = measured["flips"][claim], measured["between"][claim]
+        closed = f"{inside['closed']} of {inside['pairs']} come within the error"
+        decided = drawn["deciding"][place].partition(": ")[2].removeprefix("most by ")
         rows.append([
-            f"{claim['claim']}. {claim['statement']}", "held" if held else "not held",
-            f"{100 * value:+.3g} % ± {100 * error:.2g} %", f"{claim['held']} of {claim['of']}",
-            *(f"{100 * one:+.3g} %" for one in (min(each), max(each))),
+            f"{claim}. {statement}",
+            f"{'held' if value >= 0 else 'not held'}, {100 * value:+.3g} % ± {100 * error:.2g} %",
+            f"{plane['each'][claim]} of {plane['judged']}",
+            f"{one['flips']} of {one['pairs']}", closed if inside["pairs"] else "–",
+            f"{drawn['each'][claim]} of {drawn['judged']}", decided.rstrip("."),
         ])  # fmt: skip
     return markdown(head, rows)
+
+
+def claims_words():
+    measured = kept("claims.json")
+    plane, drawn, search = (measured[name] for name in ("map", "assumptions", "search"))
+    lines = [
+        f"- **Map** ({plane['judged']} machines, 9 cases each, {plane['seconds']:.0f} s): "
+        + " ".join(plane["said"][1:]),
+        f"- **All assumptions** ({drawn['judged']} machines, {drawn['chaotic']} of them with "
+        f"chaotic cases, {drawn['seconds']:.0f} s): " + " ".join(drawn["said"][1:]),
+        f"- **Search** ({search['judged']} machines, {search['seconds']:.0f} s): "
+        + " ".join(search["said"]),
+    ]
+    return "\n".join(lines)
 
 
 def store_table():
@@ -692,6 +706,7 @@ PAGES = {
         "calibration": calibration_table,
         "trade": trade_table,
         "claims": claims_table,
+        "machines": claims_words,
         "store": store_table,
         "peers": peers_table,
         "throughput": throughput_table,

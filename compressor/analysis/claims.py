@@ -1,6 +1,5 @@
 """The paper's claims, measured on stored runs by the rules of `claim_rules`."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from compressor.analysis.claim_rules import RULES, Runs, vibrating
@@ -48,10 +47,3 @@ def claim_margins(runs: Runs) -> tuple[list[Margin], dict[str, Margin]]:
     shares = Shares._fields
     alone = {name: least(each[6][n :: len(shares)]) for n, name in enumerate(shares)}
     return [least(margins) for margins in each], alone | {"active": vibrating(kept)}
-
-
-def held_share(all_claims: list[list[Claim]]) -> Iterator[tuple[int, int, int]]:
-    """For each claim, over several sets of claims: its number, in how many it held, of how many."""
-    for same in zip(*all_claims, strict=True):
-        judged = [claim.held for claim in same if claim.held is not None]
-        yield same[0].number, sum(judged), len(judged)

@@ -1,12 +1,10 @@
 """Relations and claims: on data whose answer is known, and on the paper's cases as data."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from compressor.analysis.claim_rules import RULES, more_continuous
-from compressor.analysis.claims import claim_margins, claims, held_share
+from compressor.analysis.claims import claim_margins, claims
 from compressor.analysis.continuity import Shares
 from compressor.analysis.margins import Measure
 from compressor.analysis.paper_cases import CLEARANCES, FAULT_LABELS, paper_cases
@@ -184,13 +182,6 @@ def test_margins_of_claims_are_those_of_the_page(paper_runs):
     for margin, claim in zip(each, claims(paper_runs), strict=True):
         assert margin == pytest.approx(claim.margin)
     assert each[6].value == min(alone[name].value for name in Shares._fields)
-
-
-def test_held_share_counts_what_was_judged(paper_runs):
-    once = claims(paper_runs)
-    flipped = [replace(claim, held=not claim.held) for claim in once]
-    for number, held, of in held_share([once, flipped, claims({})]):
-        assert (held, of) == (1, 2), number
 
 
 def test_the_case_of_a_run_is_recovered(paper_runs):
