@@ -4,6 +4,7 @@ A sentence is chosen by numbers, and says them.
 """
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
@@ -11,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis.cam import Cam
-from compressor.analysis.course import Course, course
+from compressor.analysis.course import APART, Course, course
 from compressor.analysis.paper_cases import CLEARANCES, SPOKEN, faulty_joints, label
 from compressor.analysis.runs import force_relation, ideal_motion, load_corners, settled
 
@@ -115,7 +116,7 @@ def deviations(of: Sequence[xr.Dataset]) -> str:
         for number, name in enumerate(SERIES):
             away = np.abs(kept[name].values - ideal[number]).max() / np.ptp(ideal[number])
             greatest[number] = max(greatest[number], away)
-    shares = [f"{share:.2g} %" if share < 99.5 else f"{share:.0f} %" for share in 100 * greatest]
+    shares = [percent(share) for share in greatest]
     return (
         f"From the machine without clearance displacement differs by at most {shares[0]} of its "
         f"range, velocity by {shares[1]}, acceleration by {shares[2]}."
@@ -126,34 +127,34 @@ def motion(courses: Sequence[Course]) -> str:
     """How the journal moves in its bearing."""
     joint = SPOKEN[courses[0].joint]
     apart = [one.apart for one in courses]
-    turns = [f"{angles(one)}" for one in courses]
-    same_count = len({len(one.turns) for one in courses}) == 1
-    at = between(courses) if same_count else "; ".join(turns)
-    reverses = (
-        f"The horizontal force at the {joint} changes its sign near {at}."
-        if at
-        else (f"The horizontal force at the {joint} does not change its sign.")
-    )
+    spans = spanned([one.turns for one in courses])
+    if any(one.turns for one in courses):
+        near = spans and max(high - low for low, high in spans) <= APART
+        at = " and ".join(map(said, spans)) if near else apart_from_each_other(courses)
+        reverses = f"The horizontal force at the {joint} changes its sign near {at}."
+    else:
+        reverses = f"The horizontal force at the {joint} does not change its sign."
     if max(apart) == 0.0:
         least = min(one.least for one in courses)
         runs_round = all(abs(abs(one.laps) - 1.0) < 0.05 for one in courses)
         how = "goes round on its wall once a revolution" if runs_round else "moves along its wall"
         stays = (
             f"The journal never leaves its bearing there: it {how}, always pressed in by "
-            f"{1e6 * least:.2g} µm or more."
+            f"{two_digits(1e6 * least)} µm or more."
         )
     else:
-        shares = ", ".join(f"{100 * share:.2g} %" for share in apart)
+        shares = ", ".join(map(percent, apart))
         stays = f"The journal is without contact for {shares} of the time."
     return f"{reverses} {stays}"
 
 
 def rings(courses: Sequence[Course]) -> list[str]:
-    """The frequencies after the first change of sign, where there is one in every run."""
+    """The frequencies after the first change of sign, where all runs have the same one."""
     found = [one.rings for one in courses]
-    if not np.isfinite(found).all():
+    spans = spanned([one.turns[:1] for one in courses])
+    if not np.isfinite(found).all() or not spans or max(spans[0]) - min(spans[0]) > APART:
         return []
-    return [f"After the first change acceleration rings at {listed(found, '{:.0f}')} Hz."]
+    return [f"After the first change acceleration rings at {listed(found, 0)} Hz."]
 
 
 def peaks(of: Sequence[xr.Dataset]) -> str:
@@ -161,7 +162,7 @@ def peaks(of: Sequence[xr.Dataset]) -> str:
     found = [float(run["peak_acceleration"]) for run in of]
     grows = all(b > a for a, b in itertools.pairwise(found))
     how = "grows with clearance" if grows else "does not always grow with clearance"
-    return f"The greatest acceleration {how}: {listed(found, '{:.0f}')} m/s²."
+    return f"The greatest acceleration {how}: {listed(found, 0)} m/s²."
 
 
 def contact_force(runs: Runs, fault: str, joint: str) -> str:
@@ -175,8 +176,8 @@ def contact_force(runs: Runs, fault: str, joint: str) -> str:
         "Force on the rod: (a) along the cylinder, positive away from the crank, and (b) vertical, "
         "on a scale of its own. Right, the part in the black rectangle, where the horizontal "
         "forces differ most.",
-        f"Greatest: {listed(np.array(along) / 1e3, '{:.2f}')} kN along the cylinder, "
-        f"{listed(np.array(across) / 1e3, '{:.2f}')} kN across it.",
+        f"Greatest: {listed(np.array(along) / 1e3, 2)} kN along the cylinder, "
+        f"{listed(np.array(across) / 1e3, 2)} kN across it.",
     ]
     slopes = [force_relation(run, joint).slope for run in of]
     if max(slopes) < 0:
@@ -193,28 +194,59 @@ def relation(runs: Runs, joint: str) -> str:
     found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
     return (
         "A dot for each stored sample. The line is the least-squares fit of force on acceleration; "
-        f"its slope is a mass: {listed([one.slope for one in found], '{:.2f}')} kg, with r² "
-        f"{listed([one.r2 for one in found], '{:.3f}')}. {LOOP[joint]}"
+        f"its slope is a mass: {listed([one.slope for one in found], 2)} kg, with r² "
+        f"{', '.join(f'{one.r2:.3f}' for one in found)}. {LOOP[joint]}"
     )
 
 
-def between(courses: Sequence[Course]) -> str:
-    """The angles of all runs, each from the least to the greatest."""
-    spans = []
-    for same in zip(*(one.turns for one in courses), strict=True):
-        low, high = f"{min(same):.0f}", f"{max(same):.0f}"
-        spans.append(f"{low}°" if low == high else f"{low}–{high}°")
-    return " and ".join(spans)
+def spanned(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
+    """The least and the greatest of each angle (degrees) over runs, in the order of the first run.
+
+    Angles of one turn belong together that lie nearest round the circle, so that 359 and 1 degrees
+    are one change: given as (359, 361). Empty where the runs have not the same number of them.
+    """
+    first = np.array(turns[0])
+    if not first.size or {len(one) for one in turns} != {first.size}:
+        return []
+    away = []
+    for one in turns:
+        rotated = (np.roll(one, n) - first for n in range(first.size))
+        away.append(min(((d + 180.0) % 360.0 - 180.0 for d in rotated), key=lambda d: (d**2).sum()))
+    return [*zip(first + np.min(away, axis=0), first + np.max(away, axis=0), strict=True)]
 
 
-def angles(one: Course) -> str:
-    """The angles of one run."""
-    return ", ".join(f"{turn:.0f}°" for turn in one.turns)
+def said(span: tuple[float, float]) -> str:
+    """A span of angles in words."""
+    low, high = (f"{angle % 360.0:.0f}".replace("360", "0") for angle in span)
+    return f"{low}°" if low == high else f"{low}–{high}°"
 
 
-def listed(values: Sequence[float] | np.ndarray, form: str) -> str:
-    """Numbers of 0.1, 0.2 and 0.3 mm, in this order."""
-    return ", ".join(form.format(value) for value in values)
+def apart_from_each_other(courses: Sequence[Course]) -> str:
+    """The angles of each run, where they are not the same few."""
+    of = [", ".join(f"{turn:.0f}°" for turn in one.turns) or "no angle" for one in courses]
+    return ", ".join(f"{at} at {c:g} mm" for at, c in zip(of, CLEARANCES, strict=True))
+
+
+def percent(share: float) -> str:
+    """A share in percent, to two digits or whole."""
+    return f"{two_digits(100.0 * share)} %"
+
+
+def two_digits(value: float) -> str:
+    """A number to two digits or whole, without a power of ten."""
+    text = f"{value:.2g}"
+    return f"{value:.{decimals(abs(value), 0)}f}" if "e" in text else text
+
+
+def decimals(size: float, usual: int) -> int:
+    """Digits after the point: as usual, or as many more as two digits of a number need."""
+    return max(usual, 1 - math.floor(math.log10(size))) if size > 0 else usual
+
+
+def listed(values: Sequence[float] | np.ndarray, usual: int) -> str:
+    """Numbers of 0.1, 0.2 and 0.3 mm, in this order; usual: digits after the point."""
+    digits = decimals(float(np.abs(values).min()), usual)
+    return ", ".join(f"{value:.{digits}f}" for value in values)
 
 
 CAPTIONS: dict[int, Callable[[Runs], str]] = {

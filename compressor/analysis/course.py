@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from compressor.analysis.runs import ideal_motion, settled
+from compressor.analysis.runs import case_of, ideal_motion, settled
 
 APART = 20.0  # degrees: changes of sign nearer to each other are one turn
 AFTER, SPAN = 5.0, 90.0  # degrees after a turn, and how long its ringing is looked at
 PADDED = 16  # times longer with zeros, so that the lines of its spectrum lie close
 DRIFT = 5  # degree of the polynomial that is taken off what rings
-LEAST_RING = 100.0  # Hz: below it a motion is the machine's
+LEAST_RING = 12.0  # of the crank's frequency: below it a motion is the machine's
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
 
 def ringing(kept: xr.Dataset, turn: float) -> float:
     """The strongest frequency (Hz) of the acceleration's deviation after a turn (degrees)."""
-    from scipy.signal import periodogram
+    from scipy.signal import find_peaks, periodogram
 
     angle = np.degrees(kept["crank_angle"].values)
     begin = angle[0] + (turn + AFTER - angle[0]) % 360.0
@@ -88,5 +88,6 @@ def ringing(kept: xr.Dataset, turn: float) -> float:
     rate = 1.0 / (time[1] - time[0])
     how = {"nfft": PADDED * rest.size, "detrend": False}
     frequency, power = periodogram(rest, rate, np.hanning(rest.size), **how)
-    power[frequency < LEAST_RING] = 0.0
-    return float(frequency[np.argmax(power)])
+    lines, _ = find_peaks(power)  # an end of the spectrum is no line, but a slower motion's foot
+    lines = lines[frequency[lines] >= LEAST_RING * case_of(kept).omega / (2.0 * np.pi)]
+    return float(frequency[lines[np.argmax(power[lines])]]) if lines.size else float("nan")

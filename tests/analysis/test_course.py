@@ -44,6 +44,20 @@ def test_ringing_of_a_known_frequency(paper_runs, frequency):
     assert ringing(known, 70.0) == pytest.approx(frequency, rel=0.02)
 
 
+@pytest.mark.parametrize("rpm", [250, 500, 1000])
+def test_a_slow_motion_s_foot_does_not_ring(rpm):
+    """A motion of order 8, ten times as high as a burst of order 80, leaks beyond order 12."""
+    run = simulate(Case.from_values({"machine": {"speed_rpm": rpm}}))
+    kept = settled(run)
+    angle = kept["crank_angle"].values
+    slow = 100.0 * np.sin(8.0 * angle)
+    burst = 10.0 * np.sin(80.0 * angle)
+    known = kept.assign(acceleration=("time", ideal_motion(kept)[2] + slow + burst))
+    assert ringing(known, 70.0) == pytest.approx(80.0 * rpm / 60.0, rel=0.02)
+    alone = kept.assign(acceleration=("time", ideal_motion(kept)[2] + slow))
+    assert not ringing(alone, 70.0) < 12.0 * rpm / 60.0
+
+
 @pytest.mark.parametrize("joint", ["big_end", "small_end"])
 @pytest.mark.parametrize("clearance", CLEARANCES)
 def test_the_paper_s_journals_run_round_their_bearings(paper_runs, joint, clearance):
