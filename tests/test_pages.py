@@ -29,7 +29,7 @@ PAGES = {
         "README.md", "configs/README.md", "compressor/solve/README.md",
         "compressor/store/README.md", "compressor/sweep/README.md",
         "compressor/physics/README.md", "compressor/README.md", "tests/README.md",
-        "tests/results/README.md",
+        "tests/results/README.md", "compressor/cases/examples/README.md",
     )
 }  # fmt: skip
 TEXT = "\n".join(PAGES.values())
