@@ -3,13 +3,14 @@
 import math
 import shlex
 import warnings
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from compressor.analysis import CLEARANCES, FAULTS, label, paper_cases
+from compressor.cases import Case
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, StoreWarning
 
 
@@ -23,8 +24,15 @@ class PaperRuns:
 
 
 def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns:
-    """The runs with the physics of the paper's cases; of several, the most exact."""
-    labels = {case.physics_key: name for name, case in paper_cases().items()}
+    """The runs with the physics of the paper's cases."""
+    return find_runs(stored, studies, paper_cases())
+
+
+def find_runs(
+    stored: Stored, studies: Sequence[StoredStudy], cases: Mapping[str, Case]
+) -> PaperRuns:
+    """The studies' runs with the physics of some cases by label; of several, the most exact."""
+    labels = {case.physics_key: name for name, case in cases.items()}
     found: dict[str, xr.Dataset] = {}
     damaged = set()
     for key in paper_candidates(stored, studies, labels):

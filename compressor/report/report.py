@@ -6,6 +6,8 @@ report which is interrupted leaves the one before as it was.
 
 import contextlib
 import sys
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 from compressor.analysis import caption
@@ -28,6 +30,15 @@ from compressor.report.page import Plate, Section, document
 from compressor.report.paper_runs import PaperRuns, find_paper_runs
 from compressor.report.paper_sections import missing_sections, paper_sections
 from compressor.report.provenance import provenance_section
+from compressor.report.second_sets import (
+    SET,
+    SecondSet,
+    second_anchor,
+    second_drawings,
+    second_name,
+    second_section,
+    second_sets,
+)
 from compressor.report.study_section import file_name, study_section
 from compressor.store import (
     Folder,
@@ -57,40 +68,54 @@ def write_report(results: Folder, report: Folder, command: str = "", claims: Fol
 
     Raises StoreError where there are no results, or the report's folder cannot be written.
     """
-    plates, page = compose(results, command, claims)
+    plates, studies, page = compose(results, command, claims)
     folder = Path(report)
     for plate in plates:
         publish(folder / f"{plate.name}.png", plate.png)
         publish(folder / f"{plate.name}.svg", plate.svg)
     publish(folder / "index.html", page.encode())
-    remove_stale(folder, {plate.name for plate in plates})
+    remove_stale(folder, studies, {plate.name for plate in plates})
     return folder / "index.html"
 
 
-def compose(results: Folder, command: str, claims: Folder) -> tuple[list[Plate], str]:
-    """All figures of a report, drawn, and its page."""
+def compose(results: Folder, command: str, claims: Folder) -> tuple[list[Plate], list[str], str]:
+    """All figures of a report, drawn, the names of its studies, and its page."""
     judged = machine_files(claims) if claims else {}
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     of_paper = draw_paper(paper)
+    others = second_sets(stored, studies, paper)
+    of_others = {n: [draw(*parts) for parts in second_drawings(one)] for n, one in others.items()}
     found = shakings(paper)
     of_faults = [draw(*parts) for parts in diagnosis_drawings(found, paper)]
     shown = {run.attrs["key"] for run in paper.stored.values()}
-    drawn = [drawn_study(stored, s) for s in studies if not shown.issuperset(s.keys)]
+    drawn = {
+        study.name: drawn_study(stored, study, others.get(study.name))
+        for study in studies
+        if not shown.issuperset(study.keys)
+    }
+    about_others = [
+        second_section(one, of_others[name], of_paper, drawn[name][0].anchor)
+        for name, one in others.items()
+    ]
     about_paper = [*paper_sections(paper, of_paper)]
-    about_paper[1:1] = diagnosis_sections(found, of_faults)
-    about_studies = [section for section, _ in drawn]
+    about_studies = [section for section, _ in drawn.values()]
+    if of_paper:
+        about_paper[1:1] = [*about_others, *diagnosis_sections(found, of_faults)]
+        told = about_paper + about_studies
+    else:
+        told = about_others + about_studies + about_paper
     about_machines = [drawn_part(*parts) for parts in machine_drawings(judged)]
     sections = [
         Section("assumptions", "What to keep in mind", "assumptions.html"),
-        *(about_paper + about_studies if of_paper else about_studies + about_paper),
+        *told,
         *machine_sections(about_machines),
         *missing_sections(paper, results),
         provenance_section(studies, results, command),
     ]
-    plates = of_paper + of_faults + [plate for _, more in drawn for plate in more]
-    plates += [part.plate for part in about_machines if part.plate]
-    return plates, document(sections)
+    sets = (of_paper, *of_others.values(), of_faults, *(more for _, more in drawn.values()))
+    plates = [*chain(*sets), *(part.plate for part in about_machines if part.plate)]
+    return plates, [study.name for study in studies], document(sections)
 
 
 def drawn_part(name: str, sentences: list[str], heading: str, drawing: Drawing | None) -> Part:
@@ -101,20 +126,31 @@ def drawn_part(name: str, sentences: list[str], heading: str, drawing: Drawing |
     return Part(name, sentences, plate)
 
 
-def drawn_study(stored: Stored, study: StoredStudy) -> tuple[Section, list[Plate]]:
-    """A user's own study: its section, and each metric against each swept axis, drawn."""
+def drawn_study(
+    stored: Stored, study: StoredStudy, other: SecondSet | None
+) -> tuple[Section, list[Plate]]:
+    """A user's own study: its section, and each metric against each swept axis, drawn.
+
+    The sweep is not drawn where all of the study is shown as another set of the paper's figures.
+    """
+    anchor = second_anchor(study.name) if other else ""
+    whole = other is not None and other.keys.issuperset(study.keys)
     with open_study(stored.folder, study.name) as data:
         plates = [
             draw(file_name("sweep", study.name, axis), f"{study.name}: metrics against {axis}",
                  SWEEP, draw_metrics(data, axis))
-            for axis in (swept(data) if measures(data) else [])
+            for axis in (swept(data) if measures(data) and not whole else [])
         ]  # fmt: skip
-        return study_section(stored, study, data, plates), plates
+        return study_section(stored, study, data, plates, anchor), plates
 
 
-def remove_stale(report: Path, drawn: set[str]) -> None:
-    """Remove an earlier report's drawings of the paper's figures that this one could not draw."""
+def remove_stale(report: Path, studies: Iterable[str], drawn: set[str]) -> None:
+    """Remove an earlier report's drawings of the paper's figures that this one could not draw.
+
+    studies: the names of those that may have had a set of their own.
+    """
     names = {f"figure-{item.number:02d}" for item in FIGURES}
+    names |= {second_name(study, item) for study in studies for item in SET}
     for name in (names | {f"diagnosis-{name}" for name in TITLES}) - drawn:
         for kind in ("png", "svg"):
             with contextlib.suppress(OSError):

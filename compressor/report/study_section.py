@@ -28,7 +28,10 @@ MOST_ROWS = 500
 
 @dataclass(frozen=True)
 class StudyContent:
-    """What a page says of a study; `chaotic` counts jobs of which statistics alone hold."""
+    """What a page says of a study; `chaotic` counts jobs of which statistics alone hold.
+
+    `second_set`: the id of the section with its own Figures 8 to 16; empty where it has none.
+    """
 
     case_file: str
     counts: str
@@ -38,10 +41,15 @@ class StudyContent:
     jobs: int
     table: Table
     plates: Sequence[Plate]
+    second_set: str = ""
 
 
 def study_section(
-    stored: Stored, study: StoredStudy, data: xr.Dataset, plates: Sequence[Plate]
+    stored: Stored,
+    study: StoredStudy,
+    data: xr.Dataset,
+    plates: Sequence[Plate],
+    second_set: str = "",
 ) -> Section:
     """A study as `open_study` gives it: its table, its failures, and its figures."""
     reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
@@ -54,6 +62,7 @@ def study_section(
         jobs=data["status"].size,
         table=jobs_table(data),
         plates=plates,
+        second_set=second_set,
     )
     return Section(file_name("study", study.name), f"Study {study.name}", "study.html", content)
 

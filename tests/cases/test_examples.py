@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from compressor.analysis.paper_cases import FAULT_LABELS, paper_cases
+from compressor.analysis.paper_cases import FAULT_LABELS, cases_of
+from compressor.cases.case import Case
 from compressor.cases.examples import FOLDER, example
 from compressor.cases.load import load_studies
 
@@ -43,6 +44,6 @@ def test_they_are_installed():
 
 def test_the_consistent_machine_has_the_paper_s_faults():
     (study,) = load_studies(example("consistent"))
-    cases = paper_cases(study.cases[-1])
+    cases = cases_of(study.cases[-1])
     assert {*study.keys} == {cases[name].key for name in ("design", *FAULT_LABELS)}
-    assert study.cases[0].machine != paper_cases()["design"].machine
+    assert study.cases[0].machine != Case().machine

@@ -17,6 +17,7 @@ from compressor.report.diagnosis_section import DiagnosisContent
 from compressor.report.page import Plate, Section, document, templates
 from compressor.report.paper_sections import MissingFigures
 from compressor.report.provenance import Provenance
+from compressor.report.second_sets import Pair, SecondSetContent
 from compressor.report.study_section import StudyContent
 from compressor.report.tables import Cell, Row, Table
 from compressor.store.studies import StoredStudy
@@ -70,6 +71,7 @@ def contents(evil):
     """What every template is given, each text of it hostile; by the template's name."""
     claims = [Claim(n, evil(), evil(), held, [(evil(), evil())], evil())
               for n, held in enumerate((True, False, None))]  # fmt: skip
+    first = Plate("drawn", evil(), "its caption stands in the first set", b"png", b"svg")
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
     return {
         "assumptions.html": None,
@@ -80,8 +82,11 @@ def contents(evil):
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
+        "second_set.html": SecondSetContent(
+            evil(), evil(), [evil()], [evil()], [Pair(first, plate(evil))], claims
+        ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], 9, table(evil),
-                                   [plate(evil)]),
+                                   [plate(evil)], evil()),
     }  # fmt: skip
 
 
@@ -92,9 +97,10 @@ def test_every_template_escapes_every_text():
     assert {*templates().list_templates()} - {*given} == {"page.html", "pieces.html", "style.css"}
     assert "<script" not in text
     assert {*re.findall(r"<(\w+)", text)} <= {
-        "html", "head", "meta", "title", "style", "body", "h1", "h2", "p", "nav", "ul", "li", "a",
-        "section", "figure", "figcaption", "img", "strong", "div", "table", "thead", "tbody", "tr",
-        "th", "td", "code", "span", "br", "small", "pre", "dl", "dt", "dd", "details", "summary",
+        "html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "nav", "ul", "li",
+        "a", "section", "figure", "figcaption", "img", "strong", "div", "table", "thead", "tbody",
+        "tr", "th", "td", "code", "span", "br", "small", "pre", "dl", "dt", "dd", "details",
+        "summary",
     }  # fmt: skip
     shown = html.unescape(text)
     assert len(evil.planted) > 70
