@@ -14,6 +14,7 @@ from jinja2 import UndefinedError
 from compressor.analysis.claims import Claim
 from compressor.report import page
 from compressor.report.diagnosis_section import DiagnosisContent
+from compressor.report.machines_section import Part
 from compressor.report.page import Plate, Section, document, templates
 from compressor.report.paper_sections import MissingFigures
 from compressor.report.provenance import Provenance
@@ -79,6 +80,7 @@ def contents(evil):
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
+        "machines.html": [Part(evil(), [evil()], plate(evil))],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
