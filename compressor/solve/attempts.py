@@ -73,12 +73,14 @@ class Solution:
 
 
 def attempt(
-    case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None
-) -> Solution:
+    case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
+    state: np.ndarray | None = None,
+) -> Solution:  # fmt: skip
     """One run of a case at a tolerance, without errors, within a wall time (s).
 
     `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
-    without. `cuts`: into revolutions; metrics are of all of them.
+    without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
+    top dead centre (`physics.STATE_NAMES`), in place of the case's own; no ideal scene has one.
     """
     p = record(case)
     samples = finer(case) * round(case.steps) if sampled else 1
@@ -92,7 +94,10 @@ def attempt(
         trajectory = closed_form(p, grid, case.settle, pieces, timeout)
     else:
         y = np.zeros(2 * FREEDOMS[scene(case)])
-        start(offsets(case), y, p)
+        if state is None:
+            start(offsets(case), y, p)
+        else:
+            y[:] = state
         how = case.solve
         trajectory = integrate(
             Request(p, y, grid, case.settle, rtol, how.method, how.max_steps, timeout, cuts)

@@ -36,7 +36,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
         result.evaluations = int(walker.evaluations)
         if walker.status == Status.DONE and ends and request.cuts:
             del ends[0]
-            if request.cuts.cut(result.tally) and walker.segment < phases.size:
+            if request.cuts.cut(result.tally, z) and walker.segment < phases.size:
                 walker.status = Status.RUNNING
         if walker.status == Status.DONE:
             return

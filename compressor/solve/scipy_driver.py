@@ -89,7 +89,7 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
             wanted = np.flatnonzero(owner == i)
             segment = Segment(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
             z = segment.run(z)
-            if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally):
+            if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally, z):
                 result.stop_time = math.nan
                 break
     finally:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from compressor.physics import new_tally
+from compressor.physics import FLOWS, new_tally
 
 Turns = list[np.record]  # tallies, of one revolution each
 SUMS = (
@@ -20,15 +20,21 @@ class Cuts:
     """Times (s) at which a run's tally is cut.
 
     `enough`: asked at each of them with the tallies so far; once it says so, the run ends there.
-    `turns`: those tallies, of what lies before each cut and after the one before it.
+    `turns`: those tallies, of what lies before each cut and after the one before it. `states`: the
+    motion at each cut.
     """
 
     times: np.ndarray
     enough: Callable[[Turns], bool] = lambda turns: False
     turns: Turns = field(default_factory=list)
+    states: list[np.ndarray] = field(default_factory=list)
 
-    def cut(self, tally: np.record) -> bool:
-        """Keep what was tallied since the last cut, begin again, and tell whether to go on."""
+    def cut(self, tally: np.record, z: np.ndarray) -> bool:
+        """Keep what was tallied since the last cut, begin again, and tell whether to go on.
+
+        z: motion and flows there.
+        """
+        self.states.append(z[:-FLOWS].copy())
         self.turns.append(tally.copy())
         fresh = new_tally()
         for name in SUMS + GREATEST:
