@@ -33,7 +33,7 @@ def explain(
     """
     from compressor.cases import load_studies
 
-    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs)
+    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, follow=False)
     caution(studies)
     from compressor.measure import explain as explained
 

@@ -85,7 +85,7 @@ def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, C
             raise click.UsageError("--set changes case files: name one, such as configs/both.yaml")
         return default_cases()
     cases = {}
-    for study in load_studies(*configs, overrides=overrides):
+    for study in load_studies(*configs, overrides=overrides, follow=False):
         for point, case in zip(points(study), study.cases, strict=True):
             name = " ".join([study.name, *(plain(value) for value in point.values())])
             if not faulty(case):

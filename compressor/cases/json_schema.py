@@ -11,6 +11,7 @@ from compressor.cases.accuracy import TARGET
 from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, Parameter
+from compressor.cases.regimes import ROWS, followable
 from compressor.cases.shorthands import SHORTHANDS, row_of
 from compressor.cases.swept import FORMS, SAMPLED, is_number
 from compressor.cases.table import GROUPS, WORDS, outside_identity, table
@@ -18,7 +19,7 @@ from compressor.metrics import METRICS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
-WHOLE_FILE = ("name", "blocks")  # what cannot stand in a block
+WHOLE_FILE = ("name", "blocks", "regimes")  # what cannot stand in a block
 
 Schema = dict[str, Any]
 
@@ -26,7 +27,7 @@ Schema = dict[str, Any]
 def case_schema() -> Schema:
     """The schema of a whole case file, in the dialect 2020-12."""
     found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in _top_keys()}
-    found |= _sweeps()
+    found |= _sweeps() | {"regimes": _regimes()}
     in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}
     blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
     blocks["description"] = "sets of jobs, one after the other; each over the keys of the file"
@@ -122,6 +123,25 @@ def _sweeps() -> Schema:
         "exclude": {"description": "comparisons; jobs for which one holds are left out",
                     "anyOf": [TEXT, texts]},
     }  # fmt: skip
+
+
+def _regimes() -> Schema:
+    """The schema of what is followed, value after value."""
+    ends = {"over": {"description": "the key that is followed", "enum": [*followable()]}}
+    ends |= {
+        "from": {"description": "its least value", **NUMBER},
+        "to": {"description": "its greatest value", **NUMBER},
+    }
+    rows = {
+        name: {
+            "description": row.phrase,
+            **({} if row.default is None else {"default": row.default}),
+        }
+        | _one(row)
+        for name, row in ROWS.items()
+    }
+    about = "one machine followed along a key; each value starts from the end of the last one"
+    return {"description": about, **_mapping(ends | rows), "required": ["over", "from", "to", "n"]}
 
 
 def _sweepable() -> Iterable[str]:

@@ -17,8 +17,13 @@ from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, sh
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
 # keys of a case file that are no part of a case: how values are swept together
-SWEEP = ("sample", "zip", "exclude", "blocks")
-SAMPLE = ("n", "seed")
+SWEEP = ("sample", "zip", "exclude", "blocks", "regimes")
+MAPPINGS = {  # of these, what stands in them
+    "sample": ("n", "seed"),
+    "regimes": (
+        "over", "from", "to", "n", "log", "direction", "section_deg", "settle_rev", "measure_rev",
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
         mapping = isinstance(node.value, dict)
         if mapping and not node.value and WORDS.get(name):
             found.values[name] = replace(node, value=True)  # all of its defaults
-        elif (name in GROUPS or name == "sample") and mapping and not _is_sweep(name, node):
+        elif (name in GROUPS or name in MAPPINGS) and mapping and not _is_sweep(name, node):
             for inner, item in _known(name, node, problems):
                 found.values[f"{name}.{inner}"] = item
                 found.places[f"{name}.{inner}"] = item.key_place
@@ -48,7 +53,7 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
             word = shown(WORDS[name])
             message = f"needs {word} or a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
-        elif (name in GROUPS or name == "sample") and name not in (*WORDS, *SHORTHANDS):
+        elif (name in GROUPS or name in MAPPINGS) and name not in (*WORDS, *SHORTHANDS):
             message = f"needs a mapping of keys, not {shown(node.plain())}"
             problems.append(FileProblem(node.place, name, message))
         else:
@@ -74,8 +79,8 @@ def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tupl
 
 
 def _allowed(group: str) -> list[str]:
-    if group == "sample":
-        return [*SAMPLE]
+    if group in MAPPINGS:
+        return [*MAPPINGS[group]]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
     return names if group else [*names, *SWEEP]
 

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compressor.cases import blocks
+from compressor.cases import blocks, regimes
 from compressor.cases.case import Case
 from compressor.cases.conditions import NoComparison, Test, comparison
 from compressor.cases.keys import Leaves, leaves, merged, overridden, read_overrides
 from compressor.cases.parameter import CaseError, Problem
+from compressor.cases.regimes import GROUP, Regimes
 from compressor.cases.shorthands import value_of
 from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.swept import SAMPLED, counted
@@ -57,6 +58,7 @@ class _Draft:
     leaves: Leaves
     changes: Mapping[str, Leaves]
     problems: list[FileProblem]
+    regimes: Regimes | None = None
 
 
 class _Built(NamedTuple):
@@ -72,7 +74,7 @@ def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
 
     Raises CaseFileError with everything that is wrong in all files, each with its place.
     """
-    return [case for study in load_studies(*paths) for case in study.cases]
+    return [case for study in load_studies(*paths, follow=False) for case in study.cases]
 
 
 def load_studies(
@@ -80,18 +82,22 @@ def load_studies(
     overrides: Sequence[str] = (),
     max_jobs: int = MAX_JOBS,
     only: str = "",
+    follow: bool = True,
 ) -> list[Study]:
     """The studies of YAML case files; each override, `key=value`, replaces a value in all of them.
 
     A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
-    comparison, selects the jobs to be run. Raises CaseFileError with everything that is wrong in
-    all files, overrides and the comparison.
+    comparison, selects the jobs to be run. A file with `regimes` is refused where the caller cannot
+    `follow` one. Raises CaseFileError with everything that is wrong in all files, overrides and the
+    comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
     test = _read_only(only, problems) if only else None
     drafts = [_draft(os.fsdecode(path), changes, problems) for path in paths]
     _refuse_shared_names(drafts)
+    if not follow:
+        _refuse_regimes(drafts)
     studies = [_study(draft, max_jobs, test) for draft in drafts]
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
@@ -119,11 +125,14 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
     elif root and root.value is not None:
         message = "needs keys at the top, such as `joint: big_end`"
         problems.append(FileProblem(root.place, "", message))
-    name = _name(path, overridden(found, changes), problems) if root else ""
+    whole = overridden(found, changes)
+    name = _name(path, whole, problems) if root else ""
+    asked = regimes.read(whole, problems)
     if "blocks" in changes:
         found = overridden(found, {"blocks": changes["blocks"]})
-    rest = {key: change for key, change in changes.items() if key != "blocks"}
-    return _Draft(path, name, found, rest, problems)
+    gone = ("blocks", GROUP)
+    rest = {key: change for key, change in changes.items() if key.partition(".")[0] not in gone}
+    return _Draft(path, name, regimes.without(found), rest, problems, asked)
 
 
 def _name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
@@ -151,9 +160,21 @@ def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
             draft.problems.append(FileProblem(place, "name", message))
 
 
+def _refuse_regimes(drafts: Sequence[_Draft]) -> None:
+    """A chain of regimes is no case."""
+    for draft in drafts:
+        if draft.regimes:
+            place = draft.leaves.places.get(GROUP, Place(draft.path, 1, 1))
+            message = "only `compsim run` and `compsim plan` follow them: give a file without"
+            draft.problems.append(FileProblem(place, GROUP, message))
+
+
 def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
     """The study of a draft; without cases if the draft has problems, to which its own are added."""
-    drafts = [blocks.draft(leaves, draft.problems) for leaves in _blocks(draft, max_jobs)]
+    every = _blocks(draft, max_jobs)
+    if draft.regimes:
+        every = (regimes.at_first(leaves, draft.regimes, draft.problems) for leaves in every)
+    drafts = [blocks.draft(leaves, draft.problems) for leaves in every]
     if not _bearable(drafts, draft, max_jobs):
         return Study(draft.name, draft.path, (), ())
     found = [one.block() for one in drafts]
@@ -174,9 +195,15 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
         ]
     if draft.problems:
         return Study(draft.name, draft.path, tuple(axes), (), tuple(built.keys), is_grid)
+    chains = _chains(draft, cases, max_jobs) if draft.regimes else ()
+    if draft.problems:
+        return Study(draft.name, draft.path, tuple(axes), (), tuple(built.keys), is_grid)
     selected = range(len(cases)) if only is None else cases.where(only)
     kept = tuple(built.cases) if len(cases) <= MAX_KEPT else cases
-    return Study(draft.name, draft.path, tuple(axes), kept, tuple(built.keys), is_grid, selected)
+    return Study(
+        draft.name, draft.path, tuple(axes), kept, tuple(built.keys), is_grid, selected,
+        draft.regimes, chains,
+    )  # fmt: skip
 
 
 def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
@@ -210,9 +237,13 @@ def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
 def _block_leaves(item: Node, draft: _Draft) -> Leaves:
     """What a block says; what only a file can say is a problem."""
     found = leaves(item, draft.problems)
-    for key in [key for key in found.values if key in ("name", "blocks")]:
-        message = "cannot stand in a block: it belongs to the whole file"
-        draft.problems.append(FileProblem(found.places[key], key, message))
+    whole = ("name", "blocks", GROUP)
+    for key in [key for key in found.values if key.partition(".")[0] in whole]:
+        group, message = (
+            key.partition(".")[0],
+            "cannot stand in a block: it belongs to the whole file",
+        )
+        draft.problems.append(FileProblem(found.places[group], group, message))
         del found.values[key]
     found.places[""] = item.place
     return found
@@ -259,6 +290,30 @@ def _build(draft: _Draft, cases: Cases, keys: Sequence[str]) -> _Built:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         draft.problems.append(FileProblem(Place(draft.path), "", message))
     return built
+
+
+def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
+    """The cases of each chain; what cannot be followed, and too many values, are problems."""
+    asked, places = draft.regimes, draft.leaves.places
+    assert asked
+    place = places.get(GROUP, Place(draft.path, 1, 1))
+    total = len(cases) * asked.n * len(asked.directions)
+    if total > max_jobs:
+        message = f"{counted(total)} values are more than {max_jobs}; lower n, or raise --max-jobs"
+        draft.problems.append(FileProblem(places.get(f"{GROUP}.n", place), f"{GROUP}.n", message))
+        return ()
+    found = []
+    for block, chosen in cases.combinations():
+        try:
+            chain = tuple(map(cases.case, regimes.followed(asked, chosen)))
+        except CaseError as error:
+            wrong = (_located(problem, chosen, block, draft.path) for problem in error.problems)
+            draft.problems.extend(wrong)
+            return ()
+        if message := regimes.objection(chain, asked):
+            draft.problems.append(FileProblem(place, GROUP, message))
+        found.append(chain)
+    return tuple(found)
 
 
 def _located(

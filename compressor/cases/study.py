@@ -9,6 +9,7 @@ from typing import Any, Protocol, overload
 from compressor.cases import blocks
 from compressor.cases.case import Case
 from compressor.cases.conditions import Test
+from compressor.cases.regimes import Regimes
 from compressor.cases.yaml_reader import Node
 
 
@@ -30,6 +31,8 @@ class Study:
     """One case file. In a grid, jobs are in C order over the axes, in the file's order.
 
     Otherwise every axis is a column, with a value for each job, None where the job has none.
+    With `regimes` the jobs are those that chains begin at, and `chains` has the cases of each, in
+    the order of the jobs, by the values of the key that is followed.
     """
 
     name: str
@@ -39,6 +42,8 @@ class Study:
     keys: tuple[str, ...] = ()  # of the cases
     is_grid: bool = True
     selected: Sequence[int] = ()  # numbers of the jobs to be run now
+    regimes: Regimes | None = None
+    chains: tuple[tuple[Case, ...], ...] = ()
 
     @property
     def jobs(self) -> int:

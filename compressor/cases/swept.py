@@ -139,10 +139,10 @@ def _ranged(
         if row and row.kind == "integer":
             return Sweep(key, node, word, 0, spread=lambda share: round(spread(share)))
         return Sweep(key, node, word, 0, spread=spread)
-    return Sweep(key, node, word, count, make=_values(word, first, last, count))
+    return Sweep(key, node, word, count, make=between(word, first, last, count))
 
 
-def _values(word: str, first: Fraction, last: Fraction, count: int) -> Make:
+def between(word: str, first: Fraction, last: Fraction, count: int) -> Make:
     """The function that makes `count` values from first to last, evenly or with even ratios."""
     low, high = float(first), float(last)
 

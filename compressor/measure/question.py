@@ -206,7 +206,7 @@ class Question:
         ends = []
         for value in (self.low, self.high):
             texts = [*self.overrides, f"{self.key}={value!r}"]
-            (study,) = load_studies(self.path, overrides=texts)
+            (study,) = load_studies(self.path, overrides=texts, follow=False)
             ends.append(study)
         if row is None:
             raise QuestionError(f"{self.key} is no single number")
@@ -225,13 +225,14 @@ class Question:
 
     def study(self, values: Sequence[float]) -> Study:
         """The study of some values of the key, its one axis."""
-        (found,) = load_studies(self.path, overrides=self.settings(values))
+        (found,) = load_studies(self.path, overrides=self.settings(values), follow=False)
         return found
 
     def _name(self) -> str:
         (study,) = load_studies(
             self.path,
             overrides=[*self.overrides, f"{self.key}={self.low!r}"],
+            follow=False,
         )
         end = f"-find-{self.key}"
         return study.name[: NAME - len(end)] + end

@@ -1,0 +1,221 @@
+"""The `regimes` of a case file: one machine followed along a parameter, value after value.
+
+Each value's run starts from the end of the last one's (`compressor.regimes`). What a file says is
+read and checked here; the key that is followed stands in the file's own cases at its first value.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+from compressor.cases.case import Case
+from compressor.cases.keys import Leaves, covers, suggestion
+from compressor.cases.parameter import Parameter, shown
+from compressor.cases.shorthands import SHORTHANDS, row_of
+from compressor.cases.swept import between
+from compressor.cases.table import OF_JOINTS, table
+from compressor.cases.yaml_reader import FileProblem, Node, Place
+from compressor.metrics import JOINTS
+
+GROUP = "regimes"
+DIRECTIONS = {"up": ("up",), "down": ("down",), "both": ("up", "down")}
+# groups of which no value is followed: of the run and its start, or of what the machine shakes
+NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
+# keys that have no meaning where runs follow on each other, and why
+IN_VAIN = {
+    "solve.duration_rev": "settle_rev and measure_rev of regimes say how long a value runs",
+    "solve.duration_s": "settle_rev and measure_rev of regimes say how long a value runs",
+    "solve.settle_rev": "settle_rev of regimes says how much is dropped at each value",
+    "body": "regimes follow the machine alone",
+    "sensor": "regimes follow the machine alone",
+}
+
+
+def _row(name: str, default: Any, kind: str, span: tuple[float, float], phrase: str) -> Parameter:
+    words = tuple(DIRECTIONS) if kind == "choice" else ()
+    return Parameter(f"{GROUP}.{name}", "", default, *span, False, "ours", phrase, kind, words)
+
+
+# what can stand beside over, from and to
+ROWS = {
+    row.key.rpartition(".")[2]: row
+    for row in (
+        _row("n", None, "integer", (2, 100_000), "how many values"),
+        _row("log", False, "boolean", (0, 0), "values with even ratios"),
+        _row("direction", "up", "choice", (0, 0), "which way the values are followed"),
+        _row("section_deg", 0.0, "number", (0, 359.999), "crank angle of Poincaré points"),
+        _row("settle_rev", 50, "integer", (3, 10_000), "most revolutions dropped at each value"),
+        _row("measure_rev", 64, "integer", (6, 10_000), "Poincaré points of a motion that does not "
+             "repeat itself"),
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Regimes:
+    """What is followed, and how: `over` from `first` to `last`, in the case file's unit.
+
+    `direction`: up, down or both; `section_deg`: crank angle of the Poincaré points;
+    `settle_rev`: most revolutions dropped at each value; `measure_rev`: Poincaré points of a motion
+    that does not repeat itself.
+    """
+
+    over: str
+    first: float
+    last: float
+    n: int
+    log: bool = False
+    direction: str = "up"
+    section_deg: float = 0.0
+    settle_rev: int = 50
+    measure_rev: int = 64
+
+    @property
+    def values(self) -> list[float]:
+        """The values of the key, going up."""
+        word, ends = "logspace" if self.log else "linspace", (self.first, self.last)
+        first, last = (Fraction(str(end)) for end in ends)
+        return between(word, first, last, self.n)()
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """The ways that it is followed, each a chain."""
+        return DIRECTIONS[self.direction]
+
+    @property
+    def unit(self) -> str:
+        """The unit of `over` in a case file."""
+        row = row_of(self.over)
+        return row.unit if row else ""
+
+    def plain(self) -> dict[str, Any]:
+        """The fields by name."""
+        return asdict(self)
+
+
+def read(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
+    """What `regimes` asks for in a file's leaves; None without it, or with something wrong in it.
+
+    What is wrong joins `problems`.
+    """
+    place = leaves.places.get(GROUP)
+    nodes = {
+        key.removeprefix(f"{GROUP}."): node
+        for key, node in leaves.values.items()
+        if key.startswith(f"{GROUP}.")
+    }
+    if place is None or any(problem.key == GROUP for problem in problems):
+        return None
+    before = len(problems)
+    if missing := [name for name in ("over", "from", "to", "n") if name not in nodes]:
+        words = "; write {over: clearance_mm, from: 0.01, to: 1, n: 60}"
+        problems.append(FileProblem(place, GROUP, f"needs {' and '.join(missing)}{words}"))
+    given = {name: _checked(name, node, problems) for name, node in nodes.items()}
+    if len(problems) == before:
+        _check_range(given, nodes, problems)
+    if len(problems) > before:
+        return None
+    more = {name: given[name] for name in ROWS if name in given}
+    return Regimes(given["over"], given["from"], given["to"], **more)
+
+
+def _checked(name: str, node: Node, problems: list[FileProblem]) -> Any:
+    """The value of a key of `regimes`; what is wrong with it joins `problems`."""
+    value, key = node.plain(), f"{GROUP}.{name}"
+    if name == "over":
+        message = _not_followed(value)
+    elif name in ROWS:
+        message = ROWS[name].check(value)
+    else:
+        message = Parameter(key, "", None, -1e300, 1e300, False, "", "", "number").check(value)
+    if message:
+        problems.append(FileProblem(node.place, key, message))
+        return None
+    if name in ("from", "to", "section_deg"):
+        return float(value) + 0.0
+    return int(value) if name in ROWS and ROWS[name].kind == "integer" else value
+
+
+def _not_followed(key: Any) -> str | None:
+    """Why a key cannot be followed, or None."""
+    row = row_of(key) if isinstance(key, str) else None
+    if row is None:
+        hint = suggestion(key, "") if isinstance(key, str) else ""
+        return f"{shown(key)} is no key of a number, such as clearance_mm{hint}"
+    if row.kind != "number":
+        return f"{key} is no number: give a key such as clearance_mm or machine.speed_rpm"
+    if key.partition(".")[0] in NOT_FOLLOWED:
+        return f"{key} is nothing of the machine: give a key such as clearance_mm"
+    return None
+
+
+def _check_range(
+    given: Mapping[str, Any], nodes: Mapping[str, Node], problems: list[FileProblem]
+) -> None:
+    """What is wrong with the ends joins `problems`."""
+    row, first, last = row_of(given["over"]), given["from"], given["to"]
+    for name in ("from", "to"):
+        message = row.check(given[name]) if row else None
+        if message:
+            told = f"of {given['over']}: {message}"
+            problems.append(FileProblem(nodes[name].place, f"{GROUP}.{name}", told))
+    if first == last:
+        message = f"from and to are both {first:g}: give two different ends"
+        problems.append(FileProblem(nodes["to"].place, f"{GROUP}.to", message))
+    elif first > last:
+        message = f"{last:g} is below from, {first:g}: write the lower end first, and direction: "
+        problems.append(FileProblem(nodes["to"].place, f"{GROUP}.to", message + "down"))
+    elif given.get("log") and first <= 0.0:
+        message = "log needs ends above 0"
+        problems.append(FileProblem(nodes["from"].place, f"{GROUP}.from", message))
+
+
+def without(leaves: Leaves) -> Leaves:
+    """The leaves that are of cases."""
+    kept = {key: node for key, node in leaves.values.items() if not covers(GROUP, key)}
+    return Leaves(kept, leaves.places)
+
+
+def at_first(leaves: Leaves, asked: Regimes, problems: list[FileProblem]) -> Leaves:
+    """A block's leaves with the key that is followed at its first value.
+
+    A key that is given in vain, or sets what is followed, is a problem.
+    """
+    over, places = asked.over, leaves.places
+    for key, node in leaves.values.items():
+        if covers(over, key) or covers(key, over):
+            message = f"is what regimes follows: leave it out, {over} goes from {asked.first:g} on"
+            problems.append(FileProblem(node.key_place, key, message))
+        for other, why in IN_VAIN.items():
+            if covers(other, key):
+                message = f"has no meaning beside regimes: leave it out; {why}"
+                problems.append(FileProblem(node.key_place, key, message))
+    place = places.get(f"{GROUP}.over", Place(""))
+    return Leaves(leaves.values | {over: Node(asked.first, place, place)}, places)
+
+
+def followed(asked: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
+    """A combination of a file's values at each value of the key that is followed, going up."""
+    at = chosen.get(asked.over)
+    for value in asked.values if at else ():  # an ideal machine has no clearance
+        yield {**chosen, asked.over: Node(value, at.place, at.key_place)}
+
+
+def objection(cases: tuple[Case, ...], asked: Regimes) -> str:
+    """Why the cases of a chain cannot be followed, or ""."""
+    worn = {tuple(getattr(case.clearance_mm, joint) > 0.0 for joint in JOINTS) for case in cases}
+    if len(worn) > 1:
+        at = f"{asked.over} = {asked.first:g}"
+        return f"starts from {at}, where a joint is ideal: begin above 0"
+    if not cases or not any(*worn):
+        none = f"set joint and {OF_JOINTS[0]}"
+        return f"has nothing to follow: no joint of the machine has clearance; {none}"
+    if cases[0].key == cases[-1].key:
+        return f"{asked.over} changes nothing in this case: follow another key"
+    return ""
+
+
+def followable() -> Iterable[str]:
+    """The keys that can be followed, shorthands among them."""
+    yield from (key for key in (*SHORTHANDS, *table()) if _not_followed(key) is None)
