@@ -33,13 +33,14 @@ MAY_IMPORT = {
                "digits"},
     # the stress campaign stores its rows and runs in worker processes: store and sweep
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
+    "regimes": {"analysis", "cases", "physics", "solve", "store", "sweep", "outcome", "metrics",
+                "reasons"},
     "compsim": {"analysis", "cases", "diagnosis", "digits", "machines", "measure", "metrics",
-                "reasons",
-                "report", "solve", "store", "sweep"},
+                "reasons", "regimes", "report", "solve", "store", "sweep"},
 }  # fmt: skip
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "measure",
-    "diagnosis", "machines",
+    "diagnosis", "machines", "regimes",
 )  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,6 +20,9 @@ from compsim.screen import (
     setting,
     size,
 )  # fmt: skip
+
+if TYPE_CHECKING:
+    from compressor.regimes import Standing
 
 
 @click.command()
@@ -50,12 +54,24 @@ def plan(
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
     caution(studies)
+    chained = [study for study in studies if study.regimes]
+    studies = [study for study in studies if not study.regimes]
+    ahead: list[Standing] = []
+    if chained:
+        from compressor.regimes import standing
+
+        ahead = standing(chained, output)
+    if not studies:
+        tell_chains(ahead, as_json)
+        return DONE
     from compressor.sweep import forecast
 
     found = forecast(studies, output, jobs or cores(), first, say)
     if as_json:
-        click.echo(json.dumps(dataclasses.asdict(found), indent=1))
+        more = {"regimes": [one._asdict() for one in ahead]} if ahead else {}
+        click.echo(json.dumps(dataclasses.asdict(found) | more, indent=1))
         return DONE
+    tell_chains(ahead, as_json)
     width = max(len(part.study) for part in found.studies)
     for part in found.studies:
         click.echo(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
@@ -67,3 +83,14 @@ def plan(
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
         click.echo(f"next: {job.study}{point}")
     return DONE
+
+
+def tell_chains(ahead: "list[Standing]", as_json: bool) -> None:
+    """Say how many values the chains of regimes have, and how many of them are stored."""
+    if as_json:
+        click.echo(json.dumps({"regimes": [one._asdict() for one in ahead]}, indent=1))
+        return
+    for one in ahead:
+        missing = one.chains * one.values - one.done
+        click.echo(f"{one.study}  {one.chains} chain{'s' if one.chains > 1 else ''} x "
+                   f"{one.values} values  {one.done:>4} done  {missing:>4} missing")  # fmt: skip

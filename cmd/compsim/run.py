@@ -26,6 +26,7 @@ from compsim.screen import (
 )
 
 if TYPE_CHECKING:
+    from compressor.cases import Study
     from compressor.sweep import Backend, Summary
 
 MOST_FAILURES = 20  # listed one by one
@@ -78,6 +79,8 @@ def run(
 ) -> int:
     """Simulate what case files ask for, and store it.
 
+    A file with `regimes` is followed in chains along its key, in regimes/STUDY of the folder.
+
     Jobs that are stored already are not run again, so a run that was interrupted goes on where it
     ended. A summary line for each study goes to stdout.
     """
@@ -91,13 +94,33 @@ def run(
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     caution(studies)
+    chained = [study for study in studies if study.regimes]
+    if chained and scheduler:
+        raise click.UsageError("regimes run in processes here: leave --backend dask out")
+    code = DONE
+    if len(chained) < len(studies):
+        code = run_jobs(context, [s for s in studies if not s.regimes], output, jobs or cores(),
+                        (rerun, part, wait, scheduler, quiet))  # fmt: skip
+    if chained:
+        from compsim.regimes import run_chains
+
+        shards = [study.shard(*part) if part else study for study in chained]
+        code = max(code, run_chains(shards, output, jobs or cores(), rerun == "failed", quiet))
+    return code
+
+
+def run_jobs(
+    context: click.Context, studies: "list[Study]", output: str, jobs: int, options: Any
+) -> int:
+    """Run studies of jobs."""
+    rerun, part, wait, scheduler, quiet = options
     from compressor.sweep import Options, sweep
 
     screen = Screen(quiet)
     try:
         with cluster(scheduler) as elsewhere:
-            options = Options(context.obj, rerun == "failed", part, wait, elsewhere)
-            summary = sweep(studies, output, jobs or cores(), screen, options)
+            how = Options(context.obj, rerun == "failed", part, wait, elsewhere)
+            summary = sweep(studies, output, jobs, screen, how)
     except BaseException:
         screen.end()
         if screen.total:

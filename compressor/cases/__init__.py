@@ -8,6 +8,7 @@ from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import contact_stiffness
 from compressor.cases.one_way import back_action
 from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
+from compressor.cases.regimes import Regimes
 from compressor.cases.shorthands import row_of, value_in
 from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design

@@ -197,9 +197,9 @@ def at_first(leaves: Leaves, asked: Regimes, problems: list[FileProblem]) -> Lea
 
 def followed(asked: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
     """A combination of a file's values at each value of the key that is followed, going up."""
-    at = chosen.get(asked.over)
-    for value in asked.values if at else ():  # an ideal machine has no clearance
-        yield {**chosen, asked.over: Node(value, at.place, at.key_place)}
+    if at := chosen.get(asked.over):  # an ideal machine has no clearance
+        for value in asked.values:
+            yield {**chosen, asked.over: Node(value, at.place, at.key_place)}
 
 
 def objection(cases: tuple[Case, ...], asked: Regimes) -> str:

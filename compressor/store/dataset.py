@@ -21,10 +21,7 @@ from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.rows import Rows
-from compressor.store.studies import StoredStudy
-
-RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
-UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
+from compressor.store.studies import StoredStudy, coordinate_names
 
 # a job's key, names of variables -> those that its file holds
 Values = Callable[[str, Sequence[str]], dict[str, np.ndarray]]
@@ -37,17 +34,6 @@ class Layout:
     dims: tuple[str, ...]
     keys: np.ndarray
     coordinates: dict[str, xr.Variable]
-
-
-def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
-    """What swept keys are called as coordinates: their last part, where that is enough."""
-    last = [key.rpartition(".")[2] for key in keys]
-    return {
-        key: RENAMED.get(key, short)
-        if last.count(short) == 1 and key.partition(".")[0] not in UNIT_IN_GROUP
-        else key.replace(".", "_")
-        for key, short in zip(keys, last, strict=True)
-    }
 
 
 def _coordinate(dims: tuple[str, ...], key: str, values: Sequence[Any], units: str) -> xr.Variable:

@@ -17,6 +17,9 @@ from compressor.program import VERSION, library_versions
 from compressor.store.files import KEY, Folder, StoreError, publish, refusals, system_error
 from compressor.store.hdf5 import digest
 
+RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
+UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
+
 
 @dataclass(frozen=True)
 class StoredAxis:
@@ -64,6 +67,17 @@ class Again(NamedTuple):
     case_file: str
     overrides: tuple[str, ...]
     jobs: int
+
+
+def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
+    """What swept keys are called as coordinates: their last part, where that is enough."""
+    last = [key.rpartition(".")[2] for key in keys]
+    return {
+        key: RENAMED.get(key, short)
+        if last.count(short) == 1 and key.partition(".")[0] not in UNIT_IN_GROUP
+        else key.replace(".", "_")
+        for key, short in zip(keys, last, strict=True)
+    }
 
 
 def owners(

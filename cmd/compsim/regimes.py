@@ -1,0 +1,75 @@
+"""What `compsim run` does with case files that have `regimes`."""
+
+import os
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import click
+
+from compsim.screen import DONE, SOME_FAILED, Screen, duration, say
+
+if TYPE_CHECKING:
+    from compressor.cases import Study
+    from compressor.regimes import RegimesSummary
+
+MOST_FAILURES = 20  # listed one by one
+
+
+def run_chains(studies: "list[Study]", folder: str, workers: int, rerun: bool, quiet: bool) -> int:
+    """Follow the chains of studies; the exit code."""
+    from compressor.regimes import run_regimes
+
+    screen = Screen(quiet, "values", alike=False)
+    try:
+        summary = run_regimes(studies, folder, workers, screen, rerun)
+    except BaseException:
+        screen.end()
+        say(f"what is finished is stored in {folder}; the same command goes on from there")
+        raise
+    screen.end()
+    tell(summary, folder, quiet)
+    return SOME_FAILED if summary.failed else DONE
+
+
+def regimes_of(folder: str, study: str) -> str:
+    """How many values of a study are in which regime."""
+    from compressor.regimes import open_regimes
+
+    found = open_regimes(folder, study)
+    words = [word for word in found["regime"].values.ravel().tolist() if word]
+    periods = [period for period in found["period"].values.ravel().tolist() if period == period]
+    told = [f"{number} {word}" for word, number in sorted(Counter(words).items())]
+    of = [f"{n} of {p:g} rev" for p, n in sorted(Counter(periods).items())]
+    return ", ".join(told) + (f"; periods: {', '.join(of)}" if of else "")
+
+
+def tell(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
+    """Say what there is now, and what failed."""
+    for count in summary.counts:
+        where = os.path.join(folder, "regimes", count.study)
+        chains = f"{count.chains} chain{'s' if count.chains > 1 else ''} x {count.values} values"
+        ok = count.done - count.failed
+        click.echo(f"{count.study}  {chains}  {ok:>4} ok  {count.failed:>4} failed  {where}")
+        click.echo(f"{count.study}  {regimes_of(folder, count.study)}")
+        if count.differ:
+            click.echo(f"{count.study}  up and down differ at {count.differ} values; second "
+                       f"attractors confirmed at {count.confirmed}")  # fmt: skip
+    if not quiet:
+        new = summary.total - summary.done_before
+        done = f"{new} values run in {duration(summary.seconds)}"
+        if summary.done_before:
+            done += f", {summary.done_before} were stored before"
+        say(done if new else f"nothing to do: all {summary.total} values are stored in {folder}")
+    if not summary.failed:
+        return
+    from compressor.cases import printable
+    from compressor.reasons import remedy
+
+    for one in summary.failed[:MOST_FAILURES]:
+        point = "".join(f" {key}={value}" for key, value in one.point.items())
+        say(f"  {one.study}{point} {one.direction} at {one.value:g}: {one.reason}: "
+            f"{printable(one.detail)}")  # fmt: skip
+    if len(summary.failed) > MOST_FAILURES:
+        say(f"  and {len(summary.failed) - MOST_FAILURES} more")
+    for reason in dict.fromkeys(one.reason for one in summary.failed):
+        say(f"  {reason}: {remedy(reason)}")
