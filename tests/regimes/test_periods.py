@@ -76,7 +76,7 @@ def test_either_joint_counts():
 def test_the_distance_of_sets_is_hausdorff_s():
     one = cycle(4, 4)
     assert apart(one, np.roll(one, 1, axis=0)) == 0
-    more = np.concatenate((one, one[:1] + [[0.3, 0.4], [0, 0]]))
+    more = np.concatenate((one, np.add(one[:1], [[0.3, 0.4], [0, 0]])))
     assert 0 < apart(one, more) <= 0.5 + 1e-12
     assert apart(one, more) == apart(more, one)
     assert apart(np.zeros((1, 2, 2)), np.full((1, 2, 2), [[3, 4], [0, 0]])) == 5
