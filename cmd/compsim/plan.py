@@ -47,7 +47,8 @@ def plan(
 ) -> int:
     """Tell what a run would do: its jobs, those that are stored, time and bytes of the others.
 
-    Times one job of each study and of each set of worn joints; stores nothing.
+    Times one job of each study and of each set of worn joints; stores nothing. Of a file with
+    `regimes` it tells chains and values alone.
     """
     from compressor.cases import load_studies
     from compressor.sweep import cores

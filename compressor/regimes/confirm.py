@@ -137,7 +137,7 @@ def doubts(pair: Pair, folder: Folder) -> list[Doubt]:
     """The values at which the stored chains of a pair differ."""
     up = kept(pair.up, pair.up.path(folder))
     down = kept(pair.down, pair.down.path(folder))
-    if len(down) < len(pair.down.cases):
+    if min(len(up), len(down)) < len(pair.up.cases):
         return []
     found = []
     for number, (one, other) in enumerate(zip(up, down[::-1], strict=False)):
@@ -232,7 +232,8 @@ class Book:
     def __init__(self, pair: Pair, folder: Folder, flush: float):
         self.pair, self.folder, self.flush = pair, folder, flush
         self.known = read_verdicts(pair, folder)
-        whole = len(kept(pair.down, pair.down.path(folder))) == len(pair.up.cases)
+        stored = (len(kept(chain, chain.path(folder))) for chain in (pair.up, pair.down))
+        whole = min(stored) == len(pair.up.cases)
         doubted = doubts(pair, folder)
         self.numbers = {doubt.number for doubt in doubted}
         self.missing = [d for d in doubted if not self.known.get(d.number, AGREED).differs]

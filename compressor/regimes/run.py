@@ -105,9 +105,9 @@ def run_regimes(
 
 def machines_of(study: Study) -> list[Machine]:
     """The selected machines of a study with their chains."""
-    found = []
+    found, selected = [], {*study.selected}
     for number, point in enumerate(points(study)):
-        if number in {*study.selected}:
+        if number in selected:
             found.append(Machine(study.name, point, chains_of(study, number)))
     return found
 
@@ -187,7 +187,8 @@ def run_chains(tasks: Sequence[Task], workers: int, watch: Watch) -> dict[str, E
     with contextlib.closing(running):
         for end in running:
             found[end.id] = result(end)
-            watch.look()
+    if jobs:
+        watch.look()
     for task in tasks:
         if task.chain.key not in found:
             stored = run_chain(Task(task.folder, task.chain))  # nothing is missing
