@@ -33,6 +33,7 @@ FURTHER = 200  # rev that a motion runs on before it is looked at again
 STARTS = 8  # from other places
 SEED = 13  # of these places
 ROOM = 0.9  # of the clearance, within which they lie
+APART = 3.0  # tolerances: each of two sets may lie one, and a little more, beside its motion
 SURE = 3.0  # standard errors by which means of chaotic motions differ
 VERDICTS = {
     "differs": "1: the chains that go up and down end in different motions here",
@@ -59,14 +60,15 @@ class Seen(NamedTuple):
 def differ(one: Seen, other: Seen, within: float) -> bool:
     """Whether two motions of a machine are different ones.
 
-    Two that repeat themselves: by their periods, or by sets of Poincaré places that are farther
-    apart than `within`, of the clearance. One that does and a chaotic one. Two chaotic ones: by
+    Two that repeat themselves: by sets of Poincaré places that are farther apart than three times
+    the tolerance `within`, of the clearance; sets of other periods are, unless a period is doubled
+    by less than can be told. One that does and a chaotic one. Two chaotic ones: by
     means of rms_acceleration that are more than 3 standard errors of their difference apart. Of a
     motion of which less is known nothing is said.
     """
     regimes = {one.regime, other.regime}
     if regimes == {Regime.PERIODIC}:
-        return one.period != other.period or apart(one.places, other.places) > within
+        return apart(one.places, other.places) > APART * within
     if regimes == {Regime.CHAOTIC}:
         error = math.hypot(one.rms_error, other.rms_error)
         return abs(one.rms - other.rms) > SURE * error

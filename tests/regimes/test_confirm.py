@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
+from compressor.cases.load import load_studies
 from compressor.cases.regimes import Regimes
 from compressor.regimes import confirm as module
-from compressor.regimes.chains import Chain
+from compressor.regimes.chains import Chain, Task, run_chain
 from compressor.regimes.confirm import (
+    APART,
     ROOM,
     STARTS,
     Book,
@@ -24,9 +26,17 @@ from compressor.regimes.confirm import (
     read_verdicts,
     seen_in_row,
 )
+from compressor.regimes.run import chains_of
 from compressor.regimes.values import empty
 
 WITHIN = 1e-3
+TWO = """
+joint: big_end
+machine: {rod_mass_kg: 2}
+contact: {damping_N_s_per_mm: 60}
+solve: {accuracy: draft, output_step_deg: 1}
+regimes: {over: clearance_mm, from: 0.7536, to: 1.024, n: 3, log: true, direction: both}
+"""
 ASKED = Regimes("clearance_mm", 0.1, 0.3, 3, direction="both", measure_rev=8)
 CASES = [
     Case.from_values({"joint": "both", "clearance_mm": c, "solve": {"accuracy": "draft"}})
@@ -53,10 +63,11 @@ UNDECIDED = chaotic()._replace(regime="undecided")
     ("one", "other", "expected"),
     [
         (periodic(), periodic(), False),
-        (periodic(), periodic(at=0.5 * WITHIN), False),
-        (periodic(), periodic(at=2 * WITHIN), True),
+        (periodic(), periodic(at=0.9 * APART * WITHIN), False),
+        (periodic(), periodic(at=1.1 * APART * WITHIN), True),
         (periodic(2), periodic(1), True),
         (periodic(2), periodic(2), False),
+        (periodic(2)._replace(places=periodic(2).places * 10 * WITHIN), periodic(), False),
         (periodic(2), periodic(2)._replace(places=periodic(2).places[::-1]), False),
         (periodic(), chaotic(), True),
         (chaotic(), chaotic(), False),
@@ -149,6 +160,23 @@ def test_verdicts_are_kept(hysteresis, tmp_path):
     again = Book(PAIR, tmp_path, 0.0)
     assert again.missing == []
     assert again.count() == (1, 1)
+
+
+def test_a_machine_with_two_motions_is_found_and_confirmed(tmp_path, monkeypatch):
+    """Going up from a motion of two revolutions, and down from one of one: two of one meet."""
+    path = tmp_path / "two.yaml"
+    path.write_text(TWO, encoding="utf-8")
+    (study,) = load_studies(path)
+    pair = Pair(*chains_of(study, 0))
+    for chain in (pair.up, pair.down):
+        assert run_chain(Task(str(tmp_path), chain)).failed == ()
+    (doubt,) = doubts(pair, tmp_path)
+    assert doubt.number == 1
+    monkeypatch.setattr(module, "FURTHER", 20)
+    monkeypatch.setattr(module, "STARTS", 2)
+    verdict = confirm(doubt)
+    assert (verdict.differs, verdict.confirmed, verdict.motions) == (1, 1, 2)
+    assert verdict.starts_like_up + verdict.starts_like_down == 2
 
 
 def test_the_paper_s_machine_has_one_motion():

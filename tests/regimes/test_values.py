@@ -1,6 +1,7 @@
 """One value of a chain: what it settles to, and where it begins."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -77,6 +78,16 @@ def test_a_lively_motion_has_impacts_and_no_period():
     share = row["contact_loss_fraction"][0]
     assert 0.1 < share < row["mode_share"][0, 0] + 0.3
     assert 0 < row["rms_acceleration_standard_error"] < row["rms_acceleration"]
+
+
+def test_a_motion_that_takes_two_revolutions_has_two_points():
+    """With a seventieth of the paper's damping and 0.0776 mm (standard accuracy)."""
+    values = {"joint": "big_end", "clearance_mm": 0.0776, "contact": {"damping_N_s_per_mm": 5}}
+    row = run_value(Case.from_values(values), None, replace(ASKED, settle_rev=40))
+    assert (row["regime"], row["period"], row["revolutions"]) == ("periodic", 2, 8)
+    points = row["section"][:3, 0, :2]
+    assert np.linalg.norm(points[1] - points[0]) > 0.01 * 0.0776e-3
+    assert np.isnan(points[2]).all()
 
 
 def test_the_same_value_has_the_same_bits(row):
