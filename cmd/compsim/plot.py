@@ -50,13 +50,19 @@ def plot(
     """Draw one job, named by its key or the beginning of it, or a study; prints files and captions.
 
     A job's signals over crank angle, spectra, orbits, contact modes and impacts, beside the same
-    machine without clearance; a study's order spectra and contact modes over a swept axis. Nothing
-    but the time series is needed.
+    machine without clearance; a study's order spectra and contact modes over a swept axis; a
+    machine that was followed along a parameter (`regimes:`): its bifurcation diagram, Poincaré
+    sections, and a map of periods over two parameters. Nothing but what is stored is needed.
     """
-    from compressor.report import PlotChoice, write_plots
+    from compressor.regimes import followed_studies, open_regimes
+    from compressor.report import PlotChoice, write_plots, write_regime_plots
 
     choice = PlotChoice(what, over, at, KINDS[form])
-    for found in write_plots(folder, output, target, choice):
+    if target in followed_studies(folder):
+        drawn = write_regime_plots(open_regimes(folder, target), output, target, choice)
+    else:
+        drawn = write_plots(folder, output, target, choice)
+    for found in drawn:
         click.echo(" ".join(map(str, found.paths)))
         click.echo(f"  {found.caption}")
     return DONE

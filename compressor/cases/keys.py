@@ -22,6 +22,7 @@ MAPPINGS = {  # of these, what stands in them
     "sample": ("n", "seed"),
     "regimes": (
         "over", "from", "to", "n", "log", "direction", "section_deg", "settle_rev", "measure_rev",
+        "exponent",
     ),
 }  # fmt: skip
 

@@ -48,6 +48,7 @@ ROWS = {
         _row("settle_rev", 50, "integer", (3, 10_000), "most revolutions dropped at each value"),
         _row("measure_rev", 64, "integer", (6, 10_000), "Poincaré points of a motion that does not "
              "repeat itself"),
+        _row("exponent", True, "boolean", (0, 0), "the largest Lyapunov exponent of each value"),
     )
 }  # fmt: skip
 
@@ -58,7 +59,7 @@ class Regimes:
 
     `direction`: up, down or both; `section_deg`: crank angle of the Poincaré points;
     `settle_rev`: most revolutions dropped at each value; `measure_rev`: Poincaré points of a motion
-    that does not repeat itself.
+    that does not repeat itself; `exponent`: whether the largest Lyapunov exponent is looked for.
     """
 
     over: str
@@ -70,6 +71,7 @@ class Regimes:
     section_deg: float = 0.0
     settle_rev: int = 50
     measure_rev: int = 64
+    exponent: bool = True
 
     @property
     def values(self) -> list[float]:

@@ -29,7 +29,7 @@ from compressor.store import Folder, StoreError, read_dataset, write_dataset
 FOLDER = "regimes"
 FLUSH = 2.0  # s between two writings of what is finished
 REMEDY = "delete it: the same command makes it again"
-SCHEMA = 1  # of a chain's numbers: a change of what they mean makes chains anew
+SCHEMA = 2  # of a chain's numbers: a change of what they mean makes chains anew
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,11 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, attrs)
 
 
+def followed_studies(results: Folder) -> list[str]:
+    """The names of the regimes studies in a folder of results."""
+    return sorted(path.parent.name for path in (Path(results) / FOLDER).glob(f"*/{FILE}"))
+
+
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Which chains a study has. Raises StoreError."""
     path = folder / FILE

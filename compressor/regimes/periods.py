@@ -32,8 +32,9 @@ def places(points: np.ndarray, clearance: np.ndarray) -> np.ndarray:
 
     points: (k, joint, 4), m and m/s; clearance: (joint,), m.
     """
-    room = np.where(clearance > 0.0, clearance, math.inf)
-    return points[:, :, :2] / room[:, None]
+    worn = clearance > 0.0
+    room = np.where(worn, clearance, math.inf)
+    return np.where(worn[:, None], points[:, :, :2], 0.0) / room[:, None]
 
 
 def period_of(found: np.ndarray, within: float) -> int | None:

@@ -125,7 +125,8 @@ def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
     if reason:
         return failed(row, reason, detail)
     end, found = motion.leg.state, motion.leg.numbers(motion.count)
-    row["section"][: len(motion.points)] = motion.points
+    worn = record(case)["clearance"] > 0.0  # an ideal joint's journal does not move
+    row["section"][: len(motion.points), worn] = motion.points[:, worn]
     known = {name: found[name] for name in METRICS}
     known |= {
         "period": motion.period,
@@ -163,12 +164,16 @@ def measured(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> Mot
     found = None if leg.reason else period(leg.points)
     if leg.reason:
         return Motion("", math.nan, leg.points[:0], leg, 0)
-    exponents = exponent(case, leg.state, clock.left)
+    exponents = math.nan, math.nan
+    if asked.exponent:
+        exponents = exponent(case, leg.state, found is not None, asked.measure_rev, clock.left)
+    parts = exponents[0] - exponents[1] > 0.0  # close motions part, as far as is known
     if found:
         count = found * ((2 * found + MORE) // found)
         points = leg.points[-found:]
-        return Motion(Regime.PERIODIC, float(found), points, leg, count, exponents)
-    word = Regime.CHAOTIC if exponents[0] - exponents[1] > 0.0 else Regime.UNDECIDED
+        word = Regime.UNDECIDED if parts else Regime.PERIODIC
+        return Motion(word, float(found), points, leg, count, exponents)
+    word = Regime.CHAOTIC if parts else Regime.UNDECIDED
     return Motion(word, math.nan, leg.points, leg, len(leg.turns), exponents)
 
 

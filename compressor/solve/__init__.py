@@ -5,6 +5,7 @@ from compressor.solve.cautions import cautions
 from compressor.solve.energy_audit import energy_residual
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.legs import Leg, Stretch, follow, settle, with_samples
+from compressor.solve.lyapunov import largest_exponent
 from compressor.solve.marching import COMPILED
 from compressor.solve.scales import JointScales, expected_cost, joint_scales
 from compressor.solve.scipy_driver import LOCAL

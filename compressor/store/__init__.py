@@ -1,6 +1,5 @@
 """Outcomes on disk, and back."""
 
-from compressor.store.dataset import coordinate_names
 from compressor.store.export import Exported, ExportOptions, export
 from compressor.store.files import Folder, StoreError, StoreWarning, make_folder, publish
 from compressor.store.hdf5 import DamagedJob

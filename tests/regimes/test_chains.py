@@ -20,7 +20,7 @@ joint: big_end
 contact: {damping_N_s_per_mm: 0.336}
 solve: {accuracy: draft, output_step_deg: 2}
 regimes: {over: clearance_mm, from: 0.02, to: 0.2, n: 6, direction: both, settle_rev: 3,
-          measure_rev: 6, section_deg: 30}
+          measure_rev: 6, section_deg: 30, exponent: false}
 """
 
 

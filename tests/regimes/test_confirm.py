@@ -35,7 +35,8 @@ joint: big_end
 machine: {rod_mass_kg: 2}
 contact: {damping_N_s_per_mm: 60}
 solve: {accuracy: draft, output_step_deg: 1}
-regimes: {over: clearance_mm, from: 0.7536, to: 1.024, n: 3, log: true, direction: both}
+regimes: {over: clearance_mm, from: 0.7536, to: 1.024, n: 3, log: true, direction: both,
+          exponent: false}
 """
 ASKED = Regimes("clearance_mm", 0.1, 0.3, 3, direction="both", measure_rev=8)
 CASES = [

@@ -18,7 +18,8 @@ TEXT = """
 joint: big_end
 machine: {rod_mass_kg: [3, 4.7]}
 solve: {accuracy: draft, max_steps: %s}
-regimes: {over: clearance_mm, from: 0.1, to: 0.3, n: 3, direction: both, measure_rev: 8}
+regimes: {over: clearance_mm, from: 0.1, to: 0.3, n: 3, direction: both, measure_rev: 8,
+          exponent: false}
 """
 
 
@@ -151,7 +152,8 @@ blocks:
   - {joint: big_end, clearance_mm: 0.2}
   - {joint: both, clearance_mm: 0.1}
 solve: {accuracy: draft}
-regimes: {over: machine.speed_rpm, from: 450, to: 500, n: 2, measure_rev: 8}
+regimes: {over: machine.speed_rpm, from: 450, to: 500, n: 2, measure_rev: 8,
+          exponent: false}
 """
     path = write(tmp_path / "blocks.yaml", text=text)
     (study,) = load_studies(path)

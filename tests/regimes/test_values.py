@@ -13,7 +13,7 @@ from compressor.solve.attempts import attempt
 from compressor.solve.legs import Stretch, follow, leg_case, settle
 from compressor.solve.simulate import simulate
 
-ASKED = Regimes("clearance_mm", 0.1, 0.3, 2, settle_rev=12, measure_rev=12)
+ASKED = Regimes("clearance_mm", 0.1, 0.3, 2, settle_rev=12, measure_rev=12, exponent=False)
 DRAFT = {"accuracy": "draft"}
 
 
@@ -61,16 +61,18 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
     assert found["settled_rev"] == since == 1
     rest = follow(after, settled.state, Stretch(6, 0.0, 60.0))
     np.testing.assert_allclose(found["end_state"], rest.state, rtol=1e-9)
-    np.testing.assert_allclose(found["section"][0], rest.points[-1], rtol=1e-9)
+    np.testing.assert_allclose(found["section"][0, 0], rest.points[-1, 0], rtol=1e-9)
+    assert np.isnan(found["section"][0, 1]).all()  # the small end is ideal
 
 
 def test_a_lively_motion_has_impacts_and_no_period():
     lively = case(0.3, contact={"damping_N_s_per_mm": 0.336})
-    row = run_value(lively, None, ASKED)
+    row = run_value(lively, None, replace(ASKED, exponent=True))
     assert (row["status"], row["revolutions"]) == ("ok", 12)
     assert math.isnan(row["period"])
     assert math.isnan(row["settled_rev"])
-    assert row["regime"] == "undecided"
+    assert row["regime"] == "chaotic"
+    assert 10.0 < row["lyapunov_exponent"] - row["lyapunov_exponent_error"] < 30.0
     assert np.isfinite(row["section"][:, 0]).all()
     assert row["impacts_per_revolution"][0] > 5
     assert 0 < row["mean_approach_speed"][0] < row["peak_approach_speed"][0]

@@ -9,7 +9,6 @@ from compressor.report.figures.regime_map import CLASSES, draw_periods, period_c
 from compressor.report.figures.regimes import (
     PERIODS,
     ROWS_OF,
-    clearances,
     draw_bifurcation,
     draw_sections,
     edges_of,
@@ -43,37 +42,26 @@ def points(panel, color=None):
     return [xy[np.isfinite(xy).all(axis=1)] for xy in found]
 
 
-def test_bifurcation_points_are_the_stored_ones_over_the_clearance(data):
+def test_bifurcation_points_are_the_stored_ones(data):
     panel = draw_bifurcation(data).axes[0]
     for direction, drawn in zip(("up", "down"), points(panel), strict=True):
         stored = data["section"].sel(direction=direction, joint="big_end", coordinate="x").values
-        share = stored / (1e-3 * data[OVER].values[:, None])
         there = np.isfinite(stored)
         x = np.repeat(data[OVER].values, REVOLUTIONS).reshape(stored.shape)
-        np.testing.assert_allclose(drawn, np.column_stack((x[there], share[there])), rtol=1e-12)
-    assert panel.get_ylabel() == "$e_x$ / clearance"
+        np.testing.assert_allclose(
+            drawn, np.column_stack((x[there], 1e3 * stored[there])), rtol=1e-12
+        )
+    assert panel.get_ylabel() == "$e_x$ (mm)"
     assert panel.get_xscale() == "log"
 
 
-def test_a_joint_whose_clearance_is_not_followed_has_millimetres():
+def test_each_worn_joint_has_its_panels():
     pair = made(np.linspace(0.2, 0.4, 5), BOTH, ("up",))
     figure = draw_bifurcation(pair)
-    big, small = figure.axes[:2]
-    assert (big.get_ylabel(), small.get_ylabel()) == ("$e_x$ / clearance", "$e_x$ (mm)")
+    small = figure.axes[1]
     stored = pair["section"].sel(joint="small_end", coordinate="x").values
     np.testing.assert_allclose(points(small)[0][:, 1], 1e3 * stored[np.isfinite(stored)])
     assert words(figure) == ["up", "flight", "impact", "following"]
-
-
-@pytest.mark.parametrize(
-    ("key", "joints"),
-    [("clearance_mm", {*BOTH}), ("clearance_mm.small_end", {"small_end"}),
-     ("machine.speed_rpm", set()), ("gas.head_clearance_mm", set())],
-)  # fmt: skip
-def test_the_clearance_that_is_followed(data, key, joints):
-    other = data.copy()
-    other[OVER].attrs["case_key"] = key
-    assert clearances(other) == joints
 
 
 def test_periods_stand_in_their_rows(data):

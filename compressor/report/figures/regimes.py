@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from compressor.analysis import SPOKEN
-from compressor.cases import row_of, table
 from compressor.report.figures.contact import MODE_COLORS, UNSEEN, mode_handles
 from compressor.report.figures.style import BLACK, BLUE, GREY, RED, legend_above, sheet, styled
 from compressor.report.figures.sweep_metric import FOOT, MARKS, positions
@@ -59,12 +58,11 @@ def draw_bifurcation(pair: xr.Dataset) -> Figure:
 
 def plot_places(panel: Axes, pair: xr.Dataset, joint: str) -> None:
     """The journal's place along the cylinder, once a revolution, at each value."""
-    over, scaled = pair.attrs["over"], joint in clearances(pair)
+    over = pair.attrs["over"]
     for direction, (color, size, height) in looks(pair).items():
         points = pair["section"].sel(direction=direction, joint=joint, coordinate="x")
         points = points.transpose(over, "revolution")
-        unit = pair[over].values[:, None] / MILLI if scaled else 1.0 / MILLI
-        place = (points.values / unit).ravel()
+        place = MILLI * points.values.ravel()
         x = np.repeat(positions(pair, over), points.sizes["revolution"])
         panel.plot(x, place, "o", color=color, markersize=0.7 * size, markeredgewidth=0,
                    zorder=height, rasterized=True)  # fmt: skip
@@ -72,7 +70,7 @@ def plot_places(panel: Axes, pair: xr.Dataset, joint: str) -> None:
         f"journal's place along the cylinder, {SPOKEN[joint]}, once a revolution at "
         f"{pair.attrs['section_deg']:g}°"
     )
-    panel.set_ylabel("$e_x$ / clearance" if scaled else "$e_x$ (mm)")
+    panel.set_ylabel("$e_x$ (mm)")
     room(panel)
 
 
@@ -209,16 +207,6 @@ def worn(data: xr.Dataset) -> list[str]:
 def looks(data: xr.Dataset) -> dict[str, tuple[str, float, float]]:
     """Colour, size and height of the directions that a dataset has."""
     return {str(name): BY_DIRECTION[str(name)] for name in data["direction"].values}
-
-
-def clearances(data: xr.Dataset) -> set[str]:
-    """The joints whose clearance is the parameter that was followed."""
-    over = data.attrs["over"]
-    key = str(data[over].attrs.get("case_key", over))
-    phrase = (row.phrase if (row := row_of(key)) else "").rpartition(" of ")[0]
-    parts = [name for name in table() if name == key or name.startswith(f"{key}.")]
-    joints = {name.rpartition(".")[2] for name in parts} & {*SPOKEN}
-    return joints if phrase.startswith("radial clearance") else set()
 
 
 def edges_of(x: np.ndarray, log: bool) -> np.ndarray:
