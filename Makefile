@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic diagnosis identify stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -83,6 +83,9 @@ ladders: install  ## measure error against tolerance, and the limit of no cleara
 chaotic: install  ## compare chaotic motions' statistics by two integrators (a quarter of an hour)
 	$(CAMPAIGN)/measure_chaotic.py tests/results/chaotic.json
 
+regimes: install  ## follow a machine over its clearance, up and down (ten minutes)
+	$(CAMPAIGN)/measure_regimes.py tests/results/regimes.json
+
 diagnosis: install  ## train on 2,000 simulated machines, and test on some it never saw (half an hour)
 	$(CAMPAIGN)/measure_diagnosis.py tests/results/diagnosis.json
 
@@ -98,7 +101,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: calibration accuracy claims tradeoff ladders chaotic diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about an hour and a half)
+measurements: calibration accuracy claims tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the generated tables of the README pages
 	$(BIN)/python tests/page_tables.py

@@ -92,10 +92,10 @@ def test_what_the_papers_cases_decide_is_refused(plan, text, key):
 
 
 def test_a_study_goes_on_where_it_ended(plan, tmp_path, monkeypatch):
-    """In the processes of a sweep: all at first, then what the file lacks, then nothing."""
+    """In a process of a sweep: all at first, then what the file lacks, then nothing."""
     study = plan(QUICK + "machine: {rod_mass_kg: [3, 4.7]}\n")
     seen = []
-    first = judge_machines(study, tmp_path / "out", 2, lambda *told: seen.append(told[:2]))
+    first = judge_machines(study, tmp_path / "out", 1, lambda *told: seen.append(told[:2]))
     assert seen == [(0, 2), (1, 2), (2, 2)]
     assert (first["status"] == "ok").all()
     assert len(np.unique(first["margin"].sel(claim=6))) == 2
