@@ -111,12 +111,21 @@ def tell(found: "list[xr.Dataset]", as_json: bool) -> None:
 
 def sentences(found: "xr.Dataset") -> Iterator[str]:
     """What a file of judged machines says."""
-    from compressor.machines import change, deciding, sensitivity, summary
+    from compressor.machines import (
+        change,
+        consistency,
+        deciding,
+        is_mass_plane,
+        sensitivity,
+        summary,
+    )
 
     if "best" in found.attrs:
         yield from change(found)
         return
     yield from summary(found)
+    if is_mass_plane(found) and min(found["status"].shape) > 2:
+        yield consistency(found)
     table = sensitivity(found)
     if table is not None:
         yield from deciding(table)

@@ -1,5 +1,7 @@
 """The cases of the paper: two ideal machines, and nine with clearance."""
 
+from dataclasses import replace
+
 from compressor.cases import Case
 from compressor.metrics import JOINTS
 
@@ -29,8 +31,7 @@ def cases_of(machine: Case) -> dict[str, Case]:
     The case's own load, joints and clearances are left aside. Raises CaseError where one of the
     eleven cannot be made.
     """
-    base = {key: value for key, value in machine.values().items() if key != "clearance_mm"}
-    base["joint"] = "none"
+    base = replace(machine, joint="none").values()  # without clearance
     cases = {load: Case.from_values({**base, "load": load}) for load in ("typical", "design")}
     for fault in FAULTS:
         for clearance in CLEARANCES:

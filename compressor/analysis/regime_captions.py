@@ -121,14 +121,20 @@ def directions(pair: xr.Dataset) -> list[str]:
     differs, confirmed = ((pair[name].values == 1) & both for name in ("differs", "confirmed"))
     if not differs.any():
         return [f"Up and down agree at all {plural(int(both.sum()), 'value')} that both reached."]
-    where = spans(pair[over].values, differs)
-    count = int((differs & confirmed).sum())
-    sure = f"at {count} of these" if count else "at none of them"
-    return [
-        f"Up and down differ at {int(differs.sum())} of {plural(int(both.sum()), 'value')} "
-        f"that both reached: {where}{unit}; a second attractor was confirmed by direct simulation "
-        f"{sure}."
-    ]
+    sure, unsure = differs & confirmed, differs & ~confirmed
+    said, reached = [], plural(int(both.sum()), "value")
+    if sure.any():
+        said.append(
+            f"Up and down end in different motions at {int(sure.sum())} of {reached} that both "
+            f"reached, {spans(pair[over].values, sure)}{unit}: a second attractor, confirmed by "
+            "direct simulation."
+        )
+    if unsure.any():
+        said.append(
+            f"At {int(unsure.sum())} of {reached}, {spans(pair[over].values, unsure)}{unit}, their "
+            "numbers differ, but further simulation reached no second motion."
+        )
+    return said
 
 
 def failures(pair: xr.Dataset) -> list[str]:

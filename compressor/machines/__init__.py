@@ -2,6 +2,8 @@
 
 from compressor.machines.findings import (
     change,
+    consistency,
+    counted,
     deciding,
     flips,
     is_mass_plane,

@@ -73,7 +73,8 @@ def summary(found: xr.Dataset) -> Iterator[str]:
     some = ", ".join(f"{claim} in {count}" for claim, count in each.items())
     yield f"Of {judged} machines each claim holds in so many: {some}."
     if failed:
-        yield f"{failed} machines have no verdict, as a case of theirs failed."
+        many = "1 machine has" if failed == 1 else f"{failed} machines have"
+        yield f"{many} no verdict, as a case failed."
     yield f"All eight claims hold in {whole or 'none'} of them."
     yield from region(found)
     if not each[7]:
@@ -107,6 +108,47 @@ def region(found: xr.Dataset) -> Iterator[str]:
             ranges.append(f"{spoken(str(key))} from {low:.3g} to {high:.3g} {unit}".rstrip())
         yield f"{name} hold in {count}, with {', '.join(ranges)}."
         return
+
+
+class Consistent(NamedTuple):
+    """A machine of a mass plane (kg), and the least margin of some claims there and around it."""
+
+    rod_mass: float
+    reciprocating_mass: float
+    least: float
+    claims: tuple[int, ...]
+
+
+def most_consistent(found: xr.Dataset) -> Consistent:
+    """Where on a mass plane most claims hold by the greatest least margin, at all neighbours too.
+
+    Claims 1 and 2, which do not depend on masses, are left aside, and so are claims that hold at
+    no machine. Machines at the plane's edge are not chosen.
+    """
+    rod, mass = (
+        next(str(dim) for dim in found["status"].dims if found[dim].attrs["case_key"] == key)
+        for key in MASSES
+    )
+    claims = tuple(c for c in CLAIMS[2:] if (found["held"].sel(claim=c) == 1).any())
+    margin = found["margin"].sel(claim=[*claims]).min("claim").fillna(-np.inf)
+    around = margin.rolling({rod: 3, mass: 3}, center=True).min()
+    best = around.isel(around.fillna(-np.inf).argmax(...))
+    return Consistent(float(best[rod]), float(best[mass]), float(best), claims)
+
+
+def consistency(found: xr.Dataset) -> str:
+    """The most consistent machine of a mass plane, in words."""
+    best = most_consistent(found)
+    said = ", ".join(map(str, best.claims))
+    where = (
+        f"rod mass {best.rod_mass:.3g} kg and reciprocating mass {best.reciprocating_mass:.3g} kg"
+    )
+    if best.least < 0.0:
+        return f"Nowhere claims {said} hold at a machine and all around it; nearest is {where}."
+    return (
+        f"The most consistent machine has {where}: there and at all neighbours claims {said} hold "
+        f"by {100 * best.least:.2g} % or more."
+    )
 
 
 def deciding(table: xr.Dataset) -> Iterator[str]:

@@ -1,6 +1,8 @@
 """Which assumption decides which claim: variance-based sensitivities of the margins."""
 
+import contextlib
 import warnings
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
@@ -65,7 +67,7 @@ def indices(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> dict[str, np.nda
     a, b: (n,); mixed: (k, n). An assumption that changes nothing has none of the variance, surely.
     """
     table = {"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), seeded():
         warnings.simplefilter("ignore")  # the bootstrap of what changes nothing
         found = sobol_indices(func=table, n=a.size, rng=np.random.default_rng(SEED))
         spread = found.bootstrap(confidence_level=LEVEL, n_resamples=RESAMPLES)
@@ -77,6 +79,17 @@ def indices(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> dict[str, np.nda
         for end, row in parts:
             values[f"{order}{end}"] = np.where(idle, 0.0, np.ravel(row))
     return values
+
+
+@contextlib.contextmanager
+def seeded() -> Iterator[None]:
+    """Have NumPy's global draws be the same each time: this bootstrap takes no generator."""
+    state = np.random.get_state()  # noqa: NPY002
+    np.random.seed(SEED)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        np.random.set_state(state)  # noqa: NPY002
 
 
 def phrase(name: str) -> str:

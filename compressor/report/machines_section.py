@@ -9,6 +9,8 @@ import xarray as xr
 from compressor.cases import Case
 from compressor.machines import (
     change,
+    consistency,
+    counted,
     deciding,
     flips,
     is_mass_plane,
@@ -22,7 +24,16 @@ from compressor.report.figures.claims import OF_MASSES, draw_claims_map, draw_se
 from compressor.report.page import Plate, Section
 from compressor.store import Folder
 
-SEARCH = "-search"
+MAP = (
+    "Blue holds, red does not, by how far the claim is from its threshold; lines are where the "
+    "verdict changes, the ring marks the default masses. Claims 1 and 2 hold at every machine "
+    "here: masses do not enter them."
+)
+BARS = (
+    "Shares of the variance of a claim's margin over all machines, with 95 % intervals: by an "
+    "assumption alone (main effect), and with its interactions (total)."
+)
+NO_FIGURE = ("", "", None)
 
 
 @dataclass(frozen=True)
@@ -46,29 +57,32 @@ def machine_files(folder: Folder) -> dict[str, xr.Dataset]:
 
 def machine_drawings(
     files: dict[str, xr.Dataset],
-) -> Iterator[tuple[str, list[str], str, Drawing | None]]:
-    """Name, sentences, heading and drawing of each file."""
+) -> Iterator[tuple[str, list[str], str, str, Drawing | None]]:
+    """Name, sentences, heading, caption and drawing of each file."""
     for name, found in files.items():
         if "best" in found.attrs:
-            yield name, [*change(found)], "", None
+            yield name, [*change(found)], *NO_FIGURE
         elif is_mass_plane(found):
-            yield name, [*summary(found), borders(found)], *plane(found)
+            sentences = [*summary(found), consistency(found), borders(found)]
+            yield name, sentences, *plane(found)
         else:
             table = sensitivity(found) if not (found["status"] == "").any() else None
             if table is None:
-                yield name, [*summary(found)], "", None
+                yield name, [*summary(found)], *NO_FIGURE
             else:
                 names = [spoken(str(one)) for one in table["assumption"].values]
                 heading = "Which assumption decides which claim"
                 sentences = [*summary(found), *deciding(table)]
-                yield name, sentences, heading, draw_sensitivity(table, names)
+                yield name, sentences, heading, BARS, draw_sensitivity(table, names)
 
 
-def plane(found: xr.Dataset) -> tuple[str, Drawing]:
-    """The heading and the map of a mass plane."""
+def plane(found: xr.Dataset) -> tuple[str, str, Drawing]:
+    """The heading, the caption and the map of a mass plane."""
     default = Case.from_values({}).machine
     place = default.rod_mass_kg, default.reciprocating_mass_kg
-    return "The paper's claims over the mass plane", draw_claims_map(found, place)
+    held = counted(found)
+    caption = MAP if held[1][1] == held[1][2] == held[0] else MAP.partition(" Claims 1")[0]
+    return "The paper's claims over the mass plane", caption, draw_claims_map(found, place)
 
 
 def borders(found: xr.Dataset) -> str:

@@ -50,10 +50,6 @@ from compressor.store import (
     read_studies,
 )
 
-MACHINES = (
-    "Of a map: blue holds, red does not; lines are where a verdict changes, the ring marks the "
-    "default masses. Of bars: total effects and main effects with their 95 % intervals."
-)
 SWEEP = (
     "A line for each combination of the other axes or, where they are many, a light line for each "
     "and their median; a study that is no grid has a point for each job. A cross: a job failed "
@@ -118,11 +114,13 @@ def compose(results: Folder, command: str, claims: Folder) -> tuple[list[Plate],
     return plates, [study.name for study in studies], document(sections)
 
 
-def drawn_part(name: str, sentences: list[str], heading: str, drawing: Drawing | None) -> Part:
+def drawn_part(
+    name: str, sentences: list[str], heading: str, caption: str, drawing: Drawing | None
+) -> Part:
     """What is said of a file of judged machines, with its figure where it has one."""
     if drawing is None:
         return Part(name, sentences, None)
-    plate = draw(file_name("machines", name), heading, MACHINES, drawing)
+    plate = draw(file_name("machines", name), heading, caption, drawing)
     return Part(name, sentences, plate)
 
 

@@ -94,12 +94,15 @@ def test_where_up_and_down_differ_and_what_was_confirmed():
     assert "Up and down agree at all 6 values that both reached." in bifurcation(data)
     data["differs"][:] = [False, True, True, False, True, False]
     said = bifurcation(data)
-    assert "Up and down differ at 3 of 6 values that both reached: 0.2 to 0.3, 0.5 mm;" in said
-    assert "confirmed by direct simulation at none of them." in said
+    alone = "their numbers differ, but further simulation reached no second motion."
+    assert f"At 3 of 6 values, 0.2 to 0.3, 0.5 mm, {alone}" in said
+    assert "attractor" not in said
     data["confirmed"][:] = [False, True, False, False, True, False]
-    assert "confirmed by direct simulation at 2 of these." in bifurcation(data)
+    both = "Up and down end in different motions at 2 of 6 values that both reached, 0.2, 0.5 mm: "
+    assert both + "a second attractor, confirmed by direct simulation." in bifurcation(data)
+    assert f"At 1 of 6 values, 0.3 mm, {alone}" in bifurcation(data)
     gone = failed(data, "down", [1], "non_finite")
-    assert "Up and down differ at 2 of 5 values that both reached: 0.3, 0.5 mm" in bifurcation(gone)
+    assert "different motions at 1 of 5 values that both reached, 0.5 mm:" in bifurcation(gone)
     assert "Up and down" not in bifurcation(data.isel(direction=[0]))
 
 

@@ -17,13 +17,15 @@ from compressor.cases.examples import example
 from compressor.cases.load import load_studies
 from compressor.regimes.dataset import open_regimes
 from compressor.regimes.run import run_regimes
+from compressor.report.figures.regimes import draw_bifurcation
+from compressor.report.figures.style import render
 
 FOLDER = "results"
 
 
 def main(target):
     (study,) = load_studies(example("regimes"), follow=True)
-    done = run_regimes([study], FOLDER, 2, lambda *told: None)
+    run_regimes([study], FOLDER, 2, lambda *told: None)
     data = open_regimes(FOLDER, study.name)
     over = data.attrs["over"]
     rows = []
@@ -37,12 +39,24 @@ def main(target):
                 "error": none(one["lyapunov_exponent_error"]),
             })  # fmt: skip
     found = {
-        **provenance("make regimes"), "over": over, "seconds": round(done.seconds, 1), "rows": rows,
-        "differs": int(data["differs"].sum()), "confirmed": int(data["confirmed"].sum()),
+        **provenance("make regimes"), "over": over, "rows": rows, "differ": differing(data),
         "said": bifurcation(data),
     }  # fmt: skip
     Path(target).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    Path(target).with_suffix(".svg").write_bytes(render(draw_bifurcation(data), "svg"))
     print(found["said"])
+
+
+def differing(data):
+    """Where up and down differ, and how many motions further simulation reached there."""
+    some = data.isel({data.attrs["over"]: data["differs"].values == 1})
+    return [
+        {"value": value.item(), "confirmed": bool(yes), "motions": int(motions)}
+        for value, yes, motions in zip(
+            some[data.attrs["over"]].values, some["confirmed"].values, some["motions"].values,
+            strict=True,
+        )
+    ]  # fmt: skip
 
 
 def none(value):

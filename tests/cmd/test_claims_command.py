@@ -55,7 +55,7 @@ def test_what_machines_say_is_printed_with_the_file(here, capsys):
     lines = said.out.splitlines()
     assert lines[0] == "out/map.nc"
     assert lines[1].startswith("  Of 3 machines each claim holds in so many: 1 in 3, ")
-    assert lines[2] == "  1 machines have no verdict, as a case of theirs failed."
+    assert lines[2] == "  1 machine has no verdict, as a case failed."
     assert "next: compsim report --claims out" in said.err
     assert Path("out").is_dir()
 

@@ -196,7 +196,7 @@ def test_the_most_jobs_are_those_of_the_library():
     defaults = [
         p.default for c in cli.cli.commands.values() for p in c.params if p.name == "max_jobs"
     ]
-    assert defaults == [MAX_JOBS] * 3
+    assert defaults == [MAX_JOBS] * 4
 
 
 @pytest.mark.parametrize(
@@ -314,9 +314,9 @@ def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
 def reporter(monkeypatch):
     """Stands in for compressor.report, which draws for seconds."""
 
-    def write_report(results, report, command):
+    def write_report(results, report, command, claims):
         read_studies(results)
-        return Path(report, command)
+        return Path(report, command, claims)
 
     monkeypatch.setattr("compressor.report.write_report", write_report)
 
@@ -325,7 +325,7 @@ def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
     assert cli.main(["run", case_file("one.yaml"), "-j", "1", "--quiet"]) == 0
     capsys.readouterr()
     assert cli.main(["report", "-o", "page"]) == 0
-    assert capsys.readouterr().out == "page/compsim report -o page\n"
+    assert capsys.readouterr().out == "page/compsim report -o page/claims\n"
 
 
 def test_report_of_nothing_says_what_to_do_first(reporter, case_file, capsys):

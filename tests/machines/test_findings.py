@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.machines.findings import counted, deciding, flips, is_mass_plane, spoken, summary
+from compressor.machines.findings import (
+    consistency,
+    counted,
+    deciding,
+    flips,
+    is_mass_plane,
+    most_consistent,
+    spoken,
+    summary,
+)
 
 ROD, RECIPROCATING = "rod_mass_kg", "reciprocating_mass_kg"
 
@@ -58,7 +67,7 @@ def test_a_failed_machine_is_no_verdict(plane):
     plane["held"][0, 0] = -1
     assert counted(plane)[0] == 23
     _, said, *_ = summary(plane)
-    assert "1 machines have no verdict" in said
+    assert "1 machine has no verdict" in said
 
 
 def test_neighbours_that_differ_are_counted(plane):
@@ -70,6 +79,24 @@ def test_neighbours_that_differ_are_counted(plane):
     assert (found.flips, found.within) == (4, 0)
     assert found.jump == pytest.approx(0.1)
     assert flips(plane, 3).flips == 0
+
+
+def test_the_most_consistent_machine_has_consistent_neighbours(plane):
+    """Claim 8 grows with the rod's mass; a single machine with a greater margin is not taken."""
+    plane["margin"][..., 2] = 0.3 - 0.02 * np.abs(plane[RECIPROCATING].values - 11.0)
+    plane["margin"][1, 1, 7] = 9.0
+    best = most_consistent(plane)
+    assert (best.rod_mass, best.reciprocating_mass) == (6.0, 11.0)
+    assert best.claims == (3, 4, 5, 6, 8)
+    assert best.least == pytest.approx(0.1)
+    assert consistency(plane) == (
+        "The most consistent machine has rod mass 6 kg and reciprocating mass 11 kg: there and at "
+        "all neighbours claims 3, 4, 5, 6, 8 hold by 10 % or more."
+    )
+    plane["margin"][..., 2] = -0.2
+    plane["margin"][0, 0, 2] = 0.1
+    plane["held"][0, 0, 2] = 1
+    assert consistency(plane).startswith("Nowhere claims 3, 4, 5, 6, 8 hold at a machine and all")
 
 
 def test_all_eight_are_said_where_they_hold(plane):

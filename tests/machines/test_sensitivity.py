@@ -58,6 +58,13 @@ def test_the_order_of_columns_is_no_matter(study):
     assert b.sel(assumption=a["assumption"].values).values == pytest.approx(a.values)
 
 
+def test_intervals_are_the_same_each_time(study):
+    np.random.seed(7)  # noqa: NPY002
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    assert sensitivity(study).identical(sensitivity(study))
+    assert (np.random.get_state()[1] == before).all()  # noqa: NPY002
+
+
 def test_what_decides_nothing_has_no_share(study):
     points = np.stack([study[name].values for name in KEYS], axis=1)
     study["margin"][:, 0] = points[:, 1] - 0.5

@@ -56,7 +56,8 @@ def drawn(folder):
 
 def test_the_map_comes_first_and_says_what_it_shows(drawn):
     assert next(iter(drawn)) == "claims"
-    sentences, heading, figure = drawn["claims"]
+    sentences, heading, caption, figure = drawn["claims"]
+    assert caption.endswith("Claims 1 and 2 hold at every machine here: masses do not enter them.")
     assert heading == "The paper's claims over the mass plane"
     assert sentences[0].startswith("Of 35 machines each claim holds in so many: 1 in 35, 2 in 35, ")
     assert "3 in 28" in sentences[0]
@@ -76,7 +77,8 @@ def test_the_map_comes_first_and_says_what_it_shows(drawn):
 
 
 def test_the_bars_are_those_of_the_sentences(drawn):
-    sentences, _, figure = drawn["assumptions"]
+    sentences, _, caption, figure = drawn["assumptions"]
+    assert "main effect" in caption
     said = next(text for text in sentences if text.startswith("Claim 3:"))
     assert said.startswith("Claim 3: most by reciprocating mass, ")
     value = float(said.split("mass, ")[1].split(" ")[0])
@@ -88,7 +90,7 @@ def test_the_bars_are_those_of_the_sentences(drawn):
 
 
 def test_a_search_is_told_in_words_alone(drawn):
-    (said, margins), heading, figure = drawn["assumptions-search"]
+    (said, margins), heading, _, figure = drawn["assumptions-search"]
     assert said.startswith("No machine was found at which all eight claims hold, among 40 that ")
     assert margins.startswith("Its margins: 1 +30 % ± 0.1 %")
     assert (heading, figure) == ("", None)
