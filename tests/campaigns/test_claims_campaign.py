@@ -67,5 +67,5 @@ def test_the_words_are_those_of_the_numbers():
         total = [value or 0.0 for value in found["assumptions"]["total_order"][place]]
         name = found["assumptions"]["names"][total.index(max(total))]
         assert "same at all machines" in said or f"most by {name}, " in said
-    assert claims_words().count("\n") == 2
+    assert claims_words().count("\n") == 3
     assert claims_table().count("\n") >= 9
