@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Regimes, row_of
+from compressor.cases import Regimes
 from compressor.metrics import JOINTS
 from compressor.regimes.chains import FOLDER, REMEDY, labels, read_chain
 from compressor.regimes.confirm import verdict_attrs
 from compressor.regimes.run import FILE
 from compressor.regimes.values import COORDINATES, NUMBERS, TEXTS
-from compressor.store import Folder, StoreError, coordinate_names, read_dataset
+from compressor.store import Folder, StoreError, coordinate_names, read_dataset, swept_column
 
 MISSING = "missing"  # status of a value that was not run
 
@@ -37,9 +37,10 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     names = coordinate_names([*axes, asked.over])
     over = names[asked.over]
     outer, shape = layout(manifest, names)
+    values, said = swept_column(asked.over, asked.values)
     coordinates = outer | {
         "direction": ("direction", [*asked.directions], {"long_name": "which way it is followed"}),
-        over: (over, np.array(asked.values), units_of(asked.over)),
+        over: (over, values, said),
         **labels(),
     }
     dims = (*[name for name, (dim, *_) in outer.items() if name == dim], "direction", over)
@@ -88,25 +89,15 @@ def stored(path: Path) -> xr.Dataset | None:
     return read_chain(path) if not path.name.startswith("pair-") else read_dataset(path, REMEDY)
 
 
-def units_of(key: str) -> dict[str, str]:
-    """The attributes of a swept key's coordinate."""
-    row = row_of(key)
-    attrs = {"long_name": row.phrase if row else key, "case_key": key}
-    return attrs | ({"units": row.unit or "1"} if row and row.kind == "number" else {})
-
-
 def layout(
     manifest: dict[str, Any], names: dict[str, str]
 ) -> tuple[dict[str, tuple], tuple[int, ...]]:
     """The coordinates of a study's own axes, and the shape that its machines are laid out in."""
     found: dict[str, tuple] = {}
     for axis in manifest["axes"]:
-        name, attrs = names[axis["key"]], units_of(axis["key"])
-        gap = math.nan if "units" in attrs else ""
-        values = [gap if value is None else value for value in axis["values"]]
-        if "units" not in attrs:
-            values = [str(value).lower() for value in values]
-        found[name] = (name if manifest["is_grid"] else "job"), np.array(values), attrs
+        name = names[axis["key"]]
+        values, attrs = swept_column(axis["key"], axis["values"])
+        found[name] = (name if manifest["is_grid"] else "job"), values, attrs
     if manifest["is_grid"]:
         return found, tuple(len(axis["values"]) for axis in manifest["axes"])
     return found, (len(manifest["chains"]),)

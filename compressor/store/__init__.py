@@ -12,6 +12,13 @@ from compressor.store.series_file import (
     write_series,
 )
 from compressor.store.status import JobReport, report_job, standings
-from compressor.store.studies import Again, StoredStudy, coordinate_names, read_studies, write_study
+from compressor.store.studies import (
+    Again,
+    StoredStudy,
+    coordinate_names,
+    read_studies,
+    swept_column,
+    write_study,
+)
 from compressor.store.verify import Damage, verify
 from compressor.store.writer import Writer

@@ -10,12 +10,15 @@ import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from compressor.cases import MODEL_VERSION, Study, points, row_of, table
 from compressor.program import VERSION, library_versions
 from compressor.store.files import KEY, Folder, StoreError, publish, refusals, system_error
 from compressor.store.hdf5 import digest
+
+if TYPE_CHECKING:
+    import numpy as np
 
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
 UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
@@ -67,6 +70,27 @@ class Again(NamedTuple):
     case_file: str
     overrides: tuple[str, ...]
     jobs: int
+
+
+def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[str, str]]:
+    """The values of a swept key as a coordinate, and its attributes.
+
+    Numbers, nan where a job has none, have a unit; others are words, "" where there is none.
+    """
+    import numpy as np  # status does without
+
+    row = row_of(key)
+    attrs = {"long_name": row.phrase if row else key, "case_key": key}
+    if row and row.kind in ("number", "integer") and not any(isinstance(v, str) for v in values):
+        numbers = [math.nan if value is None else value for value in values]
+        return np.array(numbers, float), attrs | {"units": row.unit or "1"}
+    return np.array([_in_words(value) for value in values], object), attrs
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        return ", ".join(map(_in_words, value))
+    return "" if value is None else str(value).lower()
 
 
 def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
