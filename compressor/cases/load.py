@@ -23,7 +23,7 @@ from compressor.cases.keys import Leaves, leaves, merged, overridden, read_overr
 from compressor.cases.parameter import CaseError, Problem
 from compressor.cases.regimes import GROUP, Regimes
 from compressor.cases.shorthands import value_of
-from compressor.cases.study import Axis, Cases, Study
+from compressor.cases.study import Axis, Cases, Study, nested
 from compressor.cases.swept import SAMPLED, counted
 from compressor.cases.table import table
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, resolved, shortened
@@ -202,7 +202,7 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
     kept = tuple(built.cases) if len(cases) <= MAX_KEPT else cases
     return Study(
         draft.name, draft.path, tuple(axes), kept, tuple(built.keys), is_grid, selected,
-        draft.regimes, chains,
+        draft.regimes, chains, tuple(nested(block.fixed) for block in found),
     )  # fmt: skip
 
 

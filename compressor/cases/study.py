@@ -31,6 +31,7 @@ class Study:
     """One case file. In a grid, jobs are in C order over the axes, in the file's order.
 
     Otherwise every axis is a column, with a value for each job, None where the job has none.
+    `fixed` has the values that are not swept, group by group as each block of the file gives them.
     With `regimes` the jobs are those that chains begin at, and `chains` has the cases of each, in
     the order of the jobs, by the values of the key that is followed.
     """
@@ -44,6 +45,7 @@ class Study:
     selected: Sequence[int] = ()  # numbers of the jobs to be run now
     regimes: Regimes | None = None
     chains: tuple[tuple[Case, ...], ...] = ()
+    fixed: tuple[Mapping[str, Any], ...] = ()
 
     @property
     def jobs(self) -> int:

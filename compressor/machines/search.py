@@ -5,7 +5,7 @@ differential evolution (Storn and Price, Journal of Global Optimization 11, 1997
 for a machine whose least margin is not negative, and then for the one nearest to the defaults.
 """
 
-import json
+import copy
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,10 +15,19 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq, differential_evolution
 
-from compressor.cases import Axis, Case, Study, value_in
+from compressor.cases import Axis, Case, Study, design, value_in
 from compressor.machines.judged import Judged
-from compressor.machines.study import ClaimsError, judge_machines, machine_key, rows_of
-from compressor.store import Folder, write_dataset
+from compressor.machines.study import (
+    ELSEWHERE,
+    OTHERS,
+    ClaimsError,
+    judge_machines,
+    kept,
+    machine_key,
+    read_machines,
+    rows_of,
+)
+from compressor.store import Folder, StoreError, write_dataset
 from compressor.sweep import Progress
 
 SEED = 1
@@ -42,10 +51,14 @@ class Span(NamedTuple):
     @property
     def home(self) -> float:
         """The share of the range at which the default lies; the nearest end where it is outside."""
+        return self.share(self.default)
+
+    def share(self, value: float) -> float:
+        """The share of the range at which a value lies; the nearest end where it is outside."""
         low, high = self.spread(0.0), self.spread(1.0)
-        if not low < self.default < high:
-            return float(self.default >= high)
-        return float(brentq(lambda share: self.spread(share) - self.default, 0.0, 1.0))
+        if not low < value < high:
+            return float(value >= high)
+        return float(brentq(lambda share: self.spread(share) - value, 0.0, 1.0))
 
 
 class Search:
@@ -54,20 +67,40 @@ class Search:
     def __init__(self, study: Study, folder: Folder, workers: int, progress: Progress):
         self.study, self.folder = study, folder
         self.workers, self.progress = workers, progress
-        self.base = study.cases[0].values()
         defaults = Case.from_values({}).values()
         self.spans = [
             Span(axis.key, axis.spread, float(value_in(defaults, axis.key)))
             for axis in study.axes
             if axis.spread is not None and isinstance(value_in(defaults, axis.key), int | float)
         ]
-        if len(self.spans) < len(study.axes) or not self.spans:
+        if len(self.spans) < len(study.axes) or not self.spans or len(study.fixed) > 1:
             raise ClaimsError(
                 f"{study.path}: a search needs assumptions that are drawn between two numbers, "
-                "such as {saltelli: [2, 9]}, and nothing else that is swept"
+                "such as {saltelli: [2, 9]}, no blocks, and nothing else that is swept"
             )
-        self.points: dict[tuple[float, ...], Judged] = {}
-        self.asked: list[tuple[float, ...]] = []
+        self.points = self.stored()
+        self.asked: list[tuple[float, ...]] = []  # in this search
+
+    def stored(self) -> dict[tuple[float, ...], Judged]:
+        """The machines of earlier searches in this folder. Raises StoreError."""
+        path = Path(self.folder) / f"{self.name}.nc"
+        if not path.exists():
+            return {}
+        found = read_machines(path)
+        at = {coordinate.attrs.get("case_key"): coordinate for coordinate in found.coords.values()}
+        if any(span.key not in at for span in self.spans):
+            raise StoreError(path, OTHERS, ELSEWHERE)
+        points = zip(*(at[span.key].values.tolist() for span in self.spans), strict=True)
+        rows = rows_of(found)
+        keys = {point: machine_key(self.case(point)) for point in points}
+        if not {*keys.values()} >= {*rows}:
+            raise StoreError(path, OTHERS, ELSEWHERE)
+        return {point: rows[key] for point, key in keys.items() if key in rows}
+
+    @property
+    def name(self) -> str:
+        """What the study of the search's machines is called."""
+        return f"{self.study.name}-search"
 
     @property
     def home(self) -> np.ndarray:
@@ -84,28 +117,40 @@ class Search:
     def judge(self, many: Sequence[Sequence[float]]) -> list[Judged]:
         """The verdicts of machines at shares of the ranges."""
         wanted = [self.values(shares) for shares in many]
+        self.asked += wanted
         new = [point for point in dict.fromkeys(wanted) if point not in self.points]
         if new:
-            self.asked += new
-            rows = rows_of(judge_machines(self.grown(), self.folder, self.workers, self.progress))
+            found = self.judged(new)
+            rows = rows_of(found)
             self.points |= {point: rows[machine_key(self.case(point))] for point in new}
         return [self.points[point] for point in wanted]
 
-    def grown(self) -> Study:
-        """The study of all machines that were asked for."""
-        cases = [self.case(point) for point in self.asked]
-        columns = zip(*self.asked, strict=True)
+    def judged(self, new: Sequence[tuple[float, ...]] = ()) -> xr.Dataset:
+        """All machines that are known, and new ones behind them."""
+        points = [*self.points, *new]
+        cases = [self.case(point) for point in points]
+        columns = zip(*points, strict=True)
         axes = [Axis(span.key, column) for span, column in zip(self.spans, columns, strict=True)]
-        name = f"{self.study.name}-search"
         keys = tuple(case.key for case in cases)
-        return Study(name, self.study.path, tuple(axes), cases, keys, False, range(len(cases)))
+        count = range(len(cases))
+        study = Study(self.name, self.study.path, tuple(axes), cases, keys, False, count)
+        return judge_machines(study, self.folder, self.workers, self.progress)
+
+    def cost(self, point: Sequence[float]) -> float:
+        """What the search makes small, of a machine that is known."""
+        return cost(self.points[tuple(point)], self.distance(point) / len(self.spans))
+
+    def distance(self, point: Sequence[float]) -> float:
+        """The sum of changes from the defaults, each as a share of its range."""
+        pairs = zip(self.spans, point, strict=True)
+        return math.fsum(abs(span.share(value) - span.home) for span, value in pairs)
 
     def case(self, point: Sequence[float]) -> Case:
         """The machine with these values."""
-        values: dict[str, Any] = json.loads(json.dumps(self.base))
+        values: dict[str, Any] = {"name": self.study.name, **copy.deepcopy(self.study.fixed[0])}
         for span, value in zip(self.spans, point, strict=True):
             group, _, name = span.key.rpartition(".")
-            values[group][name] = value
+            values.setdefault(group, {})[name] = value
         return Case.from_values(values)
 
 
@@ -134,53 +179,72 @@ def least_change(
 
     study: whose axes are all drawn by a design, in whose ranges is looked; machines are stored in
     FOLDER/NAME-search.nc, and the same call goes on from them. The distance is the sum of changes,
-    each as a share of its range. Where all claims hold, each change is then taken back as far as
-    they go on holding. Raises ClaimsError where the study draws nothing.
+    each as a share of its range. It begins at the best of the study's own machines, as far as they
+    are judged. Where all claims hold, each change is then taken back as far as they go on holding.
+    Raises ClaimsError where the study draws nothing.
     """
     search = Search(study, folder, workers, progress)
-    home, most = search.home, float(len(search.spans))
 
     def costs(shares: np.ndarray) -> np.ndarray:
-        many = np.atleast_2d(shares.T)
-        away = np.abs(many - home).sum(axis=1) / most
-        verdicts = search.judge(many.tolist())
-        return np.array([cost(v, d) for v, d in zip(verdicts, away.tolist(), strict=True)])
+        many = np.atleast_2d(shares.T).tolist()
+        search.judge(many)
+        return np.array([search.cost(search.values(point)) for point in many])
 
-    rounds = -(-POPULATION // len(search.spans))
-    best = differential_evolution(
-        costs, [(0.0, 1.0)] * len(search.spans), maxiter=generations, popsize=rounds, tol=0.0,
-        vectorized=True, updating="deferred", polish=False, rng=np.random.default_rng(SEED),
-        x0=home,
-    ).x  # fmt: skip
-    if costs(best) < 1.0:
-        best = taken_back(search, best)
-    found = judge_machines(search.grown(), folder, workers, progress)
-    values = search.values(best)
-    found.attrs["best"] = search.asked.index(values)
-    found.attrs["distance"] = float(np.abs(best - home).sum())
+    differential_evolution(
+        costs, [(0.0, 1.0)] * len(search.spans), maxiter=generations, init=beginning(search),
+        tol=0.0, vectorized=True, updating="deferred", polish=False,
+        rng=np.random.default_rng(SEED),
+    )  # fmt: skip
+    best = min(search.asked, key=search.cost)
+    if search.cost(best) < 1.0:
+        taken_back(search, best)
+    best = min(search.points, key=search.cost)
+    found = search.judged()
+    found.attrs["best"] = [*search.points].index(best)
+    found.attrs["distance"] = search.distance(best)
     write_dataset(Path(found.encoding["source"]), found)
     return found
 
 
-def taken_back(search: Search, best: np.ndarray) -> np.ndarray:
-    """A machine at which all claims hold, with each change taken back as far as they go on to.
+def beginning(search: Search) -> np.ndarray:
+    """The first generation: the defaults, the study's best machines, and draws where these are few.
+
+    (machines, k), shares of the ranges. No machines of earlier searches, so that the same call
+    takes the same way.
+    """
+    study, spans = search.study, search.spans
+    known = kept(Path(search.folder) / f"{study.name}.nc")
+    found = []
+    for number, case in enumerate(study.cases):
+        verdict = known.get(machine_key(case))
+        if verdict is not None:
+            point = [axis.values[number] for axis in study.axes]
+            shares = [span.share(value) for span, value in zip(spans, point, strict=True)]
+            found.append((cost(verdict, search.distance(point) / len(spans)), shares))
+    best = [shares for _, shares in sorted(found)][: POPULATION - 1]
+    drawn = design("lhs", POPULATION - 1 - len(best), len(spans), SEED)
+    return np.array([search.home.tolist(), *best, *drawn])
+
+
+def taken_back(search: Search, best: tuple[float, ...]) -> None:
+    """Take back each change of a machine at which all claims hold, as far as they go on to.
 
     The smallest change first; a whole one if that goes, else by bisection.
     """
     home = search.home
-    for number in np.argsort(np.abs(best - home)):
-        inside, outside = float(best[number]), float(home[number])
+    shares = np.array([s.share(value) for s, value in zip(search.spans, best, strict=True)])
+    for number in np.argsort(np.abs(shares - home)):
+        inside, outside = float(shares[number]), float(home[number])
         if inside == outside:
             continue
         for tried in [outside, *[None] * HALVINGS]:
             share = 0.5 * (inside + outside) if tried is None else tried
-            moved = best.copy()
+            moved = shares.copy()
             moved[number] = share
             (verdict,) = search.judge([moved.tolist()])
             if cost(verdict, 0.0) < 1.0:
-                inside, best = share, moved
+                inside, shares = share, moved
                 if share == home[number]:
                     break
             else:
                 outside = share
-    return best

@@ -14,15 +14,24 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import RULES
-from compressor.cases import Case, Study, row_of, value_in
+from compressor.cases import Case, Study
 from compressor.machines.judged import CLAIMS, SHARES, Judged, judge
 from compressor.program import PROGRAM, CompsimError
-from compressor.store import Folder, StoreError, coordinate_names, read_dataset, write_dataset
+from compressor.store import (
+    Folder,
+    StoreError,
+    coordinate_names,
+    read_dataset,
+    swept_column,
+    write_dataset,
+)
 from compressor.sweep import Done, Lost, Needs, Progress, run_here
 
 FLUSH = 3.0  # s between two writings of what is finished
 TIMEOUT = 900.0  # s that a machine may take, with all of its cases
 REMEDY = "delete it, or choose another folder"
+OTHERS = "holds machines of another case file, or of another version of compsim"
+ELSEWHERE = "choose another folder by -o, or delete it"
 ROLES = ("joint", "load", "clearance_mm", "initial_offset_mm", "body", "sensor")
 UNIT = {"units": "1"}
 
@@ -60,11 +69,14 @@ def judge_machines(
     """Judge the machines of a study that FOLDER/NAME.nc does not hold yet; gives all of them.
 
     As `dataset` makes it. Whatever ends the run early, what was finished is stored, but for the
-    last seconds. Raises ClaimsError, StoreError and WorkersFailed.
+    last seconds. Raises ClaimsError, WorkersFailed, and StoreError also where the file holds
+    finished machines that the study does not have, which would be lost.
     """
     cases, path = machines(study), Path(folder) / f"{study.name}.nc"
     keys = [machine_key(case) for case in cases]
-    known = {key: row for key, row in kept(path).items() if key in {*keys}}
+    known = kept(path)
+    if not known.keys() <= {*keys}:
+        raise StoreError(path, OTHERS, ELSEWHERE)
     missing = [number for number, key in enumerate(keys) if key not in known]
     total, written, done = len(keys), time.monotonic(), len(keys) - len(missing)
     progress(done, total, "")
@@ -111,9 +123,11 @@ def dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr
     dims = tuple(names.values()) if on_grid else ("machine",)
     shape = tuple(len(axis.values) for axis in study.axes) if on_grid else (len(keys),)
     coordinates: dict[str, tuple] = {
-        names[axis.key]: ((names[axis.key],) if on_grid else dims, column(axis.values), about(axis))
+        names[axis.key]: (
+            (names[axis.key],) if on_grid else dims, *swept_column(axis.key, axis.values)
+        )
         for axis in study.axes
-    }
+    }  # fmt: skip
     found = [rows.get(key, Judged()) for key in keys]
     status = [
         "" if key not in rows else "failed" if row.failed else "ok"
@@ -156,27 +170,6 @@ def dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr
     return xr.Dataset(variables, coordinates, attrs)
 
 
-def column(values: Sequence[Any]) -> np.ndarray:
-    """The values of a swept key; words for what is no number."""
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values, float)
-    return np.array([spoken(value) for value in values], object)
-
-
-def spoken(value: Any) -> str:
-    """A value of a case file in words."""
-    if isinstance(value, tuple | list):
-        return ", ".join(map(spoken, value))
-    return "" if value is None else str(value).lower()
-
-
-def about(axis: Any) -> dict[str, str]:
-    """The attributes of a swept key's coordinate."""
-    row = row_of(axis.key)
-    attrs = {"case_key": axis.key, "long_name": row.phrase if row else axis.key}
-    return attrs | ({"units": row.unit} if row and row.unit else {})
-
-
 def kept(path: Path) -> dict[str, Judged]:
     """The machines of a file by key; none where there is no file. Raises StoreError."""
     if not path.exists():
@@ -211,15 +204,3 @@ def rows_of(found: xr.Dataset) -> dict[str, Judged]:
                 failed,
             )
     return rows
-
-
-def default_place(found: xr.Dataset) -> dict[str, float]:
-    """The defaults of a study's swept numbers, by coordinate."""
-    values = Case.from_values({}).values()
-    place = {}
-    for name, coordinate in found.coords.items():
-        key = coordinate.attrs.get("case_key", "")
-        value = value_in(values, key) if key else None
-        if isinstance(value, int | float):
-            place[str(name)] = float(value)
-    return place

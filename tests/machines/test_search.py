@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from compressor.cases.load import load_studies
+from compressor.cases.load import load_cases, load_studies
 from compressor.machines import search as searching
 from compressor.machines.findings import change
 from compressor.machines.judged import Judged
-from compressor.machines.search import Span, cost, least_change
+from compressor.machines.search import POPULATION, Span, cost, least_change
 from compressor.machines.study import ClaimsError, dataset, machine_key
-from compressor.store.series_file import read_dataset
+from compressor.store import StoreError
+from compressor.store.series_file import read_dataset, write_dataset
 
 TEXT = """\
 machine: {rod_mass_kg: {saltelli: [1, 9]}, reciprocating_mass_kg: {saltelli: [2, 30]}}
@@ -82,6 +83,60 @@ def test_a_search_is_the_same_again(judge):
         judge(lambda case: case.machine.rod_mass_kg - 6.0, generations=1) for _ in range(2)
     )
     assert one.identical(other)
+
+
+def test_a_search_begins_at_the_study_s_best_machine(judge, tmp_path):
+    """Before any generation it is as good as what was judged before."""
+
+    def least(case):
+        return -abs(case.machine.rod_mass_kg - 7.3) / 10.0 - abs(case.friction.dynamic - 0.15)
+
+    (tmp_path / "some.yaml").write_text(TEXT.replace("n: 2", "n: 64"))
+    (study,) = load_studies(tmp_path / "some.yaml")
+    keys = [machine_key(case) for case in study.cases]
+    rows = {
+        key: Judged((1.0,) * 7 + (least(case),), (0.0,) * 8, (0.0,) * 4, (0.0,) * 4)
+        for key, case in zip(keys, study.cases, strict=True)
+    }
+    write_dataset(tmp_path / "some.nc", dataset(study, keys, rows))
+    nearest = max(row.margin[7] for row in rows.values())
+    found = judge(least, TEXT.replace("n: 2", "n: 64"), generations=0)
+    assert found.sizes["machine"] == POPULATION
+    assert float(found["margin"].max("machine").min()) == pytest.approx(nearest, abs=1e-5)
+
+
+def test_machines_of_earlier_searches_stay(judge, tmp_path):
+    """A search that takes another way knows them, and what was best."""
+
+    def least(case):
+        return -abs(case.machine.rod_mass_kg - 7.3) / 10.0
+
+    first = judge(least, generations=4)
+    again = judge(lambda case: -0.9, TEXT.replace("seed: 1", "seed: 2"), generations=0)
+    assert {*again["key"].values} == {*first["key"].values}
+    assert again.attrs["best"] == first.attrs["best"]
+    path = tmp_path / "some-search.nc"
+    found = read_dataset(path)
+    found["key"] = found["key"].copy(data=[f"{key} of old" for key in found["key"].values])
+    write_dataset(path, found)
+    with pytest.raises(StoreError, match="another case file, or of another version of compsim"):
+        judge(least)
+
+
+def test_what_follows_from_an_assumption_follows_in_a_search(judge, tmp_path):
+    """Its machines are those of a sweep at the same values: a rod's inertia is that of its mass."""
+    seen = []
+    judge(lambda case: seen.append(case) or -1.0, generations=0)
+    inertia = [case.machine.rod_inertia_kg_m2 for case in seen]
+    assert inertia == pytest.approx([0.03 * case.machine.rod_mass_kg for case in seen], rel=1e-12)
+    last = seen[-1]
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / "some.yaml").write_text(
+        f"machine: {{rod_mass_kg: {last.machine.rod_mass_kg}, "
+        f"reciprocating_mass_kg: {last.machine.reciprocating_mass_kg}}}\n"
+        f"friction: {{friction_velocity_mm_per_s: {last.friction.friction_velocity_mm_per_s}}}\n"
+    )
+    assert load_cases(tmp_path / "one" / "some.yaml") == [last]
 
 
 def test_a_search_needs_ranges(judge):
