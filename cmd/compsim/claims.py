@@ -65,7 +65,7 @@ def claims(
     from compressor.sweep import cores
 
     paths = configs or tuple(str(example(name)) for name in EXAMPLES)
-    studies = load_studies(*paths, overrides=overrides, max_jobs=max_jobs)
+    studies = load_studies(*paths, overrides=overrides, max_jobs=max_jobs, follow=False)
     drawn = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
     if generations and not drawn:
         raise click.UsageError(

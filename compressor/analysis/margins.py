@@ -11,11 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.special import stdtrit
 
 from compressor.analysis.runs import settled
-
-SURE = 0.975  # quantile of Student's t: an error of scatter holds in 95 % of cases
+from compressor.solve import mean_bar, sure
 
 
 class Measure(NamedTuple):
@@ -102,11 +100,7 @@ def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> floa
 
     inf of a single revolution.
     """
-    each = np.array([value(turn) for turn in revolutions(run)])
-    if each.size < 2:
-        return math.inf
-    error = float(each.std(ddof=1)) / math.sqrt(each.size)
-    return float(stdtrit(each.size - 1, SURE)) * error
+    return mean_bar(np.array([value(turn) for turn in revolutions(run)]))
 
 
 def measured(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> Measure:
@@ -126,8 +120,7 @@ def peak(run: xr.Dataset, name: str, **where: str) -> Measure:
     value, error = (
         float(run[n].sel(where)) for n in (f"{name}_mean", f"{name}_mean_standard_error")
     )
-    degrees = max(int(run["revolutions"]) - 1, 1)
-    return Measure(value, float(stdtrit(degrees, SURE)) * error)
+    return Measure(value, float(sure(np.array(error), int(run["revolutions"]))))
 
 
 def metric(run: xr.Dataset, name: str, **where: str) -> Measure:

@@ -13,18 +13,16 @@ from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
 
 from compressor.cases import Study, load_studies, row_of
 from compressor.metrics import AXES, JOINTS, METRICS, NUMBERS, ROD_LOAD
 from compressor.program import CompsimError
+from compressor.solve import sure
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
 COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^\s<>=]+)\s*")
 OVER = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*")
 WORDS = {"joint": JOINTS, "axis": AXES}
-SURE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
-MOST_BATCHES = 30  # of revolutions, whose means a standard error is taken of
 DIGITS = 12  # of an argument: enough for any tolerance, and short to read
 NAME = 64  # characters that a study's name may have
 
@@ -89,11 +87,9 @@ class Goal:
         averaged = regime == "chaotic" and metric.kind == "greatest"
         if averaged:
             mean = f"{self.metric}_mean"
-            revolutions = max(1, int(numbers["revolutions"]))
-            batches = revolutions // math.ceil(revolutions / MOST_BATCHES)
-            student = float(stdtrit(max(batches - 1, 1), SURE))
             value = self._at(numbers, mean)
-            bar = student * self._at(numbers, f"{mean}_standard_error")
+            error = np.array(self._at(numbers, f"{mean}_standard_error"))
+            bar = float(sure(error, max(1, int(numbers["revolutions"]))))
         else:
             value = self._at(numbers, self.metric)
             bar = self._at(numbers, f"{self.metric}_error")

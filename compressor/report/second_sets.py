@@ -13,6 +13,7 @@ from compressor.analysis import (
     ORDER,
     caption,
     case_of,
+    cases_of,
     claims,
     label,
     paper_cases,
@@ -108,7 +109,7 @@ def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSe
 
 
 def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Case]]:
-    """`cases_like` of each machine but the default one whose nine worn cases a study holds."""
+    """`cases_of` each machine but the default one whose nine worn cases a study holds."""
     swept = {value for axis in study.axes for value in axis.values}
     if not swept >= {*FAULTS, *CLEARANCES}:
         return
@@ -123,26 +124,13 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
             case = Case.from_attribute(stored.rows.attributes(position)["case"])
         except CaseError:
             continue  # of another version of compsim
-        cases = cases_like(case)
+        cases = cases_of(case)
         ideal = cases["design"].physics_key
         if ideal in seen or not is_other(case):
             continue
         seen.add(ideal)
         if all(cases[name].physics_key.encode() in held for name in WORN):
             yield cases
-
-
-def cases_like(case: Case) -> dict[str, Case]:
-    """The paper's eleven cases by label, alike in all other assumptions of a case.
-
-    The typical load may not fit a machine of other lengths; of such a case no run is stored.
-    """
-    ideal = replace(case, joint="none")
-    cases = {load: replace(ideal, load=load) for load in LOADS}
-    for fault, c in itertools.product(FAULTS, CLEARANCES):
-        sizes = replace(case.clearance_mm, big_end=c, small_end=c)
-        cases[label(fault, c)] = replace(cases["design"], joint=fault, clearance_mm=sizes)
-    return cases
 
 
 def is_other(case: Case) -> bool:
@@ -176,7 +164,7 @@ def borrowed(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]
     unread = ["contact", "friction", "initial_offset_mm", "body", "sensor"]
     unread += [] if loads else ["gas", "spring"]
     same = replace(case, machine=machine, **{name: getattr(default, name) for name in unread})
-    twins, defaults = cases_like(same), paper_cases()
+    twins, defaults = cases_of(same), paper_cases()
     return {
         load: paper.usable[load]
         for load in LOADS

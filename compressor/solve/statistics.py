@@ -88,6 +88,15 @@ def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
     return np.asarray(error) * float(stdtrit(max(batches - 1, 1), SURE))
 
 
+def mean_bar(values: np.ndarray) -> float:
+    """Half of the 95 % interval of the mean of revolutions' values in a row, (n,), by batch means.
+
+    inf of a single one.
+    """
+    means = np.array([part.mean() for part in parts(values, MOST_BATCHES, 1)])
+    return float(sure(standard_error(means), len(values)))
+
+
 def chaotic_bars(found: Metrics, numbers: Metrics) -> Metrics:
     """The error bars of a chaotic run's metrics: of averages; a greatest value is not known."""
     bars = {}

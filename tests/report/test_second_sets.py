@@ -11,14 +11,20 @@ from conftest import keep, store
 from test_report import forget, read
 
 from compressor.analysis.captions import caption
-from compressor.analysis.paper_cases import CLEARANCES, FAULT_LABELS, FAULTS, label, paper_cases
+from compressor.analysis.paper_cases import (
+    CLEARANCES,
+    FAULT_LABELS,
+    FAULTS,
+    cases_of,
+    label,
+    paper_cases,
+)
 from compressor.cases.case import Case
 from compressor.report import report, second_sets
 from compressor.report.paper_runs import PaperRuns, find_paper_runs
 from compressor.report.report import write_report
 from compressor.report.second_sets import (
     borrowed,
-    cases_like,
     comparable,
     is_other,
     second_drawings,
@@ -119,10 +125,10 @@ def test_eight_of_nine_are_no_set(spoilt):
 
 def test_the_eleven_cases_keep_the_other_assumptions_of_one():
     worn = {"joint": "small_end", "clearance_mm": 0.7}
-    assert cases_like(Case.from_values(worn)) == paper_cases()
+    assert cases_of(Case.from_values(worn)) == paper_cases()
     heavy = {"machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 20}}
-    assert cases_like(Case.from_values(worn | heavy)) == paper_cases(**heavy["machine"])
-    found = cases_like(Case.from_values(worn | {"machine": {"crank_radius_mm": 110}}))
+    assert cases_of(Case.from_values(worn | heavy)) == paper_cases(**heavy["machine"])
+    found = cases_of(Case.from_values(worn | {"machine": {"crank_radius_mm": 110}}))
     assert {case.machine.crank_radius_mm for case in found.values()} == {110}
 
 
