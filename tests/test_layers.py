@@ -6,6 +6,7 @@ the sources that lists what breaks it, so that a planted fault shows that the ru
 
 import ast
 import subprocess
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -280,6 +281,14 @@ def test_top_level_holds_only_what_was_agreed():
     ).stdout.split("\n")
     top = {name.split("/")[0] for name in tracked if name}
     assert {name for name in top if not name.startswith(".")} - {"LICENSE"} <= agreed
+
+
+def test_every_package_is_installed():
+    """An editable install does not tell: a wheel without a package fails at the user's."""
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    doors = [*(ROOT / "compressor").rglob("__init__.py"), ROOT / "cmd" / "compsim" / "__init__.py"]
+    parts = (door.parent.relative_to(ROOT).parts for door in doors)
+    assert sorted(listed) == sorted(".".join(p[p[0] == "cmd" :]) for p in parts)
 
 
 def test_cmd_is_no_package():
