@@ -1,8 +1,9 @@
 """The least change of assumptions that makes all of the paper's claims hold, by a directed search.
 
 A sweep that finds no such machine says little: a box of eight assumptions is mostly corners. So
-differential evolution (Storn and Price, Journal of Global Optimization 11, 1997, by SciPy) looks
-for a machine whose least margin is not negative, and then for the one nearest to the defaults.
+differential evolution (Storn and Price, Journal of Global Optimization 11, 1997, by SciPy), and a
+compass search from its best machine, look for one whose least margin is not negative, and then for
+the one nearest to the defaults.
 """
 
 import copy
@@ -34,6 +35,7 @@ SEED = 1
 POPULATION = 48  # machines of a generation
 DIGITS = 6  # of an assumption's value
 FAR = 10.0  # the cost of a machine that was not judged
+STEP, LEAST_STEP = 0.05, 0.003  # of a compass search, as shares of the ranges
 HALVINGS = 5  # of each change, on the way back to the default
 
 
@@ -180,7 +182,8 @@ def least_change(
     study: whose axes are all drawn by a design, in whose ranges is looked; machines are stored in
     FOLDER/NAME-search.nc, and the same call goes on from them. The distance is the sum of changes,
     each as a share of its range. It begins at the best of the study's own machines, as far as they
-    are judged. Where all claims hold, each change is then taken back as far as they go on holding.
+    are judged. Evolution finds a region, and a compass search goes on from its best machine. Where
+    all claims hold, each change is then taken back as far as they go on holding.
     Raises ClaimsError where the study draws nothing.
     """
     search = Search(study, folder, workers, progress)
@@ -195,7 +198,7 @@ def least_change(
         tol=0.0, vectorized=True, updating="deferred", polish=False,
         rng=np.random.default_rng(SEED),
     )  # fmt: skip
-    best = min(search.asked, key=search.cost)
+    best = descended(search, min(search.asked, key=search.cost))
     if search.cost(best) < 1.0:
         taken_back(search, best)
     best = min(search.points, key=search.cost)
@@ -224,6 +227,26 @@ def beginning(search: Search) -> np.ndarray:
     best = [shares for _, shares in sorted(found)][: POPULATION - 1]
     drawn = design("lhs", POPULATION - 1 - len(best), len(spans), SEED)
     return np.array([search.home.tolist(), *best, *drawn])
+
+
+def descended(search: Search, best: tuple[float, ...]) -> tuple[float, ...]:
+    """The best machine of a compass search that begins at one; until claims hold, or steps end.
+
+    All neighbours of a round, one up and one down in each assumption, are judged side by side
+    (Kolda, Lewis and Torczon, SIAM Review 45, 2003, 385-482).
+    """
+    step = STEP
+    while step >= LEAST_STEP and search.cost(best) >= 1.0:
+        shares = np.array([s.share(value) for s, value in zip(search.spans, best, strict=True)])
+        moves = step * np.vstack([np.eye(shares.size), -np.eye(shares.size)])
+        around = np.clip(shares + moves, 0.0, 1.0).tolist()
+        search.judge(around)
+        nearest = min((search.values(point) for point in around), key=search.cost)
+        if search.cost(nearest) < search.cost(best):
+            best = nearest
+        else:
+            step /= 2.0
+    return best
 
 
 def taken_back(search: Search, best: tuple[float, ...]) -> None:
