@@ -129,7 +129,7 @@ def claims_words():
         + " ".join(plane["said"][1:]),
         f"- **All assumptions** ({drawn['judged']} machines, {drawn['chaotic']} of them with "
         "chaotic cases): " + " ".join(drawn["said"][1:]),
-        f"- **Search** ({search['judged']} machines): " + " ".join(search["said"]),
+        f"- **Search** ({search['looked']} machines): " + " ".join(search["said"]),
     ]
     return "\n".join(lines) + "\n"
 

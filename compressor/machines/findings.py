@@ -103,7 +103,7 @@ def region(found: xr.Dataset) -> Iterator[str]:
             if "case_key" not in coordinate.attrs or coordinate.dtype == object:
                 continue
             inside = coordinate.where(there)
-            unit = coordinate.attrs.get("units", "")
+            unit = coordinate.attrs.get("units", "").removeprefix("1")
             low, high = float(inside.min()), float(inside.max())
             ranges.append(f"{spoken(str(key))} from {low:.3g} to {high:.3g} {unit}".rstrip())
         yield f"{name} hold in {count}, with {', '.join(ranges)}."
@@ -182,16 +182,20 @@ def share(one: xr.Dataset, place: int) -> str:
 def change(found: xr.Dataset) -> Iterator[str]:
     """The least change of assumptions that makes all claims hold, of `least_change`."""
     best = found.isel(machine=int(found.attrs["best"]))
-    margin = best["margin"].values
-    machines = found.sizes["machine"]
-    if (margin >= 0.0).all():
-        yield f"The least change that makes all eight claims hold: {changes(best)}."
+    margin, sure = best["margin"].values, best["margin"].values - best["error"].values
+    machines = int(found.attrs["looked"])
+    if (sure >= 0.0).all():
+        yield (
+            "The least change that makes all eight claims hold, each beyond its error, among "
+            f"{machines} machines that a directed search looked at: {changes(best)}."
+        )
     else:
         holding = int((margin >= 0.0).sum())
         yield (
-            f"No machine was found at which all eight claims hold, among {machines} that a "
-            f"directed search looked at. The one that lacks least: {changes(best)}; there "
-            f"{holding} claims hold."
+            "No machine was found at which all eight claims hold beyond their errors, among "
+            f"{machines} that a directed search looked at. The one that lacks least: "
+            f"{changes(best)}; there {holding} claims hold, {int((sure >= 0.0).sum())} of them "
+            "beyond their errors."
         )
     said = ", ".join(
         f"{claim} {100 * m:+.3g} % ± {100 * e:.2g} %"
@@ -208,7 +212,7 @@ def changes(machine: xr.Dataset) -> str:
         key = coordinate.attrs.get("case_key", "")
         default = value_in(defaults, key) if key else None
         if isinstance(default, int | float) and float(coordinate) != float(default):
-            unit = coordinate.attrs.get("units", "")
+            unit = coordinate.attrs.get("units", "").removeprefix("1")
             parts.append(
                 f"{spoken(str(name))} {float(coordinate):.4g} {unit}".rstrip()
                 + f" (not {default:g})"

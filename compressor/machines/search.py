@@ -36,7 +36,8 @@ POPULATION = 48  # machines of a generation
 DIGITS = 6  # of an assumption's value
 FAR = 10.0  # the cost of a machine that was not judged
 STEP, LEAST_STEP = 0.05, 0.003  # of a compass search, as shares of the ranges
-HALVINGS = 5  # of each change, on the way back to the default
+LONGER = 5  # times: runs by which a machine is told to be consistent
+HALVINGS = 4  # of each change, on the way back to the default
 
 
 class Span(NamedTuple):
@@ -64,10 +65,16 @@ class Span(NamedTuple):
 
 
 class Search:
-    """The machines of a search, which grow; each is judged once and stored."""
+    """The machines of a search, which grow; each is judged once and stored.
 
-    def __init__(self, study: Study, folder: Folder, workers: int, progress: Progress):
-        self.study, self.folder = study, folder
+    longer: how many times as long as the study's their runs are. In longer runs a claim counts as
+    held where its margin is beyond its error, else by its margin alone.
+    """
+
+    def __init__(
+        self, study: Study, folder: Folder, workers: int, progress: Progress, longer: int = 1
+    ):
+        self.study, self.folder, self.longer = study, folder, longer
         self.workers, self.progress = workers, progress
         defaults = Case.from_values({}).values()
         self.spans = [
@@ -102,7 +109,7 @@ class Search:
     @property
     def name(self) -> str:
         """What the study of the search's machines is called."""
-        return f"{self.study.name}-search"
+        return f"{self.study.name}-search" + ("-longer" if self.longer > 1 else "")
 
     @property
     def home(self) -> np.ndarray:
@@ -118,7 +125,10 @@ class Search:
 
     def judge(self, many: Sequence[Sequence[float]]) -> list[Judged]:
         """The verdicts of machines at shares of the ranges."""
-        wanted = [self.values(shares) for shares in many]
+        return self.ask([self.values(shares) for shares in many])
+
+    def ask(self, wanted: Sequence[tuple[float, ...]]) -> list[Judged]:
+        """The verdicts of machines with these values of the assumptions."""
         self.asked += wanted
         new = [point for point in dict.fromkeys(wanted) if point not in self.points]
         if new:
@@ -140,7 +150,8 @@ class Search:
 
     def cost(self, point: Sequence[float]) -> float:
         """What the search makes small, of a machine that is known."""
-        return cost(self.points[tuple(point)], self.distance(point) / len(self.spans))
+        verdict = self.points[tuple(point)]
+        return cost(verdict, self.distance(point) / len(self.spans), self.longer > 1)
 
     def distance(self, point: Sequence[float]) -> float:
         """The sum of changes from the defaults, each as a share of its range."""
@@ -153,16 +164,21 @@ class Search:
         for span, value in zip(self.spans, point, strict=True):
             group, _, name = span.key.rpartition(".")
             values.setdefault(group, {})[name] = value
+        if self.longer > 1:
+            solve = self.study.cases[0].solve
+            key = "duration_rev" if solve.duration_s is None else "duration_s"
+            values.setdefault("solve", {})[key] = self.longer * getattr(solve, key)
         return Case.from_values(values)
 
 
-def cost(verdict: Judged, distance: float) -> float:
+def cost(verdict: Judged, distance: float, sure: bool = False) -> float:
     """What a search makes small: 1 and what the least margin lacks, or else the distance below 1.
 
-    distance: over its greatest.
+    distance: over its greatest. sure: a margin counts less its error.
     """
-    least = min(verdict.margin)
-    if math.isnan(least):  # not judged
+    pairs = zip(verdict.margin, verdict.error, strict=True)
+    least = min(margin - error if sure else margin for margin, error in pairs)
+    if not math.isfinite(least):  # not judged, or an error that is not known
         return FAR
     return distance if least >= 0.0 else 1.0 - least
 
@@ -176,15 +192,17 @@ def least_change(
 ) -> xr.Dataset:
     """The machine nearest to the defaults at which all claims hold, or the one that lacks least.
 
-    All machines of the search come back, as of `judge_machines`; the attribute `best` is the number
-    of that one, and `distance` how far it is from the defaults.
+    The machines of longer runs come back, as of `judge_machines`; the attribute `best` is the
+    number of that one, `distance` how far it is from the defaults, the sum of changes, each as a
+    share of its range, and `looked` how many machines the search judged in all.
 
     study: whose axes are all drawn by a design, in whose ranges is looked; machines are stored in
-    FOLDER/NAME-search.nc, and the same call goes on from them. The distance is the sum of changes,
-    each as a share of its range. It begins at the best of the study's own machines, as far as they
-    are judged. Evolution finds a region, and a compass search goes on from its best machine. Where
-    all claims hold, each change is then taken back as far as they go on holding.
-    Raises ClaimsError where the study draws nothing.
+    FOLDER/NAME-search.nc and NAME-search-longer.nc, and the same call goes on from them. It begins
+    at the best of the study's own machines, as far as they are judged. Evolution finds a region,
+    and a compass search goes on from its best machine. Chaotic runs of few revolutions leave wide
+    errors, in which a search finds lucky machines: so another compass search looks from there, in
+    runs LONGER times as long, until all claims hold beyond their errors. Then each change is taken
+    back as far as they go on holding. Raises ClaimsError where the study draws nothing.
     """
     search = Search(study, folder, workers, progress)
 
@@ -198,13 +216,16 @@ def least_change(
         tol=0.0, vectorized=True, updating="deferred", polish=False,
         rng=np.random.default_rng(SEED),
     )  # fmt: skip
-    best = descended(search, min(search.asked, key=search.cost))
-    if search.cost(best) < 1.0:
-        taken_back(search, best)
-    best = min(search.points, key=search.cost)
-    found = search.judged()
-    found.attrs["best"] = [*search.points].index(best)
-    found.attrs["distance"] = search.distance(best)
+    near = descended(search, min(search.asked, key=search.cost), STEP)
+    longer = Search(study, folder, workers, progress, LONGER)
+    best = descended(longer, near, STEP / 2.0)
+    if longer.cost(best) < 1.0:
+        taken_back(longer, best)
+    best = min(longer.points, key=longer.cost)
+    found = longer.judged()
+    found.attrs["best"] = [*longer.points].index(best)
+    found.attrs["distance"] = longer.distance(best)
+    found.attrs["looked"] = len(search.points) + len(longer.points)
     write_dataset(Path(found.encoding["source"]), found)
     return found
 
@@ -229,13 +250,13 @@ def beginning(search: Search) -> np.ndarray:
     return np.array([search.home.tolist(), *best, *drawn])
 
 
-def descended(search: Search, best: tuple[float, ...]) -> tuple[float, ...]:
+def descended(search: Search, best: tuple[float, ...], step: float) -> tuple[float, ...]:
     """The best machine of a compass search that begins at one; until claims hold, or steps end.
 
     All neighbours of a round, one up and one down in each assumption, are judged side by side
     (Kolda, Lewis and Torczon, SIAM Review 45, 2003, 385-482).
     """
-    step = STEP
+    search.ask([best])
     while step >= LEAST_STEP and search.cost(best) >= 1.0:
         shares = np.array([s.share(value) for s, value in zip(search.spans, best, strict=True)])
         moves = step * np.vstack([np.eye(shares.size), -np.eye(shares.size)])
@@ -264,8 +285,8 @@ def taken_back(search: Search, best: tuple[float, ...]) -> None:
             share = 0.5 * (inside + outside) if tried is None else tried
             moved = shares.copy()
             moved[number] = share
-            (verdict,) = search.judge([moved.tolist()])
-            if cost(verdict, 0.0) < 1.0:
+            search.judge([moved.tolist()])
+            if search.cost(search.values(moved.tolist())) < 1.0:
                 inside, shares = share, moved
                 if share == home[number]:
                     break

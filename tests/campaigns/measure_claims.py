@@ -40,7 +40,7 @@ from compressor.report.figures.claims import draw_claims_map
 from compressor.report.figures.style import render
 
 FOLDER = "claims"
-GENERATIONS = 24
+GENERATIONS = 12
 PAIRS = 12  # of neighbours a claim, that are looked between
 HALVINGS = 18
 SEED = 13
@@ -79,7 +79,7 @@ def main(target):
     search = least_change(drawn, FOLDER, 2, GENERATIONS)
     best = search.isel(machine=int(search.attrs["best"]))
     found["search"] = {
-        **told(search),
+        **told(search), "looked": int(search.attrs["looked"]),
         "said": [*change(search)], "changes": changes(best),
         "margin": best["margin"].values.tolist(), "error": best["error"].values.tolist(),
         "values": {str(n): best[n].item() for n in best.coords if "case_key" in best[n].attrs},

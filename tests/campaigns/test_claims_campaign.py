@@ -61,8 +61,9 @@ def test_the_words_are_those_of_the_numbers():
     each = found["map"]["each"]
     assert all(f"{claim} in {each[str(claim)]}" in found["map"]["said"][0] for claim in CLAIMS)
     assert f"hold in {found['map']['all'] or 'none'} of them" in " ".join(found["map"]["said"])
-    holds = all(margin >= 0.0 for margin in found["search"]["margin"])
-    assert found["search"]["said"][0].startswith("The least change" if holds else "No machine was")
+    search = found["search"]
+    holds = all(m - e >= 0.0 for m, e in zip(search["margin"], search["error"], strict=True))
+    assert search["said"][0].startswith("The least change" if holds else "No machine was")
     for place, said in enumerate(found["assumptions"]["deciding"]):
         total = [value or 0.0 for value in found["assumptions"]["total_order"][place]]
         name = found["assumptions"]["names"][total.index(max(total))]
