@@ -48,9 +48,11 @@ class Part:
 def machine_files(folder: Folder) -> dict[str, xr.Dataset]:
     """The files of judged machines in a folder by name, mass planes first; none without a folder.
 
-    Raises StoreError for a file that is something else.
+    The first, short runs of a search are left out: what it found stands in its longer runs. Raises
+    StoreError for a file that is something else.
     """
     paths = sorted(Path(folder).glob("*.nc"), key=lambda path: path.stem)
+    paths = [path for path in paths if not path.stem.endswith("-search")]
     found = {path.stem: read_machines(path) for path in paths}
     return dict(sorted(found.items(), key=lambda item: not is_mass_plane(item[1])))
 

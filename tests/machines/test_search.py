@@ -121,7 +121,7 @@ def test_a_search_begins_at_the_study_s_best_machine(judge, tmp_path):
     }
     write_dataset(tmp_path / "some.nc", dataset(study, keys, rows))
     nearest = max(row.margin[7] for row in rows.values())
-    found = judge(least, TEXT.replace("n: 2", "n: 64"), generations=0)
+    judge(least, TEXT.replace("n: 2", "n: 64"), generations=0)
     first = read_dataset(tmp_path / "some-search.nc").isel(machine=slice(POPULATION))
     assert float(first["margin"].max("machine").min()) == pytest.approx(nearest, abs=1e-5)
 
