@@ -1,0 +1,171 @@
+"""The numbers of a figure as a script beside the page, from which the page draws it interactively.
+
+The script calls `compsimFigure(name, {...})`, since a page from disk may load scripts, but no data.
+Numbers are 32-bit floats in base64, or `[first, step, count]` where they are evenly spaced; curves
+have as many points as a screen can show.
+"""
+
+import base64
+import json
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compressor.report.figures.shown import Note, Panel, Scale, Sheet, Trace
+from compressor.store import publish
+
+LIBRARY = "plotly.min.js"
+MOST_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
+FLOAT = np.dtype("f4").newbyteorder("little")
+EVEN = 1e-6  # of a step: how far evenly spaced numbers may be off
+
+
+def publish_library(folder: Path) -> None:
+    """Put plotly.js beside the page, unless this version of it lies there. Raises StoreError."""
+    path = folder / LIBRARY
+    source = find_spec("plotly")
+    (place,) = (source.submodule_search_locations or [""])[:1] if source else [""]
+    library = Path(place) / "package_data" / LIBRARY
+    if not path.exists() or path.stat().st_size != library.stat().st_size:
+        publish(path, library.read_bytes())
+
+
+def script(name: str, sheet: Sheet) -> str:
+    """The script of a figure."""
+    data = json.dumps(content(sheet), separators=(",", ":"), allow_nan=False)
+    data = data.replace("<", "\\u003c")
+    return f"compsimFigure({json.dumps(name)},{data});\n"
+
+
+def content(sheet: Sheet) -> dict[str, Any]:
+    """What a figure shows, as plain data. Panels with the same `link` are zoomed together."""
+    links = linked([panel.x for panel in sheet.panels]), linked([p.y for p in sheet.panels], "y")
+    width, height = sheet.size
+    return {
+        "aspect": round(height / width, 4),
+        "heights": sheet.heights,
+        "widths": sheet.widths,
+        "panels": [
+            {
+                "title": panel.title,
+                "x": axis(panel.x) | {"link": x},
+                "y": axis(panel.y) | {"link": y},
+                "row": panel.row,
+                "column": panel.column,
+                "square": panel.is_square,
+                "traces": [shown(trace, panel) for trace in panel.traces],
+                "notes": [note(one) for one in panel.notes],
+            }
+            for panel, x, y in zip(sheet.panels, *links, strict=True)
+        ],
+    }
+
+
+def linked(scales: Sequence[Scale], way: str = "x") -> list[int]:
+    """A number for each scale, the same where scales show the same span of the same quantity.
+
+    In x a title that is left out is that of the panels below.
+    """
+    keys = []
+    for scale in scales:
+        span = scale.low, scale.high, scale.log
+        keys.append((*span, "" if way == "x" else scale.title))
+    return [keys.index(key) for key in keys]
+
+
+def axis(scale: Scale) -> dict[str, Any]:
+    """An axis as plain data."""
+    words = [[place, text] for place, text in scale.words.items()]
+    found = {"title": scale.title, "range": [scale.low, scale.high], "log": scale.log}
+    more = {"words": words, "step": scale.step}
+    return found | {name: value for name, value in more.items() if value}
+
+
+def note(one: Note) -> dict[str, Any]:
+    """A text, or a straight line, as plain data."""
+    place = {way: value for way in "xy" if not np.isnan(value := getattr(one, way))}
+    return {"text": one.text, **place, "color": one.color, "dash": one.dash, "inside": one.inside}
+
+
+def shown(trace: Trace, panel: Panel) -> dict[str, Any]:
+    """A trace as plain data, with the points that its panel can show."""
+    found: dict[str, Any] = {
+        "kind": trace.kind, "name": trace.name, "color": trace.color,
+        "width": round(float(trace.width), 3), "dash": trace.dash, "marker": trace.marker,
+        "opacity": trace.opacity,
+    }  # fmt: skip
+    if trace.z is not None:
+        more = {"z": numbers(trace.z.ravel()), "limits": trace.limits, "log": trace.log,
+                "scale": trace.scale_name}  # fmt: skip
+        found |= more
+        part: Any = slice(None)
+        found |= {"x": numbers(trace.x), "y": numbers(trace.y)}
+    else:
+        part = visible(trace, panel)
+        found |= {"x": numbers(trace.x[part]), "y": numbers(trace.y[part])}
+    if trace.errors is not None:
+        found["errors"] = [numbers(ends[part]) for ends in trace.errors]
+    if trace.jobs:
+        found["jobs"] = [*np.array(trace.jobs, object)[part].tolist()]
+    return found
+
+
+def visible(trace: Trace, panel: Panel) -> Any:
+    """The places of the points to draw: all, or where these are many the extremes of each pixel.
+
+    Of a curve in x from left to right only what lies in the panel, and a point on either side.
+    """
+    x, y = trace.x, trace.y
+    if trace.kind not in ("line", "points") or x.size < 3 or not np.isfinite(x).all():
+        return slice(None)
+    if trace.kind == "points" or (np.diff(x) < 0).any():
+        return slice(None) if x.size <= 2 * MOST_POINTS else every(x.size, 2 * MOST_POINTS)
+    low, high = sorted((panel.x.low, panel.x.high))
+    first = max(0, int(np.searchsorted(x, low, "left")) - 1)
+    last = min(x.size, int(np.searchsorted(x, high, "right")) + 1)
+    if last - first <= MOST_POINTS:
+        return slice(first, last)
+    return first + extremes(y[first:last], MOST_POINTS // 2)
+
+
+def every(size: int, count: int) -> np.ndarray:
+    """Evenly chosen places."""
+    return np.unique(np.linspace(0, size - 1, count).astype(int))
+
+
+def extremes(y: np.ndarray, count: int) -> np.ndarray:
+    """The places of the least and the greatest value of each of so many parts, and of the ends."""
+    edges = np.linspace(0, y.size, count + 1).astype(int)[:-1]
+    filled = np.where(np.isfinite(y), y, 0.0)
+    least, greatest = np.minimum.reduceat(filled, edges), np.maximum.reduceat(filled, edges)
+    part = np.repeat(np.arange(count), np.diff([*edges, y.size]))
+    wanted = (filled == least[part]) | (filled == greatest[part]) | ~np.isfinite(y)
+    wanted[[0, -1]] = True
+    places = np.flatnonzero(wanted)
+    return places if places.size <= 4 * count else every(y.size, 2 * count)
+
+
+def numbers(values: np.ndarray) -> Any:
+    """Numbers for the page: `[first, step, count]` where they are even, else base64."""
+    values = np.asarray(values, float)
+    if values.size > 8 and np.isfinite(values).all():
+        step = (values[-1] - values[0]) / (values.size - 1)
+        even = values[0] + step * np.arange(values.size)
+        if step and np.abs(values - even).max() <= EVEN * abs(step):
+            return [float(values[0]), float(step), values.size]
+    return base64.b64encode(values.astype(FLOAT).tobytes()).decode()
+
+
+def described(sheet: Sheet) -> str:
+    """What is seen in a figure, in words: its panels, their axes and curves."""
+    told = []
+    for panel in sheet.panels:
+        names = dict.fromkeys(trace.name or trace.scale_name for trace in panel.traces)
+        curves = ", ".join(name for name in names if name)
+        axes = " over ".join(title for title in (panel.y.title, panel.x.title) if title)
+        told.append(": ".join(part for part in (panel.title or axes, curves) if part))
+    several = f"{len(told)} panels. " if len(told) > 1 else ""
+    return several + "; ".join(dict.fromkeys(told))
