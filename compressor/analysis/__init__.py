@@ -3,7 +3,7 @@
 from compressor.analysis.cam import Cam, comparisons
 from compressor.analysis.captions import caption
 from compressor.analysis.claim_rules import RULES
-from compressor.analysis.claims import claim_margins, claims
+from compressor.analysis.claims import Claim, claim_margins, claims
 from compressor.analysis.contact_modes import MODES, angle_modes, contact_modes, mode_shares
 from compressor.analysis.contacts import joints_with_clearance
 from compressor.analysis.diagnosis_captions import diagnosis_caption

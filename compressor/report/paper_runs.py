@@ -28,6 +28,13 @@ def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns
     return find_runs(stored, studies, paper_cases())
 
 
+def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
+    """Whether all stored jobs of a study, and at least one, are cases of the paper."""
+    there = sum(at >= 0 for at in stored.rows.find([*study.keys]))
+    labels = {case.physics_key for case in paper_cases().values()}
+    return 0 < there == len(paper_candidates(stored, [study], labels))
+
+
 def find_runs(
     stored: Stored, studies: Sequence[StoredStudy], cases: Mapping[str, Case]
 ) -> PaperRuns:

@@ -11,14 +11,15 @@ from compressor.report.figures import FIGURES
 from compressor.report.figures.sweep_metric import MEASURES, Measure, measures
 from compressor.report.page import Plate, Section
 from compressor.report.paper_runs import PaperRuns, case_files, run_command
+from compressor.report.study_section import SHORT
 from compressor.report.tables import (
     Cell,
     Row,
     Table,
+    column_title,
     ending,
     job_row,
     measured_cell,
-    metric_columns,
     number_cell,
     value_cell,
 )
@@ -34,23 +35,26 @@ class MissingFigures:
     command: str
 
 
-def paper_sections(paper: PaperRuns, plates: Sequence[Plate]) -> Iterator[Section]:
-    """What there is of the paper: figures, cases, claims, and the load's printed numbers."""
-    if plates:
-        yield Section("figures", "The paper's figures", "figures.html", plates)
-    if paper.stored:
-        verdicts = claims(paper.usable)
-        yield Section("cases", "The paper's cases", "cases.html", cases_table(paper))
-        yield Section("claims", "The paper's claims", "claims.html", verdicts)
-        title = "Spring and cam: what is printed, what follows"
-        yield Section("printed", title, "printed.html", printed_table())
+def paper_sections(
+    paper: PaperRuns, plates: Sequence[Plate]
+) -> tuple[list[Section], list[Section]]:
+    """What there is of the paper: figures; claims, cases, and the load's printed numbers."""
+    figures = [Section("figures", "The paper's figures", "figures.html", plates)] if plates else []
+    if not paper.stored:
+        return figures, []
+    title = "Spring and cam: what is printed, what follows"
+    return figures, [
+        Section("claims", "The paper's claims", "claims.html", claims(paper.usable)),
+        Section("cases", "The paper's cases", "cases.html", cases_table(paper)),
+        Section("printed", title, "printed.html", printed_table()),
+    ]
 
 
 def cases_table(paper: PaperRuns) -> Table:
     """A row for each of the paper's cases, stored or not."""
     known = [measures(run) for run in paper.stored.values()]
-    columns = metric_columns(m for m in MEASURES if any(m in some for some in known))
-    head = ["case", "status", *columns, "energy residual", "rtol", "job"]
+    shown = [m for m in MEASURES if any(m in some for some in known)]
+    head = ["case", "status", *map(column_title, shown), "energy residual", "rtol", "job"]
     rows = []
     for name in paper_cases():
         run = paper.stored.get(name)
@@ -58,15 +62,14 @@ def cases_table(paper: PaperRuns) -> Table:
             cells = [Cell(spoken(name)), Cell("not stored"), *[Cell("")] * (len(head) - 2)]
             rows.append(Row(cells, "missing"))
             continue
-        status = str(run["status"].item())
+        status, key = str(run["status"].item()), run.attrs["key"]
         regime = run.attrs.get("regime", "")
         start = [Cell(spoken(name)), Cell(ending(status, run["reason"].item(), regime))]
-        metrics = [measured_cell(same, (value_of(m, run) for m in same))
-                   for same in columns.values()]  # fmt: skip
+        metrics = [measured_cell(m, *value_of(m, run)) for m in shown]
         residual = number_cell(float(run.get("energy_residual", math.nan)))
         tolerance = value_cell(run.attrs.get("rtol", ""))
-        trust = [residual, tolerance, Cell(run.attrs["key"], "code")]
-        rows.append(job_row([*start, *metrics, *trust], status, regime))
+        trust = [residual, tolerance, Cell(key[:SHORT], "code")]
+        rows.append(job_row([*start, *metrics, *trust], status, regime, key))
     return Table(head, rows)
 
 

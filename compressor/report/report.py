@@ -6,11 +6,22 @@ report which is interrupted leaves the one before as it was.
 
 import contextlib
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
+from typing import Any, NamedTuple
 
-from compressor.analysis import caption
+from compressor.analysis import caption, claims
+from compressor.report.answer import (
+    Answer,
+    Finding,
+    Line,
+    answer_section,
+    findings,
+    round_robin,
+    study_findings,
+)
+from compressor.report.assumptions import assumptions_section
 from compressor.report.diagnosis_section import (
     TITLES,
     diagnosis_drawings,
@@ -18,8 +29,11 @@ from compressor.report.diagnosis_section import (
     shakings,
 )
 from compressor.report.figures import FIGURES, Drawing
+from compressor.report.figures.extract import extract
+from compressor.report.figures.shown import as_csv
 from compressor.report.figures.style import render
 from compressor.report.figures.sweep_metric import draw_metrics, measures, swept
+from compressor.report.interactive import described, publish_library, script
 from compressor.report.machines_section import (
     Part,
     machine_drawings,
@@ -27,8 +41,8 @@ from compressor.report.machines_section import (
     machine_sections,
 )
 from compressor.report.page import Plate, Section, document
-from compressor.report.paper_runs import PaperRuns, find_paper_runs
-from compressor.report.paper_sections import missing_sections, paper_sections
+from compressor.report.paper_runs import PaperRuns, find_paper_runs, is_of_paper
+from compressor.report.paper_sections import missing_sections, paper_sections, spoken
 from compressor.report.provenance import provenance_section
 from compressor.report.second_sets import (
     SET,
@@ -39,7 +53,13 @@ from compressor.report.second_sets import (
     second_section,
     second_sets,
 )
-from compressor.report.study_section import file_name, study_section
+from compressor.report.study_section import (
+    file_name,
+    job_counts,
+    job_facts,
+    study_sections,
+    table_anchor,
+)
 from compressor.store import (
     Folder,
     Stored,
@@ -50,6 +70,7 @@ from compressor.store import (
     read_studies,
 )
 
+KINDS = ("png", "svg", "csv", "js")  # of files beside the page
 SWEEP = (
     "A line for each combination of the other axes or, where they are many, a light line for each "
     "and their median; a study that is no grid has a point for each job. A cross: a job failed "
@@ -67,8 +88,9 @@ def write_report(results: Folder, report: Folder, command: str = "", claims: Fol
     plates, studies, page = compose(results, command, claims)
     folder = Path(report)
     for plate in plates:
-        publish(folder / f"{plate.name}.png", plate.png)
-        publish(folder / f"{plate.name}.svg", plate.svg)
+        for name, content in plate.files.items():
+            publish(folder / name, content)
+    publish_library(folder)
     publish(folder / "index.html", page.encode())
     remove_stale(folder, studies, {plate.name for plate in plates})
     return folder / "index.html"
@@ -79,39 +101,39 @@ def compose(results: Folder, command: str, claims: Folder) -> tuple[list[Plate],
     judged = machine_files(claims) if claims else {}
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
+    if not any(is_of_paper(stored, study) for study in studies):
+        paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = draw_paper(paper)
     others = second_sets(stored, studies, paper)
     of_others = {n: [draw(*parts) for parts in second_drawings(one)] for n, one in others.items()}
     found = shakings(paper)
     of_faults = [draw(*parts) for parts in diagnosis_drawings(found, paper)]
     shown = {run.attrs["key"] for run in paper.stored.values()}
-    drawn = {
-        study.name: drawn_study(stored, study, others.get(study.name))
-        for study in studies
-        if not shown.issuperset(study.keys)
-    }
-    about_others = [
-        second_section(one, of_others[name], of_paper, drawn[name][0].anchor)
+    own = [study for study in studies if not shown.issuperset(study.keys)]
+    drawn = [drawn_study(stored, study, others.get(study.name)) for study in own]
+    sets = [
+        second_section(one, of_others[name], of_paper, table_anchor(name))
         for name, one in others.items()
     ]
-    about_paper = [*paper_sections(paper, of_paper)]
-    about_studies = [section for section, _ in drawn.values()]
-    if of_paper:
-        about_paper[1:1] = [*about_others, *diagnosis_sections(found, of_faults)]
-        told = about_paper + about_studies
-    else:
-        told = about_others + about_studies + about_paper
-    about_machines = [drawn_part(*parts) for parts in machine_drawings(judged)]
+    of_machines = [drawn_part(*parts) for parts in machine_drawings(judged)]
+    figures, tables = paper_sections(paper, of_paper)
     sections = [
-        Section("assumptions", "What to keep in mind", "assumptions.html"),
-        *told,
-        *machine_sections(about_machines),
+        answer_section(summarised(stored, own, paper, drawn)),
+        *(one.figures for one in drawn),
+        *figures,
+        *sets,
+        *diagnosis_sections(found, of_faults),
+        *machine_sections(of_machines),
+        *(one.table for one in drawn),
+        *tables,
+        assumptions_section(stored, studies, bool(paper.stored)),
         *missing_sections(paper, results),
         provenance_section(studies, results, command),
     ]
-    sets = (of_paper, *of_others.values(), of_faults, *(more for _, more in drawn.values()))
-    plates = [*chain(*sets), *(part.plate for part in about_machines if part.plate)]
-    return plates, [study.name for study in studies], document(sections)
+    plates = [*chain(of_paper, *of_others.values(), of_faults, *(one.plates for one in drawn))]
+    plates += [part.plate for part in of_machines if part.plate]
+    jobs = {key: told for one in drawn for key, told in one.jobs.items()}
+    return plates, [study.name for study in studies], document(sections, jobs)
 
 
 def drawn_part(
@@ -124,10 +146,19 @@ def drawn_part(
     return Part(name, sentences, plate)
 
 
-def drawn_study(
-    stored: Stored, study: StoredStudy, other: SecondSet | None
-) -> tuple[Section, list[Plate]]:
-    """A user's own study: its section, and each metric against each swept axis, drawn.
+class DrawnStudy(NamedTuple):
+    """What the page has of a user's own study. jobs: what a click on a job's point tells."""
+
+    figures: Section
+    table: Section
+    plates: list[Plate]
+    findings: list[Finding]
+    line: Line
+    jobs: dict[str, dict[str, Any]]
+
+
+def drawn_study(stored: Stored, study: StoredStudy, other: SecondSet | None) -> DrawnStudy:
+    """A user's own study: its sections, and its sweep, drawn.
 
     The sweep is not drawn where all of the study is shown as another set of the paper's figures.
     """
@@ -139,7 +170,30 @@ def drawn_study(
                  SWEEP, draw_metrics(data, axis))
             for axis in (swept(data) if measures(data) and not whole else [])
         ]  # fmt: skip
-        return study_section(stored, study, data, plates, anchor), plates
+        figures, table = study_sections(stored, study, data, plates, anchor)
+        keys = [key for plate in plates for key in plate.jobs]
+        counts = job_counts(data)
+        return DrawnStudy(
+            figures, table, plates, study_findings(data),
+            Line(f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed)),
+            job_facts(stored.folder, data, keys),
+        )  # fmt: skip
+
+
+def summarised(
+    stored: Stored, own: Sequence[StoredStudy], paper: PaperRuns, drawn: Sequence[DrawnStudy]
+) -> Answer:
+    """The page's first screen."""
+    lines = [one.line for one in drawn]
+    each: list[tuple[str, Sequence[Finding]]] = [(one.line.name, one.findings) for one in drawn]
+    if paper.stored:
+        failed = [n for n, run in paper.stored.items() if str(run["status"].item()) != "ok"]
+        said = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")
+        lines.append(Line("The paper's cases", "cases", said, bool(failed)))
+        worn = ((spoken(name), run) for name, run in paper.stored.items() if name != "typical")
+        each.append(("The paper's cases", findings(worn)))
+    found = claims(paper.usable) if paper.stored else []
+    return Answer(lines, [*round_robin(each)], found, [])
 
 
 def remove_stale(report: Path, studies: Iterable[str], drawn: set[str]) -> None:
@@ -150,7 +204,7 @@ def remove_stale(report: Path, studies: Iterable[str], drawn: set[str]) -> None:
     names = {f"figure-{item.number:02d}" for item in FIGURES}
     names |= {second_name(study, item) for study in studies for item in SET}
     for name in (names | {f"diagnosis-{name}" for name in TITLES}) - drawn:
-        for kind in ("png", "svg"):
+        for kind in KINDS:
             with contextlib.suppress(OSError):
                 (report / f"{name}.{kind}").unlink()
 
@@ -169,4 +223,10 @@ def draw(name: str, heading: str, caption: str, drawing: Drawing) -> Plate:
     """A drawing as it is stored and shown; tells of it on stderr."""
     with contextlib.suppress(OSError):
         print(f"drawing {heading}", file=sys.stderr, flush=True)
-    return Plate(name, heading, caption, render(drawing, "png"), render(drawing, "svg"))
+    png, svg = render(drawing, "png"), render(drawing, "svg")
+    sheet = extract(drawing)
+    jobs = dict.fromkeys(key for panel in sheet.panels for t in panel.traces for key in t.jobs)
+    return Plate(
+        name, heading, caption, png, svg, as_csv(sheet), script(name, sheet), described(sheet),
+        tuple(jobs),
+    )  # fmt: skip

@@ -1,8 +1,10 @@
 """The section of a report about a user's own study: its failures, its table and its figures."""
 
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,16 +16,35 @@ from compressor.report.page import Plate, Section
 from compressor.report.tables import (
     Cell,
     Table,
+    column_title,
     ending,
     job_row,
     measured_cell,
-    metric_columns,
     value_cell,
 )
-from compressor.store import Stored, StoredStudy
+from compressor.store import Folder, Stored, StoredStudy
 
 MOST_DETAILS = 20
 MOST_ROWS = 500
+MOST_FACTS = 2000  # jobs whose points tell where they are
+SHORT = 10  # digits of a job's key
+
+
+class Counts(NamedTuple):
+    """How many jobs of a study are ok, failed, or were not run."""
+
+    ok: int
+    failed: int
+    missing: int
+
+    @property
+    def text(self) -> str:
+        """The counts in words."""
+        jobs = sum(self)
+        parts = [f"{jobs} job{'s' * (jobs != 1)}: {self.ok} ok"]
+        parts += [f"{self.failed} failed"] if self.failed else []
+        parts += [f"{self.missing} not run"] if self.missing else []
+        return ", ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -38,33 +59,50 @@ class StudyContent:
     chaotic: int
     failures: Sequence[str]
     remedies: Sequence[str]
-    jobs: int
-    table: Table
     plates: Sequence[Plate]
+    jobs: str
     second_set: str = ""
 
 
-def study_section(
+@dataclass(frozen=True)
+class JobsContent:
+    """The table of a study's jobs, as far as a page can hold them."""
+
+    study: str
+    jobs: int
+    table: Table
+
+
+def study_sections(
     stored: Stored,
     study: StoredStudy,
     data: xr.Dataset,
     plates: Sequence[Plate],
     second_set: str = "",
-) -> Section:
-    """A study as `open_study` gives it: its table, its failures, and its figures."""
+) -> tuple[Section, Section]:
+    """A study as `open_study` gives it: its figures and failures, and its table."""
     reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
+    anchor = table_anchor(study.name)
     content = StudyContent(
         case_file=study.case_file,
-        counts=job_counts(data),
+        counts=job_counts(data).text,
         chaotic=int((data["regime"].values == Regime.CHAOTIC).sum()),
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
-        jobs=data["status"].size,
-        table=jobs_table(data),
         plates=plates,
+        jobs=anchor,
         second_set=second_set,
     )
-    return Section(file_name("study", study.name), f"Study {study.name}", "study.html", content)
+    table = JobsContent(study.name, data["status"].size, jobs_table(data))
+    return (
+        Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),
+        Section(anchor, f"Jobs of study {study.name}", "jobs.html", table),
+    )
+
+
+def table_anchor(study: str) -> str:
+    """The id of the section with a study's table."""
+    return file_name("jobs", study)
 
 
 def file_name(*words: str) -> str:
@@ -72,12 +110,31 @@ def file_name(*words: str) -> str:
     return re.sub(r"[^A-Za-z0-9._-]", "_", "-".join(words))
 
 
-def job_counts(data: xr.Dataset) -> str:
+def job_counts(data: xr.Dataset) -> Counts:
     """How many jobs of a study are ok, failed or were not run."""
     status = data["status"].values
     failed, missing = int((status == "failed").sum()), int((status == "missing").sum())
-    counts = f"{status.size} jobs: {status.size - failed - missing} ok, {failed} failed"
-    return counts + (f", {missing} not run." if missing else ".")
+    return Counts(status.size - failed - missing, failed, missing)
+
+
+def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """What a click on the point of a job tells: where it is in the sweep, how it ended, a command.
+
+    keys: of the jobs, of which the first MOST_FACTS are told of.
+    """
+    swept = swept_values(data)
+    place = {str(key): n for n, key in enumerate(data["key"].values.flat)}
+    status, reason = (data[name].values.ravel() for name in ("status", "reason"))
+    found = {}
+    for key in [*dict.fromkeys(keys)][:MOST_FACTS]:
+        n = place[key]
+        point = {name: value_cell(values[n]).text for name, values in swept.items()}
+        found[key] = {
+            "values": point,
+            "status": ending(status[n], reason[n]),
+            "command": f"compsim show {key[:SHORT]} -i {shlex.quote(str(results))}",
+        }
+    return found
 
 
 def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
@@ -96,19 +153,18 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
 
 def jobs_table(data: xr.Dataset) -> Table:
     """A row for every job of a study, as far as a page can hold them."""
-    swept, columns = swept_values(data), metric_columns(measures(data))
-    metrics = [(same, [(ravelled(m.of(data)), ravelled(m.bar(data))) for m in same])
-               for same in columns.values()]  # fmt: skip
+    swept, shown = swept_values(data), measures(data)
+    metrics = [(m, ravelled(m.of(data)), ravelled(m.bar(data))) for m in shown]
     words = ("status", "reason", "regime", "key")
     ends = zip(*(data[name].values.flat for name in words), strict=True)
     rows = []
     for place, (status, reason, regime, key) in zip(range(MOST_ROWS), ends, strict=False):
         cells = [value_cell(values[place]) for values in swept.values()]
         cells.append(Cell(ending(status, reason, regime)))
-        cells += [measured_cell(same, ((value[place], bar[place]) for value, bar in pairs))
-                  for same, pairs in metrics]  # fmt: skip
-        rows.append(job_row([*cells, Cell(str(key), "code")], str(status), str(regime)))
-    return Table([*swept, "status", *columns, "job"], rows)
+        cells += [measured_cell(m, float(of[place]), float(bar[place])) for m, of, bar in metrics]
+        cells.append(Cell(str(key)[:SHORT], "code"))
+        rows.append(job_row(cells, str(status), str(regime), str(key)))
+    return Table([*swept, "status", *map(column_title, shown), "job"], rows)
 
 
 def ravelled(values: xr.DataArray) -> np.ndarray:

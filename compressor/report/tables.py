@@ -1,14 +1,12 @@
 """The tables of a report: rows of cells, and numbers in them as text."""
 
-import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from compressor.analysis import SPOKEN
 from compressor.digits import by_bar
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
@@ -17,18 +15,23 @@ from compressor.report.figures.sweep_metric import Measure
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell: numbers stand to the right, words to the left, code in its own letters."""
+    """A cell: numbers stand to the right, words to the left, code in its own letters.
+
+    `value`: by what a column is sorted, where that is not the text.
+    """
 
     text: str
     kind: Literal["word", "number", "code"] = "word"
+    value: float | None = None
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row's cells; `mark` shows that a job failed, is missing, or is chaotic."""
+    """A row's cells; `mark`: the job failed, is missing, or is chaotic; `key`: of the job."""
 
     cells: Sequence[Cell]
     mark: Literal["", "failed", "missing", "chaotic"] = ""
+    key: str = ""
 
 
 @dataclass(frozen=True)
@@ -51,23 +54,17 @@ def number(value: float) -> str:
     return f"{value:.{max(0, 3 - math.floor(math.log10(size)))}f}"
 
 
-def number_cell(*values: float) -> Cell:
-    """One measured number, or one for each joint."""
-    return Cell(" | ".join(map(number, values)), "number")
+def number_cell(value: float) -> Cell:
+    """One measured number."""
+    return Cell(number(value), "number", None if math.isnan(value) else value)
 
 
-def measured_cell(measures: Sequence[Measure], values: Iterable[tuple[float, float]]) -> Cell:
-    """A metric, or one of each joint, and its error bar in one cell, to the digits that it allows.
-
-    values: of each measure, the number and its bar, in its unit.
-    """
-    texts = [
-        by_bar(value, bar, METRICS[measure.variable].bar.relative, bare=True)
-        if not math.isnan(bar)
-        else number(value)
-        for measure, (value, bar) in zip(measures, values, strict=True)
-    ]
-    return Cell(" | ".join(texts), "number")
+def measured_cell(measure: Measure, value: float, bar: float) -> Cell:
+    """A metric and its error bar, in its unit, to the digits that the bar allows."""
+    if math.isnan(bar):
+        return number_cell(value)
+    text = by_bar(value, bar, METRICS[measure.variable].bar.relative)
+    return Cell(text, "number", None if math.isnan(value) else value)
 
 
 def value_cell(value: Any) -> Cell:
@@ -77,13 +74,13 @@ def value_cell(value: Any) -> Cell:
     return Cell(str(value))
 
 
-def job_row(cells: Sequence[Cell], status: str, regime: str = "") -> Row:
+def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> Row:
     """A job's row, marked where the job failed, is missing, or is chaotic."""
     if status == "failed":
-        return Row(cells, "failed")
+        return Row(cells, "failed", key)
     if status == "missing":
-        return Row(cells, "missing")
-    return Row(cells, "chaotic" if regime == Regime.CHAOTIC else "")
+        return Row(cells, "missing", key)
+    return Row(cells, "chaotic" if regime == Regime.CHAOTIC else "", key)
 
 
 def ending(status: object, reason: object, regime: object = "") -> str:
@@ -92,12 +89,6 @@ def ending(status: object, reason: object, regime: object = "") -> str:
     return f"{status}: {said}" if said else str(status)
 
 
-def metric_columns(shown: Iterable[Measure]) -> dict[str, list[Measure]]:
-    """Measures by what stands above their column; both joints share one."""
-    found = {}
-    for _, same in itertools.groupby(shown, lambda measure: measure.variable):
-        group = list(same)
-        other = f" | {SPOKEN[group[1].joint]}" if len(group) > 1 else ""
-        unit = f" ({group[0].unit})" if group[0].unit else ""
-        found[group[0].title + other + unit] = group
-    return found
+def column_title(measure: Measure) -> str:
+    """What stands above a measure's column."""
+    return measure.title + (f" ({measure.unit})" if measure.unit else "")

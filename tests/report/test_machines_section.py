@@ -44,8 +44,9 @@ def folder(tmp_path):
            "machine.reciprocating_mass_kg={linspace: [6, 26, 5]}"]  # fmt: skip
     judged(tmp_path, example("claims"), few)
     found = judged(tmp_path, example("assumptions"), ["sample.n=4"])
-    found.attrs |= {"best": 3, "distance": 0.5}
     write_dataset(tmp_path / "assumptions-search.nc", found)
+    found.attrs |= {"best": 3, "distance": 0.5, "looked": 99}
+    write_dataset(tmp_path / "assumptions-search-longer.nc", found)
     return tmp_path
 
 
@@ -90,8 +91,9 @@ def test_the_bars_are_those_of_the_sentences(drawn):
 
 
 def test_a_search_is_told_in_words_alone(drawn):
-    (said, margins), heading, _, figure = drawn["assumptions-search"]
-    assert said.startswith("No machine was found at which all eight claims hold, among 40 that ")
+    (said, margins), heading, _, figure = drawn["assumptions-search-longer"]
+    assert said.startswith("No machine was found at which all eight claims hold beyond their")
+    assert "among 99 that" in said
     assert margins.startswith("Its margins: 1 +30 % ± 0.1 %")
     assert (heading, figure) == ("", None)
 
@@ -100,8 +102,8 @@ def test_the_section_of_the_page_has_words_and_figures(folder, capsys):
     drawings = machine_drawings(machine_files(folder))
     parts = [drawn_part(*found) for found in drawings]
     assert [part.plate is None for part in parts] == [False, False, True]
-    plate = Plate("machines-claims", "h", "c", b"png", b"svg")
-    text = document([*machine_sections([replace(part, plate=plate) for part in parts])])
+    plate = Plate("machines-claims", "h", "c", bytes(24), b"svg", "csv", "js", "alt")
+    text = document([*machine_sections([replace(part, plate=plate) for part in parts])], {})
     assert "In which machines the paper&#39;s claims hold" in text
     assert "machines-claims.svg" in text
     assert [*machine_sections([])] == []

@@ -4,8 +4,10 @@ import ast
 import fnmatch
 import html
 import html.parser
+import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,22 +15,23 @@ from jinja2 import UndefinedError
 
 from compressor.analysis.claims import Claim
 from compressor.report import page
+from compressor.report.answer import Answer, Finding, Line
+from compressor.report.assumptions import Assumptions
 from compressor.report.diagnosis_section import DiagnosisContent
 from compressor.report.machines_section import Part
 from compressor.report.page import Plate, Section, document, templates
 from compressor.report.paper_sections import MissingFigures
 from compressor.report.provenance import Provenance
 from compressor.report.second_sets import Pair, SecondSetContent
-from compressor.report.study_section import StudyContent
+from compressor.report.study_section import JobsContent, StudyContent
 from compressor.report.tables import Cell, Row, Table
 from compressor.store.studies import StoredStudy
 
 ROOT = Path(__file__).parents[2]
 HOME = Path(page.__file__).parent
-MODULES = ("page", "tables", "provenance", "paper_runs", "paper_sections", "study_section",
-           "diagnosis_section", "plots", "report")  # fmt: skip
-SOURCES = [*(HOME / f"{name}.py" for name in MODULES), *(HOME / "figures").glob("*.py")]
+SOURCES = [*HOME.rglob("*.py")]
 KINDS = ("word", "number", "code")
+PNG = bytes(16) + (300).to_bytes(4, "big") + (200).to_bytes(4, "big")  # the head tells its size
 
 
 def strings(source):
@@ -60,11 +63,12 @@ class Hostile:
 
 
 def plate(evil):
-    return Plate("drawn", evil(), evil(), b"png", b"svg")
+    return Plate("drawn", evil(), evil(), PNG, b"svg", "csv", "js", evil())
 
 
 def table(evil):
-    rows = [Row([Cell(evil(), kind) for kind in KINDS], mark) for mark in ("", "failed", "missing")]
+    marks = ("", "failed", "missing")
+    rows = [Row([Cell(evil(), kind, 1.0) for kind in KINDS], mark, evil()) for mark in marks]
     return Table([evil(), evil()], rows)
 
 
@@ -72,14 +76,23 @@ def contents(evil):
     """What every template is given, each text of it hostile; by the template's name."""
     claims = [Claim(n, evil(), evil(), held, [(evil(), evil())], evil())
               for n, held in enumerate((True, False, None))]  # fmt: skip
-    first = Plate("drawn", evil(), "its caption stands in the first set", b"png", b"svg")
+    first = replace(plate(lambda: "stands in the first set"), heading=evil())
+    found = Finding(*(evil() for _ in range(6)), 1.0)
+    answer = Answer(
+        [Line(evil(), evil(), evil(), bad) for bad in (True, False)],
+        [(evil(), [found]), (evil(), [found])],
+        claims,
+        [(evil(), evil())],
+    )
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
     return {
-        "assumptions.html": None,
+        "answer.html": answer,
+        "assumptions.html": Assumptions([evil()], True, True, True),
         "cases.html": table(evil),
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
+        "jobs.html": JobsContent(evil(), 9, table(evil)),
         "machines.html": [Part(evil(), [evil()], plate(evil))],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         "printed.html": table(evil),
@@ -87,22 +100,29 @@ def contents(evil):
         "second_set.html": SecondSetContent(
             evil(), evil(), [evil()], [evil()], [Pair(first, plate(evil))], claims
         ),
-        "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], 9, table(evil),
-                                   [plate(evil)], evil()),
+        "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [plate(evil)],
+                                   evil(), evil()),
     }  # fmt: skip
 
 
 def test_every_template_escapes_every_text():
     evil = Hostile()
     given = contents(evil)
-    text = document([Section(evil(), evil(), name, content) for name, content in given.items()])
-    assert {*templates().list_templates()} - {*given} == {"page.html", "pieces.html", "style.css"}
+    jobs = {"key": {"values": {"a": "</script><script>alert(1)</script>"}}}
+    sections = [Section(evil(), evil(), name, content) for name, content in given.items()]
+    text = document(sections, jobs)
+    own = {"page.html", "pieces.html", "style.css", "report.js"}
+    assert {*templates().list_templates()} - {*given} == own
+    scripts = re.findall("<script(.*?)>(.*?)</script>", text, re.DOTALL)
+    assert [kind for kind, _ in scripts] == ["", ' type="application/json" id="jobs"']
+    assert json.loads(scripts[1][1]) == jobs
+    text = re.sub("<script.*?</script>", "", text, flags=re.DOTALL)
     assert "<script" not in text
     assert {*re.findall(r"<(\w+)", text)} <= {
         "html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "nav", "ul", "li",
         "a", "section", "figure", "figcaption", "img", "strong", "div", "table", "thead", "tbody",
         "tr", "th", "td", "code", "span", "br", "small", "pre", "dl", "dt", "dd", "details",
-        "summary",
+        "summary", "header", "main", "button", "dialog",
     }  # fmt: skip
     shown = html.unescape(text)
     assert len(evil.planted) > 70
@@ -123,21 +143,24 @@ class Attributes(html.parser.HTMLParser):
 
 def test_an_attribute_ends_where_its_text_ends():
     evil = "a b=c d=\"e\" f='g' \"h='"
-    content = {**contents(lambda: evil), "figures.html": [Plate(evil, evil, evil, b"png", b"")]}
-    text = document([Section(evil, evil, name, given) for name, given in content.items()])
+    named = replace(plate(lambda: evil), name=evil)
+    content = {**contents(lambda: evil), "figures.html": [named]}
+    text = document([Section(evil, evil, name, given) for name, given in content.items()], {})
     assert Attributes(text).names == {
         "alt", "aria-label", "charset", "class", "content", "href", "id", "lang", "name", "role",
-        "scope", "src", "tabindex",
+        "scope", "src", "tabindex", "aria-pressed", "data-copy", "data-job", "data-title",
+        "data-value", "decoding", "download", "height", "hidden", "type", "width",
     }  # fmt: skip
 
 
 def test_rows_are_marked_and_cells_have_their_class():
     long = "x" * 37
-    rows = [Row([Cell("1", "number"), Cell(long[1:]), Cell(long), Cell(long, "code")], "failed"),
-            Row([Cell("", "word"), Cell("k", "code")])]  # fmt: skip
-    text = document([Section("a", "A", "cases.html", Table(["head"], rows))])
+    cells = [Cell("1 ± 2", "number", 1.25), Cell(long[1:]), Cell(long), Cell(long, "code")]
+    rows = [Row(cells, "failed", "k1"), Row([Cell("", "word"), Cell("k", "code")])]
+    text = document([Section("a", "A", "cases.html", Table(["head"], rows))], {})
     assert re.findall("<tr.*?</tr>", text, re.DOTALL)[1:] == [
-        f'<tr class="failed"><td class="number">1</td><td>{long[1:]}</td>'
+        '<tr class="failed" data-job="k1"><td class="number" data-value="1.25">1 ± 2</td>'
+        f"<td>{long[1:]}</td>"
         f'<td class="prose">{long}</td><td class="prose"><code>{long}</code></td></tr>',
         "<tr><td></td><td><code>k</code></td></tr>",
     ]
@@ -145,7 +168,7 @@ def test_rows_are_marked_and_cells_have_their_class():
 
 def test_a_verdict_has_its_class():
     claims = [Claim(n, "", "", held) for n, held in enumerate((True, False, None))]
-    text = document([Section("a", "A", "claims.html", claims)])
+    text = document([Section("a", "A", "claims.html", claims)], {})
     assert re.findall(r"<span.*?</span>", text) == [
         '<span class="held">held</span>',
         '<span class="not-held">not held</span>',
@@ -155,7 +178,7 @@ def test_a_verdict_has_its_class():
 
 def test_a_template_that_lacks_a_value_is_an_error():
     with pytest.raises(UndefinedError, match="case_file"):
-        document([Section("a", "A", "study.html", object())])
+        document([Section("a", "A", "study.html", object())], {})
 
 
 def test_templates_are_installed_with_their_package():

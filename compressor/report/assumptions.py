@@ -1,0 +1,54 @@
+"""What a reader of a report must keep in mind, as far as the stored studies give reason to."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from compressor.cases import Case
+from compressor.report.page import Section
+from compressor.store import Stored, StoredStudy
+
+MASSES = {
+    "rod_mass_kg": "rod {:g} kg (a steel bar of 600 × 40 × 25 mm)",
+    "reciprocating_mass_kg": "crosshead with piston rod and piston {:g} kg",
+}
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Which of the assumptions enter what the page shows."""
+
+    masses: Sequence[str]  # that a study leaves to the defaults, in words
+    worn: bool
+    design: bool
+    claims: bool
+
+
+def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: bool) -> Section:
+    """What to keep in mind of the studies of a store, and of the claims if they are told."""
+    default = Case.from_values({}).machine
+    cases = [(study, values) for study in studies if (values := first_case(stored, study))]
+    ours = [
+        words.format(getattr(default, mass))
+        for mass, words in MASSES.items()
+        if any(
+            values["machine"][mass] == getattr(default, mass)
+            and f"machine.{mass}" not in {axis.key for axis in study.axes}
+            for study, values in cases
+        )
+    ]
+    content = Assumptions(
+        ours,
+        any(values["joint"] != "none" for _, values in cases),
+        any(values["load"] == "design" for _, values in cases),
+        claims,
+    )
+    return Section("assumptions", "What to keep in mind", "assumptions.html", content)
+
+
+def first_case(stored: Stored, study: StoredStudy) -> dict | None:
+    """The values of a study's last stored job; None where there is none."""
+    for position in stored.rows.find([*study.keys])[::-1]:
+        if position >= 0:
+            return dict(json.loads(stored.rows.attributes(int(position))["case"]))
+    return None

@@ -1,0 +1,507 @@
+// The page's own script: theme, tables that sort and filter, figures that zoom and tell values.
+// Without it, or where a figure's script is missing, the page shows pictures and plain tables.
+"use strict";
+
+const root = document.documentElement;
+const each = (selector, act, within = document) => within.querySelectorAll(selector).forEach(act);
+
+// ---- light and dark -------------------------------------------------------------------------
+const remembered = {
+  get: (key) => { try { return localStorage.getItem(key); } catch { return null; } },
+  set: (key, value) => { try { localStorage.setItem(key, value); } catch { /* not kept */ } },
+};
+const prefersDark = matchMedia("(prefers-color-scheme: dark)");
+const isDark = () =>
+  (root.dataset.theme || (prefersDark.matches ? "dark" : "light")) === "dark";
+
+function setTheme(theme) {
+  root.dataset.theme = theme;
+  remembered.set("compsim-theme", theme);
+  each(".theme", (button) => button.setAttribute("aria-pressed", String(isDark())));
+  drawn.forEach((figure) => figure.redraw());
+}
+
+// ---- tables ---------------------------------------------------------------------------------
+const collator = new Intl.Collator(undefined, { numeric: true });
+
+function value(row, column) {
+  const cell = row.cells[column];
+  return cell === undefined ? "" : cell.dataset.value ?? cell.textContent.trim();
+}
+
+function compare(a, b) {
+  const [x, y] = [Number(a), Number(b)];
+  const numbers = a !== "" && b !== "" && !Number.isNaN(x) && !Number.isNaN(y);
+  if (numbers) return x - y;
+  if (a === "" || b === "") return (a === "") - (b === ""); // what has no value comes last
+  return collator.compare(a, b);
+}
+
+function sortable(table) {
+  const heads = [...table.tHead.rows[0].cells];
+  heads.forEach((head, column) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...head.childNodes);
+    head.append(button);
+    button.addEventListener("click", () => {
+      const down = head.getAttribute("aria-sort") === "ascending";
+      heads.forEach((other) => other.removeAttribute("aria-sort"));
+      head.setAttribute("aria-sort", down ? "descending" : "ascending");
+      const rows = [...table.tBodies[0].rows];
+      const empty = (row) => value(row, column) === "";
+      rows.sort((a, b) => {
+        const order = compare(value(a, column), value(b, column));
+        return down && !empty(a) && !empty(b) ? -order : order;
+      });
+      table.tBodies[0].append(...rows);
+    });
+  });
+}
+
+function filterable(table, tools) {
+  const label = document.createElement("label");
+  const field = document.createElement("input");
+  const count = document.createElement("output");
+  field.type = "search";
+  label.append("Show rows with ", field);
+  const rows = [...table.tBodies[0].rows];
+  const marks = ["failed", "chaotic", "missing"].filter((mark) =>
+    rows.some((row) => row.classList.contains(mark)));
+  const boxes = marks.map((mark) => {
+    const box = document.createElement("label");
+    const input = document.createElement("input");
+    input.type = "checkbox";
+    input.value = mark;
+    const found = rows.filter((row) => row.classList.contains(mark)).length;
+    box.append(input, ` ${mark === "missing" ? "not run" : mark} (${found})`);
+    return [box, input];
+  });
+  const update = () => {
+    const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const only = boxes.filter(([, input]) => input.checked).map(([, input]) => input.value);
+    let shown = 0;
+    rows.forEach((row) => {
+      const text = row.textContent.toLowerCase();
+      const fits = words.every((word) => text.includes(word)) &&
+        (!only.length || only.some((mark) => row.classList.contains(mark)));
+      row.hidden = !fits;
+      shown += fits;
+    });
+    count.textContent = shown === rows.length ? "" : `${shown} of ${rows.length} rows`;
+  };
+  field.addEventListener("input", update);
+  boxes.forEach(([, input]) => input.addEventListener("change", update));
+  tools.append(label, ...boxes.map(([box]) => box), count);
+}
+
+function openTable(table) {
+  if (!table.tHead || table.tBodies[0].rows.length < 2) return;
+  sortable(table);
+  if (table.tBodies[0].rows.length < 12) return;
+  const tools = document.createElement("div");
+  tools.className = "tools";
+  table.parentElement.before(tools);
+  filterable(table, tools);
+}
+
+// ---- figures --------------------------------------------------------------------------------
+const LIBRARY = "plotly.min.js";
+const scripts = new Map();
+const sheets = new Map();
+const drawn = [];
+
+function script(source) {
+  if (!scripts.has(source)) {
+    scripts.set(source, new Promise((good, bad) => {
+      const tag = document.createElement("script");
+      tag.src = source;
+      tag.onload = good;
+      tag.onerror = () => bad(new Error(`${source} does not lie beside the page`));
+      document.head.append(tag);
+    }));
+  }
+  return scripts.get(source);
+}
+
+window.compsimFigure = (name, sheet) => sheets.set(name, sheet);
+
+function numbers(packed) {
+  if (Array.isArray(packed)) {
+    const [first, step, count] = packed;
+    return Float64Array.from({ length: count }, (_, n) => first + step * n);
+  }
+  const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+  return new Float32Array(bytes.buffer);
+}
+
+const escaped = (text) =>
+  text.replace(/[&<>]/g, (letter) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[letter])
+    .replace(/([A-Za-zδ])_([A-Za-z0-9]+)/g, "$1<sub>$2</sub>");
+const unit = (title) => escaped(/\(([^()]*)\)[^()]*$/.exec(title)?.[1] ?? "");
+
+// the printed figures' colours, made light enough for a dark ground
+const ON_DARK = {
+  "#000000": "#f2f2f2", "#1f4488": "#86aef5", "#d0583b": "#f08a6f", "#ecb44a": "#f2c46d",
+  "#b5b5b5": "#6d737d", "#8c8c8c": "#a0a0a0", "#606060": "#b0b0b0",
+};
+const tone = (color) => (isDark() && ON_DARK[color]) || color;
+const SYMBOLS = { o: "circle", ".": "circle", s: "square", D: "diamond", d: "diamond",
+  "^": "triangle-up", v: "triangle-down", x: "x-thin", "+": "cross-thin", "*": "star" };
+
+class Figure {
+  constructor(frame) {
+    this.frame = frame;
+    this.name = frame.id;
+    this.off = new Set(); // names of the curves that are switched off
+  }
+
+  async start() {
+    try {
+      await Promise.all([script(LIBRARY), script(`${this.name}.js`)]);
+      this.sheet = sheets.get(this.name);
+      this.build();
+      drawn.push(this);
+      await this.redraw();
+      this.frame.classList.add("live");
+    } catch (problem) {
+      this.frame.classList.remove("live");
+      this.say(`shown as a picture: ${problem.message}`);
+    }
+  }
+
+  say(text) {
+    const told = document.createElement("p");
+    told.className = "told";
+    told.textContent = text;
+    this.frame.querySelector("figcaption").append(told);
+  }
+
+  build() {
+    const head = document.createElement("div");
+    head.className = "controls";
+    const names = new Map(); // of curves, with the first that is called so
+    this.sheet.panels.forEach((panel) => panel.traces.forEach((trace) => {
+      if (trace.name && trace.kind !== "map" && !names.has(trace.name)) names.set(trace.name, trace);
+    }));
+    if (names.size > 1) {
+      names.forEach((trace, name) => head.append(this.entry(name, trace)));
+    }
+    const whole = document.createElement("button");
+    whole.type = "button";
+    whole.textContent = "whole view";
+    whole.addEventListener("click", () => this.redraw());
+    head.append(whole);
+    this.place = document.createElement("div");
+    this.place.className = "plot";
+    this.place.tabIndex = 0;
+    this.place.setAttribute("role", "application");
+    this.place.setAttribute("aria-label", `${this.frame.dataset.title}, interactive: ` +
+      "plus and minus zoom, left and right arrows move, zero shows all");
+    this.place.addEventListener("keydown", (event) => this.key(event));
+    this.frame.querySelector("picture, img").before(head, this.place);
+    new ResizeObserver(() => {
+      if (this.place.clientWidth && this.place.clientWidth !== this.width) this.redraw();
+    }).observe(this.place);
+  }
+
+  entry(name, trace) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "curve";
+    button.setAttribute("aria-pressed", "true");
+    const swatch = document.createElement("span");
+    swatch.className = "swatch";
+    swatch.dataset.color = trace.color;
+    swatch.dataset.kind = trace.dash.length ? "dashed" : trace.kind;
+    button.append(swatch, name);
+    button.addEventListener("click", () => {
+      const on = this.off.has(name);
+      if (on) this.off.delete(name); else this.off.add(name);
+      button.setAttribute("aria-pressed", String(on));
+      const wanted = this.plotted.map((one) => !this.off.has(one.meta));
+      Plotly.restyle(this.place, { visible: wanted });
+    });
+    return button;
+  }
+
+  key(event) {
+    const zoom = { "+": 0.7, "=": 0.7, "-": 1 / 0.7 }[event.key];
+    const move = { ArrowLeft: -0.15, ArrowRight: 0.15 }[event.key];
+    if (event.key === "0") { this.redraw(); return; }
+    if (!zoom && !move) return;
+    event.preventDefault();
+    const change = {};
+    Object.entries(this.place.layout).forEach(([key, axis]) => {
+      if (!/^xaxis/.test(key) || axis.matches) return;
+      const [low, high] = axis.range;
+      const [middle, half] = [(low + high) / 2 + (move ?? 0) * (high - low), (high - low) / 2];
+      change[`${key}.range`] = [middle - half * (zoom ?? 1), middle + half * (zoom ?? 1)];
+    });
+    Plotly.relayout(this.place, change);
+  }
+
+  // Ticks at whole quarters of a turn suit the whole view; a part of it has its own.
+  freeTicks(change) {
+    const axes = Object.keys(change).map((key) => /^([xy]axis\d*)\.range/.exec(key)?.[1]);
+    const fixed = axes.filter((axis) => axis && this.place.layout[axis].dtick);
+    if (!fixed.length) return;
+    const links = Object.keys(this.place.layout).filter((key) =>
+      /^[xy]axis/.test(key) && this.place.layout[key].dtick);
+    Plotly.relayout(this.place, Object.fromEntries(links.flatMap((axis) =>
+      [[`${axis}.dtick`, null], [`${axis}.tickmode`, "auto"], [`${axis}.nticks`, 8]])));
+  }
+
+  redraw() {
+    if (!this.sheet) return Promise.resolve();
+    const { data, layout } = this.plotly();
+    this.plotted = data;
+    this.frame.querySelectorAll(".swatch").forEach((swatch) => {
+      swatch.style.setProperty("--curve", tone(swatch.dataset.color));
+    });
+    const settings = { displaylogo: false, responsive: false, scrollZoom: false,
+      displayModeBar: false, doubleClick: "reset" };
+    const done = Plotly.react(this.place, data, layout, settings);
+    this.place.removeAllListeners?.("plotly_click");
+    this.place.removeAllListeners?.("plotly_relayout");
+    this.place.on("plotly_relayout", (change) => this.freeTicks(change));
+    this.place.on("plotly_click", (event) => {
+      const point = event.points.find((one) => one.customdata);
+      if (point) showJob([point.customdata].flat()[0]);
+    });
+    return done;
+  }
+
+  // Where each panel lies, in shares of the figure: beside each other, or below where it is narrow.
+  places(width) {
+    const { panels, heights, widths, aspect } = this.sheet;
+    const narrow = width < 640;
+    const total = narrow ? panels.length * 260 : Math.max(260 * heights.length, width * aspect);
+    const share = (sizes, [first, last]) => {
+      const sum = (part) => part.reduce((a, b) => a + b, 0);
+      return [sum(sizes.slice(0, first)) / sum(sizes), sum(sizes.slice(0, last)) / sum(sizes)];
+    };
+    return { total, narrow, boxes: panels.map((panel, n) => {
+      const [left, right] = narrow ? [0, 1] : share(widths, panel.column);
+      const [top, bottom] = narrow ? [n / panels.length, (n + 1) / panels.length]
+        : share(heights, panel.row);
+      const scale = panel.traces.some((trace) => trace.kind === "map") ? 62 : 0;
+      const words = Math.max(0, ...(panel.y.words ?? []).map(([, text]) => text.length));
+      const wide = Math.min(0.4 * width * (right - left), Math.max(62, 24 + 6.2 * words));
+      const box = { x: [left * width + wide, right * width - 14 - scale],
+        y: [(1 - bottom) * total + 48, (1 - top) * total - 30] };
+      return { x: box.x.map((at) => at / width), y: box.y.map((at) => at / total) };
+    }) };
+  }
+
+  plotly() {
+    const style = getComputedStyle(root);
+    const ink = style.getPropertyValue("--ink").trim();
+    const faint = style.getPropertyValue("--grid").trim();
+    const width = this.width = this.place.clientWidth || 900;
+    const { total, boxes, narrow } = this.places(width);
+    const { panels } = this.sheet;
+    const layout = {
+      width, height: total, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false,
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: "zoom",
+      font: { family: "system-ui, sans-serif", size: 12, color: ink },
+      hoverlabel: { bgcolor: style.getPropertyValue("--paper").trim(), font: { color: ink } },
+      annotations: [], shapes: [], bargap: 0,
+    };
+    const data = [];
+    let ordered = true; // whether all curves go from left to right
+    panels.forEach((panel, n) => {
+      const [x, y] = [`x${n ? n + 1 : ""}`, `y${n ? n + 1 : ""}`];
+      const lowest = narrow || !panels.some((other) => other !== panel &&
+        other.row[0] >= panel.row[1] && other.column[0] === panel.column[0] &&
+        other.x.link === panel.x.link);
+      const axis = (way, domain, anchor, titled) => {
+        const scale = panel[way];
+        const log = (value) => (scale.log ? Math.log10(value) : value);
+        const made = {
+          domain, anchor, type: scale.log ? "log" : "linear", range: scale.range.map(log),
+          gridcolor: faint, zeroline: false, linecolor: faint, showline: true, ticks: "outside",
+          ticklen: 3, tickcolor: faint, exponentformat: "power", automargin: false,
+          title: { text: titled ? escaped(scale.title) : "", standoff: 6, font: { size: 12 } },
+        };
+        if (scale.words) {
+          made.tickmode = "array";
+          made.tickvals = scale.words.map(([at]) => at);
+          made.ticktext = scale.words.map(([, text]) => escaped(text));
+        } else if (scale.step) {
+          const wanted = Math.abs(scale.range[1] - scale.range[0]) / scale.step;
+          made.dtick = scale.step * Math.ceil(wanted / (width < 640 ? 5 : 9));
+          made.tick0 = 0;
+        } else {
+          made.nticks = way === "x" ? 8 : 6;
+        }
+        if (scale.link !== n) made.matches = `${way}${scale.link ? scale.link + 1 : ""}`;
+        return made;
+      };
+      layout[`xaxis${n ? n + 1 : ""}`] = axis("x", boxes[n].x, y, lowest || panel.x.title);
+      layout[`yaxis${n ? n + 1 : ""}`] = axis("y", boxes[n].y, x, true);
+      if (panel.square) layout[`yaxis${n ? n + 1 : ""}`].scaleanchor = x;
+      if (panel.title) {
+        layout.annotations.push({ text: `<b>${escaped(panel.title)}</b>`, showarrow: false,
+          xref: "paper", yref: "paper", x: boxes[n].x[0], y: boxes[n].y[1], xanchor: "left",
+          yanchor: "bottom", yshift: 4, font: { size: 13 } });
+      }
+      panel.traces.forEach((trace) => {
+        const made = this.trace(trace, panel, boxes[n]);
+        made.xaxis = x;
+        made.yaxis = y;
+        data.push(made);
+        if (trace.kind !== "line" || !Array.isArray(trace.x)) ordered = false;
+      });
+      panel.notes.forEach((note) => this.note(note, layout, x, y, panel));
+    });
+    layout.hovermode = ordered ? "x unified" : "closest";
+    return { data, layout };
+  }
+
+  trace(trace, panel, box) {
+    const color = Array.isArray(trace.color) ? trace.color : tone(trace.color);
+    const [xu, yu] = [unit(panel.x.title), unit(panel.y.title)];
+    const name = escaped(trace.name || panel.title || "");
+    const made = { type: "scatter", x: numbers(trace.x), y: numbers(trace.y), name,
+      meta: trace.name, visible: !this.off.has(trace.name), opacity: trace.opacity };
+    if (trace.jobs) made.customdata = trace.jobs;
+    const inX = `%{x:.6~g} ${xu}`;
+    made.hovertemplate = `%{y:.5~g} ${yu}<extra>${name}</extra>`;
+    if (!trace.name && trace.kind !== "map" && trace.kind !== "bars") made.hoverinfo = "skip";
+    if (made.hoverinfo) delete made.hovertemplate;
+    const error = (way) => (trace.errors && { type: "data", symmetric: false, color,
+      array: numbers(trace.errors[1]), arrayminus: numbers(trace.errors[0]), width: 3,
+      thickness: 1.2, visible: true, [way]: undefined });
+    if (trace.kind === "map") {
+      const scale = trace.color;
+      const stops = scale.length < 33
+        ? scale.flatMap((c, n) => [[n / scale.length, c], [(n + 1) / scale.length, c]])
+        : scale.map((c, n) => [n / (scale.length - 1), c]);
+      const columns = made.x.length - 1;
+      const flat = numbers(trace.z);
+      const rows = Array.from({ length: made.y.length - 1 }, (_, n) =>
+        flat.slice(n * columns, (n + 1) * columns));
+      Object.assign(made, { type: "heatmap", z: rows, colorscale: stops,
+        zmin: trace.limits[0], zmax: trace.limits[1], hoverinfo: undefined,
+        colorbar: { x: box.x[1], xpad: 6, y: (box.y[0] + box.y[1]) / 2, thickness: 10,
+          len: box.y[1] - box.y[0], tickfont: { size: 10 }, outlinewidth: 0,
+          title: { text: escaped(trace.scale), side: "right", font: { size: 11 } } } });
+      if (trace.log) made.colorbar.tickprefix = "10^";
+      const shown = trace.log ? rows.map((row) => Array.from(row, (v) => (10 ** v).toPrecision(5)))
+        : rows.map((row) => Array.from(row, (v) => String(Number(v.toPrecision(5)))));
+      made.text = shown;
+      made.hovertemplate = `${inX}, %{y:.6~g} ${yu}<br>%{text} ${unit(trace.scale)}` +
+        `<extra>${escaped(trace.scale || panel.title)}</extra>`;
+      if (trace.jobs) {
+        made.customdata = rows.map((row, n) => trace.jobs.slice(n * columns, (n + 1) * columns));
+      }
+      if (trace.limits[0] === trace.limits[1]) made.showscale = false;
+      return made;
+    }
+    if (trace.kind === "bars" || trace.kind === "columns") {
+      const lying = trace.kind === "bars";
+      Object.assign(made, { type: "bar", orientation: lying ? "h" : "v",
+        width: trace.width, marker: { color } });
+      if (trace.errors) made[lying ? "error_x" : "error_y"] = error();
+      made.hovertemplate = lying ? `%{x:.4~g} ${xu}<extra>${name}</extra>` : made.hovertemplate;
+      return made;
+    }
+    if (trace.kind === "band") {
+      return Object.assign(made, { fill: "toself", mode: "none", fillcolor: color,
+        opacity: Math.min(trace.opacity, 0.5), hoverinfo: "skip", hovertemplate: undefined });
+    }
+    const dash = trace.dash.length ? trace.dash.map((d) => `${d * 1.4}px`).join(",") : "solid";
+    made.mode = trace.kind === "line" ? (trace.marker ? "lines+markers" : "lines") : "markers";
+    made.line = { color, width: Math.max(1, trace.width * 1.3), dash };
+    made.marker = { color, symbol: SYMBOLS[trace.marker] ?? "circle",
+      size: trace.kind === "points" ? Math.max(3, trace.width * 1.4) : 6,
+      line: { color, width: trace.marker === "x" || trace.marker === "+" ? 2 : 0 } };
+    if (trace.errors) made.error_y = error();
+    if (trace.kind === "points" || !Array.isArray(trace.x)) {
+      made.hovertemplate = made.hoverinfo ? undefined
+        : `${inX}, %{y:.5~g} ${yu}<extra>${name}</extra>`;
+    }
+    return made;
+  }
+
+  note(note, layout, x, y, panel) {
+    const color = tone(note.color);
+    const log = (value, scale) => (scale.log ? Math.log10(value) : value);
+    if (!note.text) {
+      const across = note.x === undefined;
+      const at = across ? log(note.y, panel.y) : log(note.x, panel.x);
+      layout.shapes.push({ type: "line", layer: "below",
+        xref: across ? `${x} domain` : x, yref: across ? y : `${y} domain`,
+        x0: across ? 0 : at, x1: across ? 1 : at, y0: across ? at : 0, y1: across ? at : 1,
+        line: { color, width: 1, dash: note.dash.length ? "dash" : "solid" } });
+      return;
+    }
+    const inside = note.inside;
+    layout.annotations.push({ text: escaped(note.text), showarrow: false,
+      xref: inside ? `${x} domain` : x, yref: inside ? `${y} domain` : y,
+      x: inside ? note.x : log(note.x, panel.x), y: inside ? note.y : log(note.y, panel.y),
+      xanchor: inside && note.x > 0.5 ? "right" : "left", font: { size: 11, color } });
+  }
+}
+
+// ---- jobs behind points ---------------------------------------------------------------------
+function showJob(key) {
+  const box = document.getElementById("job");
+  const row = [...document.querySelectorAll("tr[data-job]")].find((one) => one.dataset.job === key);
+  const job = jobs[key] ?? {};
+  box.querySelector("h2").textContent = `Job ${key.slice(0, 10)}`;
+  const list = box.querySelector("dl");
+  list.replaceChildren();
+  const tell = (name, text) => {
+    const [term, told] = [document.createElement("dt"), document.createElement("dd")];
+    term.textContent = name;
+    told.textContent = text;
+    list.append(term, told);
+  };
+  Object.entries(job.values ?? {}).forEach(([name, text]) => tell(name, text));
+  if (job.status) tell("status", job.status);
+  const command = box.querySelector("code");
+  command.textContent = job.command ?? `compsim show ${key}`;
+  const link = box.querySelector("a");
+  link.hidden = !row;
+  link.onclick = (event) => {
+    event.preventDefault();
+    box.close();
+    each("tr.chosen", (other) => other.classList.remove("chosen"));
+    row.classList.add("chosen");
+    row.scrollIntoView({ block: "center" });
+  };
+  box.showModal();
+}
+
+let jobs = {};
+
+// ---- start ----------------------------------------------------------------------------------
+const kept = remembered.get("compsim-theme");
+if (kept) root.dataset.theme = kept;
+
+document.addEventListener("DOMContentLoaded", () => {
+  const told = document.getElementById("jobs");
+  if (told) jobs = JSON.parse(told.textContent);
+  each(".theme", (button) => {
+    button.hidden = false;
+    button.setAttribute("aria-pressed", String(isDark()));
+    button.addEventListener("click", () => setTheme(isDark() ? "light" : "dark"));
+  });
+  prefersDark.addEventListener("change", () => drawn.forEach((figure) => figure.redraw()));
+  each("table.sorts", openTable);
+  each("dialog button", (button) => button.addEventListener("click", () => {
+    if (button.dataset.copy !== undefined) {
+      navigator.clipboard?.writeText(button.closest("dialog").querySelector("code").textContent);
+    } else {
+      button.closest("dialog").close();
+    }
+  }));
+  const seen = new IntersectionObserver((entries) => entries.forEach((entry) => {
+    if (!entry.isIntersecting) return;
+    seen.unobserve(entry.target);
+    new Figure(entry.target).start();
+  }), { rootMargin: "500px" });
+  each("figure[data-title]", (frame) => seen.observe(frame));
+});

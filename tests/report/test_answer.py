@@ -1,0 +1,122 @@
+"""The first screen: which changes are told, by which numbers, and in which words."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from compressor.report.answer import (
+    Finding,
+    Points,
+    finding,
+    quantity,
+    ranked,
+    round_robin,
+    study_findings,
+    worded,
+)
+from compressor.report.figures.sweep_metric import MEASURES
+
+PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
+FORCE = next(m for m in MEASURES if m.variable == "peak_contact_force")
+LOSS = next(m for m in MEASURES if m.variable == "contact_loss_fraction")
+COUNT = next(m for m in MEASURES if m.variable == "impact_count")
+NAMES = ["a", "b", "c"]
+
+
+def told(measure, values, bars):
+    return finding(measure, np.array(values, float), np.array(bars, float), NAMES)
+
+
+def test_a_change_is_told_by_its_ends():
+    found = told(PEAK, [300.0, 200.0, 500.0], [1.0, 2.0, 3.0])
+    assert (found.low, found.at_low) == ("200 ± 2 m/s²", "b")
+    assert (found.high, found.at_high) == ("500 ± 3 m/s²", "c")
+    assert found.change == "2.5 times"
+    assert found.rank == pytest.approx(np.log(2.5))
+
+
+def test_a_change_within_the_bars_is_none():
+    assert told(PEAK, [200.0, 202.0, 203.0], [2.0, 2.0, 2.0]) is None
+    assert told(PEAK, [200.0, 202.0, 205.0], [2.0, 2.0, 2.0]) is not None
+
+
+def test_a_value_that_is_not_known_does_not_count():
+    """A chaotic motion's peak has an infinite bar, a failed job no number."""
+    found = told(PEAK, [200.0, 900.0, 300.0], [1.0, np.inf, 1.0])
+    assert found.at_high == "c"
+    assert told(PEAK, [np.nan] * 3, [np.nan] * 3) is None
+
+
+def test_what_appears_ranks_before_what_grows():
+    rows = [
+        (PEAK, np.array([100.0, 200.0, 300.0]), np.full(3, 0.1)),
+        (LOSS, np.array([0.0, 0.0, 5.0]), np.full(3, 0.01)),
+        (COUNT, np.array([0.0, 0.0, 999.0]), np.full(3, 1.0)),
+        (FORCE, np.array([1.0, 2.0, 2.0]), np.full(3, 0.001)),
+    ]
+    found = ranked(rows, NAMES)
+    assert [one.title.partition(",")[0] for one in found] == [
+        "Time without contact", "Peak acceleration", "Peak contact force",
+    ]  # fmt: skip
+    assert found[0].change == "from nearly nothing"
+
+
+@pytest.mark.parametrize(
+    ("value", "bar", "text"),
+    [(1234.5678, 1.3, "1234.6 ± 1.3 m/s²"), (1234.5678, 0.000123, "1234.6 m/s² ± 1e-05 %"),
+     (1234.5678, np.nan, "1234.57 m/s²"), (1234.5678, 2000.0, "unknown m/s²")],
+)  # fmt: skip
+def test_numbers_have_the_digits_of_their_bars(value, bar, text):
+    assert quantity(value, bar, PEAK) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "unit", "text"),
+    [("clearance_mm", 0.2, "mm", "clearance 0.2 mm"), ("fault", "big_end", "", "fault big end"),
+     ("damping_N_s_per_mm", 336.0, "N s/mm", "damping 336 N s/mm"),
+     ("static", 0.23, "1", "static 0.23"), ("clearance_mm", np.nan, "mm", ""),
+     ("fault", "none", "", "fault none")],
+)  # fmt: skip
+def test_swept_values_in_words(name, value, unit, text):
+    assert worded(name, value, unit) == text
+
+
+@pytest.fixture
+def study():
+    """Two speeds and three clearances; the peak grows with the clearance."""
+    peak = np.array([[100.0, 200.0, 400.0], [90.0, 180.0, 360.0]])
+    dims = ("speed_rpm", "clearance_mm")
+    return xr.Dataset(
+        {
+            "status": (dims, np.full((2, 3), "ok", object)),
+            "key": (dims, np.array(list("abcdef"), object).reshape(2, 3)),
+            "peak_acceleration": (dims, peak),
+            "peak_acceleration_error": (dims, 0.01 * peak),
+        },
+        {
+            "speed_rpm": ("speed_rpm", [500.0, 600.0], {"units": "rpm", "case_key": "s"}),
+            "clearance_mm": ("clearance_mm", [0.1, 0.2, 0.3], {"units": "mm", "case_key": "c"}),
+        },
+    )
+
+
+def test_a_study_s_findings_name_its_points(study):
+    (found,) = study_findings(study)
+    assert found.at_low == "speed 600 rpm, clearance 0.1 mm"
+    assert found.at_high == "speed 500 rpm, clearance 0.3 mm"
+    assert Points(study.isel(speed_rpm=[0]))[1] == "clearance 0.2 mm"
+    assert len(Points(study)) == 6
+
+
+def test_a_single_job_is_told_by_its_numbers(study):
+    (found,) = study_findings(study.isel(speed_rpm=[0], clearance_mm=[0]))
+    assert (found.low, found.high) == ("", "100 ± 1 m/s²")
+
+
+def test_three_findings_are_shared_among_studies():
+    one = Finding("", "", "", "", "", "", 0.0)
+    assert [(n, len(f)) for n, f in round_robin([("a", [one] * 3), ("b", [one])])] == [
+        ("a", 2), ("b", 1),
+    ]  # fmt: skip
+    assert [(n, len(f)) for n, f in round_robin([("a", [one] * 5)])] == [("a", 3)]
+    assert [*round_robin([("a", [])])] == []
