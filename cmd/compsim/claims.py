@@ -120,7 +120,7 @@ def sentences(found: "xr.Dataset") -> Iterator[str]:
         summary,
     )
 
-    if "best" in found.attrs:
+    if "looked" in found.attrs:
         yield from change(found)
         return
     yield from summary(found)

@@ -180,22 +180,27 @@ def share(one: xr.Dataset, place: int) -> str:
 
 
 def change(found: xr.Dataset) -> Iterator[str]:
-    """The least change of assumptions that makes all claims hold, of `least_change`."""
-    best = found.isel(machine=int(found.attrs["best"]))
+    """Whether a search found a machine at which all claims hold, as of `least_change`."""
+    best = found.isel(machine=0)
     margin, sure = best["margin"].values, best["margin"].values - best["error"].values
+    holding, known = int((margin >= 0.0).sum()), int((sure >= 0.0).sum())
     machines = int(found.attrs["looked"])
     if (sure >= 0.0).all():
+        which = "with the least change" if found.attrs["least"] else "with these changes"
         yield (
-            "The least change that makes all eight claims hold, each beyond its error, among "
-            f"{machines} machines that a directed search looked at: {changes(best)}."
+            f"All eight claims hold, each beyond its error, at a machine {which} that a directed "
+            f"search found among {machines}: {changes(best)}."
+        )
+    elif holding == margin.size:
+        yield (
+            f"Among {machines} machines that a directed search looked at, the best holds all eight "
+            f"claims, but only {known} of them beyond their errors: {changes(best)}."
         )
     else:
-        holding = int((margin >= 0.0).sum())
         yield (
-            "No machine was found at which all eight claims hold beyond their errors, among "
+            "No machine was found at which all eight claims hold, among "
             f"{machines} that a directed search looked at. The one that lacks least: "
-            f"{changes(best)}; there {holding} claims hold, {int((sure >= 0.0).sum())} of them "
-            "beyond their errors."
+            f"{changes(best)}; there {holding} claims hold, {known} of them beyond their errors."
         )
     said = ", ".join(
         f"{claim} {100 * m:+.3g} % ± {100 * e:.2g} %"

@@ -36,7 +36,8 @@ POPULATION = 48  # machines of a generation
 DIGITS = 6  # of an assumption's value
 FAR = 10.0  # the cost of a machine that was not judged
 STEP, LEAST_STEP = 0.05, 0.003  # of a compass search, as shares of the ranges
-LONGER = 5  # times: runs by which a machine is told to be consistent
+LONGER, LONGEST = 5, 20  # times: runs by which a machine is told to be consistent
+NAMES = {1: "", LONGER: "-longer", LONGEST: "-longest"}
 HALVINGS = 4  # of each change, on the way back to the default
 
 
@@ -109,7 +110,7 @@ class Search:
     @property
     def name(self) -> str:
         """What the study of the search's machines is called."""
-        return f"{self.study.name}-search" + ("-longer" if self.longer > 1 else "")
+        return f"{self.study.name}-search{NAMES[self.longer]}"
 
     @property
     def home(self) -> np.ndarray:
@@ -192,17 +193,19 @@ def least_change(
 ) -> xr.Dataset:
     """The machine nearest to the defaults at which all claims hold, or the one that lacks least.
 
-    The machines of longer runs come back, as of `judge_machines`; the attribute `best` is the
-    number of that one, `distance` how far it is from the defaults, the sum of changes, each as a
-    share of its range, and `looked` how many machines the search judged in all.
+    As `judge_machines` gives it, alone, and stored in FOLDER/NAME-best.nc. The attribute `distance`
+    is how far it is from the defaults, the sum of changes, each as a share of its range; `looked`
+    how many machines were judged in all; `least` is 1 where its changes were taken back as far as
+    the claims go on holding.
 
-    study: whose axes are all drawn by a design, in whose ranges is looked; machines are stored in
-    FOLDER/NAME-search.nc and NAME-search-longer.nc, and the same call goes on from them. It begins
+    study: whose axes are all drawn by a design, in whose ranges is looked; all machines are stored,
+    in FOLDER/NAME-search.nc and -longer, -longest, and the same call goes on from them. It begins
     at the best of the study's own machines, as far as they are judged. Evolution finds a region,
     and a compass search goes on from its best machine. Chaotic runs of few revolutions leave wide
     errors, in which a search finds lucky machines: so another compass search looks from there, in
-    runs LONGER times as long, until all claims hold beyond their errors. Then each change is taken
-    back as far as they go on holding. Raises ClaimsError where the study draws nothing.
+    runs 5 times as long, until all claims hold beyond their errors. Then each change is taken back
+    as far as they go on holding. Where some hold within their errors alone, a run 20 times as long
+    decides. Raises ClaimsError where the study draws nothing.
     """
     search = Search(study, folder, workers, progress)
 
@@ -219,14 +222,19 @@ def least_change(
     near = descended(search, min(search.asked, key=search.cost), STEP)
     longer = Search(study, folder, workers, progress, LONGER)
     best = descended(longer, near, STEP / 2.0)
-    if longer.cost(best) < 1.0:
+    if holds := longer.cost(best) < 1.0:
         taken_back(longer, best)
     best = min(longer.points, key=longer.cost)
-    found = longer.judged()
-    found.attrs["best"] = [*longer.points].index(best)
-    found.attrs["distance"] = longer.distance(best)
-    found.attrs["looked"] = len(search.points) + len(longer.points)
-    write_dataset(Path(found.encoding["source"]), found)
+    looked, last = len(search.points) + len(longer.points), longer
+    if not holds and min(longer.points[best].margin) >= 0.0:
+        last = Search(study, folder, workers, progress, LONGEST)
+        last.ask([best])
+        looked += 1
+    found = last.judged().isel(machine=[[*last.points].index(best)])
+    found.attrs |= {"distance": last.distance(best), "looked": looked, "least": int(holds)}
+    path = Path(folder) / f"{study.name}-best.nc"
+    write_dataset(path, found)
+    found.encoding["source"] = str(path)
     return found
 
 

@@ -48,11 +48,11 @@ class Part:
 def machine_files(folder: Folder) -> dict[str, xr.Dataset]:
     """The files of judged machines in a folder by name, mass planes first; none without a folder.
 
-    The first, short runs of a search are left out: what it found stands in its longer runs. Raises
+    The machines that a search looked at are left out: what it found has a file of its own. Raises
     StoreError for a file that is something else.
     """
     paths = sorted(Path(folder).glob("*.nc"), key=lambda path: path.stem)
-    paths = [path for path in paths if not path.stem.endswith("-search")]
+    paths = [path for path in paths if "-search" not in path.stem]
     found = {path.stem: read_machines(path) for path in paths}
     return dict(sorted(found.items(), key=lambda item: not is_mass_plane(item[1])))
 
@@ -62,7 +62,7 @@ def machine_drawings(
 ) -> Iterator[tuple[str, list[str], str, str, Drawing | None]]:
     """Name, sentences, heading, caption and drawing of each file."""
     for name, found in files.items():
-        if "best" in found.attrs:
+        if "looked" in found.attrs:
             yield name, [*change(found)], *NO_FIGURE
         elif is_mass_plane(found):
             sentences = [*summary(found), consistency(found), borders(found)]
