@@ -56,6 +56,17 @@ def test_the_example_is_the_most_consistent_machine():
     assert best["claims"] == [3, 4, 5, 6, 8]
 
 
+def test_the_other_example_is_the_machine_in_which_all_claims_hold():
+    (study,) = load_studies(example("agreeing"))
+    case, best = study.cases[0].values(), kept("claims.json")["search"]
+    groups = [case[name] for name in ("machine", "friction", "contact", "gas")]
+    given = {key: value for group in groups for key, value in group.items()}
+    assert {key: given[key] for key in best["values"]} == pytest.approx(best["values"])
+    sure = [m - e for m, e in zip(best["margin"], best["error"], strict=True)]
+    assert min(sure) >= 0.0
+    assert 100 * best["margin"][7] == pytest.approx(1.6, abs=0.05)  # as its comment says
+
+
 def test_the_words_are_those_of_the_numbers():
     found = kept("claims.json")
     each = found["map"]["each"]

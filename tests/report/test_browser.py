@@ -1,0 +1,210 @@
+"""The page in a real browser, opened from disk without a network (`make page` runs these, too)."""
+
+import re
+
+import pytest
+from browsing import axe_script, browser, lacking, live, wait_for
+from conftest import store
+
+from compressor.report.report import write_report
+
+pytestmark = [
+    pytest.mark.skipif(bool(lacking()), reason=lacking() or "a browser is there"),
+    pytest.mark.slow,
+]
+EVIL = "<script>window.broken = 1</script><img src=x onerror='window.broken=1'>"
+WORN = """\
+joint: [big_end, small_end]
+clearance_mm: [0.1, 0.2, 0.3]
+machine: {speed_rpm: [300, 500]}
+solve: {accuracy: draft}
+"""
+
+
+@pytest.fixture(scope="module")
+def page(once, paper_store):
+    """The page of the paper's eleven cases."""
+    return once("full-report", lambda folder: write_report(paper_store, folder, EVIL))
+
+
+@pytest.fixture(scope="module")
+def own(once):
+    """The page of a sweep of one's own, of twelve jobs."""
+
+    def made(folder):
+        folder.mkdir()
+        (folder / "worn.yaml").write_text(WORN)
+        store(folder / "results", folder / "worn.yaml")
+        write_report(folder / "results", folder, EVIL)
+
+    return once("own-report", made)
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory):
+    with browser(tmp_path_factory.mktemp("profile")) as driven:
+        yield driven
+
+
+def opened(driver, folder):
+    driver.get(f"file://{folder}/index.html")
+    wait_for(driver, "return document.readyState === 'complete'")
+
+
+def problems(driver):
+    return [entry for entry in driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
+
+
+def test_the_page_opens_from_disk_and_nothing_breaks(driver, page):
+    opened(driver, page)
+    names = driver.execute_script("return [...document.querySelectorAll('figure')].map(f => f.id)")
+    for name in names:
+        live(driver, name)
+    assert not problems(driver)
+    assert not driver.execute_script("return document.querySelectorAll('.told').length")
+    assert driver.execute_script("return window.broken") is None
+    outside = driver.execute_script(
+        "return performance.getEntriesByType('resource').map(r => r.name)"
+        ".filter(name => !name.startsWith('file:'))"
+    )
+    assert outside == []
+
+
+def test_every_figure_says_what_is_seen(driver, page):
+    opened(driver, page)
+    alts = driver.execute_script("return [...document.images].map(image => image.alt)")
+    assert len(alts) >= 13
+    assert all(len(alt) > 40 for alt in alts)
+    assert len({*alts}) == len(alts)
+
+
+def test_zoom_is_linked_across_panels_of_one_span(driver, page):
+    opened(driver, page)
+    live(driver, "figure-08")
+    ranges = (
+        "const l = document.querySelector('#figure-08 .plot').layout;"
+        "return Object.keys(l).filter(k => /^xaxis/.test(k)).map(k => l[k].range)"
+    )
+    before = driver.execute_script(ranges)
+    driver.execute_script(
+        "Plotly.relayout(document.querySelector('#figure-08 .plot'), {'xaxis.range': [30, 60]})"
+    )
+    after = driver.execute_script(ranges)
+    linked = [n for n, span in enumerate(before) if span == before[0]]
+    assert len(linked) >= 2
+    for n, (old, new) in enumerate(zip(before, after, strict=True)):
+        assert new == ([30, 60] if n in linked else old)
+    plot = driver.find_element("css selector", "#figure-08 .plot")
+    plot.send_keys("0")  # by the keyboard
+    wait_for(driver, f"{ranges.replace('return', 'const r =')}; return r[0][0] === {before[0][0]}")
+    plot.send_keys("+")
+    zoomed = driver.execute_script(ranges)[0]
+    assert zoomed[1] - zoomed[0] == pytest.approx(0.7 * (before[0][1] - before[0][0]))
+
+
+def test_hovering_tells_value_and_unit(driver, page):
+    opened(driver, page)
+    live(driver, "figure-08")
+    from selenium.webdriver import ActionChains
+
+    panel = driver.find_element("css selector", "#figure-08 .plot .draglayer .xy .nsewdrag")
+    ActionChains(driver).move_to_element_with_offset(panel, 20, 10).perform()
+    layer = "document.querySelector('#figure-08 .plot .hoverlayer')"
+    told = wait_for(driver, f"return {layer}.textContent")
+    assert re.search(r"no clearance : [\d.]+ mm", told)
+    assert re.search(r"0.2 mm : [\d.]+ mm", told)
+
+
+def test_curves_can_be_switched_off(driver, page):
+    opened(driver, page)
+    live(driver, "figure-08")
+    shown = (
+        "return document.querySelector('#figure-08 .plot').data"
+        ".filter(t => t.meta && t.visible).map(t => t.meta)"
+    )
+    names = {*driver.execute_script(shown)}
+    assert len(names) == 4
+    button = driver.find_element("css selector", "#figure-08 .curve")
+    name = button.text
+    button.click()
+    assert {*driver.execute_script(shown)} == names - {name}
+    assert button.get_attribute("aria-pressed") == "false"
+    button.click()
+    assert {*driver.execute_script(shown)} == names
+
+
+def test_tables_sort_and_filter(driver, own):
+    opened(driver, own)
+    place = "document.querySelector('#jobs-worn table')"
+    column = driver.execute_script(
+        f"return [...{place}.tHead.rows[0].cells].findIndex(c => /^peak acc/.test(c.textContent))"
+    )
+    button = driver.find_elements("css selector", "#jobs-worn th button")[column]
+    values = (
+        f"return [...{place}.tBodies[0].rows].filter(r => !r.hidden)"
+        f".map(r => Number(r.cells[{column}].dataset.value))"
+    )
+    button.click()
+    up = driver.execute_script(values)
+    assert len(up) == 12
+    assert up == sorted(up)
+    button.click()
+    assert driver.execute_script(values) == sorted(up, reverse=True)
+    head = driver.find_elements("css selector", "#jobs-worn th")[column]
+    assert head.get_attribute("aria-sort") == "descending"
+    driver.find_element("css selector", "#jobs-worn input[type=search]").send_keys("small_end 500")
+    assert len(driver.execute_script(values)) == 3
+    told = driver.find_element("css selector", "#jobs-worn output").text
+    assert told == "3 of 12 rows"
+
+
+def test_a_click_on_a_job_tells_of_it(driver, own):
+    opened(driver, own)
+    driver.execute_script("showJob(document.querySelector('tr[data-job]').dataset.job)")
+    box = driver.find_element("css selector", "#job")
+    key = driver.execute_script("return document.querySelector('tr[data-job]').dataset.job")
+    assert key[:10] in box.text
+    assert "compsim show" in box.text
+    box.find_element("css selector", "a").click()
+    assert driver.execute_script("return document.querySelector('tr.chosen').dataset.job") == key
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("width", [1400, 800, 360])
+def test_no_width_needs_to_scroll_sideways(page, tmp_path, width, dark):
+    with browser(tmp_path, width, 900, dark) as driven:
+        opened(driven, page)
+        live(driven, "figure-08")
+        assert driven.execute_script("return document.documentElement.scrollWidth") <= width
+        ground = driven.execute_script("return getComputedStyle(document.body).backgroundColor")
+        assert (sum(map(int, re.findall(r"\d+", ground)[:3])) < 200) == dark
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_axe_finds_no_serious_violation(page, own, tmp_path, dark):
+    axe = axe_script()
+    if not axe:
+        pytest.skip("axe-core is not installed (PyPI: axe-playwright-python)")
+    with browser(tmp_path, dark=dark) as driven:
+        for folder in (page, own):
+            opened(driven, folder)
+            live(driven, driven.execute_script("return document.querySelector('figure').id"))
+            driven.execute_script(axe)
+            found = driven.execute_async_script(
+                "const done = arguments[0]; axe.run().then(r => done(r.violations))"
+            )
+            serious = {
+                one["id"]: [node["html"][:120] for node in one["nodes"][:3]]
+                for one in found
+                if one["impact"] in ("serious", "critical")
+            }
+            assert serious == {}
+
+
+def test_without_scripts_there_are_pictures(page, tmp_path):
+    with browser(tmp_path) as driven:
+        driven.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+        driven.get(f"file://{page}/index.html")
+        sizes = [image.size["width"] for image in driven.find_elements("css selector", "img")]
+        assert len(sizes) >= 13
+        assert min(sizes) > 500
