@@ -7,6 +7,7 @@ have as many points as a screen can show.
 
 import base64
 import json
+import re
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -41,18 +42,27 @@ def script(name: str, sheet: Sheet) -> str:
 
 
 def content(sheet: Sheet) -> dict[str, Any]:
-    """What a figure shows, as plain data. Panels with the same `link` are zoomed together."""
+    """What a figure shows, as plain data. Panels with the same `link` are zoomed together.
+
+    `unified`: all curves go from left to right, so that the values at one x are told together.
+    """
     links = linked([panel.x for panel in sheet.panels]), linked([p.y for p in sheet.panels], "y")
     width, height = sheet.size
     return {
         "aspect": round(height / width, 4),
         "heights": sheet.heights,
         "widths": sheet.widths,
+        "unified": all(
+            trace.kind == "line" and not (np.diff(trace.x) < 0).any()
+            for panel in sheet.panels
+            for trace in panel.traces
+            if trace.name
+        ),
         "panels": [
             {
                 "title": panel.title,
-                "x": axis(panel.x) | {"link": x},
-                "y": axis(panel.y) | {"link": y},
+                "x": axis(panel.x) | {"link": x, "unit": unit(titled(sheet, panel))},
+                "y": axis(panel.y) | {"link": y, "unit": unit(panel.y.title)},
                 "row": panel.row,
                 "column": panel.column,
                 "square": panel.is_square,
@@ -62,6 +72,18 @@ def content(sheet: Sheet) -> dict[str, Any]:
             for panel, x, y in zip(sheet.panels, *links, strict=True)
         ],
     }
+
+
+def titled(sheet: Sheet, panel: Panel) -> str:
+    """The title of a panel's x axis, or of one below it in the same column."""
+    below = [one for one in sheet.panels if one.column == panel.column and one.row >= panel.row]
+    return next((one.x.title for one in below if one.x.title), "")
+
+
+def unit(title: str) -> str:
+    """The unit in an axis' title: what stands in the last brackets."""
+    found = re.search(r"\(([^()]*)\)[^()]*$", title)
+    return found[1] if found else ""
 
 
 def linked(scales: Sequence[Scale], way: str = "x") -> list[int]:

@@ -122,6 +122,8 @@ def test_the_page_gets_what_was_drawn(figure):
     assert low["traces"][0]["jobs"] == ["a", "b", "c", "d"]
     assert [panel["x"]["link"] for panel in found["panels"]] == [0, 1, 2, 3]
     assert found["aspect"] == 0.5
+    assert not found["unified"]  # a map is no curve
+    assert (whole["x"]["unit"], whole["y"]["unit"]) == ("°", "kN")
 
 
 def test_panels_of_the_same_span_are_zoomed_together():

@@ -14,10 +14,12 @@ const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 const isDark = () =>
   (root.dataset.theme || (prefersDark.matches ? "dark" : "light")) === "dark";
 
+const nameTheme = (button) => { button.textContent = isDark() ? "light" : "dark"; };
+
 function setTheme(theme) {
   root.dataset.theme = theme;
   remembered.set("compsim-theme", theme);
-  each(".theme", (button) => button.setAttribute("aria-pressed", String(isDark())));
+  each(".theme", nameTheme);
   drawn.forEach((figure) => figure.redraw());
 }
 
@@ -137,8 +139,7 @@ function numbers(packed) {
 
 const escaped = (text) =>
   text.replace(/[&<>]/g, (letter) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[letter])
-    .replace(/([A-Za-zδ])_([A-Za-z0-9]+)/g, "$1<sub>$2</sub>");
-const unit = (title) => escaped(/\(([^()]*)\)[^()]*$/.exec(title)?.[1] ?? "");
+    .replace(/\b([A-Za-zδ])_([A-Za-z0-9]{1,3})\b/g, "$1<sub>$2</sub>");
 
 // the printed figures' colours, made light enough for a dark ground
 const ON_DARK = {
@@ -309,7 +310,6 @@ class Figure {
       annotations: [], shapes: [], bargap: 0,
     };
     const data = [];
-    let ordered = true; // whether all curves go from left to right
     panels.forEach((panel, n) => {
       const [x, y] = [`x${n ? n + 1 : ""}`, `y${n ? n + 1 : ""}`];
       const lowest = narrow || !panels.some((other) => other !== panel &&
@@ -324,6 +324,7 @@ class Figure {
           ticklen: 3, tickcolor: faint, exponentformat: "power", automargin: false,
           title: { text: titled ? escaped(scale.title) : "", standoff: 6, font: { size: 12 } },
         };
+        if (way === "x") made.unifiedhovertitle = { text: `%{x:.6~g} ${escaped(scale.unit)}` };
         if (scale.words) {
           made.tickmode = "array";
           made.tickvals = scale.words.map(([at]) => at);
@@ -344,24 +345,24 @@ class Figure {
       if (panel.title) {
         layout.annotations.push({ text: `<b>${escaped(panel.title)}</b>`, showarrow: false,
           xref: "paper", yref: "paper", x: boxes[n].x[0], y: boxes[n].y[1], xanchor: "left",
-          yanchor: "bottom", yshift: 4, font: { size: 13 } });
+          yanchor: "bottom", yshift: 4, font: { size: Math.max(9.5, Math.min(13,
+            1.75 * width * (boxes[n].x[1] - boxes[n].x[0]) / panel.title.length)) } });
       }
       panel.traces.forEach((trace) => {
         const made = this.trace(trace, panel, boxes[n]);
         made.xaxis = x;
         made.yaxis = y;
         data.push(made);
-        if (trace.kind !== "line" || !Array.isArray(trace.x)) ordered = false;
       });
       panel.notes.forEach((note) => this.note(note, layout, x, y, panel));
     });
-    layout.hovermode = ordered ? "x unified" : "closest";
+    layout.hovermode = this.sheet.unified ? "x unified" : "closest";
     return { data, layout };
   }
 
   trace(trace, panel, box) {
     const color = Array.isArray(trace.color) ? trace.color : tone(trace.color);
-    const [xu, yu] = [unit(panel.x.title), unit(panel.y.title)];
+    const [xu, yu] = [escaped(panel.x.unit), escaped(panel.y.unit)];
     const name = escaped(trace.name || panel.title || "");
     const made = { type: "scatter", x: numbers(trace.x), y: numbers(trace.y), name,
       meta: trace.name, visible: !this.off.has(trace.name), opacity: trace.opacity };
@@ -391,7 +392,7 @@ class Figure {
       const shown = trace.log ? rows.map((row) => Array.from(row, (v) => (10 ** v).toPrecision(5)))
         : rows.map((row) => Array.from(row, (v) => String(Number(v.toPrecision(5)))));
       made.text = shown;
-      made.hovertemplate = `${inX}, %{y:.6~g} ${yu}<br>%{text} ${unit(trace.scale)}` +
+      made.hovertemplate = `${inX}, %{y:.6~g} ${yu}<br>%{text}` +
         `<extra>${escaped(trace.scale || panel.title)}</extra>`;
       if (trace.jobs) {
         made.customdata = rows.map((row, n) => trace.jobs.slice(n * columns, (n + 1) * columns));
@@ -418,7 +419,7 @@ class Figure {
       size: trace.kind === "points" ? Math.max(3, trace.width * 1.4) : 6,
       line: { color, width: trace.marker === "x" || trace.marker === "+" ? 2 : 0 } };
     if (trace.errors) made.error_y = error();
-    if (trace.kind === "points" || !Array.isArray(trace.x)) {
+    if (!this.sheet.unified) {
       made.hovertemplate = made.hoverinfo ? undefined
         : `${inX}, %{y:.5~g} ${yu}<extra>${name}</extra>`;
     }
@@ -486,10 +487,13 @@ document.addEventListener("DOMContentLoaded", () => {
   if (told) jobs = JSON.parse(told.textContent);
   each(".theme", (button) => {
     button.hidden = false;
-    button.setAttribute("aria-pressed", String(isDark()));
+    nameTheme(button);
     button.addEventListener("click", () => setTheme(isDark() ? "light" : "dark"));
   });
-  prefersDark.addEventListener("change", () => drawn.forEach((figure) => figure.redraw()));
+  prefersDark.addEventListener("change", () => {
+    each(".theme", nameTheme);
+    drawn.forEach((figure) => figure.redraw());
+  });
   each("table.sorts", openTable);
   each("dialog button", (button) => button.addEventListener("click", () => {
     if (button.dataset.copy !== undefined) {
