@@ -19,6 +19,7 @@ from compressor.solve.si_record import record
 
 FIGURE = {figure.number: figure for figure in FIGURES}
 SETTLED = slice(1200, None)  # 0.3 degrees a sample: the first revolution is start-up
+LAST = slice(-1201, None)  # the last revolution, both ends
 SIZES = ("0.1", "0.2", "0.3")
 JOINTS = {9: ("big_end", "big_end"), 12: ("small_end", "small_end"),
           15: ("both", "big_end"), 16: ("both", "small_end")}  # fmt: skip
@@ -43,9 +44,22 @@ def check_lines(panel, expected):
 
 
 def curve(run, values, factor):
-    """Crank angle from the second top dead centre, and values in a unit."""
-    angle = run["crank_angle"].values[SETTLED] * 180 / np.pi - 360
-    return angle, values.values[SETTLED] * factor
+    """Crank angle of the last revolution, from its top dead centre, and values in a unit."""
+    angle = run["crank_angle"].values[LAST] * 180 / np.pi
+    return angle - angle[0], values.values[LAST] * factor
+
+
+def views(drawn, number):
+    """The panels of a figure: those in full, and the enlarged one, of each quantity."""
+    panels = drawn[number].axes
+    enlarged = [p for p in panels if "enlarged" in p.get_title(loc="left")]
+    found = []
+    for view in sorted(enlarged, key=lambda panel: -panel.get_position().y1):
+        rows = view.get_subplotspec().rowspan
+        full = [p for p in panels if p not in enlarged
+                and p.get_subplotspec().rowspan.start in rows]  # fmt: skip
+        found.append((full, view))
+    return found
 
 
 def responses(fault):
@@ -82,25 +96,33 @@ def test_needs_are_all_that_is_read(paper_runs):
                                     ((8, "big_end"), (11, "small_end"), (14, "both"))],
 )  # fmt: skip
 def test_response_lines(drawn, paper_runs, number, labels):
-    panels = drawn[number].axes
     series = [("displacement", 1000), ("velocity", 1), ("acceleration", 1)]
-    for i, (name, factor) in enumerate(series):
+    for (full, enlarged), (name, factor) in zip(views(drawn, number), series, strict=True):
         expected = [curve(paper_runs[k], paper_runs[k][name], factor) for k in labels]
-        check_lines(panels[2 * i], expected)
-        check_lines(panels[2 * i + 1], expected)
+        check_lines(enlarged, expected)
+        if len(full) == 1:
+            check_lines(full[0], expected)
+        else:
+            for panel, worn in zip(full, expected[1:], strict=True):
+                check_lines(panel, [expected[0], worn])
 
 
 @pytest.mark.parametrize("number", JOINTS)
 def test_contact_force_lines(drawn, paper_runs, number):
     fault, joint = JOINTS[number]
-    panels = drawn[number].axes
-    for i, axis in enumerate("xy"):
+    for (full, enlarged), axis in zip(views(drawn, number), "xy", strict=True):
         expected = [
             curve(run, run["contact_force"].sel(joint=joint, axis=axis), 1 / 1000)
             for run in (paper_runs[f"{fault} {size}"] for size in SIZES)
         ]
-        check_lines(panels[2 * i], expected)
-        check_lines(panels[2 * i + 1], expected)
+        check_lines(enlarged, expected)
+        for panel, one in zip(full, expected, strict=True):
+            check_lines(panel, [one])
+
+
+def test_the_forces_of_both_joints_are_enlarged_at_the_same_angle(drawn):
+    spans = [view.get_xlim() for number in (15, 16) for _, view in views(drawn, number)]
+    assert len({*spans}) == 1
 
 
 def test_piston_force_lines(drawn, paper_runs):
@@ -178,14 +200,9 @@ def test_cam(drawn):
 # ---- enlarged views ---------------------------------------------------------------------------
 
 
-def pairs(figure):
-    """Full and enlarged panels."""
-    return zip(figure.axes[::2], figure.axes[1::2], strict=True)
-
-
 @pytest.mark.parametrize("number", [6, 8, 9, 11, 12, 14, 15, 16])
 def test_enlarged_views_are_marked_and_hold_their_curves(drawn, number):
-    for full, enlarged in pairs(drawn[number]):
+    for full, enlarged in ((one, view) for many, view in views(drawn, number) for one in many):
         (mark,) = [patch for patch in full.patches if isinstance(patch, Rectangle)]
         (left, right), (low, high) = enlarged.get_xlim(), enlarged.get_ylim()
         assert (mark.get_x(), mark.get_x() + mark.get_width()) == pytest.approx((left, right))
@@ -203,9 +220,9 @@ def test_enlarged_views_are_marked_and_hold_their_curves(drawn, number):
 
 @pytest.mark.parametrize("number", [8, 11, 14])
 def test_acceleration_is_enlarged_where_it_differs_most(drawn, number):
-    full, enlarged = drawn[number].axes[4:]
-    spread = np.ptp([y for _, y in lines(full)], axis=0)
-    angle = lines(full)[0][0]
+    _, enlarged = views(drawn, number)[-1]
+    spread = np.ptp([y for _, y in lines(enlarged)], axis=0)
+    angle = lines(enlarged)[0][0]
     left, right = enlarged.get_xlim()
     inside = (angle >= left) & (angle <= right)
     assert spread[inside].max() >= 0.98 * spread.max()

@@ -1,10 +1,11 @@
-"""What is plotted of a run: stored series after the first revolution, in a reader's units.
+"""What is plotted of a run: stored series of its last revolution, in a reader's units.
 
-Every panel of curves can have an enlarged view beside it, placed where the curves differ most.
+Every panel of curves can have an enlarged view beside it, placed where the curves differ most. What
+oscillates so fast that curves would hide each other has a row a curve.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -14,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MultipleLocator
 from numpy.lib.stride_tricks import sliding_window_view
 
-from compressor.analysis import CLEARANCES, label, settled
+from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled
 from compressor.report.figures.style import BY_CLEARANCE, BY_LOAD, IDEAL, Line
 
 Runs = Mapping[str, xr.Dataset]
@@ -22,6 +23,7 @@ Runs = Mapping[str, xr.Dataset]
 ANGLE_AXIS = "crank angle (°), 0 = top dead centre"
 LOADS = {"typical": "typical model (gas force)", "design": "design model (spring and cam)"}
 KILONEWTON = 1e-3
+TICK = 90.0  # degrees between ticks
 SAME = 1e-9  # curves closer than this share of their range are one curve
 NEARLY = 0.98  # of the greatest difference: the first window that has this much is taken
 LEAST_MARK = 0.05  # of a panel's height: a flatter mark would not be seen
@@ -50,7 +52,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Curve:
-    """One run in a figure: its name in the legend, its settled samples, and its line."""
+    """One run in a figure: its name in the legend, its last revolution, and its line."""
 
     name: str
     run: xr.Dataset
@@ -62,39 +64,67 @@ class Curve:
 
 
 def degrees(run: xr.Dataset) -> np.ndarray:
-    """Crank angle (°) of a run's samples, counted from the top dead centre where they begin."""
+    """Crank angle (°) of a run's samples, counted from the top dead centre before they begin."""
     angle = np.degrees(run["crank_angle"].values)
     return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9)
 
 
 def fault_curves(runs: Runs, fault: str, ideal: bool) -> list[Curve]:
     """The curves of 0.1, 0.2 and 0.3 mm, and that of no clearance before them."""
-    curves = [
-        Curve(f"{c:g} mm", settled(runs[label(fault, c)]), BY_CLEARANCE[c]) for c in CLEARANCES
-    ]
-    return [Curve("no clearance", settled(runs["design"]), IDEAL), *curves] if ideal else curves
+    curves = [Curve(f"{c:g} mm", turn(runs[label(fault, c)]), BY_CLEARANCE[c]) for c in CLEARANCES]
+    return [Curve("no clearance", turn(runs["design"]), IDEAL), *curves] if ideal else curves
 
 
 def load_curves(runs: Runs) -> list[Curve]:
     """The curves of the typical and the design model, without clearance."""
-    return [Curve(name, settled(runs[load]), BY_LOAD[load]) for load, name in LOADS.items()]
+    return [Curve(name, turn(runs[load]), BY_LOAD[load]) for load, name in LOADS.items()]
 
 
-def plot(panel: Axes, curves: Sequence[Curve], quantity: Quantity, tick: float = 180.0) -> None:
-    """All curves of one quantity over the whole plotted span; a tick (°) for the crank angle."""
+def turn(run: xr.Dataset) -> xr.Dataset:
+    """The last revolution of a run; of one that has none after settling, all that has settled."""
+    try:
+        return last_revolution(run)[1]
+    except NoSeriesError:
+        return settled(run)
+
+
+def plot(panel: Axes, curves: Sequence[Curve], quantity: Quantity) -> None:
+    """All curves of one quantity over the revolution."""
     for curve in curves:
-        panel.plot(degrees(curve.run), quantity.values(curve.run), **curve.line.properties())
+        panel.plot(
+            degrees(curve.run), quantity.values(curve.run), label=curve.name,
+            **curve.line.properties(),
+        )  # fmt: skip
     angle = degrees(curves[0].run)
     panel.set_xlim(angle[0], angle[-1])
-    panel.xaxis.set_major_locator(MultipleLocator(tick))
+    panel.xaxis.set_major_locator(MultipleLocator(TICK))
     panel.set_title(quantity.title)
     panel.set_ylabel(quantity.axis)
 
 
+def plot_rows(panels: np.ndarray, curves: Sequence[Curve], quantity: Quantity) -> None:
+    """A panel a curve, from the top; the one of no clearance is in all of them."""
+    ideal = [curve for curve in curves if curve.line is IDEAL]
+    worn = [curve for curve in curves if curve.line is not IDEAL]
+    for panel, curve in zip(panels, worn, strict=True):
+        alone = replace(curve, line=replace(curve.line, linestyle="-", linewidth=1.0))
+        plot(panel, [*ideal, alone], quantity)
+        panel.set_title(curve.name)
+    panels[0].set_title(f"{quantity.title}, {worn[0].name}")
+    ends = np.array([panel.get_ylim() for panel in panels])
+    for panel in panels:
+        panel.set_ylim(ends.min(), ends.max())
+        panel.tick_params(labelbottom=panel is panels[-1])
+
+
 def plot_enlarged(
-    full: Axes, enlarged: Axes, curves: Sequence[Curve], quantity: Quantity, part: slice
+    full: Sequence[Axes] | np.ndarray,
+    enlarged: Axes,
+    curves: Sequence[Curve],
+    quantity: Quantity,
+    part: slice,
 ) -> None:
-    """The same curves over a part of the span, which is marked in the full panel."""
+    """The same curves over a part of the span, which is marked in the full panels."""
     plot(enlarged, curves, quantity)
     enlarged.xaxis.set_major_locator(MultipleLocator(10 if quantity.window > 30 else 5))
     angle = degrees(curves[0].run)[part]
@@ -103,13 +133,14 @@ def plot_enlarged(
     low, high = values.min() - margin, values.max() + margin
     enlarged.set_xlim(angle[0], angle[-1])
     enlarged.set_ylim(low, high)
-    bottom, top = full.get_ylim()
+    bottom, top = full[0].get_ylim()
     lift = max(0.0, LEAST_MARK * (top - bottom) - (high - low)) / 2
     low, high = low - lift, high + lift
     room = 0.01 * (top - bottom)
-    full.set_ylim(min(bottom, low - room), max(top, high + room))
-    size = angle[-1] - angle[0], high - low
-    full.add_patch(Rectangle((angle[0], low), *size, fill=False, linewidth=1.1, zorder=3))
+    for panel in full:
+        panel.set_ylim(min(bottom, low - room), max(top, high + room))
+        size = angle[-1] - angle[0], high - low
+        panel.add_patch(Rectangle((angle[0], low), *size, fill=False, linewidth=1.1, zorder=3))
 
 
 def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:

@@ -12,7 +12,9 @@ from compressor.report.figures.curves import (
     load_curves,
     plot,
     plot_enlarged,
+    plot_rows,
 )
+from compressor.report.figures.response import beside, finished
 from compressor.report.figures.style import legend_above, sheet, styled
 
 PISTON = Quantity("piston_force", "", "force on the piston, towards the crank (kN)", KILONEWTON)
@@ -24,7 +26,7 @@ def draw_piston_force(runs: Runs) -> Figure:
     figure, panels = sheet(1, 1, 4.2)
     (panel,) = panels.flat
     curves = load_curves(runs)
-    plot(panel, curves, PISTON, tick=90.0)
+    plot(panel, curves, PISTON)
     panel.set_ylim(bottom=0)
     panel.set_xlabel(ANGLE_AXIS)
     legend_above(figure, [curve.handle() for curve in curves])
@@ -33,28 +35,33 @@ def draw_piston_force(runs: Runs) -> Figure:
 
 @styled
 def draw_contact_force(runs: Runs, fault: str, joint: str) -> Figure:
-    """Figures 9, 12, 15, 16: contact force at one joint, horizontal and vertical.
+    """Figures 9, 12, 15, 16: contact force at one joint, both ways, a row a clearance.
 
-    Both enlarged views show the window in which the horizontal forces differ most.
+    All enlarged views show the window in which the horizontal forces at the fault's first joint
+    differ most, so that those of both joints show the same angles.
     """
-    figure, panels = sheet(2, 2, 7.4, width_ratios=(2, 1), sharex="col")
+    figure, panels = sheet(6, 2, 11.5, width_ratios=(2, 1))
     curves = fault_curves(runs, fault, ideal=False)
-    part, _ = differing_part(curves, contact_force(joint, "x"))
-    for (full, enlarged), axis, letter in zip(panels, "xy", "ab", strict=True):
+    part, _ = differing_part(curves, contact_force(first_joint(fault), "x"))
+    for rows, axis, letter in zip((slice(0, 3), slice(3, 6)), "xy", "ab", strict=True):
         quantity = contact_force(joint, axis)
-        plot(full, curves, quantity, tick=90.0)
-        plot_enlarged(full, enlarged, curves, quantity, part)
-        full.set_title(f"({letter}) {quantity.title}")
+        enlarged = beside(figure, panels, rows)
+        plot_rows(panels[rows, 0], curves, quantity)
+        plot_enlarged(panels[rows, 0], enlarged, curves, quantity, part)
+        top = panels[rows, 0][0]
+        top.set_title(f"({letter}) {top.get_title('left')}")
         enlarged.set_title("enlarged")
         enlarged.set_ylabel("")
-    for panel in panels[-1]:
-        panel.set_xlabel(ANGLE_AXIS)
-    legend_above(figure, [curve.handle() for curve in curves])
-    return figure
+    return finished(figure, [panels[-1, 0], enlarged], curves)
+
+
+def first_joint(fault: str) -> str:
+    """The joint whose forces choose the enlarged view."""
+    return "small_end" if fault == "small_end" else "big_end"
 
 
 def contact_force(joint: str, axis: str) -> Quantity:
     """The force on the rod at a joint along an axis, kN."""
-    title = {"x": "horizontal (along the cylinder)", "y": "vertical"}[axis]
+    title = {"x": "horizontal force on the rod", "y": "vertical force on the rod"}[axis]
     where = (("joint", joint), ("axis", axis))
-    return Quantity("contact_force", title, f"$F_{axis}$ on the rod (kN)", KILONEWTON, where=where)
+    return Quantity("contact_force", title, "force (kN)", KILONEWTON, where=where)

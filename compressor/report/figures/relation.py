@@ -19,21 +19,23 @@ def draw_relation(runs: Runs, joint: str) -> Figure:
     figure, panels = sheet(1, 3, 4.0, sharex=True, sharey=True)
     for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
         run = runs[label(joint, clearance)]
-        scatter(panel, settled(run), joint, BY_CLEARANCE[clearance].color)
+        name = f"{clearance:g} mm"
+        scatter(panel, settled(run), joint, BY_CLEARANCE[clearance].color, name)
         regress(panel, run, joint)
-        panel.set_title(f"({letter}) {clearance:g} mm")
-        panel.set_xlabel("$F_x$ on the rod (kN)")
+        panel.set_title(f"({letter}) {name}")
+        panel.set_xlabel("horizontal force on the rod (kN)")
         panel.margins(x=0.05)
-    panels[0, 0].set_ylabel("a (m/s²)")
+    panels[0, 0].set_ylabel("acceleration (m/s²)")
     return figure
 
 
-def scatter(panel: Axes, run: xr.Dataset, joint: str, color: str) -> None:
+def scatter(panel: Axes, run: xr.Dataset, joint: str, color: str, name: str) -> None:
     """A dot for every stored sample."""
     force = contact_force(joint, "x").values(run)
     panel.plot(
         force,
         run["acceleration"].values,
+        label=name,
         linestyle="none",
         marker="o",
         markersize=2.2,
@@ -49,7 +51,7 @@ def regress(panel: Axes, run: xr.Dataset, joint: str) -> None:
     a = settled(run)["acceleration"].values
     ends = np.array([a.min(), a.max()])
     force = (relation.slope * ends + relation.intercept) * KILONEWTON
-    panel.plot(force, ends, color=BLACK, linewidth=1.1)
+    panel.plot(force, ends, color=BLACK, linewidth=1.1, label="fit")
     r = math.copysign(math.sqrt(relation.r2), relation.slope)
     sign = "−" if relation.intercept < 0 else "+"
     numbers = (
