@@ -1,10 +1,9 @@
 """What a reader of a report must keep in mind, as far as the stored studies give reason to."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from compressor.cases import Case
+from compressor.cases import Case, CaseError
 from compressor.report.page import Section
 from compressor.store import Stored, StoredStudy
 
@@ -27,28 +26,31 @@ class Assumptions:
 def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: bool) -> Section:
     """What to keep in mind of the studies of a store, and of the claims if they are told."""
     default = Case.from_values({}).machine
-    cases = [(study, values) for study in studies if (values := first_case(stored, study))]
+    cases = [(study, case) for study in studies if (case := last_case(stored, study))]
     ours = [
         words.format(getattr(default, mass))
         for mass, words in MASSES.items()
         if any(
-            values["machine"][mass] == getattr(default, mass)
+            getattr(case.machine, mass) == getattr(default, mass)
             and f"machine.{mass}" not in {axis.key for axis in study.axes}
-            for study, values in cases
+            for study, case in cases
         )
     ]
     content = Assumptions(
         ours,
-        any(values["joint"] != "none" for _, values in cases),
-        any(values["load"] == "design" for _, values in cases),
+        any(case.joint != "none" for _, case in cases),
+        any(case.load == "design" for _, case in cases),
         claims,
     )
     return Section("assumptions", "What to keep in mind", "assumptions.html", content)
 
 
-def first_case(stored: Stored, study: StoredStudy) -> dict | None:
-    """The values of a study's last stored job; None where there is none."""
+def last_case(stored: Stored, study: StoredStudy) -> Case | None:
+    """The case of a study's last stored job; None where there is none that this version knows."""
     for position in stored.rows.find([*study.keys])[::-1]:
         if position >= 0:
-            return dict(json.loads(stored.rows.attributes(int(position))["case"]))
+            try:
+                return Case.from_attribute(stored.rows.attributes(int(position))["case"])
+            except CaseError:
+                return None
     return None

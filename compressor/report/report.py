@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compressor.analysis import caption, claims
+from compressor.analysis import caption, case_of, claims
 from compressor.report.answer import (
     Answer,
     Finding,
@@ -21,7 +21,7 @@ from compressor.report.answer import (
     round_robin,
     study_findings,
 )
-from compressor.report.assumptions import assumptions_section
+from compressor.report.assumptions import assumptions_section, last_case
 from compressor.report.diagnosis_section import (
     TITLES,
     diagnosis_drawings,
@@ -40,6 +40,7 @@ from compressor.report.machines_section import (
     machine_files,
     machine_sections,
 )
+from compressor.report.mechanism import mechanism_svg, mechanism_words
 from compressor.report.page import Plate, Section, document
 from compressor.report.paper_runs import PaperRuns, find_paper_runs, is_of_paper
 from compressor.report.paper_sections import missing_sections, paper_sections, spoken
@@ -193,7 +194,16 @@ def summarised(
         worn = ((spoken(name), run) for name, run in paper.stored.items() if name != "typical")
         each.append(("The paper's cases", findings(worn)))
     found = claims(paper.usable) if paper.stored else []
-    return Answer(lines, [*round_robin(each)], found, [])
+    shown = [(f"The last job of {study.name}", last_case(stored, study)) for study in own[:1]]
+    if paper.stored and not shown:
+        name, run = [*paper.stored.items()][-1]
+        shown = [(spoken(name), case_of(run))]
+    pictures = [
+        (mechanism_svg(case), f"{name[0].upper()}{name[1:]}: {mechanism_words(case)}")
+        for name, case in shown
+        if case
+    ]
+    return Answer(lines, [*round_robin(each)], found, pictures)
 
 
 def remove_stale(report: Path, studies: Iterable[str], drawn: set[str]) -> None:

@@ -186,7 +186,8 @@ class Figure {
       if (trace.name && trace.kind !== "map" && !names.has(trace.name)) names.set(trace.name, trace);
     }));
     if (names.size > 1) {
-      names.forEach((trace, name) => head.append(this.entry(name, trace)));
+      const sorted = [...names].sort(([a], [b]) => collator.compare(a, b));
+      sorted.forEach(([name, trace]) => head.append(this.entry(name, trace)));
     }
     const whole = document.createElement("button");
     whole.type = "button";
