@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,6 +56,12 @@ accuracy: install  ## judge promises and error bars on 1,000 other random cases 
 claims: install  ## measure the paper's claims over machines, and what decides them (an hour)
 	$(CAMPAIGN)/measure_claims.py tests/results/claims.json
 
+page: install  ## test the report's page in a browser, measure how it is written and opens (six minutes)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check selenium
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps axe-playwright-python
+	$(BIN)/python -m pytest tests/report/test_browser.py
+	$(CAMPAIGN)/measure_page.py tests/results/page.json
+
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
 	$(CAMPAIGN)/measure_store.py tests/results/store.json
 
@@ -101,7 +107,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: calibration accuracy claims tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
+measurements: calibration accuracy claims page tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the generated tables of the README pages
 	$(BIN)/python tests/page_tables.py

@@ -8,6 +8,9 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+from compsim.screen import one_thread_each
+
+one_thread_each()  # before numpy loads: as the commands do, so that sums are theirs to the bit
 import hypothesis
 import numpy as np
 import pytest

@@ -22,9 +22,9 @@ from chaos.common import (
     contents,
     forked,
     fresh,
+    undrawn,
 )
 from chaos.tally import Tally
-from compressor.report import report
 from compressor.store import writer
 from compressor.store.files import StoreError, StoreWarning
 from compressor.store.reader import open_study, read_store
@@ -87,7 +87,7 @@ class Campaign:
 
     def say(self, reader: str, store: Path, key: str) -> Any:
         """What a command says of a store, and of the job of a key."""
-        report.draw_metrics = report.render = lambda *drawing: b"a drawing"  # takes seconds
+        undrawn()
         words = reader.split()
         if words[0] == "show":
             words.insert(1, key)

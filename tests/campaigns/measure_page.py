@@ -1,0 +1,122 @@
+"""Measure the report's page: how long it takes to write, how large it is, how fast it opens.
+
+    python tests/campaigns/measure_page.py tests/results/page.json [jobs]  (make page)
+
+Of three stores: the paper's eleven cases, a study of 420 jobs over four axes, and one of 100,000
+jobs. Writing is the whole command, in a process of its own; opening is by a headless chromium
+without a network, from the start of the navigation to the end of `load`, and until the first figure
+is interactive. Medians of a few.
+"""
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from measure_accuracy import provenance
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "report"))
+from browsing import browser, lacking, live, wait_for
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = sorted(map(str, (ROOT / "configs").glob("*.yaml")))
+ROUNDS = 3
+FOUR_AXES = """\
+joint: [big_end, small_end]
+clearance_mm: {linspace: [0.06, 0.3, 7]}
+machine: {speed_rpm: {linspace: [200, 700, 6]}, rod_mass_kg: {linspace: [2, 8, 5]}}
+solve: {accuracy: draft}
+output: {keep: metrics}
+"""
+MANY = """\
+joint: both
+clearance_mm: {{linspace: [0.05, 0.3, 50]}}
+machine: {{speed_rpm: {{linspace: [200, 700, {speeds}]}}, rod_mass_kg: {{linspace: [2, 8, 20]}}}}
+solve: {{accuracy: draft, duration_rev: 2}}
+output: {{keep: metrics}}
+"""
+LIBRARY = "plotly.min.js"
+
+
+def main(target, jobs=100_000):
+    if lacking():
+        sys.exit(lacking())
+    found = {**provenance("make page"), "stores": {}}
+    for name, make, rounds in (
+        ("the paper's eleven cases", paper, ROUNDS),
+        ("420 jobs, four axes", four_axes, ROUNDS),
+        (f"{jobs:,} jobs", lambda folder: many(folder, jobs), 1),
+    ):
+        with tempfile.TemporaryDirectory() as folder:
+            make(folder)
+            found["stores"][name] = measured(Path(folder), rounds)
+            print(name, found["stores"][name], flush=True)
+    Path(target).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+def compsim(folder, *words):
+    subprocess.run([sys.executable, "-m", "compsim", *words], cwd=folder, check=True,
+                   capture_output=True)  # fmt: skip
+
+
+def paper(folder):
+    compsim(folder, "run", *CONFIGS)
+
+
+def four_axes(folder):
+    (Path(folder) / "four.yaml").write_text(FOUR_AXES)
+    compsim(folder, "run", "four.yaml")
+
+
+def many(folder, jobs):
+    (Path(folder) / "many.yaml").write_text(MANY.format(speeds=jobs // 1000))
+    compsim(folder, "run", "many.yaml", "--max-jobs", str(jobs))
+
+
+def measured(folder, rounds):
+    """Seconds to write, bytes, and seconds to open."""
+    seconds = []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        compsim(folder, "report")
+        seconds.append(time.perf_counter() - began)
+    files = {path.name: path.stat().st_size for path in (folder / "report").iterdir()}
+    of = {
+        kind: sum(size for name, size in files.items() if name.endswith(kind) and name != LIBRARY)
+        for kind in (".html", ".js", ".csv", ".png", ".svg")
+    }
+    opens = [opened(folder / "report") for _ in range(max(rounds, 2))]
+    loaded, first = (statistics.median(column) for column in zip(*opens, strict=True))
+    return {
+        "write_seconds": round(statistics.median(seconds), 2), "figures": len(
+            [name for name in files if name.endswith(".svg")]
+        ),
+        "page_bytes": of[".html"], "data_bytes": of[".js"], "library_bytes": files[LIBRARY],
+        "csv_bytes": of[".csv"], "picture_bytes": of[".png"] + of[".svg"],
+        "open_seconds": round(loaded, 3), "first_figure_seconds": round(first, 3),
+    }  # fmt: skip
+
+
+def opened(report):
+    """Seconds until the page is loaded, and until its first figure is interactive."""
+    with tempfile.TemporaryDirectory() as profile, browser(profile) as driver:
+        driver.get("about:blank")
+        driver.get(f"file://{report}/index.html")
+        loaded = wait_for(driver, "return performance.timing.loadEventEnd - "
+                                  "performance.timing.navigationStart > 0 && "
+                                  "performance.timing.loadEventEnd - "
+                                  "performance.timing.navigationStart")  # fmt: skip
+        name = driver.execute_script("return document.querySelector('figure')?.id")
+        if name is None:
+            return loaded / 1e3, loaded / 1e3
+        began = driver.execute_script("return performance.now()")
+        live(driver, name)
+        first = driver.execute_script("return performance.now()") - began
+        return loaded / 1e3, first / 1e3
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], *map(int, sys.argv[2:]))
