@@ -1,36 +1,91 @@
 """Reciprocating compressor with joint clearance: cases, simulation, studies.
 
-The public calls: `load_cases(path, ...)` reads case files, `simulate(case)` runs one case,
-`open_study(folder)` opens what a sweep stored. They are imported when first used, since the
-command line must answer `--help` at once. `CompsimError` is the base of all errors that were
-foreseen, `CompsimWarning` that of all warnings.
+Build a case, simulate it, and read a number with its error bar:
+
+>>> import compressor
+>>> case = compressor.Case.from_values({
+...     "joint": "big_end", "clearance_mm": 0.2,
+...     "solve": {"duration_rev": 2, "accuracy": "draft"},
+... })
+>>> run = compressor.simulate(case)
+>>> force = run.peak_contact_force.sel(joint="big_end")
+>>> bar = run.peak_contact_force_error.sel(joint="big_end")
+>>> print(f"{force.item() / 1e3:.1f} kN, surely within {bar.item() / force.item():.0%}")
+
+What a sweep has stored is opened by `open_study`. Case files and `Case` have the units that stand
+in the names of their keys, such as `clearance_mm`; all results are SI. Everything is imported when
+it is first used, since the command line must answer `--help` at once.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from compressor.program import VERSION as __version__
 from compressor.program import CompsimError, CompsimWarning
 
 if TYPE_CHECKING:
-    from compressor.cases import Case, load_cases
+    from compressor.cases import (
+        Body,
+        Case,
+        CaseError,
+        CaseFileError,
+        Contact,
+        Friction,
+        Gas,
+        Machine,
+        Offset,
+        Output,
+        PerJoint,
+        Sensor,
+        Solve,
+        Spring,
+        load_cases,
+    )
     from compressor.solve import simulate
-    from compressor.store import open_study
+    from compressor.store import StoreError, StoreWarning, open_study, read_job
 
 __all__ = [
+    "Body",
     "Case",
+    "CaseError",
+    "CaseFileError",
     "CompsimError",
     "CompsimWarning",
+    "Contact",
+    "Friction",
+    "Gas",
+    "Machine",
+    "Offset",
+    "Output",
+    "PerJoint",
+    "Sensor",
+    "Solve",
+    "Spring",
+    "StoreError",
+    "StoreWarning",
     "__version__",
     "load_cases",
     "open_study",
+    "read_job",
     "simulate",
 ]
 
-HOMES = {"Case": "cases", "load_cases": "cases", "simulate": "solve", "open_study": "store"}
+HOMES = {  # of what is not in `cases`
+    "simulate": "solve",
+    "open_study": "store",
+    "read_job": "store",
+    "StoreError": "store",
+    "StoreWarning": "store",
+}
 
 
-def __getattr__(name: str) -> Any:
-    if name not in HOMES:
-        raise AttributeError(f"module 'compressor' has no attribute {name!r}")
-    return getattr(import_module(f"compressor.{HOMES[name]}"), name)
+def __dir__() -> list[str]:
+    return [*__all__]
+
+
+if not TYPE_CHECKING:  # a type checker would take any name for one of ours
+
+    def __getattr__(name):
+        if name not in __all__:
+            raise AttributeError(f"module 'compressor' has no attribute {name!r}")
+        return getattr(import_module(f"compressor.{HOMES.get(name, 'cases')}"), name)

@@ -95,7 +95,7 @@ class Reason(StrEnum):
         "internal_error",
         "an unexpected exception in the program",
         "a bug of compsim: please report it, with what Python prints for "
-        "compressor.store.read_job(FOLDER, JOB).traceback",
+        "compressor.read_job(FOLDER, JOB).traceback",
     )
 
 

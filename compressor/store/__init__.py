@@ -3,7 +3,7 @@
 from compressor.store.export import Exported, ExportOptions, export
 from compressor.store.files import Folder, StoreError, StoreWarning, make_folder, publish
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.reader import Stored, open_study, read_store
+from compressor.store.reader import Stored, open_study, read_job, read_store
 from compressor.store.series_file import (
     read_dataset,
     series_file,
