@@ -13,7 +13,7 @@ from typing import Any
 from compressor.cases.checked import checked
 from compressor.cases.conditions import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.keys import SWEEP, Leaves, covers, suggestion
+from compressor.cases.keys import Leaves, covers
 from compressor.cases.parameter import Problem, shown
 from compressor.cases.shorthands import row_of, single, stands_for
 from compressor.cases.swept import (
@@ -25,6 +25,7 @@ from compressor.cases.swept import (
     sweep_of,
 )
 from compressor.cases.table import OF_JOINTS, WORDS, outside_identity, table
+from compressor.cases.unknown import SWEEP, suggestion
 from compressor.cases.yaml_reader import FileProblem, Node
 
 MAX_EXCLUSIONS = 20

@@ -4,20 +4,27 @@ import contextlib
 import hashlib
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 from typing import Any
 
 from compressor.cases.accuracy import ACCURACY, Targets, first_rung
 from compressor.cases.checked import checked_part, keys_given
 from compressor.cases.conflicts import conflicts
-from compressor.cases.parameter import CaseError, Problem
-from compressor.cases.shorthands import expanded
+from compressor.cases.parameter import CaseError, Problem, shown
+from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
+from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
+from compressor.cases.unknown import SWEEP, meant
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "2"  # of the equations and the meaning of what is stored; part of a job's identity
+EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
+NO_SWEEP = (
+    "would be swept, and a case has one value of each key: build a case for each, or write a case "
+    "file for load_cases"
+)
 
 
 @dataclass(frozen=True)
@@ -29,17 +36,20 @@ class Case(Settings):
         """Build a case from nested values as in a case file, without lists.
 
         Raises CaseError with everything that is wrong: unknown keys, wrong types, ranges, and
-        values that do not fit each other.
+        values that do not fit each other, in the words that a case file would be told.
         """
         problems: list[Problem] = []
-        values = expanded(values)
-        parts = {key: checked_part(key, value, problems) for key, value in values.items()}
+        if not isinstance(values, Mapping):
+            message = f"needs a mapping of keys, such as {EXAMPLE}, not {shown(values)}"
+            raise CaseError([Problem("", message)])
+        whole = expanded(values)
+        parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
         if problems:
-            raise CaseError(problems)
+            raise CaseError(_as_written(values, _everything_wrong(whole, parts, problems)))
         case = cls(**parts)
-        problems = [*conflicts(case, frozenset(keys_given(values)))]
+        problems = [*conflicts(case, frozenset(keys_given(whole)))]
         if problems:
-            raise CaseError(problems)
+            raise CaseError(_as_written(values, problems))
         vars(case)["problems"] = ()  # known: see `problems`
         return case
 
@@ -168,6 +178,59 @@ class Case(Settings):
         duration: float | str = self.duration if how.duration_rev != "auto" else "auto"
         settle: float | str = self.settle if how.settle_rev != "auto" else "auto"
         return [duration, settle, round(self.steps)]
+
+
+def _everything_wrong(
+    values: Mapping[str, Any], parts: Mapping[str, Any], problems: Sequence[Problem]
+) -> Iterator[Problem]:
+    """What is wrong with values one by one, and what does not fit together in the others.
+
+    A value that would be swept in a case file is told that one case has no sweep.
+    """
+    wrong = set()
+    for problem in problems:
+        key, _, inner = problem.key.rpartition(".")
+        wrong.add(problem.key)
+        if problem.key not in (*table(), *GROUPS):
+            wrong |= {*meant(inner, key)} if key in ("", *GROUPS) else {key}
+        whole = key if inner in FORMS else problem.key
+        value = _value_at(whole, values)
+        if _is_swept(whole, value):
+            wrong.add(whole)
+            problem = Problem(whole, f"{shown(value)} {NO_SWEEP}")
+        yield problem
+    known = {item.name for item in fields(Case)} - wrong
+    rest = Case(**{key: part for key, part in parts.items() if key in known})
+    yield from conflicts(rest, frozenset(keys_given(values)), frozenset(wrong))
+
+
+def _value_at(key: str, values: Mapping[str, Any]) -> Any:
+    """The value of a dotted key in nested values; None where there is none."""
+    group, _, name = key.rpartition(".")
+    within = values.get(group) if group else values
+    return within.get(name) if isinstance(within, Mapping) else None
+
+
+def _is_swept(key: str, value: Any) -> bool:
+    """Whether a case file would sweep a key by this value, or by what stands under it."""
+    if key in SWEEP:
+        return True
+    if isinstance(value, Mapping):
+        return bool({*value} & {*FORMS})
+    many = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+    return (many and key != "contact.materials") or getattr(value, "ndim", 0) > 0
+
+
+def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[Problem]:
+    """Problems of a shorthand's parts as problems of the shorthand, each once."""
+    short = {
+        part: key
+        for key in SHORTHANDS
+        if key in values and not isinstance(values[key], Mapping)
+        for part in stands_for(key)
+    }
+    found = (Problem(short.get(one.key, one.key), one.message) for one in problems)
+    return [*dict.fromkeys(found)]
 
 
 @cache

@@ -6,26 +6,37 @@ from functools import lru_cache
 from typing import Any
 
 from compressor.cases.accuracy import checked_targets
-from compressor.cases.parameter import Problem, shown
+from compressor.cases.parameter import NO_VALUE, Problem
 from compressor.cases.table import GROUPS, WORDS, table
+from compressor.cases.unknown import no_mapping, unknown
+
+PLAIN = (int, float, str)
 
 
 def checked(key: str, value: Any, problems: list[Problem]) -> Any:
-    """A value as its dataclass holds it; what is wrong with it joins `problems`."""
-    row = table()[key]
+    """A value as its dataclass holds it; its default if it is wrong, which joins `problems`."""
+    row, before = table()[key], len(problems)
     if value is None and row.optional:
         return row.default
     if row.kind == "accuracy" and isinstance(value, Mapping):
-        return checked_targets(key, value, problems)
+        targets = checked_targets(key, value, problems)
+        return targets if len(problems) == before else row.default
+    if not isinstance(value, PLAIN):
+        value = _scalar(value)
     message = row.check(value)
     if message:
         problems.append(Problem(key, message))
-        return value
+        return row.default
     if row.kind == "number" and not isinstance(value, str):
         return float(value) + 0.0  # no -0.0: equal cases have one key
     if row.kind == "integer":
         return int(value)
     return tuple(value) if row.kind == "materials" else value
+
+
+def _scalar(value: Any) -> Any:
+    """A scalar of numpy or xarray as Python has it; any other value as it is."""
+    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
 
 
 def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
@@ -37,7 +48,7 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
         if key in WORDS and value is WORDS[key]:
             return GROUPS[key]() if value else None
         if not isinstance(value, Mapping):
-            problems.append(Problem(key, f"needs a mapping of keys, not {shown(value)}"))
+            problems.append(Problem(key, NO_VALUE if value is None else no_mapping(key, value)))
             return None
         try:
             found, wrong = _shared_group(key, tuple((n, v, type(v)) for n, v in value.items()))
@@ -45,8 +56,8 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
             found, wrong = _group(key, value.items())
         problems += wrong
         return found
-    if key not in table():
-        problems.append(Problem(key, "unknown key"))
+    if key not in table() or "." in key:
+        problems.append(Problem(str(key), unknown(str(key), "", file=False)))
         return None
     return checked(key, value, problems)
 
@@ -61,11 +72,15 @@ def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[A
 
 
 def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Problem]]:
+    """A group from its values, the defaults in place of wrong ones, and what is wrong."""
     problems: list[Problem] = []
-    known = {item.name for item in dataclasses.fields(GROUPS[key])}
-    values = dict(items)
-    problems += [Problem(f"{key}.{name}", "unknown key") for name in values if name not in known]
-    good = {n: checked(f"{key}.{n}", v, problems) for n, v in values.items() if n in known}
+    fields = {item.name for item in dataclasses.fields(GROUPS[key])}
+    good = {}
+    for name, value in items:
+        if name in fields:
+            good[name] = checked(f"{key}.{name}", value, problems)
+        else:
+            problems.append(Problem(f"{key}.{name}", unknown(str(name), key)))
     return GROUPS[key](**good), problems
 
 

@@ -16,10 +16,10 @@ import warnings
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from compressor.cases.keys import suggestion
 from compressor.cases.parameter import Parameter, shown
 from compressor.cases.shorthands import row_of
 from compressor.cases.swept import is_number
+from compressor.cases.unknown import suggestion
 from compressor.cases.yaml_reader import resolved, shortened
 
 MAX_LENGTH = 1000  # characters

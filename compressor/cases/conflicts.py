@@ -1,11 +1,14 @@
 """What does not fit together in a case whose values are each in range."""
 
+import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, cast
 
 from compressor.cases.one_way import back_action, moving_mass
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
-from compressor.cases.table import Settings, table
+from compressor.cases.table import GROUPS, Settings, table
 from compressor.metrics import AXES, JOINTS
 
 # One key, and the other whose place it takes; a case gives one of the two.
@@ -20,32 +23,91 @@ MOST_BACK = 0.3  # of a force that a body's motion may change at the speed's fir
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
-def conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Everything in a case that does not fit together; `given`: the dotted keys set by hand."""
-    yield from _inertia_conflicts(case)
-    yield from _geometry_conflicts(case)
-    yield from _clearance_conflicts(case, given)
-    yield from _choice_conflicts(given)
-    yield from _load_conflicts(case)
-    yield from _time_conflicts(case)
-    yield from _body_conflicts(case)
+# keys that a case fills in where others are not given or not used, and those that decide it
+FILLED_IN = {
+    "machine.rod_centre_mm": ("machine.rod_length_mm",),
+    "machine.rod_inertia_kg_m2": ("machine.rod_mass_kg", "machine.rod_length_mm"),
+    **{f"clearance_mm.{joint}": ("joint",) for joint in JOINTS},
+}
+
+
+def conflicts(
+    case: Settings, given: frozenset[str], wrong: frozenset[str] = frozenset()
+) -> Iterator[Problem]:
+    """Everything in a case that does not fit together; `given`: the dotted keys set by hand.
+
+    Where some keys, or whole groups, are `wrong`, the case holds defaults in their place, and
+    what does not fit is told of the others alone.
+    """
+    if not wrong:
+        for rule in RULES:
+            yield from rule(case, given)
+        return
+    known = cast(Settings, _Known(case, _undecided(wrong)))
+    for rule in RULES:
+        with contextlib.suppress(_Unknown):
+            yield from rule(known, given)
+
+
+def _undecided(wrong: frozenset[str]) -> frozenset[str]:
+    """The keys of which nothing is known where some are wrong: these, and what they decide."""
+    filled_in = {key for key, by in FILLED_IN.items() if wrong & {*by, "machine"}}
+    rivals = {pair[not place] for pair in IN_PLACE_OF for place in (0, 1) if pair[place] in wrong}
+    return wrong | filled_in | rivals
+
+
+class _Unknown(Exception):
+    """Ends a rule that reads what is wrong."""
+
+
+class _Known:
+    """A case, or a group of one, of which some values are wrong: to read those raises _Unknown."""
+
+    def __init__(self, values: Any, wrong: frozenset[str], prefix: str = ""):
+        self._values, self._wrong, self._prefix = values, wrong, prefix
+
+    def __getattr__(self, name: str) -> Any:
+        key = self._prefix + name
+        if key in self._wrong:
+            raise _Unknown(key)
+        made = getattr(type(self._values), name, None)
+        if isinstance(made, property) and made.fget:
+            return made.fget(self)
+        value = getattr(self._values, name)
+        return _Known(value, self._wrong, f"{key}.") if name in GROUPS and value else value
+
+
+def _output_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     if case.output.signals and case.output.keep != "series":
         yield Problem("output.signals", "are time series: they need output.keep: series")
-    if case.contact.materials is not None and case.contact.exponent != 1.5:
-        yield Problem("contact.exponent", "Eq. 15's stiffness from materials needs exponent 1.5")
-    if case.contact.geometry is not None and case.contact.materials is None:
+
+
+def _contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    contact = case.contact
+    if contact.geometry is not None and contact.materials is None:
         yield Problem(
             "contact.geometry",
             "is that of the stiffness that contact.materials give: add materials: [steel, steel]",
         )
-    friction = case.friction
-    if friction and friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
+    if contact.materials is not None and contact.exponent != 1.5:
         yield Problem(
-            "friction.friction_velocity_mm_per_s", "must exceed the stiction_velocity_mm_per_s"
+            "contact.exponent",
+            f"is {contact.exponent:g}, but Eq. 15's stiffness from materials needs exponent 1.5: "
+            "leave it out, or give stiffness_N_per_mm15 in place of materials",
         )
 
 
-def _body_conflicts(case: Settings) -> Iterator[Problem]:
+def _friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    friction = case.friction
+    if friction and friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
+        yield Problem(
+            "friction.friction_velocity_mm_per_s",
+            f"{friction.friction_velocity_mm_per_s:g} mm/s must exceed the "
+            f"stiction_velocity_mm_per_s, {friction.stiction_velocity_mm_per_s:g} mm/s",
+        )
+
+
+def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     """What a body and its sensor need; one that would move the machine back is refused."""
     body, sensor = case.body, case.sensor
     if sensor is not None and body is None:
@@ -95,7 +157,7 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
             )
 
 
-def _inertia_conflicts(case: Settings) -> Iterator[Problem]:
+def _inertia_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     """A default inertia may leave the range that a given one must keep."""
     key = "machine.rod_inertia_kg_m2"
     message = table()[key].check(case.machine.rod_inertia_kg_m2)
@@ -103,7 +165,7 @@ def _inertia_conflicts(case: Settings) -> Iterator[Problem]:
         yield Problem(key, f"m L^2 / 12 of the rod: {message}")
 
 
-def _geometry_conflicts(case: Settings) -> Iterator[Problem]:
+def _geometry_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     machine, play = case.machine, _play(case)
     if machine.crank_radius_mm + play >= machine.rod_length_mm:
         loose = f" and {play:g} mm of clearance" if play else ""
@@ -113,41 +175,52 @@ def _geometry_conflicts(case: Settings) -> Iterator[Problem]:
             f"{machine.rod_length_mm:g} mm, or the mechanism locks",
         )
     if (machine.rod_centre_mm or 0) > machine.rod_length_mm:
-        yield Problem("machine.rod_centre_mm", "the mass centre lies beyond the rod's small end")
+        yield Problem(
+            "machine.rod_centre_mm",
+            f"{machine.rod_centre_mm:g} mm: the mass centre lies beyond the rod's small end, at "
+            f"{machine.rod_length_mm:g} mm",
+        )
 
 
-def _clearance_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    pin = case.machine.pin_radius_mm
-    keys = {joint: f"clearance_mm.{joint}" for joint in JOINTS}
-    for joint, key in keys.items():
-        clearance = getattr(case.clearance_mm, joint)
-        if case.joint in (joint, "both") and key not in given:
-            yield Problem(key, f"is needed with joint: {case.joint}")
-        if clearance > pin:
-            yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm")
-        shift = math.hypot(*(getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy"))
-        if 0 < clearance < shift - IMPLAUSIBLE * pin:
-            yield Problem(
-                f"initial_offset_mm.{joint}_x",
-                f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
-                f"more than a tenth of the pin radius; lower it, or raise {key}",
-            )
-    if case.joint == "none" and given & {*keys.values()}:
+def _clearance_conflicts(case: Settings, given: frozenset[str], joint: str) -> Iterator[Problem]:
+    clearance, pin = getattr(case.clearance_mm, joint), case.machine.pin_radius_mm
+    key = f"clearance_mm.{joint}"
+    if clearance > pin:
+        yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it")
+    shift = math.hypot(*(getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy"))
+    if 0 < clearance < shift - IMPLAUSIBLE * pin:
+        yield Problem(
+            f"initial_offset_mm.{joint}_x",
+            f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
+            f"more than a tenth of the pin radius; lower it, or raise {key}",
+        )
+
+
+def _missing_clearance(case: Settings, given: frozenset[str], joint: str) -> Iterator[Problem]:
+    key = f"clearance_mm.{joint}"
+    worn = case.joint in (joint, "both")
+    if worn and not getattr(case.clearance_mm, joint) and key not in given:
+        yield Problem(key, f"is needed with joint: {case.joint}; give it in mm, such as 0.2")
+
+
+def _joint_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    if case.joint == "none" and given & {f"clearance_mm.{joint}" for joint in JOINTS}:
         yield Problem("clearance_mm", "has no joint to be at; set joint, or leave it out")
 
 
-def _choice_conflicts(given: frozenset[str]) -> Iterator[Problem]:
+def _choice_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     for one, other in IN_PLACE_OF:
         if one in given and other in given:
             yield Problem(one, f"stands in place of {other}: give one of the two")
 
 
-def _load_conflicts(case: Settings) -> Iterator[Problem]:
+def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     machine, gas = case.machine, case.gas
     if case.load == "design" and case.spring.stroke_mm >= 2 * machine.crank_radius_mm:
         yield Problem(
             "spring.stroke_mm",
-            f"must be less than the piston's stroke, {2 * machine.crank_radius_mm:g} mm",
+            f"{case.spring.stroke_mm:g} mm must be less than the piston's stroke, "
+            f"{2 * machine.crank_radius_mm:g} mm",
         )
     if case.load != "typical":
         return
@@ -156,10 +229,13 @@ def _load_conflicts(case: Settings) -> Iterator[Problem]:
         yield Problem(
             "gas.head_clearance_mm",
             f"{gas.head_clearance_mm:g} mm does not exceed the clearances, {play:g} mm in all: the "
-            "piston would reach the cylinder head, where the gas force has no bound",
+            "piston would reach the cylinder head, where the gas force has no bound; raise it",
         )
     if gas.discharge_MPa <= gas.suction_MPa:
-        yield Problem("gas.discharge_MPa", "must exceed suction_MPa")
+        yield Problem(
+            "gas.discharge_MPa",
+            f"{gas.discharge_MPa:g} MPa must exceed suction_MPa, {gas.suction_MPa:g} MPa",
+        )
     elif gas.switching == "exact":
         full = 2 * machine.crank_radius_mm + gas.head_clearance_mm
         growth = (gas.discharge_MPa / gas.suction_MPa) ** (1 / gas.exponent)
@@ -195,17 +271,19 @@ def _gas_geometry(case: Settings) -> tuple[float, ...]:
     )
 
 
-def _time_conflicts(case: Settings) -> Iterator[Problem]:
+def _time_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     solve = case.solve
     span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
     step_key = "solve.output_step_s" if solve.output_step_s is not None else "solve.output_step_deg"
     if not case.steps <= 1e8:  # which may be inf, or nan
-        yield Problem(step_key, f"makes {case.steps:.3g} samples; at most 1e8")
+        yield Problem(step_key, f"makes {case.steps:.3g} samples; at most 1e8: lengthen it")
     elif round(case.steps) < 1:
-        yield Problem(step_key, "is longer than the duration")
+        yield Problem(step_key, f"is longer than the duration, {case.duration:g} s: shorten it")
     elif abs(case.steps - round(case.steps)) > 1e-6 * max(1.0, 1e-3 * case.steps):
         yield Problem(
-            step_key, f"the duration is {case.steps:.6g} output steps, not a whole number of them"
+            step_key,
+            f"the duration is {case.steps:.6g} output steps, not a whole number of them: "
+            "choose a step that divides it",
         )
     if solve.settle_rev == "auto" and case.duration < SETTLING_REV * case.turn * (1 - 1e-12):
         text = f"auto compares {SETTLING_REV:g} revolutions; lengthen {span_key}"
@@ -222,3 +300,13 @@ def _time_conflicts(case: Settings) -> Iterator[Problem]:
             f"{solve.settle_rev:g} revolutions leave nothing of a run of {revolutions:g}; "
             f"lengthen {span_key}, or shorten settle_rev",
         )
+
+
+Rule = Callable[[Settings, frozenset[str]], Iterator[Problem]]
+RULES: tuple[Rule, ...] = (
+    _inertia_conflicts, _geometry_conflicts, _joint_conflicts,
+    *(partial(rule, joint=joint) for joint in JOINTS
+      for rule in (_missing_clearance, _clearance_conflicts)),
+    _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts, _output_conflicts,
+    _contact_conflicts, _friction_conflicts,
+)  # fmt: skip

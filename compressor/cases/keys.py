@@ -1,30 +1,20 @@
 """Values by dotted key: of a case file's tree, of `key=value` texts, of blocks, one over another.
 
-An unknown key is told what was probably meant.
+An unknown key is told what was probably meant (`unknown`).
 """
 
-import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.parameter import shown
 from compressor.cases.shorthands import SHORTHANDS, stands_for
 from compressor.cases.swept import FORMS
-from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, table
+from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
+from compressor.cases.unknown import MAPPINGS, known, no_mapping, unknown
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shortened
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
-# keys of a case file that are no part of a case: how values are swept together
-SWEEP = ("sample", "zip", "exclude", "blocks", "regimes")
-MAPPINGS = {  # of these, what stands in them
-    "sample": ("n", "seed"),
-    "regimes": (
-        "over", "from", "to", "n", "log", "direction", "section_deg", "settle_rev", "measure_rev",
-        "exponent",
-    ),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -50,13 +40,10 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
             for inner, item in _known(name, node, problems):
                 found.values[f"{name}.{inner}"] = item
                 found.places[f"{name}.{inner}"] = item.key_place
-        elif name in WORDS and node.value is not WORDS[name]:
-            word = shown(WORDS[name])
-            message = f"needs {word} or a mapping of keys, not {shown(node.plain())}"
-            problems.append(FileProblem(node.place, name, message))
-        elif (name in GROUPS or name in MAPPINGS) and name not in (*WORDS, *SHORTHANDS):
-            message = f"needs a mapping of keys, not {shown(node.plain())}"
-            problems.append(FileProblem(node.place, name, message))
+        elif name in SHORTHANDS or (name in WORDS and node.value is WORDS[name]):
+            found.values[name] = node
+        elif name in GROUPS or name in MAPPINGS:
+            problems.append(FileProblem(node.place, name, no_mapping(name, node.plain())))
         else:
             found.values[name] = node
     return found
@@ -71,56 +58,12 @@ def _is_sweep(name: str, node: Node) -> bool:
 def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tuple[str, Node]]:
     """The entries of a group (or, for "", of a file) that it may hold and that have a value."""
     for name, item in node.value.items():
-        if name not in _allowed(group):
-            hint = suggestion(name, group) if len(problems) < MAX_SUGGESTIONS else ""
+        if name not in known(group):
+            message = unknown(name, group) if len(problems) < MAX_SUGGESTIONS else "unknown key"
             key = f"{group}.{name}" if group else name
-            problems.append(FileProblem(item.key_place, key, "unknown key" + hint))
+            problems.append(FileProblem(item.key_place, key, message))
         elif item.value is not None:
             yield name, item
-
-
-def _allowed(group: str) -> list[str]:
-    if group in MAPPINGS:
-        return [*MAPPINGS[group]]
-    names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
-    return names if group else [*names, *SWEEP]
-
-
-def suggestion(name: str, group: str) -> str:
-    """The end of an error about an unknown key: what was probably meant, if anything."""
-    if name in table():
-        outer, _, inner = name.partition(".")
-        return f"; write {inner} inside {outer}"
-    if name.partition(":")[0] in _allowed(group):
-        return "; put a space after the colon"
-    near = _nearest(name, _allowed(group), cutoff=0.6)
-    if near:
-        return f"; did you mean {group}.{near}?" if group else f"; did you mean {near}?"
-    near = _nearest(name, [_leaf(key) for key in table()], cutoff=0.8)
-    meant = [key for key in table() if _leaf(key) == near]
-    return f"; did you mean {' or '.join(meant)}?" if meant else ""
-
-
-def _leaf(key: str) -> str:
-    return key.rpartition(".")[2]
-
-
-def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
-    """The allowed key with another unit, or else the one most alike."""
-    stems = {_stem(key): key for key in reversed(allowed)}
-    for stem in sorted(stems, key=len, reverse=True):
-        if stem != stems[stem] and f"{name}_".startswith(f"{stem}_"):
-            return stems[stem]
-    return next(iter(get_close_matches(name, allowed, n=1, cutoff=cutoff)), None)
-
-
-def _stem(name: str) -> str:
-    """A key's name without its unit."""
-    for row in table().values():
-        if _leaf(row.key) == name and row.unit:
-            unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")
-            return name.removesuffix(f"_{unit}")
-    return name
 
 
 def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[str, Leaves]:

@@ -7,12 +7,18 @@
 import math
 import re
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Any
+
+from compressor.program import CompsimError
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
+NO_VALUE = "has no value; leave the key out to get its default"
+# a number that is written as text, with a comma or a unit
+WRITTEN = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
 # case-file unit -> (SI unit, numerator, denominator): SI value = value * numerator / denominator
 UNITS = {
@@ -43,18 +49,24 @@ class Problem:
     key: str
     message: str
 
+    def __str__(self) -> str:
+        return f"{self.key}: {self.message}" if self.key else self.message
 
-class CaseError(ValueError):
+
+class CaseError(CompsimError, ValueError):
     """A case that cannot be simulated; `problems` lists everything that is wrong with it."""
 
-    def __init__(self, problems: list[Problem]):
+    exit_code = 2
+
+    def __init__(self, problems: Sequence[Problem]):
         self.problems = problems
         super().__init__(problems)
 
     def __str__(self) -> str:
-        return "; ".join(f"{p.key}: {p.message}" for p in self.problems)
+        return "\n".join(map(str, self.problems))
 
 
+MOST_WORD = 100  # characters that are looked at to find what was meant
 SHORT = reprlib.Repr()
 SHORT.maxstring = SHORT.maxother = SHORT.maxlong = 60
 
@@ -105,43 +117,76 @@ class Parameter:
         opening = "(" if self.above else "["
         return " | ".join([*self.choices, f"{opening}{self.low:g}, {self.high:g}]"])
 
+    @property
+    def needed(self) -> str:
+        """The allowed values in words, with their unit."""
+        words = listed(self.choices)
+        if self.kind == "choice":
+            return words
+        if self.kind == "boolean":
+            return listed([*self.choices, "true", "false"])
+        if self.kind == "accuracy":
+            return f"{words}, or errors by metric such as {{peak_acceleration: 0.01}}"
+        if self.kind == "materials":
+            return f"a pair of materials, {words}, such as [steel, steel]"
+        if self.kind == "text":
+            return "text"
+        span = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
+        number = "a whole number" if self.kind == "integer" else "a number"
+        return " or ".join([*self.choices, f"{number} in {span} {self.unit}".strip()])
+
     def check(self, value: Any) -> str | None:
         """What is wrong with a scalar value of this parameter, or None."""
-        if self.kind in ("choice", "text", "accuracy"):
-            return self._check_text(value)
+        if value is None:
+            return NO_VALUE
+        if self.kind == "text":
+            return self._check_name(value)
         if self.kind == "materials":
-            return self._check_materials(value)
+            good = isinstance(value, tuple | list) and len(value) == 2
+            bad = [name for name in value if name not in self.choices] if good else []
+            return self._refused(value, bad[0] if bad else None) if bad or not good else None
         if isinstance(value, str) and value in self.choices:
             return None
+        if self.kind in ("choice", "accuracy"):
+            return self._refused(value, value)
         if self.kind == "boolean":
-            words = ", ".join([*self.choices, "true"])
-            good = isinstance(value, bool)
-            return None if good else f"needs {words} or false, not {shown(value)}"
+            return None if isinstance(value, bool) else self._refused(value, value)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            return f"needs {' or '.join([*self.choices, 'a number'])}, not {shown(value)}"
+            return self._refused(value, value)
         if not _is_finite(value):
-            return "must be finite"
+            return f"must be finite: {self._refused(value)}"
         if self.kind == "integer" and value != int(value):
-            return f"needs a whole number, not {value!r}"
+            return self._refused(value)
         if value < self.low or value > self.high or (self.above and value == self.low):
             return f"{value:g} is outside {self.range}" + (f" {self.unit}" if self.unit else "")
         return None
 
-    def _check_text(self, value: Any) -> str | None:
-        if not isinstance(value, str):
-            return f"needs text, not {shown(value)}"
-        if self.kind == "text":
-            good = NAME.fullmatch(value) and not value.startswith(".")
-            return None if good else f"{shown(value)} is no name: use {self.range}, no leading dot"
-        return None if value in self.choices else f"{shown(value)} is none of {self.range}"
+    def _refused(self, value: Any, word: Any = None) -> str:
+        """The error of a value of another kind; `word`: what may be a choice that is misspelt."""
+        message = f"needs {self.needed}, not {shown(value)}"
+        if not isinstance(word, str):
+            return message
+        lower = {choice.lower(): choice for choice in (*self.choices, "true", "false")}
+        near = get_close_matches(word[:MOST_WORD].lower(), lower, n=1)
+        if near and lower[near[0]] in self.needed:
+            return f"{message}; did you mean {lower[near[0]]}?"
+        if self.kind in ("number", "integer") and (number := WRITTEN.fullmatch(word[:MOST_WORD])):
+            plain, comma, unit = number[1].replace(",", "."), number[2] == ",", number[3]
+            if unit and unit != self.unit:
+                return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
+            return f"{message}; write {plain}" + ("" if comma or unit else " without quotes")
+        return message
 
-    def _check_materials(self, value: Any) -> str | None:
-        if not isinstance(value, tuple | list) or len(value) != 2:
-            return "needs a pair of materials, such as [steel, steel]"
-        bad = [name for name in value if name not in self.choices]
-        if not bad:
-            return None
-        return f"unknown material {shown(bad[0])}; known: {', '.join(self.choices)}"
+    def _check_name(self, value: Any) -> str | None:
+        if not isinstance(value, str):
+            return self._refused(value)
+        good = NAME.fullmatch(value) and not value.startswith(".")
+        return None if good else f"{shown(value)} is no name: use {self.range}, no leading dot"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words as a sentence lists them: a, b or c."""
+    return " or ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
 def _is_finite(value: float) -> bool:

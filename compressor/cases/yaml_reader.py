@@ -14,6 +14,8 @@ from typing import Any
 
 import yaml
 
+from compressor.cases.parameter import NO_VALUE
+
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 20
 MAX_PARTS = 50_000  # keys, values and brackets, which take a second
@@ -226,7 +228,7 @@ class _Builder:
     def scalar(self, event: Any, key: str) -> Any:
         value = resolved(event.value) if event.style is None else event.value
         if value is None:
-            self.note(event, key, "has no value; leave the key out to get its default")
+            self.note(event, key, NO_VALUE)
         return value
 
     def sequence(self, key: str, depth: int) -> list[Node]:

@@ -78,7 +78,7 @@ def run_scene(task: tuple[int, int, Budget]) -> Row:
         return row | {
             "verdict": "failed",
             "reason": str(Reason.INVALID_INPUT),
-            "detail": str(error),
+            "detail": "; ".join(map(str, error.problems)),
         }
     began = time.perf_counter()
     result = judge(case)

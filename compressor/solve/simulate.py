@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import MODEL_VERSION, Case, CaseError
+from compressor.cases import MODEL_VERSION, Case
 from compressor.metrics import SERIES
 from compressor.outcome import ROW, Outcome, Table, without_run
 from compressor.physics import FLOWS, STATE_NAMES
@@ -60,7 +60,8 @@ def measure(case: Case) -> Outcome:
 
 def refused(case: Case) -> Outcome:
     """The outcome of a case that no case file could ask for."""
-    return without_run(case.attributes(), Reason.INVALID_INPUT, str(CaseError([*case.problems])))
+    detail = "; ".join(map(str, case.problems))
+    return without_run(case.attributes(), Reason.INVALID_INPUT, detail)
 
 
 def series(case: Case, solution: Solution) -> dict[str, tuple]:
