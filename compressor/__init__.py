@@ -10,11 +10,12 @@ Build a case, simulate it, and read a number with its error bar:
 >>> run = compressor.simulate(case)
 >>> force = run.peak_contact_force.sel(joint="big_end")
 >>> bar = run.peak_contact_force_error.sel(joint="big_end")
->>> print(f"{force.item() / 1e3:.1f} kN, surely within {bar.item() / force.item():.0%}")
+>>> print(f"{force / 1e3:.2f} kN, known to {100 * bar / force:.2f} %")
+8.81 kN, known to 0.04 %
 
 What a sweep has stored is opened by `open_study`. Case files and `Case` have the units that stand
-in the names of their keys, such as `clearance_mm`; all results are SI. Everything is imported when
-it is first used, since the command line must answer `--help` at once.
+in the names of their keys, such as `clearance_mm`; all results are SI. Names are imported when they
+are first used.
 """
 
 from importlib import import_module

@@ -13,7 +13,15 @@ COMPILED = Path(__file__).parent / "physics"  # the sources that are compiled
 class CompsimError(Exception):
     """An error that was foreseen: its text says what is wrong and what to do about it.
 
-    exit_code: what the command line ends with; prefix: what it prints before the text.
+    The base of CaseError, CaseFileError, StoreError and all others. exit_code: what the command
+    line ends with; prefix: what it prints before the text.
+
+    >>> import compressor
+    >>> try:
+    ...     compressor.open_study("nowhere")
+    ... except compressor.CompsimError as error:
+    ...     print(error.exit_code, type(error).__name__)
+    5 StoreError
     """
 
     exit_code = 1
@@ -21,7 +29,15 @@ class CompsimError(Exception):
 
 
 class CompsimWarning(UserWarning):
-    """What was asked for and is not there; the program goes on without it."""
+    """What was asked for and is not there; the program goes on without it.
+
+    The base of StoreWarning and all others. To stop at any of them:
+
+    >>> import warnings
+    >>> import compressor
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", compressor.CompsimWarning)
+    """
 
 
 def library_versions(*names: str) -> dict[str, str]:

@@ -3,16 +3,8 @@
 from compressor.cases.accuracy import ACCURACY, TIGHTEST
 from compressor.cases.case import MODEL_VERSION, Case
 from compressor.cases.examples import example
-from compressor.cases.json_schema import case_schema
-from compressor.cases.load import CaseFileError, load_cases, load_studies
-from compressor.cases.materials import contact_stiffness
-from compressor.cases.one_way import back_action
-from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
-from compressor.cases.regimes import Regimes
-from compressor.cases.shorthands import row_of, value_in
-from compressor.cases.study import Axis, Study, points
-from compressor.cases.swept import design
-from compressor.cases.table import (
+from compressor.cases.file_error import CaseFileError
+from compressor.cases.groups import (
     METHODS,
     Contact,
     Friction,
@@ -23,7 +15,16 @@ from compressor.cases.table import (
     PerJoint,
     Solve,
     Spring,
-    table,
 )
+from compressor.cases.json_schema import case_schema
+from compressor.cases.load import load_cases, load_studies
+from compressor.cases.materials import contact_stiffness
+from compressor.cases.one_way import back_action
+from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
+from compressor.cases.regimes import Regimes
+from compressor.cases.shorthands import row_of, value_in
+from compressor.cases.study import Axis, Study, points
+from compressor.cases.swept import design
+from compressor.cases.table import table
 from compressor.cases.vibration import Body, Sensor
 from compressor.cases.yaml_reader import printable

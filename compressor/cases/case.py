@@ -29,14 +29,45 @@ NO_SWEEP = (
 
 @dataclass(frozen=True)
 class Case(Settings):
-    """One fully resolved simulation, in the case file's units."""
+    """One fully resolved simulation: every value of a case file, in the case file's units.
+
+    `Case.from_values` makes a valid one. `name` (of the study), `load` (design, typical or none)
+    and `joint` (none, big_end, small_end or both) are words. The groups are `clearance_mm`
+    (PerJoint), `initial_offset_mm` (Offset), `machine`, `gas`, `spring`, `contact`, `friction`,
+    `body`, `sensor`, `solve` and `output`, each of the class of that name; friction, body and
+    sensor may be None. A case never changes; `dataclasses.replace` makes another:
+
+    >>> from dataclasses import replace
+    >>> import compressor
+    >>> case = compressor.Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
+    >>> case.machine.speed_rpm, case.clearance_mm.big_end
+    (500.0, 0.2)
+    >>> fast = replace(case, machine=replace(case.machine, speed_rpm=700))
+    >>> fast.key == case.key
+    False
+    >>> fast.problems  # what is made without from_values is checked when it is asked for
+    ()
+    """
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> "Case":
-        """Build a case from nested values as in a case file, without lists.
+        """Build a case from nested values as in a case file, without sweeps.
 
-        Raises CaseError with everything that is wrong: unknown keys, wrong types, ranges, and
-        values that do not fit each other, in the words that a case file would be told.
+        values: words, numbers (also those of numpy) and, by group, mappings, in the units that
+        stand in the keys. What is left out has its default; `help(compressor.Machine)` and the like
+        tell defaults, ranges and sources.
+
+        Raises CaseError with everything that is wrong at once: unknown keys, wrong types, ranges,
+        and values that do not fit each other, in the words that a case file would be told.
+
+        >>> import compressor
+        >>> case = compressor.Case.from_values({
+        ...     "joint": "both",
+        ...     "clearance_mm": {"big_end": 0.1, "small_end": 0.2},
+        ...     "machine": {"speed_rpm": 700, "rod_mass_kg": 3},
+        ... })
+        >>> case.machine.speed_rpm
+        700.0
         """
         problems: list[Problem] = []
         if not isinstance(values, Mapping):
@@ -55,7 +86,17 @@ class Case(Settings):
 
     @cached_property
     def problems(self) -> tuple[Problem, ...]:
-        """What is wrong with a case that was made without `from_values`, which would raise it."""
+        """What is wrong with a case that was made without `from_values`; () if nothing is.
+
+        Each problem has the dotted `key` and the `message` that `from_values` would raise. A run
+        of such a case fails as invalid_input, and simulates nothing.
+
+        >>> import compressor
+        >>> case = compressor.Case(spring=compressor.Spring(stroke_mm=300))
+        >>> for problem in case.problems:
+        ...     print(problem)
+        spring.stroke_mm: 300 mm must be less than the piston's stroke, 240 mm
+        """
         try:
             Case.from_values(self.values())
         except CaseError as error:
@@ -88,11 +129,28 @@ class Case(Settings):
 
     @classmethod
     def from_attribute(cls, text: str) -> "Case":
-        """The case of a stored dataset, from its `case` attribute (JSON of `values`)."""
+        """The case of a stored Dataset, from its attribute `case` (JSON of `values`).
+
+        Raises CaseError where this version of the program has no such case, ValueError where the
+        text is no JSON.
+
+        >>> import compressor
+        >>> case = compressor.Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
+        >>> compressor.Case.from_attribute(case.attributes()["case"]) == case
+        True
+        """
         return cls.from_values(json.loads(text))
 
     def values(self) -> dict[str, Any]:
-        """The case as plain nested values; `from_values` reads them back to an equal case."""
+        """The case as plain nested values; `from_values` reads them back to an equal case.
+
+        >>> import compressor
+        >>> case = compressor.Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
+        >>> case.values()["clearance_mm"]
+        {'big_end': 0.2, 'small_end': 0.0}
+        >>> compressor.Case.from_values(case.values()) == case
+        True
+        """
         plain: dict[str, Any] = {"name": self.name, "load": self.load, "joint": self.joint}
         for name in GROUPS:
             group = getattr(self, name)
@@ -125,7 +183,7 @@ class Case(Settings):
 
     @property
     def promise(self) -> float:
-        """The relative L2 error of acceleration that `accuracy` promises; inf: none is named."""
+        """The relative L2 error of acceleration that `accuracy` promises; inf: none is promised."""
         word = self.solve.accuracy
         named = isinstance(word, str) and self.solve.rtol is None
         return ACCURACY[str(word)].promise if named else math.inf
@@ -142,12 +200,16 @@ class Case(Settings):
 
     @cached_property
     def physics_key(self) -> str:
-        """Hash of what is simulated: the resolved physics and span, not how it is solved."""
+        """Hash of what is simulated, 20 hexadecimal digits: physics and span, not the solver."""
         return _digest(self._identity(with_solver=False))
 
     @cached_property
     def key(self) -> str:
-        """The job's identity: a hash of the resolved physics and solve settings and the model."""
+        """The job's identity, 20 hexadecimal digits: a hash of physics, solver and model version.
+
+        Equal keys have equal results, and a store holds each once. Name, output, time limit and
+        error bars are no part of it.
+        """
         return _digest(self._identity(with_solver=True))
 
     def attributes(self) -> dict[str, Any]:

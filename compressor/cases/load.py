@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from compressor.cases import blocks, regimes
 from compressor.cases.case import Case
 from compressor.cases.conditions import NoComparison, Test, comparison
+from compressor.cases.file_error import CaseFileError
 from compressor.cases.keys import Leaves, leaves, merged, overridden, read_overrides
 from compressor.cases.parameter import CaseError, Problem
 from compressor.cases.regimes import GROUP, Regimes
@@ -27,26 +28,11 @@ from compressor.cases.study import Axis, Cases, Study, nested
 from compressor.cases.swept import SAMPLED, counted
 from compressor.cases.table import table
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, resolved, shortened
-from compressor.program import CompsimError
 
 MAX_JOBS = 10_000
 MAX_KEPT = 100_000  # cases of a study that stay in memory, each 1 kB
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
-
-
-class CaseFileError(CompsimError, ValueError):
-    """Case files that cannot be read; `problems` lists everything wrong, each with its place."""
-
-    exit_code = 2
-    prefix = ""  # each line begins with the file that it is about
-
-    def __init__(self, problems: Sequence[FileProblem]):
-        self.problems = sorted(set(problems))
-        super().__init__(self.problems)
-
-    def __str__(self) -> str:
-        return "\n".join(map(str, self.problems))
 
 
 @dataclass(frozen=True)
@@ -72,7 +58,20 @@ class _Built(NamedTuple):
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
     """The cases of YAML case files, in the order of the files and of their axes.
 
+    A list of values in a file is an axis, and axes multiply; `configs/README.md` tells every key.
     Raises CaseFileError with everything that is wrong in all files, each with its place.
+
+    >>> import compressor
+    >>> wear = '''
+    ... joint: big_end
+    ... clearance_mm: [0.1, 0.2, 0.3]
+    ... solve: {duration_rev: 2, accuracy: draft}
+    ... '''
+    >>> with open("wear.yaml", "w") as file:
+    ...     print(wear, file=file)
+    >>> cases = compressor.load_cases("wear.yaml")
+    >>> [case.clearance_mm.big_end for case in cases]
+    [0.1, 0.2, 0.3]
     """
     return [case for study in load_studies(*paths, follow=False) for case in study.cases]
 

@@ -8,9 +8,10 @@ import math
 import re
 import reprlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
-from typing import Any
+from inspect import cleandoc
+from typing import Any, TypeVar
 
 from compressor.program import CompsimError
 
@@ -41,6 +42,8 @@ UNITS = {
     "rev": ("rev", 1, 1),
 }
 
+Group = TypeVar("Group")
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -54,7 +57,20 @@ class Problem:
 
 
 class CaseError(CompsimError, ValueError):
-    """A case that cannot be simulated; `problems` lists everything that is wrong with it."""
+    """A case that cannot be simulated; raised by `Case.from_values`. Also a ValueError.
+
+    `problems` lists everything that is wrong with it, each with its dotted `key` and a `message`
+    that says what was given, what is allowed, and what to write. The error's text has a line for
+    each:
+
+    >>> import compressor
+    >>> try:
+    ...     compressor.Case.from_values({"joint": "big_end", "machine": {"speed": "700 rpm"}})
+    ... except compressor.CaseError as error:
+    ...     print(error)
+    machine.speed: unknown key; did you mean machine.speed_rpm?
+    clearance_mm.big_end: is needed with joint: big_end; give it in mm, such as 0.2
+    """
 
     exit_code = 2
 
@@ -211,6 +227,21 @@ def choice(default: Any, choices: tuple[str, ...], source: str, phrase: str, **m
     row = {"unit": "", "low": 0.0, "high": 0.0, "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "choice", "choices": choices}
     return field(default=default, metadata=row | more)
+
+
+def documented(group: type[Group]) -> type[Group]:
+    """A group's dataclass, its fields told in its docstring: range, unit, default, source."""
+    lines = []
+    for item in fields(group):  # type: ignore[arg-type]
+        row = Parameter(item.name, default=item.default, **item.metadata)
+        default = f"{row.default:g}" if isinstance(row.default, float) else repr(row.default)
+        needed = row.needed.replace("true or false", "True or False")
+        lines.append(
+            f"- `{row.key}`: {row.phrase}. Needs {needed}; default {default} ({row.source})."
+        )
+    text = cleandoc(group.__doc__ or "")
+    group.__doc__ = f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
+    return group
 
 
 def parameter_table(rows: Iterable[Parameter]) -> str:

@@ -2,14 +2,24 @@
 
 from dataclasses import dataclass
 
-from compressor.cases.parameter import choice, parameter
+from compressor.cases.parameter import choice, documented, parameter
 
 OURS = "ours"
 
 
+@documented
 @dataclass(frozen=True)
 class Body:
-    """The compressor's body on its foundation, driven one way; absent unless a case asks."""
+    """The compressor's rigid body on its foundation; a case's `body`, None unless a case asks.
+
+    It is driven one way: the machine's forces move it, and it does not move the machine back. A
+    body for which that would be wrong, since its motion would change the force by more than 30 %
+    at the speed's first two orders, is refused. `True` stands for the defaults:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"body": True}).body.mass_kg
+    500.0
+    """
 
     freedoms: str = choice(
         "xy", ("x", "y", "xy", "xy_rocking"), OURS, "how the rigid body may move"
@@ -49,9 +59,19 @@ class Body:
     )  # fmt: skip
 
 
+@documented
 @dataclass(frozen=True)
 class Sensor:
-    """An accelerometer on the body, with a tacho once a turn; absent unless a case asks."""
+    """An accelerometer on the body, with a tacho; a case's `sensor`, None unless a case asks.
+
+    `True` stands for the defaults:
+
+    >>> import compressor
+    >>> sensor = {"place": "bearing", "noise_m_per_s2": 0.05}
+    >>> case = compressor.Case.from_values({"body": True, "sensor": sensor})
+    >>> case.sensor.rate_Hz, case.sensor.noise_m_per_s2
+    (25600.0, 0.05)
+    """
 
     place: str = choice(
         "guide", ("guide", "bearing", "body"), OURS,

@@ -39,7 +39,18 @@ REMEDIES = {
 
 
 class StoreError(CompsimError):
-    """What is wrong with the store: at which path, and what to do about it."""
+    """What is wrong with a store: `path`, `problem`, and `remedy`, what to do about it.
+
+    Raised where a folder has no study, or not the one asked for, where files are damaged or of
+    another version, and where the disk refuses to read or write.
+
+    >>> import compressor
+    >>> try:
+    ...     compressor.open_study("nowhere")
+    ... except compressor.StoreError as error:
+    ...     print(f"{error.problem}; {error.remedy}")
+    holds no study; choose the folder of a sweep, or make one: compsim run CONFIG...
+    """
 
     exit_code = 5
 
@@ -52,7 +63,14 @@ class StoreError(CompsimError):
 
 
 class StoreWarning(CompsimWarning):
-    """What a store lacks that was asked for; who reads it goes on without."""
+    """What a store lacks that was asked for, such as a damaged file; who reads it goes on without.
+
+    Its jobs count as missing, and the next run computes them again. To stop instead:
+
+    >>> import warnings
+    >>> import compressor
+    >>> warnings.simplefilter("error", compressor.StoreWarning)
+    """
 
 
 def system_error(path: Folder, error: OSError) -> StoreError:

@@ -205,7 +205,19 @@ def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
 
 
 def read_job(folder: Folder, key: str) -> "xr.Dataset":
-    """A stored job's Dataset (`Stored.job`); who reads many jobs keeps a `Stored`."""
+    """A stored job's Dataset: what `simulate` gives of its case, time series where they were kept.
+
+    folder: of results; key: 20 hexadecimal digits, as `Case.key` and the coordinate `key` of a
+    study have them. Raises StoreError where there is no such job, or a damaged one.
+
+    After `compsim run wear.yaml` with the file of `load_cases`:
+
+    >>> import compressor
+    >>> study = compressor.open_study("results", "wear")
+    >>> run = compressor.read_job("results", study.key.sel(clearance_mm=0.2).item())
+    >>> run.acceleration.dims, compressor.Case.from_attribute(run.attrs["case"]).joint
+    (('time',), 'big_end')
+    """
     return read_store(folder).job(key)
 
 
@@ -222,6 +234,9 @@ def finished_keys(folder: Folder) -> set[str]:
 def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
     """A study as one Dataset, labelled by its axes; series are read when they are used.
 
+    folder: of results; name: of the study, all studies without. Variables and SI units are those
+    of `simulate`.
+
     One study (that of `name`, or the only one) has its axes as dimensions: the last part of each
     swept key, such as `clearance_mm`, in the case file's unit; a swept `joint` is called `fault`.
     Several studies, and one that is no grid (zip, samples, exclude, blocks), have a `job` dimension
@@ -234,6 +249,22 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
 
     With `trusted`, metrics are nan where they are not known: where the error bar is as long as the
     number or inf, as of single peaks of a chaotic motion, or was not made; and where a job failed.
+
+    Raises StoreError where the folder holds no study, or none of that name. Damaged files are told
+    by a StoreWarning, and their jobs count as missing.
+
+    After `compsim run wear.yaml` with the file of `load_cases`:
+
+    >>> import compressor
+    >>> study = compressor.open_study("results", "wear")
+    >>> one = study.sel(clearance_mm=0.2)
+    >>> print(f"{one.peak_acceleration:.0f} ± {one.peak_acceleration_error:.1f} m/s2")
+    647 ± 0.1 m/s2
+    >>> surely_below = study.peak_acceleration + study.peak_acceleration_error < 700
+    >>> study.clearance_mm.where(surely_below, drop=True).values.tolist()
+    [0.1, 0.2]
+    >>> study.acceleration.sel(clearance_mm=0.3).dims
+    ('time',)
     """
     from compressor.store import dataset as datasets  # loads xarray: half a second
 

@@ -17,7 +17,7 @@ from measure_accuracy import provenance
 
 from compressor.analysis.paper_cases import FAULTS
 from compressor.cases.case import Case
-from compressor.cases.table import Contact
+from compressor.cases.groups import Contact
 from compressor.measure.work_precision import (
     REFERENCES,
     default_cases,

@@ -22,7 +22,7 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
-from compressor.cases.table import Output
+from compressor.cases.groups import Output
 from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import open_study, read_store
 from compressor.store.series_file import read_series, series_path, write_series

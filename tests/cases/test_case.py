@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
+from compressor.cases.groups import Machine
 from compressor.cases.parameter import CaseError, Problem, shown, to_si
-from compressor.cases.table import Machine, table
+from compressor.cases.table import table
 from compressor.metrics import JOINTS
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.table import Friction
+from compressor.cases.groups import Friction
 from compressor.measure.features import (
     FEATURES,
     GRID,

@@ -8,7 +8,7 @@ import reference
 
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
-from compressor.cases.table import METHODS
+from compressor.cases.groups import METHODS
 from compressor.physics.record import FREEDOMS
 from compressor.solve.march_driver import CHUNK, with_edge
 from compressor.solve.marching import COMPILED

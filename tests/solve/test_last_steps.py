@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.table import METHODS
+from compressor.cases.groups import METHODS
 from compressor.physics.record import STATE_NAMES, Scene
 from compressor.solve import march_driver
 from compressor.solve.integrate import integrate

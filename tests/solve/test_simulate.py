@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.table import Machine, Output, PerJoint, Solve
+from compressor.cases.groups import Machine, Output, PerJoint, Solve
 from compressor.metrics import NUMBERS, SOMETIMES
 from compressor.program import library_versions
 from compressor.solve.simulate import SERIES, measure, simulate

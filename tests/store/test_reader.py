@@ -15,9 +15,10 @@ import xarray as xr
 from conftest import keep
 
 from compressor.cases.case import Case
+from compressor.cases.groups import Output
 from compressor.cases.load import load_studies
 from compressor.cases.study import points
-from compressor.cases.table import Output, table
+from compressor.cases.table import table
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
 from compressor.store import dataset as labels
