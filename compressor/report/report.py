@@ -6,7 +6,7 @@ report which is interrupted leaves the one before as it was.
 
 import contextlib
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,6 +34,7 @@ from compressor.report.figures.shown import as_csv
 from compressor.report.figures.style import render
 from compressor.report.figures.sweep_metric import draw_metrics, measures, swept
 from compressor.report.interactive import described, publish_library, script
+from compressor.report.job_series import job_scripts, series_name
 from compressor.report.machines_section import (
     Part,
     machine_drawings,
@@ -55,6 +56,7 @@ from compressor.report.second_sets import (
     second_sets,
 )
 from compressor.report.study_section import (
+    MOST_ROWS,
     file_name,
     job_counts,
     job_facts,
@@ -86,19 +88,30 @@ def write_report(results: Folder, report: Folder, command: str = "", claims: Fol
 
     Raises StoreError where there are no results, or the report's folder cannot be written.
     """
-    plates, studies, page = compose(results, command, claims)
+    made = compose(results, command, claims)
     folder = Path(report)
-    for plate in plates:
+    for plate in made.plates:
         for name, content in plate.files.items():
             publish(folder / name, content)
+    for key, text in made.series.items():
+        publish(folder / f"{series_name(key)}.js", text.encode())
     publish_library(folder)
-    publish(folder / "index.html", page.encode())
-    remove_stale(folder, studies, {plate.name for plate in plates})
+    publish(folder / "index.html", made.page.encode())
+    remove_stale(folder, made)
     return folder / "index.html"
 
 
-def compose(results: Folder, command: str, claims: Folder) -> tuple[list[Plate], list[str], str]:
-    """All figures of a report, drawn, the names of its studies, and its page."""
+class Made(NamedTuple):
+    """A report that is drawn: its figures, the names of its studies, series by job, its page."""
+
+    plates: list[Plate]
+    studies: list[str]
+    series: dict[str, str]
+    page: str
+
+
+def compose(results: Folder, command: str, claims: Folder) -> Made:
+    """Everything of a report, in memory."""
     judged = machine_files(claims) if claims else {}
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
@@ -134,7 +147,10 @@ def compose(results: Folder, command: str, claims: Folder) -> tuple[list[Plate],
     plates = [*chain(of_paper, *of_others.values(), of_faults, *(one.plates for one in drawn))]
     plates += [part.plate for part in of_machines if part.plate]
     jobs = {key: told for one in drawn for key, told in one.jobs.items()}
-    return plates, [study.name for study in studies], document(sections, jobs)
+    series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs)}
+    for key in series:
+        jobs[key]["series"] = series_name(key)
+    return Made(plates, [study.name for study in studies], series, document(sections, jobs))
 
 
 def drawn_part(
@@ -172,7 +188,7 @@ def drawn_study(stored: Stored, study: StoredStudy, other: SecondSet | None) -> 
             for axis in (swept(data) if measures(data) and not whole else [])
         ]  # fmt: skip
         figures, table = study_sections(stored, study, data, plates, anchor)
-        keys = [key for plate in plates for key in plate.jobs]
+        keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MOST_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(
             figures, table, plates, study_findings(data),
@@ -206,17 +222,18 @@ def summarised(
     return Answer(lines, [*round_robin(each)], found, pictures)
 
 
-def remove_stale(report: Path, studies: Iterable[str], drawn: set[str]) -> None:
-    """Remove an earlier report's drawings of the paper's figures that this one could not draw.
-
-    studies: the names of those that may have had a set of their own.
-    """
+def remove_stale(report: Path, made: Made) -> None:
+    """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
+    drawn = {plate.name for plate in made.plates}
     names = {f"figure-{item.number:02d}" for item in FIGURES}
-    names |= {second_name(study, item) for study in studies for item in SET}
-    for name in (names | {f"diagnosis-{name}" for name in TITLES}) - drawn:
-        for kind in KINDS:
-            with contextlib.suppress(OSError):
-                (report / f"{name}.{kind}").unlink()
+    names |= {second_name(study, item) for study in made.studies for item in SET}
+    names = (names | {f"diagnosis-{name}" for name in TITLES}) - drawn
+    stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
+    kept = {f"{series_name(key)}.js" for key in made.series}
+    stale += [path for path in report.glob(f"{series_name('*')}.js") if path.name not in kept]
+    for path in stale:
+        with contextlib.suppress(OSError):
+            path.unlink()
 
 
 def draw_paper(paper: PaperRuns) -> list[Plate]:

@@ -160,8 +160,13 @@ def test_tables_sort_and_filter(driver, own):
 
 def test_a_click_on_a_job_tells_of_it(driver, own):
     opened(driver, own)
-    driver.execute_script("showJob(document.querySelector('tr[data-job]').dataset.job)")
+    driver.find_element("css selector", "tr[data-job] button.job").click()
     box = driver.find_element("css selector", "#job")
+    wait_for(driver, "return document.querySelector('#job figure.live') !== null")
+    shown = driver.execute_script(
+        "return document.querySelector('#job .plot').data.map(trace => trace.meta)"
+    )
+    assert shown == ["acceleration", "big end", "small end"]
     key = driver.execute_script("return document.querySelector('tr[data-job]').dataset.job")
     assert key[:10] in box.text
     assert "compsim show" in box.text

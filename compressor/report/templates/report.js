@@ -97,7 +97,21 @@ function filterable(table, tools) {
   tools.append(label, ...boxes.map(([box]) => box), count);
 }
 
+// The key of a job becomes a button that tells of it.
+function openJobs(table) {
+  each("tr[data-job] td code", (code) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "job";
+    button.title = "where it is in the sweep, how to show it, its last revolution";
+    code.replaceWith(button);
+    button.append(code);
+    button.addEventListener("click", () => showJob(button.closest("tr").dataset.job));
+  }, table);
+}
+
 function openTable(table) {
+  openJobs(table);
   if (!table.tHead || table.tBodies[0].rows.length < 2) return;
   sortable(table);
   if (table.tBodies[0].rows.length < 12) return;
@@ -201,7 +215,7 @@ class Figure {
     this.place.setAttribute("aria-label", `${this.frame.dataset.title}, interactive: ` +
       "plus and minus zoom, left and right arrows move, zero shows all");
     this.place.addEventListener("keydown", (event) => this.key(event));
-    this.frame.querySelector("picture, img").before(head, this.place);
+    this.frame.querySelector("img, figcaption").before(head, this.place);
     new ResizeObserver(() => {
       if (this.place.clientWidth && this.place.clientWidth !== this.width) this.redraw();
     }).observe(this.place);
@@ -474,7 +488,18 @@ function showJob(key) {
     row.classList.add("chosen");
     row.scrollIntoView({ block: "center" });
   };
+  box.querySelector("figure")?.remove();
   box.showModal();
+  if (job.series) {
+    const frame = document.createElement("figure");
+    frame.id = job.series;
+    frame.dataset.title = "last revolution";
+    const caption = document.createElement("figcaption");
+    caption.textContent = "The last revolution, as it is kept with the job.";
+    frame.append(caption);
+    list.after(frame);
+    new Figure(frame).start();
+  }
 }
 
 let jobs = {};
