@@ -8,7 +8,7 @@ have as many points as a screen can show.
 import base64
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,7 @@ def content(sheet: Sheet) -> dict[str, Any]:
     `unified`: all curves go from left to right, so that the values at one x are told together.
     """
     links = linked([panel.x for panel in sheet.panels]), linked([p.y for p in sheet.panels], "y")
+    words = [*(panel.y.words for panel in sheet.panels)]
     width, height = sheet.size
     return {
         "aspect": round(height / width, 4),
@@ -62,7 +63,7 @@ def content(sheet: Sheet) -> dict[str, Any]:
             {
                 "title": panel.title,
                 "x": axis(panel.x) | {"link": x, "unit": unit(titled(sheet, panel))},
-                "y": axis(panel.y) | {"link": y, "unit": unit(panel.y.title)},
+                "y": axis(panel.y, words[y]) | {"link": y, "unit": unit(panel.y.title)},
                 "row": panel.row,
                 "column": panel.column,
                 "square": panel.is_square,
@@ -94,15 +95,15 @@ def linked(scales: Sequence[Scale], way: str = "x") -> list[int]:
     keys = []
     for scale in scales:
         span = scale.low, scale.high, scale.log
-        keys.append((*span, "" if way == "x" else scale.title))
+        keys.append((*span, "" if way == "x" or scale.bare else scale.title))
     return [keys.index(key) for key in keys]
 
 
-def axis(scale: Scale) -> dict[str, Any]:
-    """An axis as plain data."""
-    words = [[place, text] for place, text in scale.words.items()]
+def axis(scale: Scale, others: Mapping[float, str] | None = None) -> dict[str, Any]:
+    """An axis as plain data; others: words of the axis that it is like."""
+    words = [[place, text] for place, text in (scale.words or others or {}).items()]
     found = {"title": scale.title, "range": [scale.low, scale.high], "log": scale.log}
-    more = {"words": words, "step": scale.step}
+    more = {"words": words, "step": scale.step, "bare": scale.bare}
     return found | {name: value for name, value in more.items() if value}
 
 
@@ -130,6 +131,7 @@ def shown(trace: Trace, panel: Panel) -> dict[str, Any]:
         found |= {"x": numbers(trace.x[part]), "y": numbers(trace.y[part])}
     if trace.errors is not None:
         found["errors"] = [numbers(ends[part]) for ends in trace.errors]
+        found["across"] = trace.across
     if trace.jobs:
         found["jobs"] = [*np.array(trace.jobs, object)[part].tolist()]
     return found

@@ -206,6 +206,21 @@ def test_axe_finds_no_serious_violation(page, own, tmp_path, dark):
             assert serious == {}
 
 
+def test_what_is_printed_are_the_pictures(driver, page):
+    opened(driver, page)
+    live(driver, "figure-08")
+    shown = (
+        "const seen = q => getComputedStyle(document.querySelector('#figure-08 ' + q)).display;"
+        "return [seen('img'), seen('.plot'), seen('.controls')]"
+    )
+    assert driver.execute_script(shown)[0] == "none"
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        assert driver.execute_script(shown) == ["block", "none", "none"]
+    finally:
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
 def test_without_scripts_there_are_pictures(page, tmp_path):
     with browser(tmp_path) as driven:
         driven.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})

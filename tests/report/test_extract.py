@@ -85,8 +85,26 @@ def test_every_artist_is_read(figure):
     assert by_kind["bars"].name == "main effect"
     assert by_kind["bars"].x.tolist() == [0.25, 0.75]
     assert by_kind["bars"].errors.T.ravel() == pytest.approx([0.1, 0.1, 0.2, 0.1])
+    assert not by_kind["line"].across
     assert by_kind["line"].errors.T.ravel() == pytest.approx([0.1, 0.3, 0.2, 0.4])
     assert bars.y.words == {0.0: "speed", 1.0: "clearance"}
+
+
+def test_bars_across_and_axes_without_numbers_are_read():
+    figure = Figure()
+    left, right = figure.subplots(1, 2, sharey=True)
+    left.set_yticks([0, 1], ["speed", "mass"])
+    right.errorbar([0.3, 0.6], [0, 1], xerr=[[0.1, 0.2], [0.3, 0.4]], linestyle="none", marker="o")
+    left.errorbar([0.3], [0], xerr=[[0.1], [0.2]], fmt="none")
+    found = extract(figure)
+    (alone,) = found.panels[0].traces
+    assert (alone.kind, alone.x.tolist()) == ("line", pytest.approx([0.2, 0.5]))
+    (points,) = found.panels[1].traces
+    assert points.across
+    assert points.errors.T.ravel() == pytest.approx([0.1, 0.3, 0.2, 0.4])
+    assert [panel.y.bare for panel in found.panels] == [False, True]
+    words = [panel["y"]["words"] for panel in content(found)["panels"]]
+    assert words == [[[0.0, "speed"], [1.0, "mass"]]] * 2
 
 
 def test_a_csv_has_every_number_once(figure):

@@ -133,23 +133,31 @@ def curve(axes: Axes, line: Any, named: Names) -> Trace | None:
 
 
 def errorbar(axes: Axes, container: ErrorbarContainer, named: Names) -> Iterator[Trace]:
-    """Points, or a line, with error bars in y."""
+    """Points, or a line, with error bars in y or in x."""
     line, _, collections = container.lines
     label = str(container.get_label())
-    if line is None or not collections:
+    if line is None:  # bars without points: lines, where something else has the points
+        found = (segments(axes, one, named) for one in collections)
+        yield from (trace for trace in found if trace is not None)
         return
-    x, y = (np.asarray(v, float) for v in (line.get_xdata(), line.get_ydata()))
-    ends = np.full((2, y.size), np.nan)
+    if not collections:
+        return
+    across = not container.has_yerr
+    at = np.array([line.get_ydata(), line.get_xdata()] if across else line.get_data(), float)
+    way = 0 if across else 1  # of a segment's ends that differ
+    ends = np.full((2, at.shape[1]), np.nan)
     for segment in collections[0].get_segments():
         if len(segment) == 2:
-            here = np.flatnonzero((x == segment[0][0]) & np.isfinite(y))
-            ends[:, here] = np.array([[y[n] - segment[0][1], segment[1][1] - y[n]] for n in here]).T
+            here = np.flatnonzero((at[0] == segment[0][1 - way]) & np.isfinite(at[1]))
+            ends[0, here] = at[1, here] - segment[0][way]
+            ends[1, here] = segment[1][way] - at[1, here]
     base = curve(axes, line, named)
     if base is not None:
         name = base.name if label.startswith("_") else label
         fields = vars(base) | {
             "name": name,
             "errors": ends,
+            "across": across,
             "jobs": jobs_of(container) or base.jobs,
         }
         yield Trace(**fields)
@@ -176,7 +184,8 @@ def bars(container: BarContainer, named: Names) -> Trace:
     color = to_hex(patches[0].get_facecolor()) if patches else "#000000"
     thick = float(patches[0].get_height() if lying else patches[0].get_width()) if patches else 1.0
     return Trace("bars" if lying else "columns", name, np.array(x, float), np.array(y, float),
-                 color=color, errors=errors, width=thick, jobs=jobs_of(container))  # fmt: skip
+                 color=color, errors=errors, across=lying, width=thick,
+                 jobs=jobs_of(container))  # fmt: skip
 
 
 def mesh(axes: Axes, artist: Any, named: Names) -> Trace:

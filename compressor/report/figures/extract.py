@@ -84,7 +84,9 @@ def scale(axis: Any, title: str, limits: tuple[float, float], kind: str) -> Scal
     if isinstance(locator, MultipleLocator):
         first, second, *_ = locator.tick_values(low, high)
         step = float(second - first)
-    return Scale(plain(title), low, high, kind == "log", words, step)
+    shown = axis.get_tick_params(which="major")
+    bare = not shown.get("labelleft" if axis.axis_name == "y" else "labelbottom", True)
+    return Scale(plain(title), low, high, kind == "log", words, step, bare)
 
 
 def plain(title: str) -> str:

@@ -18,9 +18,9 @@ class Trace:
     """What one artist shows, in the units of its panel's axes.
 
     kind: `line`, `points`, `band` (a closed outline), `bars` (x from 0, at y), `map` (`z` over the
-    edges x and y). A name of "" has no entry in the legend. errors: (below, above) in y, or in x
-    of bars, shape (2, n). jobs: the key of each point's job. color: `#rrggbb`; of a map the scale,
-    from its least to its greatest value, which `limits` are, in powers of ten if `log`.
+    edges x and y). A name of "" has no entry in the legend. errors: (below, above), shape (2, n),
+    in y, or in x where `across`. jobs: the key of each point's job. color: `#rrggbb`; of a map the
+    scale, from its least to its greatest value, which `limits` are, in powers of ten if `log`.
     """
 
     kind: str
@@ -34,6 +34,7 @@ class Trace:
     marker: str = ""
     opacity: float = 1.0
     errors: np.ndarray | None = None
+    across: bool = False
     jobs: tuple[str, ...] = ()
     limits: tuple[float, float] = (0.0, 1.0)
     log: bool = False
@@ -56,7 +57,7 @@ class Note:
 class Scale:
     """An axis: title, what is shown of it, and the words that stand for numbers.
 
-    step: between two ticks, 0 where that is left open.
+    step: between two ticks, 0 where that is left open; bare: without numbers, which stand beside.
     """
 
     title: str
@@ -65,6 +66,7 @@ class Scale:
     log: bool = False
     words: dict[float, str] = field(default_factory=dict)
     step: float = 0.0
+    bare: bool = False
 
 
 @dataclass(frozen=True)

@@ -291,19 +291,25 @@ class Figure {
   // Where each panel lies, in shares of the figure: beside each other, or below where it is narrow.
   places(width) {
     const { panels, heights, widths, aspect } = this.sheet;
-    const narrow = width < 640;
-    const total = narrow ? panels.length * 260 : Math.max(260 * heights.length, width * aspect);
+    const narrow = width < 190 * widths.length || width < 560;
+    const columns = narrow ? Math.max(1, Math.min(widths.length, Math.floor(width / 330))) : 0;
+    const rows = narrow ? Math.ceil(panels.length / columns) : 0;
+    const total = narrow ? rows * 260
+      : Math.max(130 * heights.length, Math.min(width * aspect, 240 * heights.length));
     const share = (sizes, [first, last]) => {
       const sum = (part) => part.reduce((a, b) => a + b, 0);
       return [sum(sizes.slice(0, first)) / sum(sizes), sum(sizes.slice(0, last)) / sum(sizes)];
     };
     return { total, narrow, boxes: panels.map((panel, n) => {
-      const [left, right] = narrow ? [0, 1] : share(widths, panel.column);
-      const [top, bottom] = narrow ? [n / panels.length, (n + 1) / panels.length]
-        : share(heights, panel.row);
+      const [across, down] = [n % columns, Math.floor(n / columns)];
+      const [left, right] = narrow ? [across / columns, (across + 1) / columns]
+        : share(widths, panel.column);
+      const [top, bottom] = narrow ? [down / rows, (down + 1) / rows] : share(heights, panel.row);
       const scale = panel.traces.some((trace) => trace.kind === "map") ? 62 : 0;
-      const words = Math.max(0, ...(panel.y.words ?? []).map(([, text]) => text.length));
-      const wide = Math.min(0.4 * width * (right - left), Math.max(62, 24 + 6.2 * words));
+      const bare = panel.y.bare && !narrow;
+      const words = bare ? 0 : Math.max(0, ...(panel.y.words ?? []).map(([, t]) => t.length));
+      const wide = bare ? 24
+        : Math.min(0.55 * width * (right - left), Math.max(62, 24 + 6.6 * words));
       const box = { x: [left * width + wide, right * width - 14 - scale],
         y: [(1 - bottom) * total + 48, (1 - top) * total - 30] };
       return { x: box.x.map((at) => at / width), y: box.y.map((at) => at / total) };
@@ -337,6 +343,7 @@ class Figure {
           domain, anchor, type: scale.log ? "log" : "linear", range: scale.range.map(log),
           gridcolor: faint, zeroline: false, linecolor: faint, showline: true, ticks: "outside",
           ticklen: 3, tickcolor: faint, exponentformat: "power", automargin: false,
+          tickangle: 0, showticklabels: !scale.bare || narrow || way === "x" && titled,
           title: { text: titled ? escaped(scale.title) : "", standoff: 6, font: { size: 12 } },
         };
         if (way === "x") made.unifiedhovertitle = { text: `%{x:.6~g} ${escaped(scale.unit)}` };
@@ -349,7 +356,8 @@ class Figure {
           made.dtick = scale.step * Math.ceil(wanted / (width < 640 ? 5 : 9));
           made.tick0 = 0;
         } else {
-          made.nticks = way === "x" ? 8 : 6;
+          const [low, high] = boxes[n][way];
+          made.nticks = Math.max(2, Math.floor((high - low) * (way === "x" ? width / 62 : total / 34)));
         }
         if (scale.link !== n) made.matches = `${way}${scale.link ? scale.link + 1 : ""}`;
         return made;
@@ -433,7 +441,7 @@ class Figure {
     made.marker = { color, symbol: SYMBOLS[trace.marker] ?? "circle",
       size: trace.kind === "points" ? Math.max(3, trace.width * 1.4) : 6,
       line: { color, width: trace.marker === "x" || trace.marker === "+" ? 2 : 0 } };
-    if (trace.errors) made.error_y = error();
+    if (trace.errors) made[trace.across ? "error_x" : "error_y"] = error();
     if (!this.sheet.unified) {
       made.hovertemplate = made.hoverinfo ? undefined
         : `${inX}, %{y:.5~g} ${yu}<extra>${name}</extra>`;
