@@ -2,10 +2,12 @@
 
 import contextlib
 import os
+import re
 import shlex
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,7 +20,43 @@ DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n
 MOST_CAUTIONS = 5  # told of one case file
 QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
 
-configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
+CASE_FILE = re.compile(r"^(joint|clearance_mm|load|machine|blocks|regimes)\s*:", re.MULTILINE)
+PLACES = (".", "configs")  # where case files are looked for, if none is named
+MOST_NEAR = 4  # of them named
+MOST_HEAD = 100_000  # bytes of a file that are looked at
+
+
+class CaseFile(click.ParamType):
+    """The path of a case file; where none is given, the error names those nearby."""
+
+    name = "case file"
+
+    def get_missing_message(self, param: Any, ctx: Any) -> str:
+        """What could have been named, and how to make one."""
+        made = "compsim init writes one to start from"
+        near = nearby_case_files()
+        if not near:
+            return f"Name a case file; {made}"
+        more = f" and {len(near) - MOST_NEAR} more" if len(near) > MOST_NEAR else ""
+        return f"Name a case file, such as {', '.join(near[:MOST_NEAR])}{more}; {made}"
+
+
+def nearby_case_files() -> list[str]:
+    """The case files here and in `configs`, by their names; what cannot be read is none."""
+    found = []
+    for place in map(Path, PLACES):
+        with contextlib.suppress(OSError):
+            for path in sorted([*place.glob("*.yaml"), *place.glob("*.yml")]):
+                with contextlib.suppress(OSError):
+                    head = path.read_bytes()[:MOST_HEAD].decode(errors="replace")
+                    if CASE_FILE.search(head):
+                        found.append(str(path))
+    return found
+
+
+configs_argument = click.argument(
+    "configs", nargs=-1, required=True, metavar="CONFIG...", type=CaseFile()
+)
 output_option = click.option("-o", "--output", default="results", show_default=True,
                              help="Folder of results.")  # fmt: skip
 setting = click.option(

@@ -1,4 +1,8 @@
-"""Have the equations compiled once on a machine, and loaded before anything is timed."""
+"""Have the equations compiled once on a machine, and loaded before anything is timed.
+
+Machine code is kept by a hash of the sources of the physics and the versions of the libraries: a
+change of either compiles anew, once.
+"""
 
 import hashlib
 import threading
@@ -10,7 +14,7 @@ from compressor.cases import Case
 from compressor.program import library_versions, machine_code_folder
 
 PATIENCE = 2.0  # s of compiling before a remark on it
-COMPILING = "compiling the equations (once per machine, under a minute)"
+COMPILING = "compiling the equations, about a minute: once for each version of the program"
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
 

@@ -82,6 +82,24 @@ def test_usage_errors(arguments, told, case_file, capsys):
     assert not Path("results").exists()
 
 
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_without_a_case_file_those_nearby_are_named(command, case_file, capsys):
+    assert cli.main([command]) == 2
+    assert "Name a case file; compsim init writes one to start from" in capsys.readouterr().err
+    case_file("wear.yaml", joint="both")
+    Path("compose.yaml").write_text("services: {}\n")
+    Path("broken.yaml").symlink_to("absent")
+    Path("configs").mkdir()
+    for letter in "abcd":
+        Path(f"configs/{letter}.yml").write_text("# mine\njoint: both\n")
+    Path("wear.yaml").write_text("load: none\n")
+    assert cli.main([command]) == 2
+    near = "wear.yaml, configs/a.yml, configs/b.yml, configs/c.yml and 1 more; compsim init "
+    assert f"Missing argument 'CONFIG...'. Name a case file, such as {near}" in (
+        capsys.readouterr().err
+    )
+
+
 def test_all_mistakes_are_told_at_once(tmp_path, capsys):
     (tmp_path / "bad.yaml").write_text("joint: knee\nload: heavy\nclearence_mm: 1\n")
     assert cli.main(["run", str(tmp_path / "bad.yaml")]) == 2

@@ -276,6 +276,7 @@ def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
     write_report(part, tmp_path / "out")
     found = read(tmp_path / "out")
     assert "design model, no clearance (failed: non_finite)" in found.text
+    assert "A case that failed is run again with --rerun failed" in found.text
     assert ("failed", "failed: non_finite") in [(k, c[1]) for k, c in found.rows if len(c) > 1]
     assert [p.name for p in (tmp_path / "out").glob("*.png")] == ["figure-03.png"]
 

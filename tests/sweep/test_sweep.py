@@ -249,15 +249,16 @@ def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path):
         assert summary.failed[0].reason == "budget_seconds"
 
 
-def test_compiling_is_told_once_on_a_machine(studies, tmp_path, monkeypatch):
+def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch):
     monkeypatch.setattr(warm_up, "PATIENCE", 0)
-    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path / "machine code")
     told = []
-    for name in ("one", "two"):
-        sweep(studies(one={}), tmp_path / name, 1, lambda *event: told.append(event[2]))
-    compiling, compiled = (remark for remark in told if remark)
-    assert compiling == warm_up.COMPILING
-    assert re.fullmatch(r"compiled in \d+ s", compiled)
+    for name in ("one", "one", "two"):
+        monkeypatch.setattr(warm_up, "machine_code_folder", lambda name=name: tmp_path / name)
+        sweep(studies(one={}), tmp_path / "out" / str(len(told)), 1, lambda *e: told.append(e[2]))
+    remarks = [remark for remark in told if remark]
+    assert remarks[0::2] == [warm_up.COMPILING] * 2
+    assert all(re.fullmatch(r"compiled in \d+ s", remark) for remark in remarks[1::2])
+    assert "once for each version" in warm_up.COMPILING
 
 
 @pytest.mark.parametrize("workers", [1, 2])
