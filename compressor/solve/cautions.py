@@ -1,10 +1,9 @@
-"""Where a case leaves the domain of its laws, or looks like a slip of units.
+"""Where a case leaves the domain of its laws, or looks like a slip of units (`unit_slips`).
 
 Nothing here is refused: a case is spoken of once, before it runs, and grouped over a sweep. What
 cannot be simulated at all is refused by `compressor.cases.conflicts`.
 """
 
-import math
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,19 +11,8 @@ from typing import NamedTuple
 
 from compressor.cases import IMPLAUSIBLE, Case, Study
 from compressor.solve.scales import JointScales, contact_scales, expected_cost
+from compressor.solve.unit_slips import slips
 
-# key -> values that nobody means in the key's unit, and the unit that they may be in
-SLIPS = {
-    "machine.crank_radius_mm": (0.0, 2.0, "metres"),
-    "machine.rod_length_mm": (0.0, 10.0, "metres"),
-    "machine.pin_radius_mm": (0.0, 0.5, "metres"),
-    "gas.piston_radius_mm": (0.0, 1.0, "metres"),
-    "spring.stroke_mm": (0.0, 1.0, "metres"),
-    "contact.stiffness_N_per_mm15": (1e9, math.inf, "N/m^1.5"),
-}
-SLIP_CLEARANCE = 1e-3  # mm
-ROUND = 10.0  # rpm: speeds that people give are multiples of it
-SAME_SPEED = 0.01  # rpm: how near to a round speed a number of rad/s must come
 SHALLOW = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
 LEAST_STICTION = 0.1  # mm/s: below it, friction all but sticks
 MOST_JOBS = 500  # of a study that are looked at
@@ -50,9 +38,9 @@ class Caution:
 
 
 def remarks(case: Case) -> Iterator[Remark]:
-    """What is odd about a case; nothing about the defaults."""
+    """What is odd about a case by itself; nothing about the defaults."""
     joints = list(contact_scales(case))
-    yield from _slips(case)
+    yield from _inertias(case)
     for joint in joints:
         yield from _depths(case, joint)
     friction = case.friction
@@ -63,23 +51,8 @@ def remarks(case: Case) -> Iterator[Remark]:
     yield from _budgets(case, joints)
 
 
-def _slips(case: Case) -> Iterator[Remark]:
-    """Values that look as if they were in another unit."""
-    unread = {"typical": {"spring"}, "design": {"gas"}}.get(case.load, {"spring", "gas"})
-    if case.joint == "none" or case.contact.exponent != 1.5:
-        unread = unread | {"contact"}
-    for key, (low, high, unit) in SLIPS.items():
-        group, _, name = key.partition(".")
-        if group in unread:
-            continue
-        value = getattr(getattr(case, group), name)
-        if value is not None and low < value < high:
-            yield Remark(key, f"{value:g} looks like {unit}", "unit")
-    rpm = case.machine.speed_rpm
-    meant = rpm * 30 / math.pi
-    near = ROUND * round(meant / ROUND)
-    if abs(meant - near) < SAME_SPEED and rpm != round(rpm):
-        yield Remark("machine.speed_rpm", f"{rpm:g} looks like rad/s: {near:g} rpm", "unit")
+def _inertias(case: Case) -> Iterator[Remark]:
+    """An inertia that no distribution of the rod's mass between its ends has."""
     machine = case.machine
     most = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2
     if (machine.rod_inertia_kg_m2 or 0.0) > most:
@@ -98,10 +71,7 @@ def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
         yield Remark("contact.stiffness_N_per_mm15", text, "deep")
         return
     clearance = 1000 * joint.clearance
-    if clearance < SLIP_CLEARANCE:
-        text = f"{clearance:g} mm is {1e6 * clearance:.3g} nm; as metres, {1000 * clearance:g} mm"
-        yield Remark("clearance_mm", text, "unit")
-    elif depth > SHALLOW * clearance:
+    if depth > SHALLOW * clearance:
         text = f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm"
         yield Remark(
             "clearance_mm", f"{text}: the joint acts as a spring more than as a gap", "shallow"
@@ -122,18 +92,21 @@ def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
 def cautions(study: Study, most: int = MOST_JOBS) -> list[Caution]:
     """What is odd about the selected jobs of a study, an entry for each oddity.
 
-    Of more than `most` jobs as many are looked at, drawn evenly and always the same, so that a
-    large sweep takes no longer.
+    A key whose values look like another unit's is told of as that alone. Of more than `most` jobs
+    as many are looked at, drawn evenly and always the same, so that a large sweep takes no longer.
     """
     numbers: Sequence[int] = study.selected
     if len(numbers) > most:
         numbers = sorted(random.Random(0).sample(numbers, most))
+    cases = [study.cases[number] for number in numbers]
+    units = {one.key: Caution(one.key, one.message, one.jobs, len(cases)) for one in slips(cases)}
     found: dict[tuple[str, str], list[str]] = {}
-    for number in numbers:
-        once = {(one.key, one.kind): one.message for one in remarks(study.cases[number])}
+    for case in cases:
+        once = {(one.key, one.kind): one.message for one in remarks(case) if one.key not in units}
         for what, message in once.items():
             found.setdefault(what, []).append(message)
-    return [
-        Caution(key, texts[0], len(texts), len(numbers))
+    others = [
+        Caution(key, texts[0], len(texts), len(cases))
         for (key, _), texts in sorted(found.items(), key=lambda item: -len(item[1]))
     ]
+    return [*units.values(), *others]
