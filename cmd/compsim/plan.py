@@ -19,6 +19,7 @@ from compsim.screen import (
     say,
     setting,
     size,
+    tell_changes,
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ def plan(
     if not studies:
         tell_chains(ahead, as_json)
         return DONE
+    tell_changes(studies, output)
     from compressor.sweep import forecast
 
     found = forecast(studies, output, jobs or cores(), first, say)

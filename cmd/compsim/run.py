@@ -23,6 +23,7 @@ from compsim.screen import (
     plural,
     say,
     setting,
+    tell_changes,
 )
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ def run_jobs(
 ) -> int:
     """Run studies of jobs."""
     rerun, part, wait, scheduler, quiet = options
+    tell_changes(studies, output)
     from compressor.sweep import Options, sweep
 
     screen = Screen(quiet)

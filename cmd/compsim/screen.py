@@ -168,6 +168,26 @@ def caution(studies: "Sequence[Study]") -> None:
             say(f"{study.path}: and {len(found) - MOST_CAUTIONS} more warnings")
 
 
+def tell_changes(studies: "Sequence[Study]", folder: str) -> None:
+    """Say which stored studies have jobs that their case files no longer ask for."""
+    from compressor.store import changes
+
+    for one in changes(folder, studies):
+        text = (
+            f"{one.study}: had {plural(one.before)}, this file asks for {one.now}, {one.shared} of "
+            "them as before"
+        )
+        if one.older_model:
+            text += f" (those were made by version {one.older_model} of the model)"
+        if one.former:
+            text += (
+                f"; {one.finished} finished before stay{'s' * (one.finished == 1)} stored, in the "
+                f"study {one.former}: "
+                f"compsim export {one.former} -i {shlex.quote(folder)} -o {one.former}.csv"
+            )
+        say(text)
+
+
 def duration(seconds: float) -> str:
     """Seconds as people say them."""
     if seconds < 100:

@@ -36,12 +36,16 @@ def status(folder: str, as_json: bool) -> int:
     for one in found:
         click.echo(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
                    f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
+        if one.former_of:
+            click.echo(f"{'':<{width}}  {one.former_of} as it was run on {one.written[:10]}, with "
+                       "finished jobs that it has no longer; opens by this name")  # fmt: skip
         for words, known in ((PROMISES, one.promises), (REGIMES, one.regimes)):
             said = [f"{number} {words[word]}" for word, number in known.items() if words.get(word)]
             if said:
                 click.echo(f"{'':<{width}}  of those ok: {', '.join(said)}")
         for reason, number in one.reasons.items():
             click.echo(f"{'':<{width}}  {number:>4} {reason}: {remedy(reason)}")
-    for command in run_commands((one.again for one in found if one.missing), folder):
+    wanting = [one.again for one in found if one.missing and not one.former_of]
+    for command in run_commands(wanting, folder):
         say(f"next: {command}")
     return DONE

@@ -204,7 +204,8 @@ def make_data_set(
 
 def chosen(folder: Folder, name: str | None) -> StoredStudy:
     """The study of a name. Raises DataSetError where there is none, with the nearest names."""
-    studies = {study.name: study for study in read_studies(folder)}
+    former = name is not None
+    studies = {study.name: study for study in read_studies(folder, former)}
     if name is None and len(studies) == 1:
         return next(iter(studies.values()))
     if name is not None and name in studies:

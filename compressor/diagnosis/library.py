@@ -71,7 +71,7 @@ def open_library(
     Features are kept in `<folder>/features/<study>.nc` and made again when jobs, or how features
     are made, have changed. Raises StoreError where there is no such study or no record in it.
     """
-    studies = {study.name: study for study in read_studies(folder)}
+    studies = {study.name: study for study in read_studies(folder, former=True)}
     if name not in studies:
         raise StoreError(folder, f"holds no study {name!r}", f"it holds {', '.join(studies)}")
     study, stored = studies[name], read_store(folder).warned()

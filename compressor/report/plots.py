@@ -40,7 +40,7 @@ def write_plots(
     Raises PlotError where there is no such study or job, or it cannot be drawn; StoreError where
     the store cannot be read or the files not be written.
     """
-    stored, studies = read_store(results).warned(), read_studies(results)
+    stored, studies = read_store(results).warned(), read_studies(results, former=True)
     named = {study.name: study for study in studies}
     if target in named:
         drawn = study_figures(stored, named[target], choice)

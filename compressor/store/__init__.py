@@ -11,7 +11,7 @@ from compressor.store.series_file import (
     write_dataset,
     write_series,
 )
-from compressor.store.status import JobReport, report_job, standings
+from compressor.store.status import JobReport, changes, report_job, standings
 from compressor.store.studies import (
     Again,
     StoredStudy,

@@ -91,7 +91,7 @@ def export(
     Returns what was written, and damage that was met, which costs the jobs in it alone. Raises
     ExportError before anything is written, StoreError where the store or the disk gives way.
     """
-    stored, known = read_store(folder), read_studies(folder)
+    stored, known = read_store(folder), read_studies(folder, former=True)
     studies, keys = _named(folder, names, stored, known)
     target = Path(output)
     options = options or ExportOptions()
@@ -120,7 +120,7 @@ def _named(
     """The studies and the keys of the jobs that are named, each once; all studies by default."""
     by_name = {study.name: study for study in known}
     if not names:
-        return list(known), []
+        return [study for study in known if not study.former_of], []
     studies, keys = [], []
     for name in dict.fromkeys(names):
         if name in by_name:

@@ -2,7 +2,8 @@
 
     <folder>/rows/<number>-<digest>.h5   how many jobs ended, and their numbers: `segments`
     <folder>/jobs/<key>-<digest>.h5      one job with its time series, where kept: `jobfiles`
-    <folder>/studies/<name>.json         one study: axes, keys of its jobs in C order: `manifest`
+    <folder>/studies/<name>.json         one study: axes, keys of its jobs in C order: `studies`
+    <folder>/former/<name>~<n>.json      the same of a study that another of its name has replaced
     <folder>/shards/<shard>/{rows,jobs}  the same of a run that is one of several
 
 A job is stored when it has a row and, if the row tells of time series, their file. Every file
@@ -269,7 +270,7 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     from compressor.store import dataset as datasets  # loads xarray: half a second
 
     folder = os.path.abspath(folder)
-    studies = read_studies(folder)
+    studies = read_studies(folder, former=name is not None)
     if name is not None:
         known = ", ".join(study.name for study in studies)
         studies = [study for study in studies if study.name == name]

@@ -8,14 +8,24 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from compressor.metrics import NUMBERS
 from compressor.store.files import Folder, StoreError
 from compressor.store.reader import Stored, read_store
-from compressor.store.studies import Again, StoredStudy, owners, read_studies
+from compressor.store.studies import (
+    Again,
+    Change,
+    StoredStudy,
+    change_of,
+    owners,
+    read_studies,
+)
+
+if TYPE_CHECKING:
+    from compressor.cases import Study
 
 MOST_LIKE = 5  # keys that an ambiguous beginning of one is answered with
 
@@ -39,6 +49,8 @@ class Standing:
     promises: dict[str, int]
     regimes: dict[str, int]
     again: Again
+    former_of: str = ""  # the study that has replaced this one; "" where none has
+    written: str = ""  # when it was first run (UTC)
 
 
 @dataclass(frozen=True)
@@ -57,12 +69,21 @@ class JobReport:
 
 
 def standings(folder: Folder) -> list[Standing]:
-    """How each study of a folder stands. Raises StoreError where there is none."""
+    """How each study of a folder stands. Raises StoreError where there is none.
+
+    Former studies come last, those that have finished jobs which the present one lacks.
+    """
     rows = read_store(folder).warned().rows
     found = []
-    for study in read_studies(folder):
+    studies = read_studies(folder, former=True)
+    present = {study.name: {*study.keys} for study in studies}
+    for study in studies:
         positions = rows.find(study.keys)
         stored = positions[positions >= 0]
+        if study.former_of:
+            more = {*study.keys}.difference(present.get(study.former_of, ()))
+            if (rows.find(sorted(more)) < 0).all():
+                continue
         good = rows.words["status"][stored] == "ok"
 
         def counts(word: str, which: np.ndarray) -> dict[str, int]:
@@ -75,7 +96,7 @@ def standings(folder: Folder) -> list[Standing]:
             Standing(
                 study.name, study.case_file, study.jobs, ok, failed, missing,
                 counts("reason", stored[~good]), counts("promise", done), counts("regime", done),
-                study.again,
+                study.again, study.former_of, study.written,
             )
         )  # fmt: skip
     return found
@@ -86,11 +107,12 @@ def report_job(folder: Folder, beginning: str) -> JobReport:
 
     Raises StoreError where no job's key does, or several do.
     """
-    store, studies = read_store(folder).warned(), read_studies(folder)
+    store, studies = read_store(folder).warned(), read_studies(folder, former=True)
     key = whole_key(folder, beginning, store, studies)
     position = store.position(key)
     mine = owners(studies, [key])[key]
-    again = tuple(study.again for study in studies if study.name in mine)
+    present = (study for study in studies if not study.former_of)  # whose case file has the job
+    again = tuple(study.again for study in present if study.name in mine)
     if position is None:
         return JobReport(key, "missing", "", "", "", mine, again, {}, {})
     end, path = store.status_at(position), store.rows.path(position)
@@ -103,6 +125,12 @@ def report_job(folder: Folder, beginning: str) -> JobReport:
     return JobReport(
         key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes
     )
+
+
+def changes(folder: Folder, studies: "Sequence[Study]") -> list[Change]:
+    """What a run of studies would take out of the stored ones of their names. Raises StoreError."""
+    found = (change_of(folder, study, lambda: read_store(folder).keys()) for study in studies)
+    return [change for change in found if change]
 
 
 def whole_key(folder: Folder, beginning: str, store: Stored, studies: Sequence[StoredStudy]) -> str:

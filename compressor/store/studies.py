@@ -1,4 +1,9 @@
-"""The studies of a store: one JSON file each, with its axes and the keys of its jobs in C order."""
+"""The studies of a store: one JSON file each, with its axes and the keys of its jobs in C order.
+
+A study whose case file asks for other jobs than before is replaced. Where finished jobs are no
+longer in it, the former one stays as `former/NAME~1.json`, and opens under that name; the next is
+NAME~2.
+"""
 
 import argparse
 import contextlib
@@ -6,15 +11,25 @@ import datetime
 import json
 import math
 import os
+import re
 import shlex
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from compressor.cases import MODEL_VERSION, Study, points, row_of, table
 from compressor.program import VERSION, library_versions
-from compressor.store.files import KEY, Folder, StoreError, publish, refusals, system_error
+from compressor.store.files import (
+    KEY,
+    Folder,
+    StoreError,
+    StoreWarning,
+    publish,
+    refusals,
+    system_error,
+)
 from compressor.store.hdf5 import digest
 
 if TYPE_CHECKING:
@@ -22,6 +37,7 @@ if TYPE_CHECKING:
 
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
 UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
+FORMER = re.compile(r"(.+)~([1-9][0-9]{0,8})")  # no name of a case file has a ~
 
 
 @dataclass(frozen=True)
@@ -53,6 +69,12 @@ class StoredStudy:
     @property
     def jobs(self) -> int:
         return len(self.keys)
+
+    @property
+    def former_of(self) -> str:
+        """The name of the study that has replaced this one; "" for one that is no former study."""
+        named = FORMER.fullmatch(self.name)
+        return named[1] if named else ""
 
     @property
     def again(self) -> "Again":
@@ -117,8 +139,69 @@ def owners(
     return found
 
 
-def write_study(folder: Folder, study: "Study", command: str = "") -> None:
-    """Store which jobs a study has; a study that is stored already is left as it is."""
+class Change(NamedTuple):
+    """How a study takes jobs out of the stored study of its name.
+
+    `before`, `now`: their jobs; `shared`: those in both; `finished`: stored jobs that are in the
+    former one alone, which stays under the name `former`, "" where there are none; `older_model`:
+    the version of the model that the former one was made by, "" where it is the present one.
+    """
+
+    study: str
+    before: int  # jobs
+    now: int
+    shared: int
+    finished: int
+    former: str
+    older_model: str
+
+
+def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) -> Change | None:
+    """What writing a study would take out of the stored one; None where nothing.
+
+    stored: gives the keys of all stored jobs, where it is asked.
+    """
+    old = _present(folder, study.name)
+    gone = {*old.keys}.difference(study.keys) if old else set()
+    if old is None or not gone:
+        return None
+    finished = len(gone & stored())
+    former = _former_name(folder, old) if finished else ""
+    model = str(old.versions.get("model", ""))
+    return Change(
+        study.name, old.jobs, study.jobs, len({*old.keys}) - len(gone), finished, former,
+        "" if model == MODEL_VERSION else model,
+    )  # fmt: skip
+
+
+def _present(folder: Folder, name: str) -> StoredStudy | None:
+    """The stored study of a name; None where there is none, or a damaged one."""
+    with contextlib.suppress(StoreError, FileNotFoundError):
+        return read_study(Path(folder) / "studies" / f"{name}.json")
+    return None
+
+
+def _former_name(folder: Folder, old: StoredStudy) -> str:
+    """Where a study that is replaced stays: under a new name, or one that has the same jobs."""
+    mine = [study for study in former_studies(folder) if study.former_of == old.name]
+    for study in mine:
+        if (study.axes, study.keys) == (old.axes, old.keys):
+            return study.name
+    numbers = [int(study.name.rpartition("~")[2]) for study in mine]
+    return f"{old.name}~{max(numbers, default=0) + 1}"
+
+
+def write_study(
+    folder: Folder,
+    study: "Study",
+    command: str = "",
+    stored: Callable[[], set[str]] = set,
+) -> None:
+    """Store which jobs a study has; a study that is stored already is left as it is.
+
+    One that is replaced stays as a former study where finished jobs, of those that `stored` gives,
+    are no longer in the new one.
+    """
     axes = [StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes]
     new = StoredStudy(
         study.name,
@@ -132,13 +215,17 @@ def write_study(folder: Folder, study: "Study", command: str = "") -> None:
         datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         study.is_grid,
     )
-    path = Path(folder) / "studies" / f"{study.name}.json"
-    with contextlib.suppress(StoreError, FileNotFoundError):
-        old = read_study(path)
+    old = _present(folder, study.name)
+    if old:
         same = replace(new, command=old.command, versions=old.versions, written=old.written)
         if same == old:
             return
-    publish(path, encode(new))
+        change = change_of(folder, study, stored)
+        if change and change.former:
+            former = Path(folder) / "former" / f"{change.former}.json"
+            if not former.exists():
+                publish(former, encode(replace(old, name=change.former)))
+    publish(Path(folder) / "studies" / f"{study.name}.json", encode(new))
 
 
 def encode(study: StoredStudy) -> bytes:
@@ -151,19 +238,31 @@ def encode(study: StoredStudy) -> bytes:
     return head + f',\n "digest": "{digest(head)}"\n}}\n'.encode()
 
 
-def study_paths(folder: Folder) -> list[Path]:
-    """The files of all studies of a store. Raises StoreError."""
+def study_paths(folder: Folder, where: str = "studies") -> list[Path]:
+    """The files of all studies of a store, or of the `former` ones. Raises StoreError."""
     with refusals(folder):
-        return sorted(Path(folder).glob("studies/*.json"))
+        return sorted(Path(folder).glob(f"{where}/*.json"))
 
 
-def read_studies(folder: Folder) -> list[StoredStudy]:
-    """All studies of a store, by name."""
+def former_studies(folder: Folder) -> list[StoredStudy]:
+    """The studies that others of their names have replaced, by name; damaged ones are told of."""
+    found = []
+    for path in study_paths(folder, "former"):
+        try:
+            found.append(read_study(path))
+        except StoreError as error:
+            text = f"{path}: {error.problem}; delete it: its jobs are stored all the same"
+            warnings.warn(text, StoreWarning, stacklevel=2)
+    return found
+
+
+def read_studies(folder: Folder, former: bool = False) -> list[StoredStudy]:
+    """All studies of a store, by name; with `former`, then those that others have replaced."""
     paths = study_paths(folder)
     if not paths:
         remedy = "choose the folder of a sweep, or make one: compsim run CONFIG..."
         raise StoreError(folder, "holds no study", remedy)
-    return [read_study(path) for path in paths]
+    return [read_study(path) for path in paths] + (former_studies(folder) if former else [])
 
 
 def read_study(path: Path) -> StoredStudy:
@@ -197,7 +296,8 @@ def _is_sound(study: StoredStudy, path: Path) -> bool:
     texts = (study.case_file, study.command, study.written, *study.versions.values())
     return (
         study.name == path.stem
-        and not table()["name"].check(study.name)
+        and bool(study.former_of) == (path.parent.name == "former")
+        and not table()["name"].check(study.former_of or study.name)
         and all(isinstance(text, str) for text in (*texts, *study.versions))
         and all(KEY.fullmatch(key) for key in study.keys)
         and isinstance(study.fixed, dict)

@@ -11,6 +11,8 @@ from compressor.store.reader import read_store
 from compressor.store.rows import Cut, Rows
 from compressor.store.studies import Again, StoredStudy, owners, read_study, study_paths
 
+FORMER_REMEDY = "delete it: its jobs stay stored"
+
 
 @dataclass(frozen=True)
 class LostJob:
@@ -48,11 +50,12 @@ def verify(
         raise StoreError(folder, "holds no study", "choose the folder of a sweep")
     found: list[Damage] = []
     studies: list[StoredStudy] = []
-    for path in study_paths(folder):
-        try:
-            studies.append(read_study(path))
-        except StoreError as error:
-            found.append(Damage(path, error.problem, (), "run its case file again"))
+    for where, remedy in (("studies", "run its case file again"), ("former", FORMER_REMEDY)):
+        for path in study_paths(folder, where):
+            try:
+                studies.append(read_study(path))
+            except StoreError as error:
+                found.append(Damage(path, error.problem, (), remedy))
     rows = Rows.of(stored.segments)
     keys = [key.decode() for key in rows.columns["key"]]
     absent = {key for study in studies for key in study.keys}.difference(keys)
@@ -78,6 +81,7 @@ def _owned(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:
     for damage in found:
         jobs = tuple(LostJob(key, belong[key]) for key in damage.keys)
         names = {name for job in jobs for name in job.studies}
-        again = tuple(study.again for study in studies if study.name in names)
+        present = (study for study in studies if not study.former_of)
+        again = tuple(study.again for study in present if study.name in names)
         owned.append(replace(damage, jobs=jobs, again=again))
     return owned

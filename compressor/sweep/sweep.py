@@ -129,7 +129,7 @@ def sweep(
             ends = {key: end for key, end in ends.items() if end.status == "ok"}
         missing = [case for key, case in cases.items() if key not in ends]
         for study in studies:
-            write_study(folder, study, options.command)
+            write_study(folder, study, options.command, writer.found.keys)
         if missing:
             for damage in writer.found.damaged:
                 progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
