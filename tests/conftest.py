@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,8 @@ from compressor.store.reader import finished_keys, read_store
 from compressor.store.series_file import write_series
 from compressor.store.studies import write_study
 from compressor.store.writer import Writer
+from compressor.sweep.run_job import run_job
+from compressor.sweep.worker import Done
 
 hypothesis.settings.register_profile("untimed", deadline=None)  # other work shares the machine
 hypothesis.settings.load_profile("untimed")
@@ -236,3 +239,18 @@ def store_worn(folder):
 def worn_store(once):
     """A results folder with the study `worn`, which `identify` can read."""
     return once("struck", store_worn)
+
+
+@pytest.fixture
+def in_process(monkeypatch):
+    """Sweeps run their jobs here, one after the other: no worker has to start."""
+
+    def here(workers):
+        def run(place, cases, remark, pulse):
+            for case in cases:
+                yield Done(case, run_job(place, case), 0.01)
+                pulse()
+
+        return run
+
+    monkeypatch.setattr(sys.modules["compressor.sweep.sweep"], "local", here)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from compressor.program import PROGRAM
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -53,7 +54,10 @@ class Part(click.ParamType):
 @setting
 @only_option
 @limit
-@click.option("--rerun", type=click.Choice(["failed"]), help="Run failed jobs again, too.")
+@click.option("--rerun", type=click.Choice(["failed", "stale"]), multiple=True,
+              help="Run stored jobs again, too: those that failed, or stale ones, which another "
+              "version has made or which lack a metric that this one gives. Can be given twice.",
+)  # fmt: skip
 @click.option("--shard", "part", type=Part(), metavar="I/N",
               help="Run part I of N: for machines that share the folder.")  # fmt: skip
 @click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
@@ -71,7 +75,7 @@ def run(
     overrides: tuple[str, ...],
     only: str,
     max_jobs: int,
-    rerun: str | None,
+    rerun: tuple[str, ...],
     part: tuple[int, int] | None,
     backend: str,
     scheduler: str | None,
@@ -98,6 +102,8 @@ def run(
     chained = [study for study in studies if study.regimes]
     if chained and scheduler:
         raise click.UsageError("regimes run in processes here: leave --backend dask out")
+    if len(chained) == len(studies) and "stale" in rerun:
+        raise click.UsageError("--rerun stale is for jobs, and regimes have none: leave it out")
     code = DONE
     if len(chained) < len(studies):
         code = run_jobs(context, [s for s in studies if not s.regimes], output, jobs or cores(),
@@ -106,7 +112,7 @@ def run(
         from compsim.regimes import run_chains
 
         shards = [study.shard(*part) if part else study for study in chained]
-        code = max(code, run_chains(shards, output, jobs or cores(), rerun == "failed", quiet))
+        code = max(code, run_chains(shards, output, jobs or cores(), "failed" in rerun, quiet))
     return code
 
 
@@ -121,7 +127,8 @@ def run_jobs(
     screen = Screen(quiet)
     try:
         with cluster(scheduler) as elsewhere:
-            how = Options(context.obj, rerun == "failed", part, wait, elsewhere)
+            how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
+                          backend=elsewhere)  # fmt: skip
             summary = sweep(studies, output, jobs, screen, how)
     except BaseException:
         screen.end()
@@ -174,7 +181,22 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
             say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
     report_failures(summary)
     if not quiet:
+        tell_stale(summary)
         say(f"next: compsim report -i {shlex.quote(folder)}")
+
+
+def tell_stale(summary: "Summary") -> None:
+    """Say how many stored jobs another version has made, and how they are brought up to date."""
+    if not summary.gaining:
+        return
+    what = ", ".join(
+        f"{number} {'is' if number == 1 else 'are'} not of {name}"
+        if name == PROGRAM
+        else f"{number} lack{'s' * (number == 1)} {name}"
+        for name, number in summary.stale.items()
+    )
+    say(f"{plural(summary.gaining)} of another version would gain by running again ({what}): "
+        "--rerun stale")  # fmt: skip
 
 
 def report_failures(summary: "Summary") -> None:

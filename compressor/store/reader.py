@@ -13,8 +13,8 @@ no index: what is stored is read from the rows. `compressor.store.writer` writes
 
 import os
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,7 @@ from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
 from compressor.store.series_file import read_series, read_values
+from compressor.store.stale import stale
 from compressor.store.studies import read_studies
 
 if TYPE_CHECKING:
@@ -56,6 +57,11 @@ class JobStatus:
         """Whether metrics have error bars."""
         return not np.isnan(self.numbers["peak_acceleration_error"])
 
+    @property
+    def has_horizon(self) -> bool:
+        """Whether it is known how long the motion can be foretold."""
+        return not np.isnan(self.numbers[HORIZON])
+
     def serves(self, case: Case) -> bool:
         """Whether a case needs no new run.
 
@@ -69,13 +75,29 @@ class JobStatus:
             return False  # nothing is promised without error bars
         if case.wants_bars and self.status == "ok" and not self.bars:
             return False
-        if case.solve.horizon is True and self.status == "ok" and np.isnan(self.numbers[HORIZON]):
+        if case.solve.horizon is True and self.status == "ok" and not self.has_horizon:
             return False
         if case.output.keep == "metrics":
             return True
         if case.output.signals and not self.signals:
             return False
         return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
+
+    def kept_by(self, case: Case) -> Case:
+        """A case that, run again, has the time series of this job, as exact as they are.
+
+        Where the job is ok, it has its error bars and its horizon as well.
+        """
+        solve, output = case.solve, case.output
+        if self.status == "ok":
+            horizon = True if self.has_horizon and not solve.horizon else solve.horizon
+            solve = replace(solve, error_bars=solve.error_bars or self.bars, horizon=horizon)
+        if self.samples:
+            exact = {self.precision} | ({output.precision} if output.keep == "series" else set())
+            precision = "double" if "double" in exact else "single"
+            signals = output.signals or self.signals
+            output = replace(output, keep="series", precision=precision, signals=signals)
+        return replace(case, solve=solve, output=output)
 
 
 class Stored:
@@ -91,6 +113,10 @@ class Stored:
             text = f"{damage}: its jobs count as missing"
             warnings.warn(text, StoreWarning, stacklevel=3)
         return self
+
+    def stale(self, keys: Iterable[str]) -> dict[str, set[str]]:
+        """Of jobs with some keys those that another version has made, by what they lack."""
+        return stale(self.rows, keys)
 
     def keys(self) -> set[str]:
         """The keys of all stored jobs, failed ones included."""

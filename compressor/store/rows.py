@@ -18,13 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from compressor.metrics import NUMBERS, SOMETIMES
+from compressor.metrics import METRICS, NUMBERS, ROD_LOAD, SOMETIMES
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
+from compressor.program import PROGRAM
 from compressor.store.files import HEX20
 from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
 from compressor.store.series_file import intact, series_path
 
 NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
+GIVEN = digest(" ".join([PROGRAM, *METRICS, *ROD_LOAD]).encode())[:8]  # by this version
 DIGITS = re.compile(rb"[0-9a-f]{20,}")  # in which keys may stand
 REMEDY = "move it away, then run its studies again"
 WORDS = {  # columns -> what their texts look like
@@ -36,6 +38,7 @@ WORDS = {  # columns -> what their texts look like
     "regime": re.compile("|".join(["", *Regime]).encode()),
     "signals": re.compile(rb"(yes)?"),
     "digest": re.compile(f"({HEX20})?".encode()),
+    "given": re.compile(rb"([0-9a-f]{8})?"),
 }
 FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
 MOST_LINE = 1 << 20  # bytes that are known of one job, on average over a segment
@@ -54,8 +57,9 @@ COLUMNS = {
     "promise": ("S", "kept, or none given; empty in files of before 2026-11-22"),
     "regime": ("S", "how far the motion can be foretold; empty where that is not known"),
     "signals": ("S", "yes where signals are kept beside the time series"),
+    "given": ("S8", "hash of the program and of the names of its metrics"),
 }
-LATER = ("promise", "regime", "signals")  # columns that older files do not have
+LATER = ("promise", "regime", "signals", "given")  # columns that older files do not have
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +105,7 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
         "promise": [str(outcome.attributes.get("promise", "")) for outcome in outcomes],
         "regime": [str(outcome.attributes.get("regime", "")) for outcome in outcomes],
         "signals": ["yes" if has_signals(outcome) else "" for outcome in outcomes],
+        "given": [GIVEN for _ in outcomes],
     }
     columns = {name: _text_column(name, values) for name, values in words.items()}
     columns["serial"] = np.full(len(outcomes), serial)

@@ -56,12 +56,14 @@ class Options:
     """How to sweep.
 
     command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
-    part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
-    wait: until another run that writes there has ended; backend: where jobs run, if not here.
+    rerun_stale: so do those of which this version would tell more (`Stored.stale`); part: (i, n)
+    for shard i of n, which other processes may run at the same time, each its own; wait: until
+    another run that writes there has ended; backend: where jobs run, if not here.
     """
 
     command: str = ""
     rerun_failed: bool = False
+    rerun_stale: bool = False
     part: tuple[int, int] | None = None
     wait: bool = False
     backend: Backend | None = None
@@ -89,7 +91,11 @@ class Count:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a sweep did; `total`, `done_before` and `run_now` count a shared job once."""
+    """What a sweep did; `total`, `done_before` and `run_now` count a shared job once.
+
+    `stale`: how many of the stored jobs another version has made, by what they lack; `gaining`:
+    how many they are together.
+    """
 
     total: int
     done_before: int
@@ -97,6 +103,8 @@ class Summary:
     counts: tuple[Count, ...]
     failed: tuple[Failure, ...]
     seconds: float
+    stale: dict[str, int]
+    gaining: int
 
 
 def silent(done: int, total: int, remark: str) -> None:
@@ -127,6 +135,14 @@ def sweep(
         ends = stored(writer.found, cases)
         if options.rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}
+        stale = writer.found.stale(ends)
+        gaining = set().union(*stale.values())
+        if options.rerun_stale:
+            for key in gaining:
+                del ends[key]
+                position = int(writer.found.rows.find([key])[0])
+                cases[key] = writer.found.status_at(position).kept_by(cases[key])
+            stale, gaining = {}, set()
         missing = [case for key, case in cases.items() if key not in ends]
         for study in studies:
             write_study(folder, study, options.command, writer.found.keys)
@@ -135,8 +151,10 @@ def sweep(
                 progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
             run_missing(writer, missing, options.backend or local(workers), ends, progress)
     counts, failed = endings(studies, ends)
-    seconds = time.monotonic() - began
-    return Summary(len(cases), len(cases) - len(missing), len(missing), counts, failed, seconds)
+    return Summary(
+        len(cases), len(cases) - len(missing), len(missing), counts, failed,
+        time.monotonic() - began, {what: len(keys) for what, keys in stale.items()}, len(gaining),
+    )  # fmt: skip
 
 
 def run_missing(
@@ -254,12 +272,8 @@ def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
             end = store.status_at(position)
             if end.serves(case) and store.rows.intact(position):
                 found[key] = End(end.status, end.reason, end.detail)
-            elif end.samples and (case.output.keep == "metrics" or end.precision == "double"):
-                signals = end.signals or case.output.signals
-                output = replace(
-                    case.output, keep="series", precision=end.precision, signals=signals
-                )
-                cases[key] = replace(case, output=output)
+            else:
+                cases[key] = end.kept_by(case)
     return found
 
 

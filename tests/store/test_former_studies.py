@@ -151,7 +151,7 @@ def test_a_study_stands_where_its_name_belongs(name, wear):
 
 
 @pytest.mark.parametrize("command", ["run", "plan"])
-def test_run_and_plan_say_so_first(command, wear, capsys, monkeypatch):
+def test_run_and_plan_say_so_first(command, wear, capsys, in_process):
     run(wear(**MORE))
     wear(**FEW)
     assert cli.main([command, "wear.yaml"]) in (0, 3)

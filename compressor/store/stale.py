@@ -1,0 +1,46 @@
+"""Stored jobs of which this version of the program would tell more, or other things."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from compressor.metrics import METRICS, ROD_LOAD
+from compressor.program import PROGRAM
+from compressor.store.rows import GIVEN, Rows
+
+WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
+
+
+def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
+    """The stored jobs, of those with some keys, that another version has made.
+
+    By what a run of this version would give that they lack, a metric or the name of this program;
+    a job may stand under several. Jobs that this version has made are none of them, whatever
+    metric has no value there.
+    """
+    found: dict[str, set[str]] = {}
+    positions = rows.find(list(keys))
+    positions = positions[positions >= 0]
+    old = positions[rows.columns["given"][positions] != GIVEN.encode()]
+    old = old[np.argsort(rows.source[old], kind="stable")]  # attributes are read by segment
+    for name, lack in _lacking(rows, old).items():
+        if lack.any():
+            found[name] = {key.decode() for key in rows.columns["key"][old[lack]]}
+    others = {
+        rows.columns["key"][position].decode()
+        for position in old.tolist()
+        if rows.attributes(position).get("program") != PROGRAM
+    }
+    return found | ({PROGRAM: others} if others else {})
+
+
+def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
+    """Which rows lack what any run of this version gives that ends well, by name."""
+    good = rows.words["status"][positions] == "ok"
+    signals = rows.words["signals"][positions] == "yes"
+    found = {}
+    for name in (*METRICS, *ROD_LOAD):
+        absent = np.isnan(rows.numbers[name][positions])
+        asked = good & signals if name in ROD_LOAD else good
+        found[name] = asked & absent.all(axis=tuple(range(1, absent.ndim)))
+    return found | {name: good & (rows.words[name][positions] == "") for name in WORDS}
