@@ -2,12 +2,15 @@
 
 import hashlib
 import os
+from collections.abc import Iterable
+from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
 
 VERSION = "0.1.0"
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
 COMPILED = Path(__file__).parent / "physics"  # the sources that are compiled
+LONGEST_WORD = 100  # characters of a word that others are compared with
 
 
 class CompsimError(Exception):
@@ -38,6 +41,20 @@ class CompsimWarning(UserWarning):
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("error", compressor.CompsimWarning)
     """
+
+
+def did_you_mean(word: str, known: Iterable[str], most: int = 3) -> str:
+    """What was probably meant by a word that is not known, as `did you mean A or B?`, or "".
+
+    A path or a file's name stands for its stem; upper and lower case are the same.
+    """
+    names = {name.casefold(): name for name in known}
+    sought = [word[:LONGEST_WORD].casefold()]
+    sought.append(Path(sought[0]).stem)
+    near = next((found for one in sought if (found := get_close_matches(one, names, most))), [])
+    exact = next(([one] for one in sought if one in names), [])
+    found = [names[one] for one in exact or near]
+    return f"did you mean {' or '.join(found)}?" if found else ""
 
 
 def library_versions(*names: str) -> dict[str, str]:

@@ -3,7 +3,6 @@
 import json
 import shlex
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -61,7 +60,7 @@ def claims(
     one_thread_each()  # before numpy loads
     from compressor.cases import example, load_studies
     from compressor.machines import judge_machines, least_change
-    from compressor.store import make_folder
+    from compressor.store import writable_folder
     from compressor.sweep import cores
 
     paths = configs or tuple(str(example(name)) for name in EXAMPLES)
@@ -71,7 +70,7 @@ def claims(
         raise click.UsageError(
             "--search needs a CONFIG whose keys are drawn from ranges, such as {saltelli: [2, 9]}"
         )
-    make_folder(Path(output))
+    writable_folder(output)
     screen = Screen(quiet, "machines", alike=False)
     found = []
     try:

@@ -46,9 +46,9 @@ def stress(
         return DONE
     from compressor.measure import campaign
     from compressor.report import draw_outcomes, render
-    from compressor.store import make_folder, publish
+    from compressor.store import publish, writable_folder
 
-    make_folder(Path(output))
+    writable_folder(output)
     screen = Screen(quiet, "scenes")
     try:
         study = campaign(output, scenes, seed, jobs or cores(), screen)

@@ -42,10 +42,10 @@ def tradeoff(
     cases = chosen(configs, overrides)
     from compressor.measure import trade as feature_trade
     from compressor.measure import work_precision
-    from compressor.store import make_folder, write_dataset
+    from compressor.store import writable_folder, write_dataset
 
     folder = Path(output)
-    make_folder(folder)  # minutes before it is needed
+    writable_folder(folder)  # minutes before it is needed
     screen = Screen(quiet, "points", alike=False)
     try:
         study = work_precision(cases, repeats=repeats, budget=budget, progress=screen)

@@ -21,7 +21,7 @@ from compressor.diagnosis.data_set import (
     make_data_set,
 )
 from compressor.program import PROGRAM
-from compressor.store import Folder, make_folder, publish, write_dataset
+from compressor.store import Folder, publish, writable_folder, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +49,7 @@ def build_data_set(
     Raises StoreError and DataSetError, what can be told beforehand before records are read.
     """
     refuse_foreign(folder)
-    make_folder(Path(folder))
+    writable_folder(folder)
     dataset = make_data_set(results, study, options, progress)
     return dataset, write_data_set(folder, dataset)
 

@@ -11,7 +11,6 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,7 @@ import numpy as np
 from compressor.cases import Case
 from compressor.diagnosis.features import FEATURES, FEWEST, RecordError, features
 from compressor.program import PROGRAM, CompsimError
-from compressor.store import DamagedJob, Folder, Stored, StoredStudy, read_store, read_studies
+from compressor.store import DamagedJob, Folder, Stored, StoredStudy, find_study, read_store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +41,6 @@ WORDS = {
     "load": "load on the piston",
     "regime": "predictable, periodic, chaotic or undecided",
 }
-LONGEST_NAME = 64
 RECORD_NEEDED = "`body: true` and `sensor: {length_rev: 11}`"
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
@@ -172,7 +170,8 @@ def make_data_set(
     DataSetError where nothing is left, StoreError where the store cannot be read.
     """
     options = options or DataSetOptions()
-    stored, of = read_store(folder).warned(), chosen(folder, study)
+    of = find_study(folder, study)
+    stored = read_store(folder).warned()
     if of.is_grid and of.fixed.get("sensor") is None:
         raise without_sensor(of)
     rows: list[dict[str, Any]] = []
@@ -200,21 +199,6 @@ def make_data_set(
         jobs=len(keys), left_out=json.dumps(left), revolutions=options.revolutions,
         hop=options.hop or options.revolutions, test_share=options.test_share, seed=options.seed,
     )  # fmt: skip
-
-
-def chosen(folder: Folder, name: str | None) -> StoredStudy:
-    """The study of a name. Raises DataSetError where there is none, with the nearest names."""
-    former = name is not None
-    studies = {study.name: study for study in read_studies(folder, former)}
-    if name is None and len(studies) == 1:
-        return next(iter(studies.values()))
-    if name is not None and name in studies:
-        return studies[name]
-    near = get_close_matches((name or "")[:LONGEST_NAME], studies, n=3)
-    if name is None:
-        raise DataSetError(f"{folder} holds several studies, name one: {', '.join(studies)}")
-    hint = f"did you mean {' or '.join(near)}?" if near else f"it holds {', '.join(studies)}"
-    raise DataSetError(f"{folder} holds no study {name!r}; {hint}")
 
 
 def without_sensor(study: StoredStudy) -> DataSetError:

@@ -21,9 +21,9 @@ from compressor.store import (
     StoredStudy,
     StoreError,
     StoreWarning,
+    find_study,
     read_dataset,
     read_store,
-    read_studies,
     report_job,
     write_dataset,
 )
@@ -71,10 +71,7 @@ def open_library(
     Features are kept in `<folder>/features/<study>.nc` and made again when jobs, or how features
     are made, have changed. Raises StoreError where there is no such study or no record in it.
     """
-    studies = {study.name: study for study in read_studies(folder, former=True)}
-    if name not in studies:
-        raise StoreError(folder, f"holds no study {name!r}", f"it holds {', '.join(studies)}")
-    study, stored = studies[name], read_store(folder).warned()
+    study, stored = find_study(folder, name), read_store(folder).warned()
     positions = {key: place for key in study.keys if (place := _place(stored, key)) is not None}
     made_of = _digest(stored, positions)
     path = Path(folder) / "features" / f"{name}.nc"

@@ -1,8 +1,9 @@
 """Outcomes on disk, and back."""
 
 from compressor.store.export import Exported, ExportOptions, export
-from compressor.store.files import Folder, StoreError, StoreWarning, make_folder, publish
+from compressor.store.files import Folder, StoreError, StoreWarning, publish, writable_folder
 from compressor.store.hdf5 import DamagedJob
+from compressor.store.names import find_study
 from compressor.store.reader import Stored, open_study, read_job, read_store
 from compressor.store.series_file import (
     read_dataset,

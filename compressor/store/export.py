@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compressor.program import PROGRAM, CompsimError
-from compressor.store.files import Folder, StoreError, publish, publishing
+from compressor.store.files import Folder, WrongName, publish, publishing
 from compressor.store.hdf5 import DamagedJob
+from compressor.store.names import find_study, whole_key
 from compressor.store.reader import Stored, read_store
 from compressor.store.series_file import read_bytes, read_series, write_dataset
-from compressor.store.status import whole_key
 from compressor.store.studies import StoredStudy, read_studies
 
 if TYPE_CHECKING:
@@ -118,18 +118,15 @@ def _named(
     folder: Folder, names: Sequence[str], stored: Stored, known: Sequence[StoredStudy]
 ) -> tuple[list[StoredStudy], list[str]]:
     """The studies and the keys of the jobs that are named, each once; all studies by default."""
-    by_name = {study.name: study for study in known}
+    by_name = {study.name for study in known}
     if not names:
         return [study for study in known if not study.former_of], []
     studies, keys = [], []
     for name in dict.fromkeys(names):
-        if name in by_name:
-            studies.append(by_name[name])
-        elif HEXADECIMAL.fullmatch(name):
-            keys.append(whole_key(folder, name, stored, known))
+        if name not in by_name and HEXADECIMAL.fullmatch(name):
+            keys.append(whole_key(folder, name, known, stored.keys()))
         else:
-            remedy = f"it holds {', '.join(by_name)}; a job is named by its key"
-            raise StoreError(folder, f"holds no study {name!r}", remedy)
+            studies.append(find_study(folder, name, known))
     return studies, list(dict.fromkeys(keys))
 
 
@@ -203,11 +200,11 @@ def _series(task: _Task, stored: Stored, form: str) -> Exported:
     """The time series of one job. In netCDF it is the stored file, to the byte."""
     position = stored.position(task.key)
     if position is None:
-        raise StoreError(stored.folder, f"job {task.key} is not stored", "run its case file first")
+        raise WrongName(stored.folder, f"job {task.key} is not stored", "run its case file first")
     source, samples = stored.rows.path(position), int(stored.rows.columns["samples"][position])
     if source is None:
         remedy = "run its case file with --set output.keep=series, or export its study"
-        raise StoreError(stored.folder, f"job {task.key} has no time series", remedy)
+        raise WrongName(stored.folder, f"job {task.key} has no time series", remedy)
     if form == "csv":
         size = write_csv(task.path, columns(read_series(source), "time"))
     else:

@@ -62,6 +62,12 @@ class StoreError(CompsimError):
         return f"{self.path}: {self.problem}; {self.remedy}"
 
 
+class WrongName(StoreError):
+    """A folder, study or job that was named is not there, or may not be used: the caller's slip."""
+
+    exit_code = 2
+
+
 class StoreWarning(CompsimWarning):
     """What a store lacks that was asked for, such as a damaged file; who reads it goes on without.
 
@@ -127,13 +133,25 @@ def make_folder(folder: Path) -> None:
         raise system_error(folder, error) from error
 
 
+def writable_folder(folder: Folder) -> None:
+    """Make a folder of which it is sure that files can be written there, before there are any.
+
+    Raises WrongName where that is not allowed, StoreError where the disk refuses.
+    """
+    path = Path(folder)
+    above = next(place for place in (path, *path.absolute().parents) if place.exists())
+    if above.is_dir() and not os.access(above, os.W_OK | os.X_OK):
+        raise WrongName(path, f"nothing may be written to {above}", FORBIDDEN)
+    make_folder(path)
+
+
 def _make_folder(folder: Path) -> None:
     if not folder.is_dir():
         make_folder(folder.parent)
         try:
             folder.mkdir(exist_ok=True)
         except FileExistsError as error:
-            raise StoreError(folder, "is a file, where a folder is needed", ELSEWHERE) from error
+            raise WrongName(folder, "is a file, where a folder is needed", ELSEWHERE) from error
         _sync_folder(folder.parent)
 
 

@@ -26,6 +26,7 @@ from compressor.outcome import Outcome
 from compressor.reasons import Reason
 from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
 from compressor.store.hdf5 import DamagedJob
+from compressor.store.names import find_study
 from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
 from compressor.store.series_file import read_series, read_values
 from compressor.store.stale import stale
@@ -277,8 +278,9 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     With `trusted`, metrics are nan where they are not known: where the error bar is as long as the
     number or inf, as of single peaks of a chaotic motion, or was not made; and where a job failed.
 
-    Raises StoreError where the folder holds no study, or none of that name. Damaged files are told
-    by a StoreWarning, and their jobs count as missing.
+    Raises WrongName, a StoreError that tells what was probably meant, for a folder without results
+    and for a study that it does not hold. Damaged files are told by a StoreWarning, and their jobs
+    count as missing.
 
     After `compsim run wear.yaml` with the file of `load_cases`:
 
@@ -298,10 +300,7 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     folder = os.path.abspath(folder)
     studies = read_studies(folder, former=name is not None)
     if name is not None:
-        known = ", ".join(study.name for study in studies)
-        studies = [study for study in studies if study.name == name]
-        if not studies:
-            raise StoreError(folder, f"holds no study {name!r}", f"it holds {known}")
+        studies = [find_study(folder, name, studies)]
     stored = read_store(folder).warned()
     is_grid = len(studies) == 1 and studies[0].is_grid
     layout = datasets.grid(studies[0]) if is_grid else datasets.table_of_jobs(studies)

@@ -6,28 +6,19 @@ Jobs whose row is damaged count as missing, with a StoreWarning.
 
 import os
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from compressor.metrics import NUMBERS
-from compressor.store.files import Folder, StoreError
-from compressor.store.reader import Stored, read_store
-from compressor.store.studies import (
-    Again,
-    Change,
-    StoredStudy,
-    change_of,
-    owners,
-    read_studies,
-)
+from compressor.store.files import Folder
+from compressor.store.names import find_job
+from compressor.store.reader import read_store
+from compressor.store.studies import Again, Change, change_of, owners, read_studies
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-
-MOST_LIKE = 5  # keys that an ambiguous beginning of one is answered with
 
 
 @dataclass(frozen=True)
@@ -69,13 +60,13 @@ class JobReport:
 
 
 def standings(folder: Folder) -> list[Standing]:
-    """How each study of a folder stands. Raises StoreError where there is none.
+    """How each study of a folder stands. Raises WrongName where there is none.
 
     Former studies come last, those that have finished jobs which the present one lacks.
     """
+    studies = read_studies(folder, former=True)
     rows = read_store(folder).warned().rows
     found = []
-    studies = read_studies(folder, former=True)
     present = {study.name: {*study.keys} for study in studies}
     for study in studies:
         positions = rows.find(study.keys)
@@ -102,13 +93,15 @@ def standings(folder: Folder) -> list[Standing]:
     return found
 
 
-def report_job(folder: Folder, beginning: str) -> JobReport:
-    """What is known of the job whose key begins so.
+def report_job(folder: Folder, *words: str) -> JobReport:
+    """What is known of one job.
 
-    Raises StoreError where no job's key does, or several do.
+    words: the beginning of its key; or its study, and values of axes such as `clearance_mm=0.2`
+    until one job is left. Raises WrongName where they name none or several.
     """
-    store, studies = read_store(folder).warned(), read_studies(folder, former=True)
-    key = whole_key(folder, beginning, store, studies)
+    studies = read_studies(folder, former=True)
+    store = read_store(folder).warned()
+    key = find_job(folder, words, studies, store.keys())
     position = store.position(key)
     mine = owners(studies, [key])[key]
     present = (study for study in studies if not study.former_of)  # whose case file has the job
@@ -131,17 +124,3 @@ def changes(folder: Folder, studies: "Sequence[Study]") -> list[Change]:
     """What a run of studies would take out of the stored ones of their names. Raises StoreError."""
     found = (change_of(folder, study, lambda: read_store(folder).keys()) for study in studies)
     return [change for change in found if change]
-
-
-def whole_key(folder: Folder, beginning: str, store: Stored, studies: Sequence[StoredStudy]) -> str:
-    """The one key, of a stored or a planned job, that begins so; StoreError where that is none."""
-    known = store.keys().union(*(study.keys for study in studies))
-    like = sorted(key for key in known if key.startswith(beginning))
-    if len(like) == 1:
-        return like[0]
-    if not like:
-        remedy = "compsim run and open_study name jobs by their keys"
-        raise StoreError(folder, f"no job's key begins with {beginning!r}", remedy)
-    some = ", ".join(like[:MOST_LIKE]) + (", …" if len(like) > MOST_LIKE else "")
-    problem = f"{len(like)} jobs' keys begin with {beginning!r}: {some}"
-    raise StoreError(folder, problem, "give more of the key")

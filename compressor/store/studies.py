@@ -30,6 +30,7 @@ from compressor.store.files import (
     refusals,
     system_error,
 )
+from compressor.store.folders import no_results
 from compressor.store.hdf5 import digest
 
 if TYPE_CHECKING:
@@ -106,12 +107,13 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
     if row and row.kind in ("number", "integer") and not any(isinstance(v, str) for v in values):
         numbers = [math.nan if value is None else value for value in values]
         return np.array(numbers, float), attrs | {"units": row.unit or "1"}
-    return np.array([_in_words(value) for value in values], object), attrs
+    return np.array([in_words(value) for value in values], object), attrs
 
 
-def _in_words(value: Any) -> str:
+def in_words(value: Any) -> str:
+    """A swept value as it is told: 0.2, big_end, true; several with commas, "" for none."""
     if isinstance(value, tuple | list):
-        return ", ".join(map(_in_words, value))
+        return ", ".join(map(in_words, value))
     return "" if value is None else str(value).lower()
 
 
@@ -257,11 +259,13 @@ def former_studies(folder: Folder) -> list[StoredStudy]:
 
 
 def read_studies(folder: Folder, former: bool = False) -> list[StoredStudy]:
-    """All studies of a store, by name; with `former`, then those that others have replaced."""
+    """All studies of a store, by name; with `former`, then those that others have replaced.
+
+    Raises WrongName where there is none.
+    """
     paths = study_paths(folder)
     if not paths:
-        remedy = "choose the folder of a sweep, or make one: compsim run CONFIG..."
-        raise StoreError(folder, "holds no study", remedy)
+        raise no_results(folder)
     return [read_study(path) for path in paths] + (former_studies(folder) if former else [])
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from compressor.store.files import Folder, StoreError
+from compressor.store.folders import no_results
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import read_store
 from compressor.store.rows import Cut, Rows
@@ -47,7 +48,7 @@ def verify(
     """
     stored = read_store(folder, DamagedJob)
     if not (stored.segments or stored.damaged or study_paths(folder)):
-        raise StoreError(folder, "holds no study", "choose the folder of a sweep")
+        raise no_results(folder)
     found: list[Damage] = []
     studies: list[StoredStudy] = []
     for where, remedy in (("studies", "run its case file again"), ("former", FORMER_REMEDY)):

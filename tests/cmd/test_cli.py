@@ -291,7 +291,7 @@ def test_verify_tells_how_a_damaged_study_is_mended(case_file, capsys):
 
 
 def test_verify_of_nothing_says_so(tmp_path, capsys):
-    assert cli.main(["verify", "-i", str(tmp_path)]) == 5
+    assert cli.main(["verify", "-i", str(tmp_path)]) == 2
     assert "holds no study" in capsys.readouterr().err
 
 
@@ -322,7 +322,7 @@ def test_many_failures_are_counted(case_file, capsys):
 
 def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
     Path("file").touch()
-    assert cli.main(["run", case_file("one.yaml"), "-o", "file"]) == 5
+    assert cli.main(["run", case_file("one.yaml"), "-o", "file"]) == 2
     err = capsys.readouterr().err
     place = Path("file").absolute()
     assert err.startswith(f"compsim: {place}: is a file, where a folder is needed; choose another")
@@ -347,10 +347,10 @@ def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
 
 
 def test_report_of_nothing_says_what_to_do_first(reporter, case_file, capsys):
-    assert cli.main(["report", "-i", "elsewhere"]) == 5
+    assert cli.main(["report", "-i", "elsewhere"]) == 2
     err = capsys.readouterr().err
-    assert err.startswith("compsim: elsewhere: holds no study; ")
-    assert "compsim run CONFIG..." in err
+    assert err.startswith("compsim: elsewhere: there is no such folder of results; ")
+    assert "make one: compsim run CONFIG..." in err
 
 
 def break_simulation(monkeypatch):
@@ -500,7 +500,7 @@ def test_usage_errors_of_studies(arguments, told, case_file, capsys):
 def test_tradeoff_finds_a_bad_folder_before_it_measures(case_file, capsys):
     case_file("a.yaml", joint="both", clearance_mm=0.1)
     Path("file").touch()
-    assert cli.main(["tradeoff", "a.yaml", "-o", "file/deeper"]) == 5
+    assert cli.main(["tradeoff", "a.yaml", "-o", "file/deeper"]) == 2
     out, err = capsys.readouterr()
     assert err.startswith("compsim: file: is a file, where a folder is needed")
     assert out == ""

@@ -85,10 +85,10 @@ def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
     [
         (["absent.csv", "--study", "worn"], 2, "absent.csv: cannot be read: No such file"),
         (["RECORD"], 2, "Missing option '--study'"),
-        (["RECORD", "--study", "torn"], 5, "holds no study 'torn'"),
+        (["RECORD", "--study", "torn"], 2, "holds no study 'torn'"),
         (["RECORD", "--study", "worn", "--rpm", "500"], 2, "--rpm and --tdc belong together"),
         (["RECORD", "--study", "worn", "--rpm", "500", "--tdc", "0"], 2, "has a tacho column"),
-        (["abcdef", "--study", "worn"], 5, "no job's key begins with 'abcdef'"),
+        (["abcdef", "--study", "worn"], 2, "no job's key begins with 'abcdef'"),
         (["abcdef", "--study", "worn", "--rpm", "1", "--tdc", "0"], 2, "a stored job has a tacho"),
     ],
 )

@@ -20,6 +20,7 @@ from compressor.diagnosis.data_set import (
     windows,
 )
 from compressor.diagnosis.features import FEATURES, features
+from compressor.store.files import WrongName
 from compressor.store.reader import read_store
 
 OPTIONS = DataSetOptions(noise=(0.0, 0.5))
@@ -183,11 +184,11 @@ def test_jobs_that_are_not_run_are_counted(worn, tmp_path):
         ("deaf", "has no sensor's record: write `body: true` and `sensor:.*deaf.yaml"),
         ("worm", "holds no study 'worm'; did you mean worn?"),
         ("quite another", "it holds deaf, worn"),
-        (None, "several studies, name one: deaf, worn"),
+        (None, "several studies; name one: deaf, worn"),
     ],
 )
 def test_a_study_that_cannot_be_used(worn, study, told):
-    with pytest.raises(DataSetError, match=told):
+    with pytest.raises((DataSetError, WrongName), match=told):
         make_data_set(worn, study)
 
 

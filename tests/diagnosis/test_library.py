@@ -100,7 +100,7 @@ def test_a_job_gives_its_record_by_the_beginning_of_its_key(library, folder):
 
 
 def test_a_study_that_is_not_there_is_named(folder):
-    with pytest.raises(StoreError, match="holds no study 'torn'; it holds worn"):
+    with pytest.raises(StoreError, match="holds no study 'torn'; did you mean worn"):
         open_library(folder, "torn")
 
 

@@ -183,11 +183,11 @@ def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_p
 def test_what_is_not_there_is_named(results, tmp_path, capsys):
     missing = str(open_study(results, "grid").key.values[1, 1])
     for name, problem in (
-        ("gird", "holds no study 'gird'; it holds grid, list"),
+        ("gird", "holds no study 'gird'; did you mean grid?"),
         (missing, f"job {missing} is not stored; run its case file first"),
         ("0" * 20, "no job's key begins with '00000000000000000000'"),
     ):
-        assert cli.main(["export", name, "-i", str(results), "-o", str(tmp_path / "x.csv")]) == 5
+        assert cli.main(["export", name, "-i", str(results), "-o", str(tmp_path / "x.csv")]) == 2
         assert problem in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
 

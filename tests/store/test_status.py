@@ -87,12 +87,12 @@ def test_show_json_is_json(mix, capsys):
 def test_a_job_must_be_told_apart(mix, beginning, problem, capsys):
     with pytest.raises(StoreError, match=problem):
         report_job("results", beginning)
-    assert cli.main(["show", beginning]) == 5
+    assert cli.main(["show", beginning]) == 2
     assert problem in capsys.readouterr().err
 
 
 def test_a_folder_without_results_is_an_error(tmp_path, capsys):
-    assert cli.main(["status", "-i", str(tmp_path)]) == 5
+    assert cli.main(["status", "-i", str(tmp_path)]) == 2
     assert str(tmp_path) in capsys.readouterr().err
 
 

@@ -276,13 +276,13 @@ class Campaign:
     def judge(self, label: str, said: Said) -> None:
         """Count how a disturbed command ended."""
         self.tally.trials += 1
-        if "Traceback" in said.err or said.code not in (0, 3, 5):
+        if "Traceback" in said.err or said.code not in (0, 2, 3, 5):
             self.tally.fail(label, f"exit code {said.code}: {said.err}")
-        elif said.code == 5 and not (named(said.err) or "damaged file" in said.err):
+        elif said.code in (2, 5) and not (named(said.err) or "damaged file" in said.err):
             self.tally.fail(label, f"unnamed: {said.err}")
         else:
             self.tally.counts[
-                "named errors" if said.code == 5 else "calls that were not needed"
+                "named errors" if said.code in (2, 5) else "calls that were not needed"
             ] += 1
 
     def complete_again(self, label: str, scene: Scene, place: Path) -> None:
