@@ -27,4 +27,5 @@ from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
 from compressor.cases.table import table
 from compressor.cases.vibration import Body, Sensor
+from compressor.cases.written import to_yaml
 from compressor.cases.yaml_reader import printable

@@ -7,10 +7,8 @@ each other. A very large study does not keep its cases: each is built again when
 """
 
 import itertools
-import json
 import math
 import os
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,12 +25,11 @@ from compressor.cases.shorthands import value_of
 from compressor.cases.study import Axis, Cases, Study, nested
 from compressor.cases.swept import SAMPLED, counted
 from compressor.cases.table import table
-from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, resolved, shortened
+from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, shortened
 
 MAX_JOBS = 10_000
 MAX_KEPT = 100_000  # cases of a study that stay in memory, each 1 kB
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
-WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 
 @dataclass(frozen=True)
@@ -328,22 +325,3 @@ def _located(
             return FileProblem(block.leaves.places[key], problem.key, problem.message)
     place = block.leaves.places.get("", Place(path, 1, 1))
     return FileProblem(place, problem.key, problem.message)
-
-
-def to_yaml(case: Case) -> str:
-    """A resolved case as the text of a case file, which reads back to an equal case."""
-    lines = []
-    for key, value in case.values().items():
-        if isinstance(value, dict):
-            lines.append(f"{key}:")
-            lines += [f"  {name}: {_scalar(item)}" for name, item in value.items()]
-        else:
-            lines.append(f"{key}: {_scalar(value)}")
-    return "\n".join(lines) + "\n"
-
-
-def _scalar(value: Any) -> str:
-    """A value in YAML: as JSON, but plain where a word reads back as text."""
-    if isinstance(value, str) and WORD.fullmatch(value) and resolved(value) == value:
-        return value
-    return json.dumps(value)

@@ -6,6 +6,7 @@ Jobs whose row is damaged count as missing, with a StoreWarning.
 
 import os
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
