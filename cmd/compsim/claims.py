@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compsim.results import files, folders
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -15,6 +16,7 @@ from compsim.screen import (
     jobs_option,
     limit,
     one_thread_each,
+    plural,
     say,
     setting,
 )
@@ -26,8 +28,9 @@ EXAMPLES = ("claims", "assumptions")
 
 
 @click.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG...]")
-@click.option("-o", "--output", default="claims", show_default=True, help="Folder of the verdicts.")
+@click.argument("configs", nargs=-1, metavar="[CONFIG...]", shell_complete=files)
+@click.option("-o", "--output", default="claims", show_default=True, shell_complete=folders,
+              help="Folder of the verdicts.")  # fmt: skip
 @click.option("--search", "generations", type=click.IntRange(min=0), default=0, metavar="N",
               help="Then look for the least change that makes all claims hold: N generations of "
               "some 50 machines, in the ranges that a CONFIG draws from.")  # fmt: skip
@@ -75,11 +78,11 @@ def claims(
     found = []
     try:
         for study in studies:
-            say_unless(quiet, f"{study.name}: {study.jobs} machines of {study.path}")
+            say_unless(quiet, f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
             found.append(judge_machines(study, output, jobs or cores(), screen))
             screen.end()
         for study in drawn if generations else ():
-            say_unless(quiet, f"{study.name}: {generations} generations of a search")
+            say_unless(quiet, f"{study.name}: {plural(generations, 'generation')} of a search")
             found.append(least_change(study, output, jobs or cores(), generations, screen))
             screen.end()
     finally:

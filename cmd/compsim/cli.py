@@ -5,6 +5,7 @@ Nothing heavy is imported at the top: `compsim --help` answers at once.
 
 import contextlib
 import os
+import platform
 import shlex
 import signal
 import sys
@@ -17,9 +18,10 @@ from typing import Any
 
 import click
 
-from compressor.program import VERSION, CompsimError, CompsimWarning
+from compressor.program import PROGRAM, CompsimError, CompsimWarning, library_versions
 from compsim import (
     claims,
+    completion,
     dataset,
     explain,
     export,
@@ -37,8 +39,10 @@ from compsim import (
     verify,
 )
 from compsim.screen import DONE, INTERNAL, say
+from compsim.usage import Commands, one_line
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
 AGAIN = 0.02  # s until a dropped signal is sent again
 
 
@@ -50,10 +54,22 @@ class Interrupted(BaseException):
         super().__init__(signal.Signals(number).name)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(VERSION, prog_name="compsim")
+def version(context: click.Context, _: click.Parameter, asked: bool) -> None:
+    """Print the version of the program and of what it computes with, and end."""
+    if asked and not context.resilient_parsing:
+        others = {"Python": platform.python_version()} | library_versions(*LIBRARIES)
+        told = ", ".join(f"{name} {number}" for name, number in others.items())
+        click.echo(f"{PROGRAM} ({told})")
+        context.exit()
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version,
+              help="Print the versions of program and libraries.")  # fmt: skip
 def cli() -> None:
     """Sweep a reciprocating compressor over joint clearances, and draw what comes out.
+
+    To begin: compsim init. To let your shell complete names: compsim completion.
 
     Exit codes: 0 done, 1 internal error, 2 usage or case file, 3 some jobs failed, 5 store,
     130/143/129 interrupted.
@@ -77,6 +93,7 @@ for verb in (
     identify.identify,
     find.find,
     claims.claims,
+    completion.completion,
 ):
     cli.add_command(verb)
 
@@ -143,7 +160,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(f"interrupted by {signal_sent}")
         return 128 + signal_sent.number
     except click.ClickException as error:
-        error.show()
+        if type(error).__name__ == "NoArgsIsHelpError":  # of click 8.2 and later
+            error.show()
+        else:
+            say(one_line(error, arguments))
         return error.exit_code
     except Exception as error:
         return told(error)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, Screen, results, say, size
+from compsim.results import of_results, one_word, results_folder, studies
+from compsim.screen import DONE, Screen, say, size
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,8 +22,7 @@ def levels(context: click.Context, parameter: click.Parameter, text: str) -> tup
 
 
 @click.command()
-@click.argument("study", metavar="STUDY")
-@results
+@of_results("STUDY", studies)
 @click.option("-o", "--output", required=True, metavar="FOLDER", help="Folder of the data set.")
 @click.option("--revolutions", type=click.IntRange(min=2), default=5, show_default=True,
               help="Whole revolutions of a window.")  # fmt: skip
@@ -37,8 +37,8 @@ def levels(context: click.Context, parameter: click.Parameter, text: str) -> tup
 @click.option("--no-signals", is_flag=True, help="Features and labels, without samples.")
 @click.option("--quiet", is_flag=True, help="No progress.")
 def dataset(
-    study: str,
-    folder: str,
+    given: tuple[str, ...],
+    folder: str | None,
     output: str,
     revolutions: int,
     hop: int | None,
@@ -53,6 +53,8 @@ def dataset(
     Writes windows.nc, features.parquet and README.md, a card of what was simulated and what is not
     in it, and replaces those of an earlier data set. The study needs a body and a sensor.
     """
+    folder, words = results_folder(given, folder)
+    study = one_word(words, "STUDY")
     from compressor.diagnosis import DataSetOptions, build_data_set
 
     options = DataSetOptions(revolutions, hop, noise, test_share, seed, not no_signals)

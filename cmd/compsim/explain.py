@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, caution, limit, plural, say, setting
+from compsim.screen import DONE, SOME_FAILED, caution, configs_argument, limit, plural, say, setting
 
 if TYPE_CHECKING:
     from compressor.measure import Explanation
@@ -17,7 +17,7 @@ INDENT = 12  # columns of a heading
 
 
 @click.command()
-@click.argument("configs", nargs=-1, required=True, metavar="CONFIG...")
+@configs_argument
 @click.option("-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
               help="Worker processes that the sweep's cost is told for.")  # fmt: skip
 @setting
@@ -39,8 +39,8 @@ def explain(
 
     found = []
     for study in studies:
-        say(f"running the first of {plural(len(study.cases))} of {study.name}, with and without "
-            "each of its features")  # fmt: skip
+        first = "the job" if study.jobs == 1 else f"the first of {plural(study.jobs)}"
+        say(f"running {first} of {study.name}, with and without each of its features")
         found.append(explained(study, jobs))
         if not as_json:
             click.echo("\n".join(lines(found[-1])))
@@ -120,7 +120,7 @@ def cost_lines(told: "Explanation") -> Iterator[str]:
         yield heading("", f"by the scales alone about {told.expected_steps:.1g} steps, "
                       f"{1e3 * told.expected_seconds:.1g} ms")  # fmt: skip
     if told.jobs > 1:
-        workers = f"{told.workers} worker{'s' if told.workers > 1 else ''}"
+        workers = plural(told.workers, "worker")
         yield heading("", f"{told.sweep_seconds:.2g} s for {plural(told.jobs)} with {workers}, "
                       "if all cost the same")  # fmt: skip
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, STORE, Screen, plural, results, say, size
+from compsim.results import jobs, of_results, results_folder
+from compsim.screen import DONE, STORE, Screen, plural, say, size
 
 if TYPE_CHECKING:
     from compressor.store import Exported
 
 
 @click.command()
-@click.argument("names", nargs=-1, metavar="[STUDY|JOB]...")
-@results
+@of_results("[STUDY|JOB]...", jobs)
 @click.option("-o", "--output", required=True, metavar="FILE|FOLDER",
               help="A file, .nc or .csv, or a folder for a file each.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["netcdf", "csv"]),
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="A list of the files as JSON.")
 @click.option("--quiet", is_flag=True, help="No progress; damage is still told.")
 def export(
-    names: tuple[str, ...],
-    folder: str,
+    given: tuple[str, ...],
+    folder: str | None,
     output: str,
     form: str | None,
     series: bool,
@@ -41,9 +41,11 @@ def export(
     or the beginning of it, a table of samples. Without either, all studies. Several studies go into
     one FILE together, or into a FOLDER with a file each.
     """
-    from compressor.store import ExportOptions
+    folder, names = results_folder(given, folder)
+    from compressor.store import ExportOptions, writable_folder
     from compressor.store import export as write
 
+    writable_folder(os.path.dirname(output) or os.curdir, make=False)
     screen = Screen(quiet, "files")
     try:
         found, damaged = write(folder, names, output, ExportOptions(form, series, force), screen)
@@ -65,9 +67,9 @@ def told(found: "list[Exported]", output: str) -> list[str]:
     for (place, _), group in itertools.groupby(found, key=lambda one: _line_of(one, output)):
         files = [*group]
         rows, count = sum(one.rows for one in files), sum(one.bytes for one in files)
-        what = plural(rows) if files[0].kind == "metrics" else f"{rows} samples"
+        what = plural(rows, "job" if files[0].kind == "metrics" else "sample")
         if len(files) > 1 or place != files[0].path:
-            what = f"{plural(len(files))}, {what}"
+            what = f"{plural(len(files), 'job')}, {what}"
         lines.append(f"{place}  {what}, {size(count)}")
     return lines
 

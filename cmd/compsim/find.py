@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from compsim.results import files
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -32,7 +33,7 @@ UNBARRED = " (no error bar was made)"
 
 
 @click.command()
-@click.argument("config", metavar="CONFIG")
+@click.argument("config", metavar="CONFIG", shell_complete=files)
 @click.option("--over", required=True, metavar="KEY=LOW:HIGH",
               help="The key to search over and its range, in the case file's unit.")  # fmt: skip
 @click.option("--first", metavar="'METRIC[.JOINT] > VALUE'",
@@ -125,7 +126,7 @@ def comparison_lines(question: "Question", answer: "Answer") -> Iterator[str]:
     low, high = answer.low, answer.high
     if high is None:
         many = f"at none of {len(answer.points)} points from {question.low:g} to {question.high:g}"
-        unsure = f", and {len(answer.blind)} of them do not decide:" if answer.blind else ""
+        unsure = f", and {len(answer.blind)} of them {doubt(answer)}:" if answer.blind else ""
         yield f"{text} surely holds {many}{unsure}" if unsure else f"{text} holds {many}"
     elif answer.kind == "at_low":
         yield f"{text} holds from the range's lower end on"
@@ -137,7 +138,12 @@ def comparison_lines(question: "Question", answer: "Answer") -> Iterator[str]:
             yield f"  {at(question, low)}: no, {number(question, low)}  job {low.key[:8]}"
         yield f"  {at(question, high)}: yes, {number(question, high)}  job {high.key[:8]}"
         if answer.blind:
-            yield f"  {len(answer.blind)} points between do not decide:"
+            yield f"  {plural(len(answer.blind), 'point')} between {doubt(answer)}:"
+
+
+def doubt(answer: "Answer") -> str:
+    """What points do whose error bars reach the limit."""
+    return "does not decide" if len(answer.blind) == 1 else "do not decide"
 
 
 def extremum_lines(question: "Question", answer: "Answer") -> Iterator[str]:
@@ -154,7 +160,8 @@ def extremum_lines(question: "Question", answer: "Answer") -> Iterator[str]:
     high = "none" if answer.high is None else f"{answer.high.argument:.9g}"
     yield f"  nearest points that are surely worse: below {low}, above {high}"
     if answer.blind:
-        yield f"  {len(answer.blind)} points between tell nothing:"
+        verb = "tells" if len(answer.blind) == 1 else "tell"
+        yield f"  {plural(len(answer.blind), 'point')} between {verb} nothing:"
 
 
 def at(question: "Question", point: Any) -> str:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compsim.screen import DONE, Screen, as_json, one_thread_each, plural, results
+from compsim.results import files, of_results, one_word, results_folder, studies
+from compsim.screen import DONE, Screen, as_json, one_thread_each, plural
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,17 +17,17 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("record", metavar="RECORD.csv|JOB")
-@click.option("--study", required=True, help="Stored study with sensor records, to explain it by.")
-@results
+@of_results("RECORD.csv|JOB", files)
+@click.option("--study", required=True, shell_complete=studies,
+              help="Stored study with sensor records, to explain it by.")  # fmt: skip
 @click.option("--rpm", type=float, help="Steady speed of a record without a tacho.")
 @click.option("--tdc", type=float, help="A time of top dead centre in it, s.")
 @as_json
 @click.option("--quiet", is_flag=True, help="No progress.")
 def identify(
-    record: str,
+    given: tuple[str, ...],
     study: str,
-    folder: str,
+    folder: str | None,
     rpm: float | None,
     tdc: float | None,
     as_json: bool,
@@ -42,6 +43,8 @@ def identify(
 
     Exit code 0 also where nothing fits: that is an answer.
     """
+    folder, words = results_folder(given, folder)
+    record = one_word(words, "RECORD.csv|JOB")
     one_thread_each()  # before numpy loads
     from compressor.diagnosis import SteadySpeed, explain_record, find_record
 

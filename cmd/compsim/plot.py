@@ -2,7 +2,9 @@
 
 import click
 
-from compsim.screen import DONE, results
+from compressor.program import did_you_mean
+from compsim.results import folders, jobs, of_results, one_word, results_folder
+from compsim.screen import DONE
 
 FIGURES = (
     "signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map",
@@ -16,19 +18,21 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
     names = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     wrong = [name for name in names if name not in (*FIGURES, "all")]
     if wrong:
-        raise click.BadParameter(f"{wrong[0]!r} is none of {', '.join(FIGURES)}, all")
+        near = did_you_mean(wrong[0], FIGURES)
+        listed = f"there are {', '.join(FIGURES)}, or all"
+        raise click.BadParameter(f"there is no figure {wrong[0]!r}; {near or listed}")
     return () if "all" in names else names
 
 
 @click.command()
-@click.argument("target", metavar="JOB|STUDY")
+@of_results("JOB|STUDY", jobs)
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
     help="Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map; of a study "
     "of regimes bifurcation, sections, periods.",
 )  # fmt: skip
-@results
-@click.option("-o", "--output", default="plots", show_default=True, help="Folder of the figures.")
+@click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
+              help="Folder of the figures.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice([*KINDS]), default="png", show_default=True)
 @click.option(
     "--over", default="", metavar="AXIS",
@@ -39,9 +43,9 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
     help="The value of another axis; by default its first.",
 )  # fmt: skip
 def plot(
-    target: str,
+    given: tuple[str, ...],
     what: tuple[str, ...],
-    folder: str,
+    folder: str | None,
     output: str,
     form: str,
     over: str,
@@ -54,6 +58,11 @@ def plot(
     machine that was followed along a parameter (`regimes:`): its bifurcation diagram, Poincaré
     sections, and a map of periods over two parameters. Nothing but what is stored is needed.
     """
+    folder, words = results_folder(given, folder)
+    target = one_word(words, "JOB|STUDY")
+    from compressor.store import writable_folder
+
+    writable_folder(output, make=False)
     from compressor.regimes import followed_studies, open_regimes
     from compressor.report import PlotChoice, write_plots, write_regime_plots
 

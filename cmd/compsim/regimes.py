@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, Screen, duration, say
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    all_stored,
+    duration,
+    plural,
+    say,
+    stored_before,
+)
 
 if TYPE_CHECKING:
     from compressor.cases import Study
@@ -47,19 +56,19 @@ def tell(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
     """Say what there is now, and what failed."""
     for count in summary.counts:
         where = os.path.join(folder, "regimes", count.study)
-        chains = f"{count.chains} chain{'s' if count.chains > 1 else ''} x {count.values} values"
+        chains = f"{plural(count.chains, 'chain')} x {plural(count.values, 'value')}"
         ok = count.done - count.failed
         click.echo(f"{count.study}  {chains}  {ok:>4} ok  {count.failed:>4} failed  {where}")
         click.echo(f"{count.study}  {regimes_of(folder, count.study)}")
         if count.differ:
-            click.echo(f"{count.study}  up and down differ at {count.differ} values; second "
-                       f"attractors confirmed at {count.confirmed}")  # fmt: skip
+            apart = plural(count.differ, "value")
+            click.echo(f"{count.study}  up and down differ at {apart}; second attractors "
+                       f"confirmed at {count.confirmed}")  # fmt: skip
     if not quiet:
         new = summary.total - summary.done_before
-        done = f"{new} values run in {duration(summary.seconds)}"
-        if summary.done_before:
-            done += f", {summary.done_before} were stored before"
-        say(done if new else f"nothing to do: all {summary.total} values are stored in {folder}")
+        done = f"{plural(new, 'value')} run in {duration(summary.seconds)}"
+        done += stored_before(summary.done_before)
+        say(done if new else all_stored(summary.total, folder, "value"))
     if not summary.failed:
         return
     from compressor.cases import printable

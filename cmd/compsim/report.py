@@ -2,19 +2,26 @@
 
 import click
 
+from compsim.results import folders, of_results, results_folder
 from compsim.screen import DONE
 
 
 @click.command()
-@click.option("-i", "--input", "results", default="results", show_default=True,
-              help="Folder of results.")  # fmt: skip
-@click.option("-o", "--output", default="report", show_default=True, help="Folder of the report.")
-@click.option("--claims", default="claims", show_default=True,
+@of_results()
+@click.option("-o", "--output", default="report", show_default=True, shell_complete=folders,
+              help="Folder of the report.")  # fmt: skip
+@click.option("--claims", default="claims", show_default=True, shell_complete=folders,
               help="Folder of what `compsim claims` judged, if there is one.")  # fmt: skip
 @click.pass_context
-def report(context: click.Context, results: str, output: str, claims: str) -> int:
+def report(
+    context: click.Context, given: tuple[str, ...], folder: str | None, output: str, claims: str
+) -> int:
     """Draw figures and tables of stored studies; prints the path of the page."""
+    folder, _ = results_folder(given, folder, named=False)
+    from compressor.store import writable_folder
+
+    writable_folder(output, make=False)  # seconds before it is needed
     from compressor.report import write_report
 
-    click.echo(write_report(results, output, context.obj, claims))
+    click.echo(write_report(folder, output, context.obj, claims))
     return DONE

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from compsim.results import files, folders
+
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.store import Again
@@ -55,10 +57,10 @@ def nearby_case_files() -> list[str]:
 
 
 configs_argument = click.argument(
-    "configs", nargs=-1, required=True, metavar="CONFIG...", type=CaseFile()
+    "configs", nargs=-1, required=True, metavar="CONFIG...", type=CaseFile(), shell_complete=files
 )
 output_option = click.option("-o", "--output", default="results", show_default=True,
-                             help="Folder of results.")  # fmt: skip
+                             shell_complete=folders, help="Folder of results.")  # fmt: skip
 setting = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
     help="Set a key in all case files, such as machine.speed_rpm=300.",
@@ -165,7 +167,7 @@ def caution(studies: "Sequence[Study]") -> None:
             share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs looked at)"
             say(f"{study.path}: warning: {one.key}: {one.message}{share}")
         if len(found) > MOST_CAUTIONS:
-            say(f"{study.path}: and {len(found) - MOST_CAUTIONS} more warnings")
+            say(f"{study.path}: and {plural(len(found) - MOST_CAUTIONS, 'more warning')}")
 
 
 def tell_changes(studies: "Sequence[Study]", folder: str) -> None:
@@ -196,13 +198,22 @@ def duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-def plural(jobs: int) -> str:
-    """A number of jobs in words."""
-    return f"{jobs} job" + ("s" if jobs != 1 else "")
+def plural(count: int, thing: str = "job") -> str:
+    """A number of things in words: 1 job, 2 jobs."""
+    return f"{count} {thing}" + ("s" if count != 1 else "")
 
 
-results = click.option("-i", "--input", "folder", default="results", show_default=True,
-                       help="Folder of results.")  # fmt: skip
+def all_stored(count: int, folder: str, thing: str = "job") -> str:
+    """That there is nothing to run."""
+    every = f"the {thing} is" if count == 1 else f"all {count} {thing}s are"
+    return f"nothing to do: {every} stored in {folder}"
+
+
+def stored_before(count: int) -> str:
+    """That some of what was asked for was there already; "" for none."""
+    return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
+
+
 as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON.")
 
 

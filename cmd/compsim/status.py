@@ -5,9 +5,10 @@ import json
 
 import click
 
-from compsim.screen import DONE, as_json, plural, results, run_commands, say
+from compsim.results import of_results, results_folder
+from compsim.screen import DONE, as_json, plural, run_commands, say
 
-PROMISES = {"kept": "keep what accuracy promises", "none": "promise nothing"}
+PROMISES = {"kept": "what accuracy promises is kept", "none": "nothing is promised"}
 REGIMES = {
     "periodic": "periodic",
     "predictable": "predictable",
@@ -17,14 +18,15 @@ REGIMES = {
 
 
 @click.command()
-@results
+@of_results()
 @as_json
-def status(folder: str, as_json: bool) -> int:
+def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     """Tell how many jobs of each stored study are done, failed or missing, and why they failed.
 
     Of those that are ok, also how many keep what their accuracy promises, and how many move
     periodically, predictably or chaotically.
     """
+    folder, _ = results_folder(given, folder, named=False)
     from compressor.reasons import remedy
     from compressor.store import standings
 

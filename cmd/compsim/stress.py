@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, Screen, duration, jobs_option, one_thread_each, say
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    duration,
+    jobs_option,
+    one_thread_each,
+    plural,
+    say,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +94,7 @@ def summary(study: "xr.Dataset") -> Iterator[str]:
         total = sum(ends.values())
         named = ", ".join(f"{name} {count}" for name, count in sorted(ends.items()))
         share = ends.get("ok", 0) / max(total, 1)
-        yield f"{kind} range: {total} scenes, {share:.1%} ok: {named}"
+        yield f"{kind} range: {plural(total, 'scene')}, {share:.1%} ok: {named}"
     yield ""
     yield f"{'verdict':<13} {'excess':>7} {'beyond':>7} {'error':>8} {'bar':>8}  repeat by"
     most = worst(study)

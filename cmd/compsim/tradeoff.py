@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compsim.results import files, folders
 from compsim.screen import DONE, Screen, say, setting
 
 if TYPE_CHECKING:
@@ -16,8 +17,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG...]")
-@click.option("-o", "--output", default="tradeoff", show_default=True, help="Folder of the study.")
+@click.argument("configs", nargs=-1, metavar="[CONFIG...]", shell_complete=files)
+@click.option("-o", "--output", default="tradeoff", show_default=True, shell_complete=folders,
+              help="Folder of the study.")  # fmt: skip
 @click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True,
               help="Rounds over all points; the best time counts.")  # fmt: skip
 @click.option("--budget", type=click.FloatRange(min=0, min_open=True), default=4.0,

@@ -5,21 +5,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compsim.screen import DONE, STORE, as_json, plural, results, run_commands, say
+from compsim.results import of_results, results_folder
+from compsim.screen import DONE, STORE, as_json, plural, run_commands, say
 
 if TYPE_CHECKING:
     from compressor.store import Damage
 
 
 @click.command()
-@results
+@of_results()
 @as_json
-def verify(folder: str, as_json: bool) -> int:
+def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     """Compare every stored file with its checksum; exit code 5 if any is damaged.
 
     Damaged files are listed with the jobs that are lost with them, by study and swept values, and
     with the command that computes them again.
     """
+    folder, _ = results_folder(given, folder, named=False)
     from compressor.store import verify as compare
 
     damages = compare(folder)
@@ -36,7 +38,7 @@ def verify(folder: str, as_json: bool) -> int:
         say("no damage")
         return DONE
     lost = len({key for damage in damages for key in damage.keys})
-    say(f"{len(damages)} damaged file{'s' * (len(damages) != 1)}, {plural(lost)} lost")
+    say(f"{plural(len(damages), 'damaged file')}, {plural(lost)} lost")
     for command in run_commands((one for damage in damages for one in damage.again), folder):
         say(f"to mend: {command}")
     return STORE

@@ -23,6 +23,7 @@ KEY = re.compile(HEX20)
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
 
 FULL = "free some space there, then run the same command again"
+IS_FILE = "is a file, where a folder is needed"
 ELSEWHERE = "choose another folder"
 FORBIDDEN = f"get the permission to use it, or {ELSEWHERE}"
 REMEDIES = {
@@ -133,16 +134,19 @@ def make_folder(folder: Path) -> None:
         raise system_error(folder, error) from error
 
 
-def writable_folder(folder: Folder) -> None:
-    """Make a folder of which it is sure that files can be written there, before there are any.
+def writable_folder(folder: Folder, make: bool = True) -> None:
+    """Be sure that files can be written to a folder before there are any, and make it if wanted.
 
     Raises WrongName where that is not allowed, StoreError where the disk refuses.
     """
     path = Path(folder)
-    above = next(place for place in (path, *path.absolute().parents) if place.exists())
-    if above.is_dir() and not os.access(above, os.W_OK | os.X_OK):
+    above = next(place for place in (path, *path.parents, Path()) if place.exists())
+    if not above.is_dir():
+        raise WrongName(above, IS_FILE, ELSEWHERE)
+    if not os.access(above, os.W_OK | os.X_OK):
         raise WrongName(path, f"nothing may be written to {above}", FORBIDDEN)
-    make_folder(path)
+    if make:
+        make_folder(path)
 
 
 def _make_folder(folder: Path) -> None:
@@ -151,7 +155,7 @@ def _make_folder(folder: Path) -> None:
         try:
             folder.mkdir(exist_ok=True)
         except FileExistsError as error:
-            raise WrongName(folder, "is a file, where a folder is needed", ELSEWHERE) from error
+            raise WrongName(folder, IS_FILE, ELSEWHERE) from error
         _sync_folder(folder.parent)
 
 

@@ -159,7 +159,7 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder):
     [
         (["wron"], "no study 'wron', and no job's key begins so: near to it are the studies worn"),
         (["worn", "--what", "orbits"], "worn is a study: for orbits name a job, such as"),
-        (["worn", "--what", "noise"], "'noise' is none of signals"),
+        (["worn", "--what", "noise"], "there is no figure 'noise'; there are signals"),
         (["worn", "--over", "mass"], "worn has no axis 'mass': its axes are clearance_mm,"),
         (["worn", "--at", "speed_rpm=450"], "--at machine.speed_rpm=450: the axis has 400, 500"),
         (["worn", "--at", "clearance_mm=0.1"], "needs key=value of an axis other than"),

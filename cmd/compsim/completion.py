@@ -1,0 +1,40 @@
+"""`compsim completion`: what makes a shell complete commands, files, studies and jobs."""
+
+import sys
+
+import click
+from click.shell_completion import get_completion_class
+
+from compsim.screen import DONE, say
+
+INSTALL = {
+    "bash": """echo 'eval "$(compsim completion bash)"' >> ~/.bashrc""",
+    "zsh": """echo 'eval "$(compsim completion zsh)"' >> ~/.zshrc""",
+    "fish": "compsim completion fish > ~/.config/fish/completions/compsim.fish",
+}
+
+
+@click.command()
+@click.argument("shell", required=False, type=click.Choice([*INSTALL]))
+@click.pass_context
+def completion(context: click.Context, shell: str | None) -> int:
+    """Print what makes a shell complete commands, options, case files, studies and jobs.
+
+    Once, and it works in every new shell; without a SHELL these lines are printed:
+
+    \b
+    bash  echo 'eval "$(compsim completion bash)"' >> ~/.bashrc
+    zsh   echo 'eval "$(compsim completion zsh)"' >> ~/.zshrc
+    fish  compsim completion fish > ~/.config/fish/completions/compsim.fish
+    """
+    if shell is None:
+        for name, line in INSTALL.items():
+            click.echo(f"{name:<5} {line}")
+        return DONE
+    kind = get_completion_class(shell)
+    root = context.find_root().command
+    assert kind is not None
+    click.echo(kind(root, {}, "compsim", "_COMPSIM_COMPLETE").source())
+    if sys.stdout.isatty():
+        say(f"to install it: {INSTALL[shell]}; then open a new shell")
+    return DONE

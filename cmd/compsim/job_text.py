@@ -1,0 +1,208 @@
+"""What is known of one job, line by line: numbers with names, units and their error bars."""
+
+import itertools
+import math
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from compressor import metrics
+from compressor.digits import UNKNOWN, by_bar
+
+if TYPE_CHECKING:
+    from compressor.store import JobReport
+
+Line = tuple[str, str]  # a label and what stands beside it
+
+WIDTH = 37  # columns of a label, or more where one is longer
+SPREAD = "_standard_error"
+# unit in SI -> the unit of case files and of the report, and its factor
+UNITS = {
+    "m/s2": ("m/s²", 1.0), "N": ("kN", 1e-3), "m": ("mm", 1e3), "rad": ("deg", math.degrees(1.0)),
+    "1": ("", 1.0),
+}  # fmt: skip
+OF_CONTACT = ("eccentricity_error", "penetration_error")  # whose joint has clearance
+FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
+
+
+def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[str, list[str]]]:
+    """Headings and lines of a job; limits: of the rod load's reversal, degrees and percent."""
+    yield "", aligned(stop(found))
+    known = numbers(found, [*metrics.METRICS, *metrics.STATISTICS, *metrics.ROD_LOAD])
+    told = aligned([*known, *reversal_verdict(found, *limits)])
+    yield "metrics, with their error bars", [*told, *cautions(found)]
+    yield (
+        "relative errors of the time series",
+        aligned(series_errors(found, [*metrics.SERIES_ERRORS])),
+    )
+    yield "the run", aligned([*numbers(found, [*metrics.LEDGER]), *facts(found)])
+
+
+def aligned(lines: list[Line]) -> list[str]:
+    """Lines with their labels in a column."""
+    width = max((len(label) for label, _ in lines), default=0)
+    return [f"{label:<{max(width, WIDTH)}}  {text}" for label, text in lines]
+
+
+def stop(found: "JobReport") -> list[Line]:
+    """Where a job's run stopped, and how its last steps went, a line each; none that ended."""
+    told = found.attributes
+    if "stop_history_words" not in told:
+        return []
+    angle = math.degrees(told["stop_crank_angle"]) % 360
+    when = f"at {told['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"
+    lines = [("stopped", when)]
+    if told["stop_dominant"]:
+        lines.append(("driven by", told["stop_dominant"]))
+    names = told["stop_state_names"].split("; ")
+    for name, value in zip(names, told["stop_state"], strict=False):
+        lines.append((name, f"{value:.6g}"))
+    steps = zip(
+        *(told[f"stop_history_{name}"] for name in ("time", "step", "error")),
+        told["stop_history_words"].split("; "),
+        strict=False,
+    )
+    for time, step, error, words in steps:
+        known = "" if math.isnan(error) else f", error {error:.3g} of the tolerance"
+        lines.append(("step", f"{time:.12g} s + {step:.4g} s, {words}{known}"))
+    return lines
+
+
+def numbers(found: "JobReport", names: list[str]) -> list[Line]:
+    """Some of a job's numbers, a line for each joint and axis, to the digits that errors allow."""
+    lines = []
+    for name in names:
+        if name.endswith(SPREAD) or name not in found.numbers:
+            continue
+        values, (errors, relative, said) = found.numbers[name], bar_of(found, name)
+        unit, factor = unit_of(name)
+        for place, label in places(name, metrics.NUMBERS[name][0]):
+            value = picked(values, place)
+            if math.isnan(value) or tells_nothing(found, name, place):
+                continue
+            error = math.nan if errors is None else picked(errors, place)
+            text = measured(value * factor, error * factor, relative)
+            if text != UNKNOWN:
+                text = " ".join(filter(None, (text, unit, "" if math.isnan(error) else said)))
+            elif said:
+                continue  # of the statistics of a chaotic motion only those that are known
+            lines.append((label, text))
+    return lines
+
+
+def series_errors(found: "JobReport", names: list[str]) -> list[Line]:
+    """How far time series may be from the exact ones, a line for each joint."""
+    lines = []
+    for name in names:
+        for place, label in places(name, metrics.NUMBERS[name][0]):
+            error = picked(found.numbers[name], place)
+            if not (math.isnan(error) or tells_nothing(found, name, place)):
+                lines.append((label, UNKNOWN if math.isinf(error) else f"{error:.2g}"))
+    return lines
+
+
+def bar_of(found: "JobReport", name: str) -> tuple[Any, bool, str]:
+    """The errors of a number, None without; whether they are relative; and what kind they are."""
+    barred = metrics.METRICS | metrics.ROD_LOAD
+    if name in barred:
+        return found.numbers.get(f"{name}_error"), barred[name].bar.relative, ""
+    return found.numbers.get(name + SPREAD), True, "(standard error)"
+
+
+def unit_of(name: str) -> tuple[str, float]:
+    """The unit in which a number is shown, as the report does, and its factor from SI."""
+    row = metrics.METRICS.get(name)
+    if row and row.shown and row.unit != "1":
+        return row.shown.unit, row.shown.factor
+    if name.endswith(("_fraction", "_share")):
+        return "%", 100.0
+    unit = metrics.NUMBERS[name][1]
+    for other in metrics.METRICS:  # a statistic has its metric's unit
+        if name.startswith(f"{other}_") and unit == metrics.METRICS[other].unit:
+            return unit_of(other)
+    return UNITS.get(unit, (unit, 1.0))
+
+
+def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], str]]:
+    """Where each of a number's values stands, and what it is called: `peak contact force, big end`.
+
+    The error of a series is called after the series.
+    """
+    words: dict[str, tuple[Any, ...]] = {
+        "joint": metrics.JOINTS,
+        "axis": metrics.AXES,
+        "quantile": metrics.QUANTILES,
+    }
+    first = name.removesuffix("_error").removesuffix("_rev").replace("_", " ")
+    for choice in itertools.product(*(enumerate(words[dim]) for dim in dims)):
+        told = [first, *(str(word).replace("_", " ") for _, word in choice)]
+        yield tuple(number for number, _ in choice), ", ".join(told)
+
+
+def picked(values: Any, place: tuple[int, ...]) -> float:
+    """One of a number's values."""
+    for number in place:
+        values = values[number]
+    return float(values)
+
+
+def tells_nothing(found: "JobReport", name: str, place: tuple[int, ...]) -> bool:
+    """Whether a number is that of the contact in a joint that has no clearance."""
+    if not place or metrics.JOINTS[place[0]] in worn(found):
+        return False
+    rows = (row for row in metrics.METRICS.values() if name.startswith(row.name))
+    return any(row.contact for row in rows) or name in OF_CONTACT
+
+
+def worn(found: "JobReport") -> tuple[str, ...]:
+    """The joints of a job's case that have clearance."""
+    from compressor.cases import Case
+
+    joint = Case.from_attribute(found.attributes["case"]).joint
+    return tuple(name for name in metrics.JOINTS if joint in (name, "both"))
+
+
+def measured(value: float, error: float, relative: bool) -> str:
+    """A number with its error, by the digits that it allows; six digits without one."""
+    return f"{value:.6g}" if math.isnan(error) else by_bar(value, error, relative)
+
+
+def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[Line]:
+    """Whether the rod load changes its side for long and far enough; none without signals."""
+    worst, told = math.inf, []
+    for name, unit, least in (("angle", math.degrees(1.0), degrees), ("share", 100.0, percent)):
+        value = unit * found.numbers.get(f"rod_load_reversal_{name}", math.nan)
+        bar = unit * found.numbers.get(f"rod_load_reversal_{name}_error", math.nan)
+        if math.isnan(value):
+            return []
+        if math.isinf(bar):
+            return [("rod load", "its reversal is not known well enough to be judged")]
+        bar = 0.0 if math.isnan(bar) else bar
+        told.append(measured(value, bar, True) if bar else f"{value:.4g}")
+        clear = value - least
+        worst = min(worst, clear / abs(clear) if abs(clear) >= bar and clear else 0.0)
+    word = {1.0: "passes", 0.0: "cannot be told apart from", -1.0: "fails"}[worst]
+    kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
+    verdict = f"reversal of {told[0]} degrees and {told[1]} %: {word} {kind} "
+    return [("rod load", f"{verdict}{degrees:g} degrees and {percent:g} %")]
+
+
+def cautions(found: "JobReport") -> list[str]:
+    """How far the numbers may be trusted, where their errors do not say it."""
+    if found.attributes.get("regime") == "undecided":
+        return ["errors are as large as numbers, and chaos could not be ruled out in the time that "
+                "was spent: ask by solve.horizon: true"]  # fmt: skip
+    if found.attributes.get("regime") != "chaotic":
+        return []
+    lines = ["the motion is chaotic: averages may be trusted, single peaks may not"]
+    wanted = found.numbers.get("revolutions_to_one_percent", math.nan)
+    if math.isfinite(wanted):
+        lines.append(f"{wanted:.0f} settled revolutions would bring the standard error of "
+                     "rms_acceleration to 1 %")  # fmt: skip
+    return lines
+
+
+def facts(found: "JobReport") -> list[Line]:
+    """How a job was run, a line each."""
+    lines = [(name, str(found.attributes[name])) for name in FACTS if name in found.attributes]
+    return [*lines, ("file", os.path.relpath(found.file))] if found.file else lines

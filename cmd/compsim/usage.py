@@ -1,0 +1,66 @@
+"""Mistakes on the command line: each is answered by one line that says what to do."""
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from compressor.program import did_you_mean
+
+CASE_FILES = (".yaml", ".yml")
+ASKED = {"help": "compsim --help, or compsim COMMAND --help", "version": "compsim --version"}
+# what stands for the folder of results in some commands, and is asked of others in vain
+FOLDERS = {"-o": "output", "--output": "output", "-i": "folder", "--input": "folder"}
+
+
+class Commands(click.Group):
+    """The commands; of one that there is not, it is told what was probably meant."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command and its arguments. Raises UsageError where there is none of this name."""
+        word = args[0]
+        unknown = self.get_command(ctx, word) is None and not word.startswith("-")
+        if unknown and not ctx.resilient_parsing:
+            raise click.UsageError(self.meant(word, args[1:]), ctx)
+        return super().resolve_command(ctx, args)
+
+    def meant(self, word: str, more: Sequence[str]) -> str:
+        """What is said of a word in the place of a command."""
+        if word == "help" and more and more[0] in self.commands:
+            return f"No such command 'help': compsim {more[0]} --help"
+        if word in ASKED:
+            return f"No such command {word!r}: {ASKED[word]}"
+        if word.endswith(CASE_FILES):
+            line = shlex.join(["compsim", "run", word, *more])
+            return f"{word!r} is a case file, and a command comes first: {line}"
+        if Path(word).is_dir():
+            place = shlex.quote(word)
+            line = f"compsim status {place}, or compsim report {place}"
+            return f"{word!r} is a folder, and a command comes first: {line}"
+        near = did_you_mean(word, self.commands) or f"there are {', '.join(self.commands)}"
+        return f"No such command {word!r}; {near}"
+
+
+def one_line(error: click.ClickException, arguments: Sequence[str]) -> str:
+    """A mistake in the use of a command, and where to read on; arguments: after `compsim`."""
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context else " ".join(["compsim", *arguments[:1]])
+    text = " ".join(error.format_message().split())
+    if isinstance(error, click.NoSuchOption) and context:
+        text = text.rstrip(".") + other_folder(error.option_name, context)
+    if text.endswith("?") or "compsim " in text:  # what to do is said
+        return f"{path}: {text}"
+    return f"{path}: {text.rstrip('.')}; see {path} --help"
+
+
+def other_folder(option: str, context: click.Context) -> str:
+    """What to write for the folder of results where another command has this option for it."""
+    names = {parameter.name for parameter in context.command.params}
+    if FOLDERS.get(option) == "output" and "folder" in names:
+        return f": the folder of results is an argument, {context.command_path} FOLDER"
+    if FOLDERS.get(option) == "folder" and "output" in names:
+        return ": the folder of results is -o FOLDER here"
+    return ""

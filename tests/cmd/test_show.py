@@ -1,0 +1,115 @@
+"""`compsim show`: how a job is named, and its numbers, units and case."""
+
+import json
+import re
+
+import pytest
+from compsim import cli
+from conftest import CHAOTIC, store
+
+from compressor.cases.load import load_cases
+from compressor.digits import by_bar
+from compressor.store.status import report_job
+
+HERE = ["big-end", "clearance_mm=0.2"]
+
+
+@pytest.fixture
+def show(capsys):
+    """Runs `compsim show` and returns what it prints."""
+
+    def run(*words):
+        assert cli.main(["show", *map(str, words)]) == 0
+        return capsys.readouterr().out
+
+    return run
+
+
+def values(out):
+    """What stands beside each label."""
+    pairs = (re.split(r"  +", line.strip(), maxsplit=1) for line in out.splitlines())
+    return {pair[0]: pair[1] for pair in pairs if len(pair) == 2}
+
+
+def test_a_job_is_named_by_its_key_or_by_its_study_and_values(paper_store, show):
+    found = report_job(paper_store, *HERE)
+    assert found.studies == {"big-end": {"clearance_mm": 0.2}}
+    assert json.loads(found.attributes["case"])["clearance_mm"]["big_end"] == 0.2
+    out = show(paper_store, *HERE)
+    assert out.startswith(f"job {found.key}: ok\n  in big-end clearance_mm=0.2\n")
+    assert show(found.key[:12], "-i", paper_store) == out
+
+
+def test_numbers_have_labels_units_and_error_bars(paper_store, show):
+    numbers, told = report_job(paper_store, *HERE).numbers, values(show(paper_store, *HERE))
+    force, bar = (numbers[name] for name in ("peak_contact_force", "peak_contact_force_error"))
+    for place, joint in enumerate(("big end", "small end")):
+        said = by_bar(force[place] / 1e3, bar[place] / 1e3)
+        assert told[f"peak contact force, {joint}"] == f"{said} kN"
+    depth, bar = (numbers[name][0] for name in ("max_penetration", "max_penetration_error"))
+    assert told["max penetration, big end"] == f"{by_bar(depth * 1e6, bar * 1e6)} µm"
+    share = numbers["contact_loss_fraction"][0]
+    bar = numbers["contact_loss_fraction_error"][0]
+    assert told["contact loss fraction, big end"] == f"{by_bar(100 * share, 100 * bar, False)} %"
+    assert float(told["acceleration"]) == pytest.approx(numbers["acceleration_error"], rel=0.05)
+    assert told["friction loss"] == f"{numbers['friction_loss']:.6g} J"
+
+
+def test_nothing_is_an_array_and_nothing_is_said_of_a_contact_that_is_none(paper_store, show):
+    out = show(paper_store, *HERE)
+    assert "[" not in out
+    told = values(out)
+    assert "penetration, big end" in told
+    of_small_end = {label for label in told if "small end" in label}
+    assert {label.split(",")[0] for label in of_small_end} == {
+        "peak contact force", "peak contact force axis", "contact force"
+    }  # fmt: skip
+    assert "max penetration, small end" in values(show(paper_store, "both", "clearance_mm=0.2"))
+    assert not any("penetration" in label for label in values(show(paper_store, "design")))
+
+
+def test_the_case_is_shown_as_yaml_that_makes_the_same_job(paper_store, show, tmp_path):
+    key = report_job(paper_store, *HERE).key
+    brief = show(paper_store, *HERE).partition("(--case prints it whole)\n")[2]
+    assert "clearance_mm:\n    big_end: 0.2\n" in brief
+    assert "speed_rpm" not in brief  # the default
+    whole = show(paper_store, *HERE, "--case")
+    assert "  speed_rpm: 500.0\n" in whole
+    for name, text in (("brief", brief.replace("\n  ", "\n").strip()), ("whole", whole)):
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(text)
+        (again,) = load_cases(path)
+        assert again.key == key
+    assert again.name == f"big-end-{key[:8]}"  # a run of it takes no study's place
+
+
+def test_json_is_in_si_and_whole(paper_store, show):
+    found = json.loads(show(paper_store, *HERE, "--json"))
+    assert found["numbers"]["peak_contact_force"] == pytest.approx(
+        report_job(paper_store, *HERE).numbers["peak_contact_force"], rel=1e-15
+    )
+    assert {*found} == {
+        "key", "status", "reason", "detail", "file", "studies", "again", "numbers", "attributes"
+    }  # fmt: skip
+
+
+def test_of_a_chaotic_job_averages_are_told_and_peaks_are_not(show, tmp_path):
+    path = tmp_path / "wild.yaml"
+    path.write_text(json.dumps(CHAOTIC | {"solve": {"accuracy": "draft"}}))
+    store(tmp_path / "results", path)
+    out = show(tmp_path / "results", "wild")
+    told = values(out)
+    assert told["peak acceleration"] == "unknown"
+    assert told["acceleration"] == "unknown"
+    assert re.fullmatch(r"\d+ ± \d+ m/s²", told["rms acceleration"])
+    mean = told["peak contact force mean, big end"]
+    assert re.fullmatch(r"\d+ ± \d+ kN \(standard error\)", mean)
+    force = report_job(tmp_path / "results", "wild").numbers["peak_contact_force_mean"][0]
+    assert int(mean.split()[0]) == pytest.approx(force / 1e3, rel=0.1)
+    assert "the motion is chaotic: averages may be trusted, single peaks may not" in out
+
+
+@pytest.mark.parametrize("text", ["15", "a,b", "200,3", "15,-1"])
+def test_a_reversal_needs_two_numbers(text, capsys):
+    assert cli.main(["show", "ab", "--reversal", text]) == 2
+    assert "give degrees and percent, such as 30,25" in capsys.readouterr().err
