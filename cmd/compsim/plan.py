@@ -80,7 +80,7 @@ def plan(
         click.echo(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
                    f"{part.missing:>4} missing")  # fmt: skip
     if found.missing:
-        workers = f"{found.workers} worker{'s' if found.workers > 1 else ''}"
+        workers = plural(found.workers, "worker")
         click.echo(f"about {duration(found.seconds)} with {workers}, and {size(found.bytes)}")
     for job in found.first:
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
@@ -95,5 +95,5 @@ def tell_chains(ahead: "list[Standing]", as_json: bool) -> None:
         return
     for one in ahead:
         missing = one.chains * one.values - one.done
-        click.echo(f"{one.study}  {one.chains} chain{'s' if one.chains > 1 else ''} x "
-                   f"{one.values} values  {one.done:>4} done  {missing:>4} missing")  # fmt: skip
+        chains = f"{plural(one.chains, 'chain')} x {plural(one.values, 'value')}"
+        click.echo(f"{one.study}  {chains}  {one.done:>4} done  {missing:>4} missing")

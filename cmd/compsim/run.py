@@ -13,6 +13,7 @@ from compsim.screen import (
     DONE,
     SOME_FAILED,
     Screen,
+    all_stored,
     caution,
     configs_argument,
     duration,
@@ -24,6 +25,7 @@ from compsim.screen import (
     plural,
     say,
     setting,
+    stored_before,
     tell_changes,
 )
 
@@ -133,7 +135,8 @@ def run_jobs(
     except BaseException:
         screen.end()
         if screen.total:
-            say(f"{screen.done} of {screen.total} jobs are stored in {output}; "
+            verb = "is" if screen.total == 1 else "are"
+            say(f"{screen.done} of {plural(screen.total)} {verb} stored in {output}; "
                 "the same command goes on from there")  # fmt: skip
         raise
     screen.end()
@@ -175,9 +178,9 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
         )
     if not quiet:
         if not summary.run_now:
-            say(f"nothing to do: all {plural(summary.total)} are stored in {folder}")
+            say(all_stored(summary.total, folder))
         else:
-            again = f", {summary.done_before} were stored before" if summary.done_before else ""
+            again = stored_before(summary.done_before)
             say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
     report_failures(summary)
     if not quiet:
