@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+import xarray as xr
 from compsim import cli
 
 from compressor.cases.load import load_studies
@@ -105,7 +106,8 @@ def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys, beg
     assert begun == []
     assert run(place, capsys, "run", "--quiet")[0] == 0
     assert len(begun) == 1
-    assert open_regimes(place / "r", "wear").identical(before)
+    # in this process, whose compiled code may round otherwise than that of the workers
+    xr.testing.assert_allclose(open_regimes(place / "r", "wear"), before, rtol=1e-6)
 
 
 def test_plan_tells_chains_and_values_as_json(place, capsys):
