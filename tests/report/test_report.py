@@ -83,6 +83,12 @@ def full(once, paper_store):
     return once("full-report", lambda folder: write_report(paper_store, folder, command))
 
 
+@pytest.fixture(autouse=True)
+def unpainted(monkeypatch):
+    """No pixels are made, which takes seconds, but for `full`, which is made before."""
+    monkeypatch.setattr(report, "render", lambda drawing, kind: bytes(24))
+
+
 @pytest.fixture
 def own(tmp_path):
     """A store with a short sweep, none of it the paper's: 2 x 2 jobs."""
