@@ -66,6 +66,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "jinja2": {"compressor.report.page"},
     "matplotlib": {"compressor.report.figures"},
     "click": {"compsim"},
+    "rich": {"compsim.live"},
     "pyarrow": {"compressor.diagnosis"},
     "sklearn": set(),  # of campaigns alone
 }

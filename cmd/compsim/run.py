@@ -31,7 +31,7 @@ from compsim.screen import (
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-    from compressor.sweep import Backend, Summary
+    from compressor.sweep import Summary
 
 MOST_FAILURES = 20  # listed one by one
 
@@ -130,7 +130,7 @@ def run_jobs(
     try:
         with cluster(scheduler) as elsewhere:
             how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
-                          backend=elsewhere)  # fmt: skip
+                          backend=elsewhere, pulse=screen.stands)  # fmt: skip
             summary = sweep(studies, output, jobs, screen, how)
     except BaseException:
         screen.end()
@@ -157,7 +157,7 @@ def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None
         raise click.UsageError("--scheduler goes with --backend dask")
 
 
-def cluster(scheduler: str | None) -> contextlib.AbstractContextManager["Backend | None"]:
+def cluster(scheduler: str | None) -> contextlib.AbstractContextManager[Any]:
     """The cluster of a scheduler; none where jobs run here."""
     if scheduler is None:
         return contextlib.nullcontext()

@@ -17,10 +17,14 @@ from compsim.results import files, folders
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.store import Again
+    from compressor.sweep import Now
+    from compsim.live import Line
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 MOST_CAUTIONS = 5  # told of one case file
-QUIET_SECONDS = 10.0  # between two lines of progress where stderr is no terminal
+# of lines of progress where stderr is no terminal: until the first, and between two others
+FIRST_SECONDS, QUIET_SECONDS, QUIET_SHARE = 1.0, 10.0, 0.05
+FEWEST = 5  # things done that a guess of the time rests on
 
 CASE_FILE = re.compile(r"^(joint|clearance_mm|load|machine|blocks|regimes)\s*:", re.MULTILINE)
 PLACES = (".", "configs")  # where case files are looked for, if none is named
@@ -94,46 +98,114 @@ def one_thread_each() -> None:
 
 
 class Screen:
-    """Progress on stderr: one line, rewritten, on a terminal; elsewhere a line now and then."""
+    """Progress on stderr: a line that is drawn anew on a terminal, elsewhere one now and then.
+
+    A terminal that cannot draw (TERM=dumb), or shall not (NO_COLOR), is taken for a log.
+    """
 
     def __init__(self, quiet: bool, things: str = "jobs", alike: bool = True):
-        self.quiet, self.live = quiet, sys.stderr.isatty()
+        drawing = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+        self.quiet, self.live = quiet, sys.stderr.isatty() and drawing
         self.things, self.alike = things, alike
-        self.done = self.total = self.width = 0
-        self.began = self.told = time.monotonic()
-        self.before: int | None = None
+        self.done = self.total = self.failed = 0
+        self.began = self.told = time.monotonic()  # told: when a line was last written
+        self.told_done = -1
+        self.pace = Pace()
+        self.known: tuple[float, bool, float] | None = None  # s left, at least, since when
+        self.line: Line | None = None
 
     def __call__(self, done: int, total: int, remark: str) -> None:
-        """Take note of a sweep's progress (`compressor.sweep.sweep.Progress`)."""
+        """Take note of progress (`compressor.sweep.sweep.Progress`)."""
         self.done, self.total = done, total
-        if self.before in (None, done):
-            self.before, self.began = done, time.monotonic()
-        text = f"{done} of {total} {self.things}, {100 * done // total} %{self.time_left()}"
+        self.pace.note(done)
         if self.quiet:
             return
         if remark:
-            self.end()
             say(remark)
         if self.live:
-            say(f"\r{text:<{self.width}}", end="")
-            self.width = len(text)
-        elif not remark and time.monotonic() - self.told > QUIET_SECONDS:
-            self.told = time.monotonic()
-            say(text)
+            self.draw()
+        else:
+            self.log()
+
+    def stands(self, now: "Now") -> None:
+        """Take note of how a sweep stands, which knows best how long it will take."""
+        self.alike, self.failed = False, now.failed
+        since = time.monotonic()
+        self.known = None if now.left is None else (now.left, now.at_least, since)
+        if self.total and not self.quiet and not self.live:
+            self.log()
+
+    def words(self) -> tuple[str, str, str]:
+        """How many are done, how many failed, and how long it will take, as far as it is known."""
+        things = self.things if self.total != 1 else self.things.removesuffix("s")
+        share = f", {100 * self.done // self.total} %" if self.total else ""
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"{self.done} of {self.total} {things}{share}", failed, self.time_left()
 
     def time_left(self) -> str:
-        """A guess from the jobs that this run has done, where all take about the same time."""
-        here = self.done - (self.before or 0)
-        if not self.alike or not here or self.done == self.total:
+        """A guess from what has been done in this run; nothing as long as there is none."""
+        if self.done == self.total:
             return ""
-        seconds = (time.monotonic() - self.began) / here * (self.total - self.done)
-        return f", {duration(seconds)} left"
+        if self.known:
+            seconds, at_least, since = self.known
+            rest = max(0.0, seconds - (time.monotonic() - since))
+            return f", {'over ' * at_least}{guessed(rest)} left"
+        left = self.pace.left(self.total) if self.alike else None
+        return "" if left is None else f", {guessed(left)} left"
+
+    def draw(self) -> None:
+        """Show the line of progress on a terminal."""
+        if self.line is None:
+            from compsim.live import Line  # loads rich: a tenth of a second
+
+            self.line = Line(self.words)
+        self.line.show(self.done, self.total)
+
+    def log(self) -> None:
+        """Write a line where the last one was long ago: the longer, the longer this has lasted."""
+        now = time.monotonic()
+        wait = FIRST_SECONDS
+        if self.told_done >= 0:
+            wait = max(QUIET_SECONDS, QUIET_SHARE * (now - self.began))
+        if self.done < self.total and now - self.told >= wait:
+            self.told, self.told_done = now, self.done
+            say("".join(self.words()))
 
     def end(self) -> None:
-        """Leave the line of progress behind."""
-        if self.width and not self.quiet:
-            say(f"\r{'':<{self.width}}\r", end="")
-            self.width = 0
+        """Take the line of progress away; in a log, end with how far it came."""
+        if self.line:
+            self.line.stop()
+            self.line = None
+        elif 0 <= self.told_done != self.done and not self.quiet:
+            self.told_done = -1
+            say("".join(self.words()))
+
+
+class Pace:
+    """How fast things get done, from the first on: it had to wait for all to start."""
+
+    def __init__(self) -> None:
+        self.before: int | None = None  # done when this run began
+        self.first: tuple[int, float] | None = None  # done, and when
+        self.last: tuple[int, float] | None = None
+
+    def note(self, done: int) -> None:
+        """So many are done now."""
+        if self.before is None or done < self.before:
+            self.before, self.first = done, None
+        if done > self.before:
+            self.last = done, time.monotonic()
+            self.first = self.first or self.last
+
+    def left(self, total: int) -> float | None:
+        """Seconds until all are done; None as long as too few are done to say."""
+        if not self.first or not self.last:
+            return None
+        things, seconds = self.last[0] - self.first[0], self.last[1] - self.first[1]
+        if things < FEWEST or seconds < FIRST_SECONDS:
+            return None
+        since = time.monotonic() - self.last[1]
+        return max(0.0, seconds / things * (total - self.last[0]) - since)
 
 
 def say(text: str, end: str = "\n") -> None:
@@ -212,6 +284,11 @@ def all_stored(count: int, folder: str, thing: str = "job") -> str:
 def stored_before(count: int) -> str:
     """That some of what was asked for was there already; "" for none."""
     return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
+
+
+def guessed(seconds: float) -> str:
+    """Seconds that are a guess."""
+    return duration(seconds) if seconds >= 1 else "under 1 s"
 
 
 as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON.")

@@ -20,6 +20,7 @@ from compressor.sweep.batches import Input
 from compressor.sweep.execution import rest, run_batches
 from compressor.sweep.run_job import run_job
 from compressor.sweep.warm_up import Needs, compile_once, load
+from compressor.sweep.work import Now, Work
 from compressor.sweep.worker import Done, Lost, Workers
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
@@ -58,7 +59,8 @@ class Options:
     command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
     rerun_stale: so do those of which this version would tell more (`Stored.stale`); part: (i, n)
     for shard i of n, which other processes may run at the same time, each its own; wait: until
-    another run that writes there has ended; backend: where jobs run, if not here.
+    another run that writes there has ended; backend: where jobs run, if not here; pulse: told how
+    the sweep stands, several times a second while jobs run.
     """
 
     command: str = ""
@@ -67,6 +69,7 @@ class Options:
     part: tuple[int, int] | None = None
     wait: bool = False
     backend: Backend | None = None
+    pulse: Callable[[Now], object] = lambda now: None
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,8 @@ def sweep(
         if missing:
             for damage in writer.found.damaged:
                 progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
-            run_missing(writer, missing, options.backend or local(workers), ends, progress)
+            running = options.backend or local(workers)
+            run_missing(writer, missing, running, ends, (progress, options.pulse))
     counts, failed = endings(studies, ends)
     return Summary(
         len(cases), len(cases) - len(missing), len(missing), counts, failed,
@@ -162,29 +166,37 @@ def run_missing(
     missing: Sequence[Case],
     backend: Backend,
     ends: dict[str, End],
-    progress: Progress,
+    watchers: tuple[Progress, Callable[[Now], object]],
 ) -> None:
-    """Run and store cases; `ends` gains how each ended, `progress` is told of what is on disk."""
-    done, total = len(ends), len(ends) + len(missing)
+    """Run and store cases; `ends` gains how each ended.
+
+    watchers: progress, told of what is on disk, and the pulse.
+    """
+    progress, pulse = watchers
+    done, total, work = len(ends), len(ends) + len(missing), Work(missing)
+    failed = sum(end.status != "ok" for end in ends.values())
 
     def tell(acknowledged: Sequence[str]) -> None:
-        nonlocal done
+        nonlocal done, failed
         if acknowledged:
             done += len(acknowledged)
+            failed += sum(ends[key].status != "ok" for key in acknowledged)
             progress(done, total, "")
+
+    def beat() -> None:
+        tell(writer.flush_if_due())
+        left = work.left()
+        pulse(Now(done, failed, total, *(left or ())))
 
     def keep(end: Done | Lost) -> None:
         outcome = outcome_of(end)
         ends[outcome.key] = End(outcome.status, outcome.reason, outcome.detail)
+        work.add(end)
         tell(writer.add(outcome))
 
     progress(done, total, "")
-    running = backend(
-        writer.place,
-        missing,
-        lambda remark: progress(done, total, remark),
-        lambda: tell(writer.flush_if_due()),
-    )
+    pulse(Now(done, failed, total))
+    running = backend(writer.place, missing, lambda remark: progress(done, total, remark), beat)
     try:
         for end in running:
             keep(end)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from compsim import cli, plan, run
-from compsim.screen import Screen, duration
+from compsim.screen import duration
 
 from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.load import MAX_JOBS, load_cases
@@ -379,28 +379,6 @@ def test_the_unforeseen_is_shown_for_debugging(case_file, capsys, monkeypatch):
     assert "in broken" in capsys.readouterr().err
 
 
-def test_a_terminal_gets_one_line_that_is_rewritten(capsys, monkeypatch):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    screen = Screen(quiet=False)
-    for event in [(2, 11, ""), (3, 11, ""), (11, 11, "")]:
-        screen(*event)
-    screen.end()
-    err = capsys.readouterr().err
-    assert "\r2 of 11 jobs, 18 %\r3 of 11 jobs, 27 %, " in err
-    assert " left\r11 of 11 jobs, 100 %" in err
-    assert err.endswith(" \r")
-    assert "\n" not in err
-
-
-def test_a_remark_stays_above_the_line_that_is_rewritten(capsys, monkeypatch):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    screen = Screen(quiet=False)
-    for event in [(0, 11, ""), (0, 11, "compiled in 43 s"), (1, 11, "")]:
-        screen(*event)
-    err = capsys.readouterr().err
-    assert re.search(r"\r0 of 11 jobs, 0 %\r +\rcompiled in 43 s\n\r0 of 11 jobs, 0 %", err)
-
-
 @pytest.mark.parametrize(
     ("seconds", "text"),
     [(0.04, "0.0 s"), (9.9, "9.9 s"), (99, "99 s"), (101, "2 min"), (7200, "2 h 00 min")],
@@ -620,5 +598,5 @@ def test_a_run_that_is_told_to_end(send, number, code, started, tmp_path):
     assert {store.job_status(tmp_path / "results", key).status for key in kept} == {"ok"}
     if code > 0:
         goes_on = f"of {JOBS} jobs are stored in results; the same command goes on from there"
-        slow = rf"(compil.+\n|\d+ of {JOBS} jobs, .+ left\n)*"  # told where it takes long
+        slow = rf"(compil.+\n|\d+ of {JOBS} jobs, .+\n)*"  # told where it takes long
         assert re.fullmatch(rf"{slow}\d+ {goes_on}\ninterrupted by {number.name}\n", err)
