@@ -27,6 +27,7 @@ from compsim import (
     export,
     find,
     identify,
+    init,
     plan,
     plot,
     report,
@@ -77,6 +78,7 @@ def cli() -> None:
 
 
 for verb in (
+    init.init,
     run.run,
     report.report,
     plot.plot,

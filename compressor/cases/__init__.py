@@ -2,7 +2,7 @@
 
 from compressor.cases.accuracy import ACCURACY, TIGHTEST
 from compressor.cases.case import MODEL_VERSION, Case
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.file_error import CaseFileError
 from compressor.cases.groups import (
     METHODS,

@@ -1,6 +1,7 @@
 """The examples that are installed with the program."""
 
 import fnmatch
+import re
 import tomllib
 from pathlib import Path
 
@@ -8,8 +9,10 @@ import pytest
 
 from compressor.analysis.paper_cases import FAULT_LABELS, cases_of
 from compressor.cases.case import Case
-from compressor.cases.examples import FOLDER, example
+from compressor.cases.examples import FOLDER, STARTS, example, templates
 from compressor.cases.load import load_studies
+from compressor.solve.cautions import cautions
+from compressor.solve.simulate import simulate
 
 ROOT = Path(__file__).parent.parent.parent
 NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
@@ -19,7 +22,45 @@ NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 def test_examples_can_be_run(name):
     (study,) = load_studies(example(name))
     assert study.name == name
-    assert study.cases
+    (said,) = re.findall(r"^(\d+) (?:jobs|machines|chain)\b", templates()[name].jobs)
+    assert study.jobs == int(said)
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_templates_run_without_a_warning(name):
+    """A few jobs of each, short ones, and all of the axes' ends."""
+    (study,) = load_studies(example(name), overrides=["solve.accuracy=draft"])
+    assert cautions(study) == []
+    for case in [*study.cases[:: study.jobs // 2], study.cases[-1]]:
+        run = simulate(case)
+        assert run["status"].item() == "ok"
+        assert run["peak_acceleration"] > 0
+
+
+def test_templates_come_first_and_say_what_they_answer():
+    found = templates()
+    assert tuple(found)[: len(STARTS)] == STARTS
+    assert sorted(found) == NAMES
+    for one in found.values():
+        assert one.question.count("?") == 1
+        assert re.search(r"seconds|minutes|hour|\d s\b", one.jobs)
+        verb = "claims" if "claims" in one.path.read_text() and "run" not in one.next else "run"
+        assert one.next.startswith(f"compsim {verb} {one.name}.yaml")
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "commands"),
+    [
+        ("wear", "bearing.yaml", "compsim run bearing.yaml; compsim report"),
+        ("diagnosis", "a/my.yaml", "compsim run a/my.yaml; compsim dataset my -o faults"),
+        ("regimes", "rise.yaml", "compsim run rise.yaml; compsim plot rise"),
+        ("claims", "our masses.yaml", "compsim claims 'our masses.yaml'"),
+    ],
+)
+def test_a_template_names_the_file_that_it_is_written_to(name, file, commands):
+    text = templates()[name].text(Path(file))
+    assert text.splitlines()[2] == f"# next: {commands}"
+    assert text.splitlines()[3:] == example(name).read_text().splitlines()[3:]
 
 
 def test_an_unknown_example_names_those_that_there_are():

@@ -1,0 +1,74 @@
+"""`compsim init`: a commented case file to start from."""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+from click.shell_completion import CompletionItem
+
+from compressor.program import did_you_mean
+from compsim.results import Items, files
+from compsim.screen import DONE, say
+from compsim.usage import CASE_FILES
+
+
+def names(_: click.Context, __: click.Parameter, word: str) -> Items:
+    """The templates, for a shell."""
+    from compressor.cases import templates
+
+    return [CompletionItem(name) for name in templates() if name.startswith(word)]
+
+
+@click.command()
+@click.argument("template", required=False, shell_complete=names)
+@click.option("-o", "--output", metavar="FILE", shell_complete=files,
+              help="The file, or a folder for it; by default TEMPLATE.yaml here.")  # fmt: skip
+def init(template: str | None, output: str | None) -> int:
+    """Write a commented case file to start from, such as `compsim init wear`.
+
+    Its first lines say what it answers, how many jobs it has and how long they take. Without
+    TEMPLATE, what there is. A file that exists is never overwritten.
+    """
+    from compressor.cases import templates
+
+    known = templates()
+    if template is None:
+        for one in known.values():
+            click.echo(f"{one.name:<{max(map(len, known))}}  {one.question}")
+            click.echo(f"{'':<{max(map(len, known))}}  {one.jobs}")
+        say("next: compsim init wear")
+        return DONE
+    if template not in known:
+        raise click.UsageError(unknown(template, known), click.get_current_context())
+    path = Path(output or known[template].path.name)
+    path = path / known[template].path.name if path.is_dir() else path
+    write(path, known[template].text(path), template)
+    click.echo(path)
+    say(f"next: {known[template].commands(path).partition(';')[0]}")
+    return DONE
+
+
+def unknown(template: str, known: Iterable[str]) -> str:
+    """What is said of a template that there is not."""
+    if template.endswith(CASE_FILES):
+        return f"a template comes first: compsim init wear -o {template}"
+    near = did_you_mean(template, known) or f"there are {', '.join(known)}"
+    return f"there is no template {template!r}; {near}"
+
+
+def write(path: Path, text: str, template: str) -> None:
+    """Write a new file. Raises UsageError where there is one, WrongName where none may be made."""
+    from compressor.cases import table
+    from compressor.store import writable_folder
+
+    context = click.get_current_context()
+    if table()["name"].check(path.stem):
+        problem = f"{path.name!r} gives the study no name: use letters, digits, dots, _ and -"
+        raise click.UsageError(problem, context)
+    if os.path.lexists(path):
+        remedy = f"compsim init {template} -o OTHER.yaml"
+        raise click.UsageError(f"{path} exists, and is not overwritten: {remedy}", context)
+    writable_folder(path.parent)
+    with open(path, "x", encoding="utf-8") as file:
+        file.write(text)

@@ -1,0 +1,75 @@
+"""`compsim init`: case files to start from."""
+
+from pathlib import Path
+
+import pytest
+from compsim import cli
+
+from compressor.cases.examples import STARTS, templates
+from compressor.cases.load import load_studies
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_list_has_questions_jobs_and_times(capsys):
+    assert cli.main(["init"]) == 0
+    out, err = capsys.readouterr()
+    lines = out.splitlines()
+    assert [line.split()[0] for line in lines[::2]] == [*templates()]
+    assert "wear         How much wear may a joint have?" in out
+    assert "14 jobs" in out
+    assert err == "next: compsim init wear\n"
+    assert not [*Path().iterdir()]
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_a_file_is_written_and_the_next_command_named(name, capsys):
+    assert cli.main(["init", name]) == 0
+    assert capsys.readouterr() == (f"{name}.yaml\n", f"next: compsim run {name}.yaml\n")
+    assert Path(f"{name}.yaml").read_text() == templates()[name].path.read_text()
+    (study,) = load_studies(f"{name}.yaml")
+    assert study.name == name
+
+
+def test_files_and_folders_may_be_chosen(capsys):
+    assert cli.main(["init", "wear", "-o", "deep/er/mine.yaml"]) == 0
+    assert capsys.readouterr().err == "next: compsim run deep/er/mine.yaml\n"
+    assert cli.main(["init", "paper", "-o", "deep"]) == 0
+    assert capsys.readouterr().out == "deep/paper.yaml\n"
+    assert Path("deep/er/mine.yaml").read_text().splitlines()[2].startswith(
+        "# next: compsim run deep/er/mine.yaml;"
+    )  # fmt: skip
+
+
+def test_nothing_is_overwritten(capsys):
+    Path("wear.yaml").write_text("mine")
+    Path("link.yaml").symlink_to("absent")
+    for words in (["wear"], ["wear", "-o", "wear.yaml"], ["paper", "-o", "link.yaml"]):
+        assert cli.main(["init", *words]) == 2
+        err = capsys.readouterr().err
+        assert "exists, and is not overwritten: compsim init " in err
+        assert "-o OTHER.yaml" in err
+    assert Path("wear.yaml").read_text() == "mine"
+    assert not Path("absent").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["waer"], "there is no template 'waer'; did you mean wear or"),
+        (["xyzzy"], "there is no template 'xyzzy'; there are paper, wear, "),
+        (["mine.yaml"], "a template comes first: compsim init wear -o mine.yaml"),
+        (["wear", "-o", "my wear.yaml"], "'my wear.yaml' gives the study no name"),
+        (["wear", "-o", "file/wear.yaml"], "file: is a file, where a folder is needed"),
+    ],
+)
+def test_what_cannot_be_written(words, told, capsys):
+    Path("file").touch()
+    assert cli.main(["init", *words]) == 2
+    out, err = capsys.readouterr()
+    assert told in err
+    assert (out, err.count("\n")) == ("", 1)
