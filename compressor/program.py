@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
@@ -10,6 +10,7 @@ from pathlib import Path
 VERSION = "0.1.0"
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
 COMPILED = Path(__file__).parent / "physics"  # the sources that are compiled
+MOST_MEANT = 3  # words that may have been meant
 LONGEST_WORD = 100  # characters of a word that others are compared with
 
 
@@ -43,17 +44,20 @@ class CompsimWarning(UserWarning):
     """
 
 
-def did_you_mean(word: str, known: Iterable[str], most: int = 3) -> str:
+def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | None = None) -> str:
     """What was probably meant by a word that is not known, as `did you mean A or B?`, or "".
 
-    A path or a file's name stands for its stem; upper and lower case are the same.
+    told: what to tell for each, itself by default. A path or a file's name stands for its stem,
+    too; upper and lower case are the same.
     """
     names = {name.casefold(): name for name in known}
     sought = [word[:LONGEST_WORD].casefold()]
     sought.append(Path(sought[0]).stem)
-    near = next((found for one in sought if (found := get_close_matches(one, names, most))), [])
+    near = next(
+        (found for one in sought if (found := get_close_matches(one, names, MOST_MEANT))), []
+    )
     exact = next(([one] for one in sought if one in names), [])
-    found = [names[one] for one in exact or near]
+    found = [str((told or {}).get(names[one], names[one])) for one in exact or near]
     return f"did you mean {' or '.join(found)}?" if found else ""
 
 

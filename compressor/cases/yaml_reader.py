@@ -14,6 +14,7 @@ from typing import Any
 
 import yaml
 
+from compressor.cases.near_files import START, no_text, unreadable
 from compressor.cases.parameter import NO_VALUE
 
 MAX_BYTES = 1 << 20
@@ -93,8 +94,7 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        message = getattr(error, "strerror", None) or str(error)
-        problems.append(FileProblem(Place(path), "", f"cannot be read: {message}"))
+        problems.append(FileProblem(Place(path), "", unreadable(path, error)))
         return None
     if len(data) > MAX_BYTES:
         problems.append(FileProblem(Place(path), "", "is larger than 1 MiB: no case file"))
@@ -103,7 +103,7 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
         text = data.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         place = _place_at(path, data[: error.start].decode())
-        problems.append(FileProblem(place, "", "is not UTF-8 text"))
+        problems.append(FileProblem(place, "", no_text(data)))
         return None
     return read_text(text, Place(path, 1, 1), problems)
 
@@ -190,7 +190,8 @@ class _Builder:
         next(self.events)  # the stream's start
         opening = next(self.events)
         if isinstance(opening, yaml.StreamEndEvent):
-            raise _Unreadable(FileProblem(self.start, "", "is empty"))
+            hint = f"; {START}" if self.start.line else ""
+            raise _Unreadable(FileProblem(self.start, "", f"is empty{hint}"))
         if opening.version not in (None, (1, 2)):
             self.note(opening, "", "case files are YAML 1.2")
         node = self.node(next(self.events), "", 0, None)

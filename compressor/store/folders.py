@@ -52,7 +52,7 @@ def remedy_for(place: Path) -> str:
     beside = {
         one.name: place.parent / one.name for one in found_in(above) if one.name != place.name
     }
-    near = did_you_mean(place.name, beside)
+    near = did_you_mean(place.name, beside, beside)
     if near:
         return near
     if beside:

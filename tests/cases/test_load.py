@@ -226,15 +226,15 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         "--set joint=y: joint: needs none, big_end, small_end or both, not 'y'",
         "a.yaml:2:1: needs keys at the top, such as `joint: big_end`",
         "b.yaml:1:7: load: needs design, typical or none, not 'x'",
-        "missing.yaml: cannot be read: No such file or directory",
+        "missing.yaml: cannot be read: No such file or directory; there are a.yaml, b.yaml",
     ]
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", "1:1: is empty"),
-        ("# nothing\n", "1:1: is empty"),
+        ("", "1:1: is empty; compsim init writes a case file to start from"),
+        ("# nothing\n", "1:1: is empty; compsim init writes a case file to start from"),
         ("12\n", "1:1: needs keys at the top, such as `joint: big_end`"),
         ("joint: none\n---\njoint: none\n", "2:1: a second document begins here; "
          "a case file holds one"),
@@ -466,7 +466,8 @@ def test_a_hostile_file_cannot_write_to_the_terminal(write, text):
 
 def test_a_hostile_file_name_cannot_either(write):
     assert mistakes("\x1b[31m.yaml") == [
-        "\\x1b[31m.yaml: cannot be read: No such file or directory"
+        "\\x1b[31m.yaml: cannot be read: No such file or directory; "
+        "compsim init writes a case file to start from"
     ]
 
 

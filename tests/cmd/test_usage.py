@@ -14,7 +14,7 @@ LAST = "see compsim --help"
     [
         (["rum"], "compsim: No such command 'rum'; did you mean run?"),
         (["Status"], "compsim: No such command 'Status'; did you mean status?"),
-        (["xyzzy"], "compsim: No such command 'xyzzy'; there are run, report, plot, "),
+        (["xyzzy"], "compsim: No such command 'xyzzy'; there are init, run, report, "),
         (["help"], "compsim: No such command 'help': compsim --help, or compsim COMMAND --help"),
         (["help", "show"], "compsim: No such command 'help': compsim show --help"),
         (["version"], "compsim: No such command 'version': compsim --version"),

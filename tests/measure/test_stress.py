@@ -254,6 +254,6 @@ def test_a_scene_is_repeated_as_a_case_file(capsys, tmp_path):
 def test_the_command_writes_data_and_map(capsys, tmp_path):
     assert cli.main(["stress", "-n", "2", "--seed", "1", "-j", "1", "-o", str(tmp_path)]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("supported range: 1 scenes")
+    assert out.startswith("supported range: 1 scene,")
     assert "peak memory of a worker: " in out
     assert {path.name for path in tmp_path.iterdir()} == {FILE, "stress.png", "stress.svg"}
