@@ -8,7 +8,7 @@ import click
 from compsim.results import of_results, results_folder
 from compsim.screen import DONE, as_json, plural, run_commands, say
 
-PROMISES = {"kept": "with the promised accuracy", "none": "without a promise"}
+PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
 REGIMES = {
     "periodic": "periodic",
     "predictable": "predictable",

@@ -117,7 +117,7 @@ def test_status_counts_by_promise_and_by_regime(ring, capsys):
     assert one.regimes == {"chaotic": 1, "periodic": 1}
     assert cli.main(["status", "-i", str(ring)]) == 0
     out = capsys.readouterr().out
-    assert "of those ok: 1 without a promise, 1 with the promised accuracy\n" in out
+    assert "of those ok: 1 without a promise, 1 kept what accuracy promises\n" in out
     assert "of those ok: 1 chaotic (averages hold, single peaks do not), 1 periodic\n" in out
 
 
