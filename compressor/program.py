@@ -25,7 +25,7 @@ class CompsimError(Exception):
     ...     compressor.open_study("nowhere")
     ... except compressor.CompsimError as error:
     ...     print(error.exit_code, type(error).__name__)
-    5 StoreError
+    2 WrongName
     """
 
     exit_code = 1

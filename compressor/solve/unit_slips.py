@@ -83,8 +83,8 @@ def values_of(case: Case, key: str) -> list[float]:
     group, _, name = key.partition(".")
     if group in UNREAD[case.load] or (case.joint == "none" and group in OF_CONTACTS):
         return []
-    if key == "clearance_mm":
-        worn = (getattr(case.clearance_mm, joint) for joint in JOINTS)
+    if not name:  # what both joints share
+        worn = (getattr(getattr(case, group), joint) for joint in JOINTS)
         return [value for value in worn if value]
     if name == "stiffness_N_per_mm15" and case.contact.exponent != 1.5:
         return []  # its unit depends on the exponent

@@ -47,10 +47,10 @@ class StoreError(CompsimError):
 
     >>> import compressor
     >>> try:
-    ...     compressor.open_study("nowhere")
+    ...     compressor.open_study("results", "waer")
     ... except compressor.StoreError as error:
     ...     print(f"{error.problem}; {error.remedy}")
-    holds no study; choose the folder of a sweep, or make one: compsim run CONFIG...
+    holds no study 'waer'; did you mean wear?
     """
 
     exit_code = 5

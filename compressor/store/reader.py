@@ -278,9 +278,9 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     With `trusted`, metrics are nan where they are not known: where the error bar is as long as the
     number or inf, as of single peaks of a chaotic motion, or was not made; and where a job failed.
 
-    Raises WrongName, a StoreError that tells what was probably meant, for a folder without results
-    and for a study that it does not hold. Damaged files are told by a StoreWarning, and their jobs
-    count as missing.
+    Raises StoreError for a folder without results and for a study that it does not hold: a
+    WrongName, which tells what was probably meant. Damaged files are told by a StoreWarning, and
+    their jobs count as missing.
 
     After `compsim run wear.yaml` with the file of `load_cases`:
 
