@@ -8,6 +8,7 @@ import click
 
 from compsim.screen import (
     DONE,
+    Reading,
     caution,
     configs_argument,
     duration,
@@ -54,7 +55,10 @@ def plan(
     from compressor.cases import load_studies
     from compressor.sweep import cores
 
-    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
+    with Reading() as told:
+        studies = load_studies(
+            *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
+        )
     caution(studies)
     chained = [study for study in studies if study.regimes]
     studies = [study for study in studies if not study.regimes]
@@ -69,20 +73,22 @@ def plan(
     tell_changes(studies, output)
     from compressor.sweep import forecast
 
-    found = forecast(studies, output, jobs or cores(), first, say)
+    found = forecast(studies, output, first)
+    workers = jobs or cores()
     if as_json:
         more = {"regimes": [one._asdict() for one in ahead]} if ahead else {}
-        click.echo(json.dumps(dataclasses.asdict(found) | more, indent=1))
+        click.echo(json.dumps(dataclasses.asdict(found.timed(workers, say)) | more, indent=1))
         return DONE
     tell_chains(ahead, as_json)
-    width = max(len(part.study) for part in found.studies)
-    for part in found.studies:
+    width = max(len(part.study) for part in found.counts.studies)
+    for part in found.counts.studies:
         click.echo(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
                    f"{part.missing:>4} missing")  # fmt: skip
-    if found.missing:
-        workers = plural(found.workers, "worker")
-        click.echo(f"about {duration(found.seconds)} with {workers}, and {size(found.bytes)}")
-    for job in found.first:
+    if found.counts.missing:
+        whole = found.timed(workers, say)
+        with_workers = plural(whole.workers, "worker")
+        click.echo(f"about {duration(whole.seconds)} with {with_workers}, and {size(whole.bytes)}")
+    for job in found.counts.first:
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
         click.echo(f"next: {job.study}{point}")
     return DONE

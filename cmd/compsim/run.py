@@ -12,6 +12,7 @@ from compressor.program import PROGRAM
 from compsim.screen import (
     DONE,
     SOME_FAILED,
+    Reading,
     Screen,
     all_stored,
     caution,
@@ -96,7 +97,10 @@ def run(
     from compressor.cases import load_studies
     from compressor.sweep import cores
 
-    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, only=only)
+    with Reading(quiet) as told:
+        studies = load_studies(
+            *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
+        )
     if only and not quiet:
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")

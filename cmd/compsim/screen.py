@@ -24,6 +24,7 @@ DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n
 MOST_CAUTIONS = 5  # told of one case file
 # of lines of progress where stderr is no terminal: until the first, and between two others
 FIRST_SECONDS, QUIET_SECONDS, QUIET_SHARE = 1.0, 10.0, 0.05
+MANY = 20_000  # cases that take seconds to be read
 FEWEST = 5  # things done that a guess of the time rests on
 
 CASE_FILE = re.compile(r"^(joint|clearance_mm|load|machine|blocks|regimes)\s*:", re.MULTILINE)
@@ -179,6 +180,24 @@ class Screen:
         elif 0 <= self.told_done != self.done and not self.quiet:
             self.told_done = -1
             say("".join(self.words()))
+
+
+class Reading:
+    """Progress of reading case files, of those that have many jobs; a context manager."""
+
+    def __init__(self, quiet: bool = False):
+        self.screen = Screen(quiet, "cases read")
+
+    def __enter__(self) -> "Reading":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.screen.end()
+
+    def __call__(self, study: str, done: int, total: int) -> None:
+        """Take note of how many cases of a study have been read; its first word is their number."""
+        if total >= MANY:
+            self.screen(done, total, f"{study}: {plural(total)}" if done == 0 else "")
 
 
 class Pace:

@@ -9,7 +9,7 @@ each other. A very large study does not keep its cases: each is built again when
 import itertools
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,6 +30,8 @@ from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, sh
 MAX_JOBS = 10_000
 MAX_KEPT = 100_000  # cases of a study that stay in memory, each 1 kB
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
+IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
+Told = Callable[[str, int, int], object]  # of a study: its name, cases read, cases in all
 
 
 @dataclass(frozen=True)
@@ -79,13 +81,14 @@ def load_studies(
     max_jobs: int = MAX_JOBS,
     only: str = "",
     follow: bool = True,
+    told: Told = lambda name, done, total: None,
 ) -> list[Study]:
     """The studies of YAML case files; each override, `key=value`, replaces a value in all of them.
 
     A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
     comparison, selects the jobs to be run. A file with `regimes` is refused where the caller cannot
-    `follow` one. Raises CaseFileError with everything that is wrong in all files, overrides and the
-    comparison.
+    `follow` one. `told` hears how many cases have been read. Raises CaseFileError with everything
+    that is wrong in all files, overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
@@ -94,7 +97,7 @@ def load_studies(
     _refuse_shared_names(drafts)
     if not follow:
         _refuse_regimes(drafts)
-    studies = [_study(draft, max_jobs, test) for draft in drafts]
+    studies = [_study(draft, max_jobs, test, told) for draft in drafts]
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(Place(f"--only {shortened(only)}"), "", "selects no job"))
@@ -165,7 +168,7 @@ def _refuse_regimes(drafts: Sequence[_Draft]) -> None:
             draft.problems.append(FileProblem(place, GROUP, message))
 
 
-def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
+def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told) -> Study:
     """The study of a draft; without cases if the draft has problems, to which its own are added."""
     every = _blocks(draft, max_jobs)
     if draft.regimes:
@@ -179,7 +182,7 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None) -> Study:
         _refuse_idle_sample(drafts, draft)
     is_grid = len(found) == 1 and found[0].is_grid
     keys = [] if is_grid else blocks.columns(found)
-    built = _build(draft, cases, keys)
+    built = _build(draft, cases, keys, told)
     if is_grid:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
@@ -235,10 +238,7 @@ def _block_leaves(item: Node, draft: _Draft) -> Leaves:
     found = leaves(item, draft.problems)
     whole = ("name", "blocks", GROUP)
     for key in [key for key in found.values if key.partition(".")[0] in whole]:
-        group, message = (
-            key.partition(".")[0],
-            "cannot stand in a block: it belongs to the whole file",
-        )
+        group, message = key.partition(".")[0], IN_BLOCK
         draft.problems.append(FileProblem(found.places[group], group, message))
         del found.values[key]
     found.places[""] = item.place
@@ -263,14 +263,14 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
     return False
 
 
-def _build(draft: _Draft, cases: Cases, keys: Sequence[str]) -> _Built:
+def _build(draft: _Draft, cases: Cases, keys: Sequence[str], told: Told) -> _Built:
     """What every case of a study is, keyed and with its values of some keys of the file.
 
     Conflicts in any combination are problems of the draft.
     """
     found: dict[Problem, FileProblem] = {}
     built = _Built([], [], [])
-    for block, chosen in cases.combinations():
+    for block, chosen in cases.counted(told):
         try:
             case = cases.case(chosen)
         except CaseError as error:

@@ -12,6 +12,8 @@ from compressor.cases.conditions import Test
 from compressor.cases.regimes import Regimes
 from compressor.cases.yaml_reader import Node
 
+TOLD_EVERY = 1000  # cases between two words on progress
+
 
 @dataclass(frozen=True)
 class Axis:
@@ -92,6 +94,16 @@ class Cases(Sequence[Case]):
         for part in self.parts:
             for number in part.kept:
                 yield part, part.chosen(number)
+
+    def counted(
+        self, told: Callable[[str, int, int], object]
+    ) -> Iterator[tuple[blocks.Block, dict[str, Node]]]:
+        """`combinations`; now and then `told` hears how many of how many have been given."""
+        for number, one in enumerate(self.combinations()):
+            if number % TOLD_EVERY == 0:
+                told(self.name, number, len(self))
+            yield one
+        told(self.name, len(self), len(self))
 
     def where(self, test: Test) -> list[int]:
         """The numbers of the cases for which a comparison holds."""

@@ -1,12 +1,13 @@
 """What a sweep will do, before it does it: its jobs, those done, and what the others will cost.
 
-One job of each kind, the jobs of one study with the same joints, is run and timed; the others are
-taken to cost the same for every revolution and sample.
+Counts come first, at once. One job of each kind, the jobs of one study with the same joints, is run
+and timed; the others are taken to cost the same for every revolution and sample.
 """
 
+import random
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from compressor.cases import Case, Study, points
@@ -15,6 +16,7 @@ from compressor.sweep.sweep import stored, wanted
 from compressor.sweep.warm_up import Needs, load_telling
 
 ROW_BYTES = 341  # of one job in a file of rows, measured by `make store-bench`
+MOST_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
 
 
 @dataclass(frozen=True)
@@ -52,55 +54,73 @@ class Forecast:
     first: tuple[Next, ...]
 
 
-def forecast(
-    studies: Sequence[Study],
-    folder: Folder,
-    workers: int,
-    first: int,
-    remark: Callable[[str], None],
-) -> Forecast:
-    """What `sweep` would do with the selected jobs of some studies; nothing is stored.
+class Ahead:
+    """What is ahead of some studies: `counts`, a Forecast without times and bytes, and `timed`."""
 
-    `remark` is told where compiling takes its time. Raises StoreError where the folder cannot
-    be read.
+    def __init__(self, counts: Forecast, missing: dict[str, list[str]], cases: dict[str, Case]):
+        self.counts = counts
+        self.missing = missing  # keys, by study
+        self.cases = cases  # of some of them, by key
+
+    def timed(self, workers: int, remark: Callable[[str], None]) -> Forecast:
+        """The whole forecast, for so many processes; `remark` is told of compiling."""
+        if self.counts.missing:
+            load_telling(Needs.of(self.cases.values()), remark)
+        parts = []
+        for part in self.counts.studies:
+            keys = self.missing[part.study]
+            looked_at = [self.cases[key] for key in keys if key in self.cases]
+            seconds, size = cost(looked_at)
+            share = len(keys) / max(len(looked_at), 1)
+            parts.append(replace(part, seconds=share * seconds, bytes=round(share * size)))
+        working = max(1, min(workers, self.counts.missing))
+        return replace(
+            self.counts,
+            workers=working,
+            seconds=sum(part.seconds for part in parts) / working,
+            bytes=sum(part.bytes for part in parts),
+            studies=tuple(parts),
+        )
+
+
+def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
+    """What `sweep` would do with the selected jobs of some studies, `first` of them by name.
+
+    Nothing is stored. Raises StoreError where the folder cannot be read.
     """
-    cases = wanted(studies)
-    ends = stored(read_store(folder), cases)
-    missing = {key: case for key, case in cases.items() if key not in ends}
-    parts: list[Part] = []
+    store = read_store(folder)
+    keys = {study.name: dict.fromkeys(study.keys[n] for n in study.selected) for study in studies}
+    done = {*stored(store, wanted(studies, store.keys()))}
+    missing: dict[str, list[str]] = {}
+    looked_at: set[str] = set()
     ahead: list[Next] = []
+    parts: list[Part] = []
     told: set[str] = set()
-    if missing:
-        load_telling(Needs.of(missing.values()), remark)
     for study in studies:
-        jobs = []
-        for job in selected(study):
-            if job.key not in told:
-                told.add(job.key)
-                jobs.append(job)
-        new = [job for job in jobs if job.key in missing]
-        seconds, size = cost([missing[job.key] for job in new])
-        parts.append(Part(study.name, len(jobs), len(jobs) - len(new), len(new), seconds, size))
-        ahead += new
-    working = max(1, min(workers, len(missing)))
-    return Forecast(
-        jobs=len(cases),
-        done=len(cases) - len(missing),
-        missing=len(missing),
-        workers=working,
-        seconds=sum(part.seconds for part in parts) / working,
-        bytes=sum(part.bytes for part in parts),
-        studies=tuple(parts),
-        first=tuple(ahead[:first]),
+        mine = [key for key in keys[study.name] if key not in told]
+        told.update(mine)
+        new = [key for key in mine if key not in done]
+        missing[study.name] = new
+        few = len(new) <= MOST_CASES
+        looked_at.update(new if few else random.Random(0).sample(new, MOST_CASES))
+        parts.append(Part(study.name, len(mine), len(mine) - len(new), len(new), 0.0, 0))
+        ahead += next_of(study, {*new}, first - len(ahead))
+    counts = Forecast(
+        len(told), len(done), len(told) - len(done), 1, 0.0, 0, tuple(parts), tuple(ahead)
     )
+    return Ahead(counts, missing, wanted(studies, looked_at))
 
 
-def selected(study: Study) -> Iterator[Next]:
-    """The selected jobs of a study."""
-    chosen = {*study.selected}
+def next_of(study: Study, keys: set[str], most: int) -> Iterator[Next]:
+    """The first of a study's jobs with some keys."""
+    left = keys if most > 0 else set()
     for number, point in enumerate(points(study)):
-        if number in chosen:
-            yield Next(study.name, point, study.keys[number])
+        if not left or most == 0:
+            return
+        if (key := study.keys[number]) in left:
+            left.discard(key)
+            most -= 1
+            yield Next(study.name, point, key)
 
 
 def cost(cases: Sequence[Case]) -> tuple[float, int]:

@@ -7,7 +7,7 @@ named reason.
 """
 
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Container, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -25,6 +25,7 @@ from compressor.sweep.worker import Done, Lost, Workers
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
+MANY = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
 
 
@@ -133,6 +134,9 @@ def sweep(
     if options.part is not None:
         studies = [study.shard(*options.part) for study in studies]
         name = "{}-of-{}".format(*options.part)
+    jobs = sum(len(study.selected) for study in studies)
+    if jobs > MANY:
+        progress(0, jobs, f"preparing {jobs} jobs")
     cases = wanted(studies)
     with Writer(folder, name, options.wait, options.command) as writer:
         ends = stored(writer.found, cases)
@@ -242,13 +246,18 @@ def as_jobs(cases: Sequence[Case]) -> list[Input]:
     return [(case, case, case.solve.timeout_s) for case in cases]
 
 
-def wanted(studies: Sequence[Study]) -> dict[str, Case]:
-    """Each selected job once, by key; where studies share one, a case that serves them all."""
+def wanted(studies: Sequence[Study], among: Container[str] | None = None) -> dict[str, Case]:
+    """Each selected job once, by key; where studies share one, a case that serves them all.
+
+    among: the keys of those that are wanted, if not all; the cases of others are not made.
+    """
     cases: dict[str, Case] = {}
     for study in studies:
         for number in study.selected:
-            key, case = study.keys[number], study.cases[number]
-            cases[key] = serving_both(cases[key], case) if key in cases else case
+            key = study.keys[number]
+            if among is None or key in among:
+                case = study.cases[number]
+                cases[key] = serving_both(cases[key], case) if key in cases else case
     return cases
 
 

@@ -75,7 +75,8 @@ def complete_store(folder: Path) -> Path:
     store = folder / "complete"
     sweep(load_studies(*case_files(folder / "cases")), store, 1)
     contents(store)
-    forecast.forecast(load_studies(*case_files(folder / "cases")), folder / "new", 1, 1, str)
+    studies = load_studies(*case_files(folder / "cases"))
+    forecast.forecast(studies, folder / "new", 1).timed(1, str)
     return store
 
 
