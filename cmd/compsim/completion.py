@@ -15,7 +15,7 @@ INSTALL = {
 
 
 @click.command()
-@click.argument("shell", required=False, type=click.Choice([*INSTALL]))
+@click.argument("shell", required=False, metavar="[SHELL]", type=click.Choice([*INSTALL]))
 @click.pass_context
 def completion(context: click.Context, shell: str | None) -> int:
     """Print what makes a shell complete commands, options, case files, studies and jobs.

@@ -29,6 +29,7 @@ from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, sh
 
 MAX_JOBS = 10_000
 MAX_KEPT = 100_000  # cases of a study that stay in memory, each 1 kB
+NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 Told = Callable[[str, int, int], object]  # of a study: its name, cases read, cases in all
@@ -100,7 +101,7 @@ def load_studies(
     studies = [_study(draft, max_jobs, test, told) for draft in drafts]
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
-        problems.append(FileProblem(Place(f"--only {shortened(only)}"), "", "selects no job"))
+        problems.append(FileProblem(Place(f"--only {shortened(only)}"), "", NONE_SELECTED))
     if problems:
         raise CaseFileError(problems)
     return studies
@@ -122,7 +123,7 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
     if root and isinstance(root.value, dict):
         found = leaves(root, problems)
     elif root and root.value is not None:
-        message = "needs keys at the top, such as `joint: big_end`"
+        message = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
         problems.append(FileProblem(root.place, "", message))
     whole = overridden(found, changes)
     name = _name(path, whole, problems) if root else ""

@@ -49,7 +49,7 @@ def build_data_set(
     Raises StoreError and DataSetError, what can be told beforehand before records are read.
     """
     refuse_foreign(folder)
-    writable_folder(folder)
+    writable_folder(folder, make=False)
     dataset = make_data_set(results, study, options, progress)
     return dataset, write_data_set(folder, dataset)
 

@@ -78,7 +78,8 @@ def _columns(path: Path, needed: list[str], also: list[str]) -> dict[str, np.nda
                     where = f"{path}:{lines.line_num}:{place + 1}: {name}"
                     found[name].append(_number(cells, place, where))
     except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from error
+        remedy = f"give a CSV file with the columns {HEADER}, or a job's key"
+        raise RecordError(f"{path}: cannot be read: {error.strerror}; {remedy}") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordError(f"{path}: is no CSV file in UTF-8: {error}") from error
     return {name: np.array(values) for name, values in found.items()}

@@ -1,6 +1,5 @@
 """`compsim plot`: figures of one job, or of a study along one of its axes, as files."""
 
-import difflib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -16,6 +15,7 @@ from compressor.analysis import (
     shaking,
 )
 from compressor.cases import points
+from compressor.program import did_you_mean
 from compressor.reasons import remedy
 from compressor.report.figures import Drawing
 from compressor.report.figures.contact import draw_impacts, draw_modes, draw_orbits
@@ -62,9 +62,8 @@ def job_key(stored: Stored, studies: Sequence[StoredStudy], target: str) -> str:
     if like:
         raise PlotError(f"{len(like)} jobs' keys begin with {target!r}: {some}; give more digits")
     names = [study.name for study in studies]
-    near = difflib.get_close_matches(target, names, MOST_NAMES, 0.4) or names[:MOST_NAMES]
-    problem = f"{stored.folder} has no study {target!r}, and no job's key begins so"
-    raise PlotError(f"{problem}: near to it are the studies {', '.join(near) or 'none'}")
+    near = did_you_mean(target, names) or f"it has {', '.join(names[:MOST_NAMES])}"
+    raise PlotError(f"{stored.folder} has no study {target!r}, and no job's key begins so; {near}")
 
 
 def job_figures(

@@ -56,7 +56,7 @@ def remedy_for(place: Path) -> str:
     if near:
         return near
     if beside:
-        return f"results are in {listed([*map(str, beside.values())])}; or {MAKE}"
+        return f"there are results in {listed([*map(str, beside.values())])}; or {MAKE}"
     return f"choose the folder of a sweep, or {MAKE}"
 
 

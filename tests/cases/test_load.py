@@ -224,7 +224,7 @@ def test_mistakes_of_all_files_are_told_at_once(write):
     paths = [write("load: x\n", "b.yaml"), "missing.yaml", write("\n- 1\n", "a.yaml")]
     assert mistakes(*paths, overrides=["joint=y"]) == [
         "--set joint=y: joint: needs none, big_end, small_end or both, not 'y'",
-        "a.yaml:2:1: needs keys at the top, such as `joint: big_end`",
+        "a.yaml:2:1: needs keys at the top, such as `joint: big_end`, with a space after the colon",
         "b.yaml:1:7: load: needs design, typical or none, not 'x'",
         "missing.yaml: cannot be read: No such file or directory; there are a.yaml, b.yaml",
     ]
@@ -235,7 +235,8 @@ def test_mistakes_of_all_files_are_told_at_once(write):
     [
         ("", "1:1: is empty; compsim init writes a case file to start from"),
         ("# nothing\n", "1:1: is empty; compsim init writes a case file to start from"),
-        ("12\n", "1:1: needs keys at the top, such as `joint: big_end`"),
+        ("12\n", "1:1: needs keys at the top, such as `joint: big_end`, "
+         "with a space after the colon"),
         ("joint: none\n---\njoint: none\n", "2:1: a second document begins here; "
          "a case file holds one"),
         ("%YAML 1.1\n---\nload: none\n", "1:1: case files are YAML 1.2"),

@@ -393,7 +393,8 @@ def test_only_some_jobs_are_selected_and_all_are_in_the_study(plan):
     assert (len(study.cases), [*study.selected]) == (10, [6, 8])
     assert [*plan(text).selected] == [*range(10)]
     assert refused(plan, text, only="clearance_mm > 1") == [
-        "--only clearance_mm > 1: selects no job"
+        "--only clearance_mm > 1: selects no job; "
+        "compsim plan without it lists those that there are"
     ]
     assert refused(plan, "laod: none", only="clearance > 1") == [
         "--only clearance > 1: unknown key 'clearance'; did you mean clearance_mm? "

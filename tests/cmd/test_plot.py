@@ -157,7 +157,7 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["wron"], "no study 'wron', and no job's key begins so: near to it are the studies worn"),
+        (["wron"], "no study 'wron', and no job's key begins so; did you mean worn"),
         (["worn", "--what", "orbits"], "worn is a study: for orbits name a job, such as"),
         (["worn", "--what", "noise"], "there is no figure 'noise'; there are signals"),
         (["worn", "--over", "mass"], "worn has no axis 'mass': its axes are clearance_mm,"),

@@ -85,7 +85,7 @@ def test_every_command_takes_the_folder_in_both_ways(command, here, capsys):
     assert cli.main([verb, *words, "-i", "wear"]) == 0
     assert capsys.readouterr() == by_argument
     assert cli.main([verb, *words]) == 2
-    assert "results: there is no such folder of results; results are in" in capsys.readouterr().err
+    assert "results: there is no such folder of results; there are" in capsys.readouterr().err
 
 
 def test_report_takes_it_and_tries_its_own_folder_first(here, capsys, monkeypatch):

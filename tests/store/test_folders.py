@@ -25,14 +25,17 @@ def place(tmp_path, monkeypatch):
     ("folder", "told"),
     [
         ("case.yaml", "is a case file, where a folder of results is needed; compsim run case.yaml"),
-        ("notes.txt", "is a file, where a folder of results is needed; results are in"),
+        ("notes.txt", "is a file, where a folder of results is needed; there are results in"),
         ("resluts", "there is no such folder of results; did you mean results?"),
-        ("elsewhere", "there is no such folder of results; results are in chains, results, wear"),
+        (
+            "elsewhere",
+            "there is no such folder of results; there are results in chains, results, wear",
+        ),
         ("results/studies", "did you mean results?"),
         ("results/rows", "did you mean results?"),
         ("deep", "holds no study; did you mean deep/wear?"),
         ("chains", "holds no study of jobs, only machines that were followed: rise; compsim plot"),
-        ("plots", "holds no study; results are in"),
+        ("plots", "holds no study; there are results in"),
         ("no/where", "there is no such folder of results; choose the folder of a sweep, or make"),
     ],
 )

@@ -1,0 +1,182 @@
+"""Realistic mistakes on the command line: each is answered by one line that says what to do.
+
+Exit code 2, nothing on stdout, no traceback. A folder has the case files of a careless morning, a
+store `results` with the studies `wear` (six jobs) and `big-end`, and this list.
+"""
+
+import json
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from compsim import cli
+from conftest import CONFIGS, store
+
+CASES = {
+    "good.yaml": "joint: big_end\nclearance_mm: 0.2\n",
+    "wear.yaml": "joint: big_end\nclearance_mm: [0.1, 0.2]\n",
+    "tabs.yaml": "joint: big_end\nmachine:\n\tspeed_rpm: 700\n",
+    "unit.yaml": "machine: {speed_rpm: 700 rpm}\n",
+    "comma.yaml": "joint: big_end\nclearance_mm: 0,2\n",
+    "nospace.yaml": "joint:big_end\n",
+    "twice.yaml": "load: none\nload: design\n",
+    "typo.yaml": "machine: {sped_rpm: 700}\n",
+    "other-unit.yaml": "clearance_m: 0.2\n",
+    "bare.yaml": "joint: big_end\n",
+    "negative.yaml": "joint: big_end\nclearance_mm: -0.2\n",
+    "word.yaml": "joint: bigend\n",
+    "range.yaml": "joint: big_end\nclearance_mm: {linspace: [0.1, 0.3]}\n",
+    "many.yaml": "machine: {rod_mass_kg: {linspace: [1, 9, 1000000]}}\n",
+    "empty.yaml": "",
+    "text.yaml": "clearance of the big end, 0.2 mm\n",
+    "again/wear.yaml": "load: none\n",
+    "my case.yaml": "load: none\n",
+}
+# a command, and what its answer must contain, in this order
+MISTAKES = [
+    # names of files
+    ("run waer.yaml", "waer.yaml: cannot be read", "did you mean wear.yaml?"),
+    ("run good", "good: cannot be read", "did you mean good.yaml?"),
+    ("run again", "again: cannot be read: Is a directory", "compsim run again/*.yaml"),
+    ("run results/jobs/JOB.h5", "is a file of results", "a case file is YAML text"),
+    ("run empty.yaml", "empty.yaml:1:1: is empty", "compsim init"),
+    ("run wear.yaml again/wear.yaml", "would be stored under one name, wear"),
+    ("run 'my case.yaml'", "name: the file's name gives none", "set name"),
+    ("run *.yml", "no file has such a name", "compsim init"),
+    # what stands in them
+    ("run tabs.yaml", "tabs.yaml:3:1", "indent with spaces, not tabs"),
+    ("run unit.yaml", "unit.yaml:1:22: machine.speed_rpm", "a number", "700 rpm"),
+    ("run comma.yaml", "comma.yaml:2:15: clearance_mm", "a number", "0,2"),
+    ("run nospace.yaml", "nospace.yaml:1:1: needs keys", "a space after the colon"),
+    ("run twice.yaml", "load: is given twice; first at line 1"),
+    ("run typo.yaml", "machine.sped_rpm: unknown key; did you mean machine.speed_rpm?"),
+    ("run other-unit.yaml", "clearance_m: unknown key; did you mean clearance_mm?"),
+    ("run bare.yaml", "bare.yaml:1:1: clearance_mm", "big_end"),
+    ("run negative.yaml", "clearance_mm", "-0.2", "[0, 1000]", "mm"),
+    ("run word.yaml", "joint", "bigend", "big_end"),
+    ("run range.yaml", "clearance_mm", "linspace needs [first, last, count]"),
+    ("run many.yaml", "jobs are more than 10000", "raise --max-jobs"),
+    ("run text.yaml", "needs keys at the top, such as `joint: big_end`"),
+    # options
+    ("run good.yaml --set speed_rpm", "needs the form key=value, such as joint=both"),
+    ("run good.yaml --set machine.sped_rpm=700", "unknown key; did you mean machine.speed_rpm?"),
+    ("run good.yaml --set speed_rpm=700", "unknown key; did you mean machine.speed_rpm?"),
+    ("run good.yaml --set clearance_mm=wide", "--set clearance_mm=wide", "a number"),
+    ("run good.yaml -j -2", "'-j' / '--jobs'", "-2", "x>=1"),
+    ("run good.yaml -j all", "'-j' / '--jobs'", "'all' is not a valid integer"),
+    ("run good.yaml --only 'clearance_mm = 0.2'", "write == for equal"),
+    ("run good.yaml --only 'clearence_mm < 0.2'", "unknown key", "did you mean clearance_mm?"),
+    ("run good.yaml --only 'clearance_mm < 0.2mm'", "write numbers without their unit"),
+    ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
+    ("run good.yaml --shard 3/2", "no I/N with 1 <= I <= N, such as 2/8"),
+    ("run good.yaml --quite", "No such option '--quite'", "'--quiet'"),
+    ("run good.yaml -i results", "the folder of results is -o FOLDER here"),
+    ("run good.yaml -o good.yaml", "good.yaml: is a file, where a folder is needed", "another"),
+    # commands
+    ("good.yaml", "is a case file, and a command comes first: compsim run good.yaml"),
+    ("results", "a command comes first: compsim status results"),
+    ("rnu good.yaml", "No such command 'rnu'; did you mean run?"),
+    ("help", "compsim --help"),
+    ("help find", "compsim find --help"),
+    ("init waer", "there is no template 'waer'; did you mean wear"),
+    ("init wear", "wear.yaml exists, and is not overwritten: compsim init wear -o OTHER.yaml"),
+    ("completion tcsh", "'tcsh' is not one of 'bash', 'zsh', 'fish'"),
+    # folders of results
+    ("status resluts", "resluts: there is no such folder of results; did you mean results?"),
+    ("verify again", "again: holds no study; there are results in results"),
+    ("report results/jobs", "did you mean results?"),
+    ("status wear.yaml", "is a case file, where a folder of results is needed; compsim run wear"),
+    ("report results -i again", "two folders of results are given", "leave one out"),
+    ("report results -o READONLY", "nothing may be written to READONLY", "another folder"),
+    ("export -o READONLY/all.csv", "nothing may be written to READONLY", "another folder"),
+    ("status -o results", "the folder of results is an argument, compsim status FOLDER"),
+    # studies, jobs and axes
+    ("show waer clearance_mm=0.1", "holds no study 'waer'; did you mean wear?"),
+    ("show wear.yaml", "did you mean wear?"),
+    ("show wear", "wear is a study of 6 jobs; choose one by clearance_mm=… of 0.1, 0.2, 0.3"),
+    ("show wear clearance_mm=0.1", "2 jobs of wear", "machine.rod_mass_kg=… of 3.0, 4.7"),
+    ("show wear clearance=0.1", "wear has no axis 'clearance'; did you mean clearance_mm"),
+    ("show wear clearance_mm=0.25", "no job of wear has clearance_mm=0.25; there are 0.1, 0.2"),
+    ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
+    ("show ffffffff", "no job's key begins with 'ffffffff'"),
+    ("show ''", "9 jobs' keys begin with ''", "give more of the key"),
+    ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
+    ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
+    ("export wear -o x.csv --format netcdf", "x.csv is no name for netcdf: end it in .nc"),
+    ("plot waer", "no study 'waer'", "did you mean wear?"),
+    ("plot wear --what orbit", "there is no figure 'orbit'; did you mean orbits?"),
+    ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm': its axes are clearance_mm, "),
+    ("dataset waer -o faults", "holds no study 'waer'; did you mean wear?"),
+    ("identify good.csv --study wear", "good.csv: cannot be read", "time_s,acceleration_m_per_s2"),
+    # questions
+    ("find good.yaml --over clearance_mm --greatest peak_acceleration", "KEY=LOW:HIGH"),
+    ("find good.yaml --over clearance_mm=0.3:0.1 --greatest peak_acceleration", "clearance_mm"),
+    ("find good.yaml --over clearance_mm=0.1:0.3 --greatest peak_aceleration",
+     "unknown metric 'peak_aceleration'; did you mean peak_acceleration"),
+    ("find good.yaml --over clearance_mm=0.1:0.3 --first peak_acceleration=600", "> "),
+    ("find good.yaml --over clearance_mm=0.1:0.3", "give one of --first, --greatest and --least"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def morning(tmp_path_factory):
+    """The folder; made once, since no mistake may change it."""
+    place = tmp_path_factory.mktemp("morning")
+    for name, text in CASES.items():
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text(text)
+    grid = {"name": "wear", "joint": "big_end", "clearance_mm": [0.1, 0.2, 0.3],
+            "machine": {"rod_mass_kg": [3, 4.7]},
+            "solve": {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft"}}  # fmt: skip
+    (place / "grid").write_text(json.dumps(grid))
+    (big_end,) = (path for path in CONFIGS if path.stem == "big-end")
+    store(place / "results", place / "grid", big_end, overrides=["solve.accuracy=draft"])
+    (place / "READONLY").mkdir()
+    job = next((place / "results" / "jobs").iterdir())
+    shutil.copy(job, place / "results" / "jobs" / "JOB.h5")
+    return place
+
+
+@pytest.fixture
+def says(morning, monkeypatch):
+    """What the program answers, and its exit code."""
+    monkeypatch.chdir(morning)
+    allowed = os_access()
+    monkeypatch.setattr("os.access", lambda path, mode: allowed(path, mode))
+
+    def run(line):
+        with CliRunner().isolation() as (out, err, _):
+            code = cli.main(shlex.split(line))
+            return code, out.getvalue().decode(), err.getvalue().decode()
+
+    return run
+
+
+def os_access():
+    """os.access, but that not even root may write to READONLY."""
+    import os
+
+    real = os.access
+    return lambda path, mode: Path(path).name != "READONLY" and real(path, mode)
+
+
+@pytest.mark.parametrize(("line", "parts"), [(line, parts) for line, *parts in MISTAKES])
+def test_a_mistake_is_answered_by_one_line_that_says_what_to_do(line, parts, says, morning):
+    before = sorted(map(str, morning.rglob("*")))
+    code, out, err = says(line)
+    assert code == 2, err
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.endswith("\n")
+    assert "Traceback" not in err
+    place = 0
+    for part in parts:
+        place = err.find(part, place)
+        assert place >= 0, (part, err)
+    assert sorted(map(str, morning.rglob("*"))) == before
+
+
+def test_there_are_thirty_mistakes_and_more():
+    assert len({line for line, *_ in MISTAKES}) == len(MISTAKES) >= 30
