@@ -18,9 +18,10 @@ def report(
 ) -> int:
     """Draw figures and tables of stored studies; prints the path of the page."""
     folder, _ = results_folder(given, folder, named=False)
-    from compressor.store import writable_folder
+    from compressor.store import read_studies, writable_folder
 
-    writable_folder(output, make=False)  # seconds before it is needed
+    read_studies(folder)  # what is wrong is told before libraries load and figures are drawn
+    writable_folder(output, make=False)
     from compressor.report import write_report
 
     click.echo(write_report(folder, output, context.obj, claims))
