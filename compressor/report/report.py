@@ -32,7 +32,7 @@ from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures.extract import extract
 from compressor.report.figures.shown import as_csv
 from compressor.report.figures.style import render
-from compressor.report.figures.sweep_metric import draw_metrics, measures, swept
+from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import described, publish_library, script
 from compressor.report.job_series import job_scripts, series_name
 from compressor.report.machines_section import (
@@ -74,11 +74,6 @@ from compressor.store import (
 )
 
 KINDS = ("png", "svg", "csv", "js")  # of files beside the page
-SWEEP = (
-    "A line for each combination of the other axes or, where they are many, a light line for each "
-    "and their median; a study that is no grid has a point for each job. A cross: a job failed "
-    "here; a circle: a job was not run."
-)
 
 
 def write_report(results: Folder, report: Folder, command: str = "", claims: Folder = "") -> Path:
@@ -183,9 +178,9 @@ def drawn_study(stored: Stored, study: StoredStudy, other: SecondSet | None) -> 
     whole = other is not None and other.keys.issuperset(study.keys)
     with open_study(stored.folder, study.name) as data:
         plates = [
-            draw(file_name("sweep", study.name, axis), f"{study.name}: metrics against {axis}",
-                 SWEEP, draw_metrics(data, axis))
-            for axis in (swept(data) if measures(data) and not whole else [])
+            draw(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
+                 one.caption, one.figure)
+            for one in ([] if whole else draw_sweep(data))
         ]  # fmt: skip
         figures, table = study_sections(stored, study, data, plates, anchor)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MOST_ROWS]]

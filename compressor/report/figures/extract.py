@@ -72,7 +72,7 @@ def scale(axis: Any, title: str, limits: tuple[float, float], kind: str) -> Scal
     if axis.get_major_formatter().__class__.__name__ in ("FixedFormatter", "FuncFormatter"):
         places, texts = axis.get_majorticklocs(), axis.get_ticklabels()
         words = {
-            float(place): text.get_text()
+            float(place): plain(text.get_text())
             for place, text in zip(places, texts, strict=False)
             if text.get_text()
         }

@@ -114,7 +114,11 @@ def legend_above(figure: Figure, handles: list[Any]) -> None:
 
 @styled
 def render(figure: Figure, kind: str) -> bytes:
-    """A figure as the bytes of a `png` or `svg` file, which tell nothing of when they were made."""
+    """A figure as the bytes of a `png` or `svg` file, which tell nothing of when they were made.
+
+    Its layout is found once, since that takes as long as to draw it.
+    """
     stream = io.BytesIO()
     figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else {})
+    figure.set_layout_engine("none")
     return stream.getvalue()

@@ -1,0 +1,213 @@
+"""A study as its sweep is drawn: its axes, and its jobs in a grid over them or in a list."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis import SPOKEN
+from compressor.metrics import METRICS
+from compressor.report.figures.sweep_metric import Measure, shown_value, swept
+
+LOG_RATIO = 100.0  # numbers that span more are drawn on a log scale
+MOST_GAPS = 0.5  # of a grid: a list of jobs with more of them is no grid
+LONG = 32  # letters of a phrase
+OUTSIDE = "outside"  # status of a point of the grid that the study leaves out
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A swept key. values: those of the grid in order or, of a list of jobs, that of each job."""
+
+    name: str
+    phrase: str
+    unit: str
+    values: np.ndarray
+
+    @property
+    def is_words(self) -> bool:
+        """Whether its values are categories."""
+        return self.values.dtype.kind not in "fiu"
+
+    @property
+    def words(self) -> list[str]:
+        """Its different values as words, in their order."""
+        return [spoken(value) for value in dict.fromkeys(self.values.tolist())]
+
+    @property
+    def places(self) -> np.ndarray:
+        """Where its values stand: at their numbers, different words one after the other."""
+        if not self.is_words:
+            return self.values.astype(float)
+        found = {word: float(n) for n, word in enumerate(dict.fromkeys(self.values.tolist()))}
+        return np.array([found[word] for word in self.values.tolist()])
+
+    @property
+    def is_log(self) -> bool:
+        """Whether it is drawn on a log scale."""
+        return not self.is_words and spans_decades(self.places)
+
+    @property
+    def title(self) -> str:
+        """What stands along it."""
+        return f"{self.phrase} ({self.unit})" if self.unit not in ("", "1") else self.phrase
+
+    def told(self, number: int) -> str:
+        """One of its values in words, such as `rod mass 3 kg`."""
+        value = self.values[number]
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"{self.phrase} {spoken(value)}{'' if self.is_words else unit}"
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The jobs of a study over its axes.
+
+    place: the number of each point's job in the order of the study's `status`, -1 where the study
+    leaves the point out; of the axes' lengths in a grid, else (jobs,).
+    """
+
+    data: xr.Dataset
+    axes: tuple[Axis, ...]
+    place: np.ndarray
+    is_grid: bool
+
+    def of(self, values: xr.DataArray) -> np.ndarray:
+        """A variable of the study's jobs at the points; nan, or no word, where there is no job."""
+        flat = values.transpose(*self.data["status"].dims).values.ravel()
+        found = flat[self.place]
+        if (self.place < 0).any():
+            found = np.where(self.place < 0, math.nan if flat.dtype.kind == "f" else "", found)
+        return found
+
+    def values(self, measure: Measure) -> np.ndarray:
+        """A measure at the points, in its unit."""
+        return self.of(measure.of(self.data))
+
+    def bars(self, measure: Measure) -> np.ndarray:
+        """The error bars of a measure at the points; nan where there is none."""
+        return self.of(measure.bar(self.data))
+
+    def known(self, measure: Measure) -> np.ndarray:
+        """A measure at the points, nan where it is not known within its error bar.
+
+        A chaotic motion's greatest value is not.
+        """
+        values, bars = self.values(measure), self.bars(measure)
+        good = np.isnan(bars) | np.isfinite(bars)
+        if METRICS[measure.variable].bar.relative:
+            good &= ~(bars >= abs(values)) | (bars == 0.0)
+        return np.where(good, values, math.nan)
+
+    @property
+    def status(self) -> np.ndarray:
+        """How each point's job ended."""
+        return np.where(self.place < 0, OUTSIDE, self.of(self.data["status"]))
+
+    @property
+    def chaotic(self) -> np.ndarray:
+        """Whether each point's job is chaotic."""
+        if "regime" not in self.data:
+            return np.zeros(self.place.shape, bool)
+        return self.of(self.data["regime"]) == "chaotic"
+
+    @property
+    def keys(self) -> np.ndarray | None:
+        """The key of each point's job."""
+        return self.of(self.data["key"]) if "key" in self.data else None
+
+
+def sweep_of(data: xr.Dataset) -> Sweep:
+    """The sweep of a study, as `open_study` gives it; a list of jobs is a grid where it fills one.
+
+    Axes that advance together are one, which is named after both. Numbers of a grid are sorted.
+    """
+    status = data["status"]
+    names = swept(data)
+    if status.dims == ("job",):
+        axes = [axis_of(data, name, data[name].values) for name in names]
+        return gridded(data, axes) or Sweep(data, tuple(axes), np.arange(status.size), False)
+    place = np.arange(status.size).reshape(status.shape)
+    found = []
+    for name in names:
+        values = data[name].values
+        order = np.arange(values.size) if values.dtype.kind not in "fiu" else np.argsort(values)
+        place = np.take(place, order, axis=status.dims.index(name))
+        found.append(axis_of(data, name, values[order]))
+    return Sweep(data, tuple(found), place.reshape([axis.values.size for axis in found]), True)
+
+
+def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:
+    """An axis of a study with its phrase and unit."""
+    attrs = data[name].attrs
+    unit, key = str(attrs.get("units", "")), str(attrs.get("case_key", name))
+    own = (name if key == name or "." in key else key).removesuffix(
+        "_" + unit.replace("/", "_per_").replace(" ", "_")
+    )
+    phrase = str(attrs.get("long_name", key))
+    if phrase in (key, name) or len(phrase) > LONG:
+        phrase = own.replace("_", " ")
+    return Axis(name, phrase, unit, values)
+
+
+def gridded(data: xr.Dataset, columns: Sequence[Axis]) -> Sweep | None:
+    """A list of jobs as a grid; None where it leaves out too much of it, as samples do."""
+    if any(has_gaps(axis) for axis in columns) or not columns:
+        return None
+    axes: list[Axis] = []
+    codes: list[np.ndarray] = []
+    for axis in columns:
+        values, code = levels(axis)
+        for n, other in enumerate(codes):
+            if advance_together(code, other, axis.is_words or axes[n].is_words):
+                named = f"{axes[n].phrase}, with {axis.phrase}"
+                axes[n] = Axis(axes[n].name, named, axes[n].unit, axes[n].values)
+                break
+        else:
+            axes.append(Axis(axis.name, axis.phrase, axis.unit, values))
+            codes.append(code)
+    shape = tuple(axis.values.size for axis in axes)
+    jobs = data["status"].size
+    if math.prod(shape) * (1.0 - MOST_GAPS) > jobs:
+        return None
+    place = np.full(shape, -1)
+    place[tuple(codes)] = np.arange(jobs)
+    if (place >= 0).sum() != jobs:
+        return None  # one point has two jobs
+    return Sweep(data, tuple(axes), place, True)
+
+
+def has_gaps(axis: Axis) -> bool:
+    """Whether some jobs have no value of a key."""
+    return bool((axis.values == "").any() if axis.is_words else np.isnan(axis.places).any())
+
+
+def levels(axis: Axis) -> tuple[np.ndarray, np.ndarray]:
+    """The different values of a column, numbers in order, and which of them each job has."""
+    if not axis.is_words:
+        return np.unique(axis.values, return_inverse=True)
+    return np.array([*dict.fromkeys(axis.values.tolist())]), axis.places.astype(int)
+
+
+def advance_together(one: np.ndarray, other: np.ndarray, has_words: bool) -> bool:
+    """Whether each value of a column has one of another's, and of numbers the order is the same."""
+    pairs = np.unique(np.stack([one, other]), axis=1)
+    size = pairs.shape[1]
+    if not size == np.unique(one).size == np.unique(other).size:
+        return False
+    return has_words or bool((np.diff(pairs[1]) > 0).all() or (np.diff(pairs[1]) < 0).all())
+
+
+def spans_decades(values: np.ndarray) -> bool:
+    """Whether numbers are all above 0 and span more than LOG_RATIO."""
+    finite = values[np.isfinite(values)]
+    return bool(finite.size and finite.min() > 0.0 and finite.max() >= LOG_RATIO * finite.min())
+
+
+def spoken(value: object) -> str:
+    """A swept value in few characters."""
+    return SPOKEN.get(value, shown_value(value).replace("_", " ")) if isinstance(value, str) else (
+        shown_value(value)
+    )  # fmt: skip

@@ -1,0 +1,68 @@
+"""Studies as their sweeps are drawn: grids in order, lists that are grids, and real lists."""
+
+import itertools
+
+import numpy as np
+import pytest
+from swept_made import grid, listed
+
+from compressor.report.figures.sweep_data import OUTSIDE, sweep_of
+from compressor.report.figures.sweep_metric import MEASURES
+
+PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
+RMS = next(m for m in MEASURES if m.variable == "rms_acceleration")
+
+
+def test_numbers_of_a_grid_are_sorted_and_words_are_not():
+    axes = {"clearance_mm": [0.3, 0.1, 0.2], "load": ["typical", "design"], "rod_mass_kg": [4.0]}
+    sweep = sweep_of(grid(axes, lambda c, load, m: 100 * c + load))
+    assert [axis.name for axis in sweep.axes] == ["clearance_mm", "load"]  # what has two values
+    assert sweep.axes[0].values.tolist() == [0.1, 0.2, 0.3]
+    assert sweep.axes[1].words == ["typical", "design"]
+    assert sweep.values(PEAK) == pytest.approx(np.array([[10, 11], [20, 21], [30, 31]]))
+    assert sweep.keys.tolist() == [["k2", "k3"], ["k4", "k5"], ["k0", "k1"]]
+    assert sweep.axes[0].title == "clearance (mm)"
+    assert sweep.axes[0].told(1) == "clearance 0.2 mm"
+
+
+def test_a_list_that_fills_a_grid_is_one():
+    """`exclude` leaves a corner out."""
+    points = [p for p in itertools.product([0.1, 0.2, 0.3], [400.0, 500.0]) if p != (0.3, 500.0)]
+    clearance, speed = zip(*points, strict=True)
+    sweep = sweep_of(listed({"clearance_mm": clearance, "speed_rpm": speed}, range(5)))
+    assert sweep.is_grid
+    assert sweep.place.tolist() == [[0, 1], [2, 3], [4, -1]]
+    assert sweep.status[2, 1] == OUTSIDE
+    assert np.isnan(sweep.values(PEAK)[2, 1])
+
+
+def test_what_advances_together_is_one_axis():
+    columns = {"clearance_mm": [0.1, 0.1, 0.2, 0.2], "speed_rpm": [400.0, 400.0, 500.0, 500.0],
+               "load": ["design", "typical"] * 2}  # fmt: skip
+    sweep = sweep_of(listed(columns, range(4)))
+    assert [axis.phrase for axis in sweep.axes] == ["clearance, with speed", "load"]
+    assert sweep.place.tolist() == [[0, 1], [2, 3]]
+
+
+def test_samples_are_no_grid():
+    rng = np.random.default_rng(1)
+    columns = {"clearance_mm": rng.random(20), "speed_rpm": rng.random(20)}
+    sweep = sweep_of(listed(columns, range(20)))
+    assert not sweep.is_grid
+    assert sweep.place.tolist() == [*range(20)]
+    gaps = listed({"clearance_mm": [0.1, np.nan, 0.1, 0.2], "speed_rpm": [1.0, 1, 2, 2]}, range(4))
+    assert not sweep_of(gaps).is_grid
+
+
+def test_what_a_bar_does_not_vouch_for_is_not_known():
+    regime = ["predictable", "chaotic"]
+    sweep = sweep_of(grid({"clearance_mm": [0.1, 0.2]}, lambda c: 100 * c, regime=regime))
+    assert np.isnan(sweep.known(PEAK)).tolist() == [False, True]
+    assert np.isnan(sweep.known(RMS)).tolist() == [False, False]
+    assert sweep.chaotic.tolist() == [False, True]
+
+
+@pytest.mark.parametrize(("values", "is_log"), [([0.01, 0.1, 1.0], True), ([0.1, 0.2], False),
+                                                ([0.0, 1.0, 1000.0], False)])  # fmt: skip
+def test_decades_are_logarithmic(values, is_log):
+    assert sweep_of(grid({"clearance_mm": values}, lambda c: c)).axes[0].is_log is is_log

@@ -1,0 +1,77 @@
+"""Sweeps along two axes: cells are the stored numbers, and lines of equal value lie right."""
+
+import time
+
+import numpy as np
+import pytest
+from swept_made import grid
+
+from compressor.report.figures.extract import extract
+from compressor.report.figures.sweep import draw_sweep
+
+AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]}
+
+
+def traces(data):
+    (drawn,) = draw_sweep(data)
+    panel = extract(drawn.figure).panels[0]
+    return drawn, panel, {trace.kind + ":" + trace.name: trace for trace in panel.traces}
+
+
+def test_cells_are_jobs():
+    drawn, panel, found = traces(grid(AXES, lambda c, n: 10 * c + n))
+    cells = found["map:peak acceleration"]
+    assert cells.z[:, 0] == pytest.approx([301, 401, 501])
+    assert cells.z[0] == pytest.approx([301, 302, 304, 305])
+    assert cells.x.tolist() == pytest.approx(
+        [0.05, 0.15, 0.3, 0.45, 0.55]
+    )  # halfway between values
+    assert cells.jobs[:5] == ("k0", "k3", "k6", "k9", "k1")  # in C order of the cells
+    assert (panel.x.title, panel.y.title) == ("clearance (mm)", "speed (rpm)")
+    assert cells.scale_name == "m/s²"
+    assert drawn.name == "map"
+
+
+def test_lines_of_equal_value_lie_where_the_plane_has_them():
+    """Of a plane they are exact: peak = speed whatever the clearance."""
+    _, _, found = traces(grid(AXES, lambda c, n: n + 0 * c))
+    (line,) = (trace for name, trace in found.items() if name.startswith("line:"))
+    levels = [float(word) for word in line.name.removeprefix("lines at ").split(", ")]
+    assert {*np.round(line.y[np.isfinite(line.y)], 9)} == {*levels}
+
+
+def test_failed_and_missing_cells_are_marked():
+    status = np.full((4, 3), "ok", dtype="U7")
+    status[1, 2], status[3, 0] = "failed", "missing"
+    _, _, found = traces(grid(AXES, lambda c, n: 10 * c + n, status=status))
+    failed, missing = found["points:a job failed here"], found["points:a job was not run"]
+    assert (failed.x, failed.y, failed.jobs) == (0.2, 500, ("k5",))
+    assert (missing.x, missing.y, missing.jobs) == (0.5, 300, ("k9",))
+    assert np.isnan(found["map:peak acceleration"].z).sum() == 2
+
+
+def test_values_and_axes_over_decades_are_logarithmic():
+    axes = {"clearance_mm": [0.01, 0.1, 1.0], "speed_rpm": [300.0, 400.0, 500.0]}
+    _, panel, found = traces(grid(axes, lambda c, n: c * n))
+    cells = found["map:peak acceleration"]
+    assert panel.x.log
+    assert cells.log
+    assert cells.z[0] == pytest.approx(np.log10([3, 30, 300]))
+    assert cells.x[1:3].tolist() == pytest.approx([10**-1.5, 10**-0.5])
+
+
+def test_words_have_no_lines_between_them():
+    axes = {"fault": ["big_end", "small_end", "both"], "load": ["design", "typical", "none"]}
+    _, panel, found = traces(grid(axes, lambda joint, load: joint + load))
+    assert [*found] == ["map:peak acceleration"]
+    assert panel.x.words == {0.0: "big end", 1.0: "small end", 2.0: "both joints"}
+
+
+def test_large_grids_are_thinned_with_a_word():
+    axes = {"clearance_mm": np.linspace(0.1, 0.9, 400), "speed_rpm": np.linspace(300, 900, 250)}
+    data = grid(axes, lambda c, n: c * n)
+    start = time.process_time()
+    drawn, _, found = traces(data)
+    assert time.process_time() - start < 5.0
+    assert found["map:peak acceleration"].z.shape == (64, 64)
+    assert "Of 400 values of clearance 64 are shown." in drawn.caption
