@@ -90,6 +90,14 @@ def test_every_artist_is_read(figure):
     assert bars.y.words == {0.0: "speed", 1.0: "clearance"}
 
 
+def test_lines_of_equal_value_have_no_name():
+    figure = Figure()
+    figure.subplots().contour([0, 1, 2], [0, 1], [[0, 1, 2], [0, 1, 2]], [0.5, 1.5])
+    (lines,) = extract(figure).panels[0].traces
+    assert (lines.kind, lines.name) == ("line", "")
+    assert {*lines.x[np.isfinite(lines.x)]} == {0.5, 1.5}
+
+
 def test_bars_across_and_axes_without_numbers_are_read():
     figure = Figure()
     left, right = figure.subplots(1, 2, sharey=True)

@@ -240,12 +240,11 @@ def segments(axes: Axes, artist: Any, named: Names) -> Trace | None:
 
 
 def contour(axes: Axes, artist: Any, named: Names) -> Trace | None:
-    """The lines of equal value."""
+    """The lines of equal value, without a name: they follow from the map that they lie on."""
     parts = [part for path in artist.get_paths() for part in path.to_polygons(closed_only=False)]
     joined = broken([np.asarray(part, float) for part in parts])
     colors = artist.get_edgecolor()
-    return Trace("line", label_of(artist), joined[:, 0], joined[:, 1],
-                 color=first_color(colors), width=0.8)  # fmt: skip
+    return Trace("line", "", joined[:, 0], joined[:, 1], color=first_color(colors), width=0.8)
 
 
 def shape(axes: Axes, artist: Any, named: Names) -> Trace | None:

@@ -357,7 +357,7 @@ class Figure {
           made.tick0 = 0;
         } else {
           const [low, high] = boxes[n][way];
-          made.nticks = Math.max(2, Math.floor((high - low) * (way === "x" ? width / 62 : total / 34)));
+          made.nticks = Math.max(2, Math.floor((high - low) * (way === "x" ? width / 48 : total / 34)));
         }
         if (scale.link !== n) made.matches = `${way}${scale.link ? scale.link + 1 : ""}`;
         return made;
