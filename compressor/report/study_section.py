@@ -126,7 +126,7 @@ def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[st
     place = {str(key): n for n, key in enumerate(data["key"].values.flat)}
     status, reason = (data[name].values.ravel() for name in ("status", "reason"))
     found = {}
-    for key in [*dict.fromkeys(keys)][:MOST_FACTS]:
+    for key in [key for key in dict.fromkeys(keys) if key in place][:MOST_FACTS]:
         n = place[key]
         point = {name: value_cell(values[n]).text for name, values in swept.items()}
         found[key] = {

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from compsim import cli
-from compsim.show import reversal_verdict
+from compsim.job_text import reversal_verdict
 from conftest import store
 
 from compressor.cases.case import Case
@@ -78,12 +78,12 @@ def test_a_reversal_that_is_not_known_is_not_judged():
         f"rod_load_reversal_{name}{end}": value
         for name in ("angle", "share") for end, value in (("", 1.0), ("_error", math.inf))
     })  # fmt: skip
-    (line,) = reversal_verdict(found, 15.0, 3.0)
+    ((_, line),) = reversal_verdict(found, 15.0, 3.0)
     assert line.endswith("its reversal is not known well enough to be judged")
     near = {"rod_load_reversal_angle": math.radians(15.2), "rod_load_reversal_share": 0.2,
             "rod_load_reversal_angle_error": math.radians(0.5),
             "rod_load_reversal_share_error": 0.01}  # fmt: skip
-    (line,) = reversal_verdict(SimpleNamespace(numbers=near), 15.0, 3.0)
+    ((_, line),) = reversal_verdict(SimpleNamespace(numbers=near), 15.0, 3.0)
     assert "cannot be told apart from API 618's 15 degrees and 3 %" in line
 
 

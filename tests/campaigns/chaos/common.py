@@ -1,6 +1,7 @@
 """What the campaigns share: a small store, commands in forked processes, what a store holds."""
 
 import contextlib
+import dataclasses
 import json
 import os
 import pickle
@@ -170,7 +171,7 @@ def contents(folder: Path) -> dict[str, Any]:
         warnings.simplefilter("error", UserWarning)
         for standing in standings(folder):
             study = open_study(folder, standing.study).load()
-            found[standing.study] = standing
+            found[standing.study] = dataclasses.replace(standing, written="")  # when: a timing
             for name, item in study.variables.items():
                 if name not in TIMINGS:
                     values = item.values
