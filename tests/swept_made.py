@@ -9,11 +9,13 @@ UNITS = {
     "rod_mass_kg": "kg",
     "load": "",
     "fault": "",
+    "law": "",
 }
 
 
 def coordinate(dim, name, values):
-    attrs = {"case_key": name} | ({"units": UNITS[name]} if UNITS[name] else {})
+    key = "joint" if name == "fault" else name
+    attrs = {"case_key": key} | ({"units": UNITS[name]} if UNITS[name] else {})
     return xr.Variable(dim, np.array(values), attrs)
 
 

@@ -48,12 +48,13 @@ LIBRARIES = {  # library -> the modules that may import it
     # designs, integrators, Student's t, splines, root finder and minimiser, spectra
     "scipy": {
         "compressor.analysis.course",
+        "compressor.analysis.effects",
         "compressor.analysis.impacts",
+        "compressor.analysis.sobol",
         "compressor.cases.swept",
         "compressor.diagnosis.regression",
         "compressor.diagnosis.strangeness",
         "compressor.machines.search",
-        "compressor.machines.sensitivity",
         "compressor.measure.find",
         "compressor.solve.scipy_driver",
         "compressor.solve.statistics",

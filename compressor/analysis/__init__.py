@@ -7,6 +7,7 @@ from compressor.analysis.claims import Claim, claim_margins, claims
 from compressor.analysis.contact_modes import MODES, angle_modes, contact_modes, mode_shares
 from compressor.analysis.contacts import joints_with_clearance
 from compressor.analysis.diagnosis_captions import diagnosis_caption
+from compressor.analysis.effects import Effects, grid_effects, sampled_effects, trend
 from compressor.analysis.frame_forces import (
     NoSeriesError,
     frame_forces,
@@ -24,4 +25,5 @@ from compressor.analysis.shaking import (
     sensor_envelope,
     shaking,
 )
+from compressor.analysis.sobol import saltelli_design
 from compressor.analysis.swept_rows import SweptRow, rows_modes

@@ -1,19 +1,12 @@
 """Which assumption decides which claim: variance-based sensitivities of the margins."""
 
-import contextlib
-import warnings
-from collections.abc import Iterator
-
 import numpy as np
 import xarray as xr
-from scipy.stats import sobol_indices
 
+from compressor.analysis import saltelli_design
 from compressor.machines.study import ClaimsError
 
 CUT = 1.0  # margins beyond this are cut: how far beyond decides no claim
-RESAMPLES = 1000
-LEVEL = 0.95
-SEED = 1  # of the resampling
 ORDERS = ("first_order", "total_order")
 
 
@@ -31,10 +24,9 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
         str(name) for name, one in found.coords.items()
         if one.dims == ("machine",) and "case_key" in one.attrs
     ]  # fmt: skip
-    parts = (
-        design_parts(np.stack([found[name].values for name in names], axis=1)) if names else None
-    )
-    if parts is None:
+    columns = np.stack([found[name].values for name in names], axis=1) if names else None
+    design = None if columns is None else saltelli_design(columns)
+    if design is None:
         return None
     if (found["status"] == "").any():
         raise ClaimsError("the study is not finished: run the same command again")
@@ -42,13 +34,12 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
     unknown = np.isnan(margin)
     middle = np.nanmedian(margin, axis=1, keepdims=True)
     margin = np.where(unknown, middle, margin)
-    a, b, mixed = (margin[:, part] for part in parts)  # (claim, n) twice, (claim, key, n)
     shape = (len(found["claim"]), len(names))
     values = {
         f"{order}{end}": np.full(shape, np.nan) for order in ORDERS for end in ("", "_low", "_high")
     }
     for claim in np.flatnonzero(np.ptp(margin, axis=1) > 0.0):
-        for name, row in indices(a[claim], b[claim], mixed[claim]).items():
+        for name, row in design.indices(margin[claim]).items():
             values[name][claim] = row
     variables: dict[str, tuple] = {
         name: (("claim", "assumption"), array, {"units": "1", "long_name": phrase(name)})
@@ -61,63 +52,9 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
     return xr.Dataset(variables, coordinates)
 
 
-def indices(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> dict[str, np.ndarray]:
-    """Both indices of one margin over k assumptions with their intervals, (k,) each.
-
-    a, b: (n,); mixed: (k, n). An assumption that changes nothing has none of the variance, surely.
-    """
-    table = {"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}
-    with warnings.catch_warnings(), seeded():
-        warnings.simplefilter("ignore")  # the bootstrap of what changes nothing
-        found = sobol_indices(func=table, n=a.size, rng=np.random.default_rng(SEED))
-        spread = found.bootstrap(confidence_level=LEVEL, n_resamples=RESAMPLES)
-    idle = (mixed == a).all(axis=1)
-    values = {}
-    for order in ORDERS:
-        interval = getattr(spread, order).confidence_interval
-        parts = ("", getattr(found, order)), ("_low", interval.low), ("_high", interval.high)
-        for end, row in parts:
-            values[f"{order}{end}"] = np.where(idle, 0.0, np.ravel(row))
-    return values
-
-
-@contextlib.contextmanager
-def seeded() -> Iterator[None]:
-    """Have NumPy's global draws be the same each time: this bootstrap takes no generator."""
-    state = np.random.get_state()  # noqa: NPY002
-    np.random.seed(SEED)  # noqa: NPY002
-    try:
-        yield
-    finally:
-        np.random.set_state(state)  # noqa: NPY002
-
-
 def phrase(name: str) -> str:
     """What an index or an end of its interval is, in words."""
     order, _, end = name.partition("_order")
     how = {"first": "by this assumption alone", "total": "with this assumption's interactions"}
     text = f"share of the margin's variance {how[order]}"
     return text + (f", {end[1:]} end of its 95 % interval" if end else "")
-
-
-def design_parts(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Where the parts A, B and A with each column of B stand in a `saltelli` design.
-
-    columns: (machines, k). Gives positions of the shapes (n,), (n,), (k, n); None where the columns
-    are no such design.
-    """
-    count, keys = columns.shape
-    n, rest = divmod(count, keys + 2)
-    if rest or n < 2 or n & (n - 1) or columns.dtype == object:
-        return None
-    a, b = columns[:n], columns[n : 2 * n]
-    blocks = np.arange(2 * n, count).reshape(keys, n)
-    mixed = np.empty_like(blocks)
-    for key in range(keys):  # the order of a file's columns is not that of its design
-        expected = a.copy()
-        expected[:, key] = b[:, key]
-        same = [np.array_equal(columns[places], expected) for places in blocks]
-        if sum(same) != 1:
-            return None
-        mixed[key] = blocks[same.index(True)]
-    return np.arange(n), np.arange(n, 2 * n), mixed

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from compressor.cases.swept import design
-from compressor.machines.sensitivity import design_parts, sensitivity
+from compressor.machines.sensitivity import sensitivity
 from compressor.machines.study import ClaimsError
 
 KEYS = ("rod_mass_kg", "static", "dynamic")
@@ -83,8 +83,6 @@ def test_a_machine_without_margins_is_told(study):
 
 def test_only_the_design_s_points_are_one(study):
     assert sensitivity(study.isel(machine=slice(0, -1))) is None
-    points = np.array(design("sobol", 40, 3, 1))
-    assert design_parts(points) is None
     study["status"][3] = ""
     with pytest.raises(ClaimsError, match="not finished"):
         sensitivity(study)

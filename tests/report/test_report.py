@@ -348,10 +348,10 @@ def test_only_jobs_with_the_paper_s_physics_are_opened(tmp_path, text, found):
 def test_a_sweep_has_its_table_and_plots(own, tmp_path):
     path = write_report(own, tmp_path / "out")
     assert path == tmp_path / "out" / "index.html"
-    drawn = {"sweep-own-map"}
+    drawn = {"sweep-own-ranking", "sweep-own-map"}
     assert {p.stem for p in (tmp_path / "out").glob("*.png")} == drawn
     found = read(tmp_path / "out")
-    assert len(found.sources) == 1
+    assert len(found.sources) == 2
     head = next(cells for _, cells in found.rows if cells[0] == "clearance_mm")
     assert head[:4] == ["clearance_mm", "rod_mass_kg", "status", "peak acceleration (m/s²)"]
     rows = {key: cells for key, (_, cells) in found.jobs.items()}
@@ -435,7 +435,9 @@ def test_progress_goes_to_stderr(own, tmp_path, capsys):
     write_report(own, tmp_path / "out")
     out, err = capsys.readouterr()
     assert not out
-    assert err.splitlines() == ["drawing own: metrics over clearance and rod mass"]
+    first, second = err.splitlines()
+    assert first == "drawing own: which key matters for which metric"
+    assert second.startswith("drawing own: metrics over ")
 
 
 @pytest.mark.parametrize("made", [False, True])

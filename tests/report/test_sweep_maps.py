@@ -13,7 +13,7 @@ AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]
 
 
 def traces(data):
-    (drawn,) = draw_sweep(data)
+    _, drawn = draw_sweep(data)  # the ranking is the first
     panel = extract(drawn.figure).panels[0]
     return drawn, panel, {trace.kind + ":" + trace.name: trace for trace in panel.traces}
 

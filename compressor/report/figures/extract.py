@@ -70,11 +70,10 @@ def scale(axis: Any, title: str, limits: tuple[float, float], kind: str) -> Scal
     """An axis; words at its ticks where these are no numbers."""
     words = {}
     if axis.get_major_formatter().__class__.__name__ in ("FixedFormatter", "FuncFormatter"):
-        places, texts = axis.get_majorticklocs(), axis.get_ticklabels()
+        places = axis.get_majorticklocs()
+        texts = axis.get_major_formatter().format_ticks(places)
         words = {
-            float(place): plain(text.get_text())
-            for place, text in zip(places, texts, strict=False)
-            if text.get_text()
+            float(place): plain(text) for place, text in zip(places, texts, strict=False) if text
         }
         if all(is_number(text) for text in words.values()):
             words = {}

@@ -1,21 +1,33 @@
 """Chooses how a study's sweep is drawn, by its axes, and says what is seen."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from compressor.report.figures import sweep_captions as captions
 from compressor.report.figures.sweep_data import Sweep, sweep_of
 from compressor.report.figures.sweep_lines import draw_curves
-from compressor.report.figures.sweep_maps import MOST_CELLS, draw_maps
-from compressor.report.figures.sweep_metric import Measure, draw_metrics, measures, shown_value
-
-MARKS = (
-    "A cross: a job failed here; an empty grey circle: a job was not run; a ring: a chaotic job, "
-    "whose averages hold within their bars, but whose greatest values hold for that run only."
+from compressor.report.figures.sweep_maps import draw_maps
+from compressor.report.figures.sweep_metric import Measure, measures
+from compressor.report.figures.sweep_multiples import (
+    draw_multiples,
+    draw_overview,
+    roles_of,
 )
+from compressor.report.figures.sweep_ranking import (
+    Ranking,
+    draw_ranking,
+    leading,
+    order_of,
+    overall,
+    ranking,
+)
+from compressor.report.figures.sweep_scatter import MOST_COLUMNS, draw_points, draw_scatter
+
+MOST_ROWS = 3  # measures that stand in a figure with rows of them
+MOST_DETAILED = 2  # measures that have a figure of their own
 
 
 class SweepFigure(NamedTuple):
@@ -30,73 +42,86 @@ class SweepFigure(NamedTuple):
 def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
     """The drawings of a study, as `open_study` gives it; none where nothing is swept or measured.
 
-    What is the same at every job is said in the caption, and not drawn.
+    What is the same at every job is said in a caption, and not drawn.
     """
     known = measures(data)
     sweep = sweep_of(data)
     if not known or not sweep.axes:
         return []
-    shown, same = parted(sweep, known)
+    shown, same = captions.parted(sweep, known)
     if not shown:
         shown, same = known, []
-    told = " ".join(part for part in (marks_caption(sweep), same_caption(sweep, same)) if part)
-    if sweep.is_grid and len(sweep.axes) == 1:
-        return [curves(sweep, shown, told)]
-    if sweep.is_grid and len(sweep.axes) == 2:
-        return [maps(sweep, shown, told)]
-    return [
-        SweepFigure(
-            axis.name, f"metrics against {axis.phrase}", told, draw_metrics(data, axis.name)
-        )
-        for axis in sweep.axes
-    ]
+    marks = captions.marks_told(sweep), captions.same_told(sweep, same)
+    if not sweep.is_grid:
+        return [*sampled(sweep, shown, marks)]
+    if len(sweep.axes) == 1:
+        (axis,) = sweep.axes
+        title = f"metrics against {axis.phrase}"
+        caption = captions.joined(captions.curves(sweep), *marks)
+        return [SweepFigure(axis.name, title, caption, draw_curves(sweep, shown))]
+    return [*several(sweep, shown, marks)]
 
 
-def parted(sweep: Sweep, known: Sequence[Measure]) -> tuple[list[Measure], list[Measure]]:
-    """The measures that differ between jobs, and those that do not."""
-    varied = [bool(np.ptp(v[np.isfinite(v)])) for v in (sweep.values(m) for m in known)]
-    both = [*zip(known, varied, strict=True)]
-    return [m for m, varies in both if varies], [m for m, varies in both if not varies]
+def several(
+    sweep: Sweep, shown: Sequence[Measure], marks: tuple[str, str]
+) -> Iterator[SweepFigure]:
+    """A grid of two or more axes: a ranking, all metrics, and of three or more axes some closer.
+
+    Two axes of numbers, or of words, are a map.
+    """
+    found = ranking(sweep, shown)
+    yield from ranked(sweep, found, shown)
+    order = overall(found) if found else [*range(len(sweep.axes))]
+    first, second = (sweep.axes[n] for n in order[:2])
+    if len(sweep.axes) == 2 and first.is_words == second.is_words:
+        title = f"metrics over {first.phrase} and {second.phrase}"
+        caption = captions.joined(captions.maps(sweep), *marks)
+        yield SweepFigure("map", title, caption, draw_maps(sweep, shown))
+        return
+    role = roles_of(sweep, order, False)
+    title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"
+    caption = captions.joined(captions.overview(sweep, role), marks[1])
+    yield SweepFigure("overview", title, caption, draw_overview(sweep, role, shown))
+    if len(sweep.axes) == 2:
+        return
+    leaders = leading(sweep, shown, MOST_ROWS)
+    groups = [leaders] if len(sweep.axes) == 3 else [[one] for one in leaders[:MOST_DETAILED]]
+    for group in groups:
+        own = found.get(group[0])
+        role = roles_of(sweep, order_of(own) if own and len(group) == 1 else order, True)
+        title = f"{', '.join(one.title for one in group)} over all axes"
+        caption = captions.multiples(sweep, role)
+        name = "panels" if len(group) > 1 else f"panels-{group[0].variable}"
+        yield SweepFigure(name, title, caption, draw_multiples(sweep, role, group))
 
 
-def curves(sweep: Sweep, shown: Sequence[Measure], told: str) -> SweepFigure:
-    """A sweep along one axis."""
-    (axis,) = sweep.axes
-    caption = (
-        f"Every metric against {axis.phrase}, a point a job. Error bars are drawn where they are "
-        f"longer than a point. {told}"
-    )
-    name = f"metrics against {axis.phrase}"
-    return SweepFigure(axis.name, name, caption.strip(), draw_curves(sweep, shown))
+def sampled(
+    sweep: Sweep, shown: Sequence[Measure], marks: tuple[str, str]
+) -> Iterator[SweepFigure]:
+    """A list of jobs: a ranking, each metric against its strongest key, and some against all."""
+    found = ranking(sweep, shown)
+    yield from ranked(sweep, found, shown)
+    order = overall(found) if found else [*range(len(sweep.axes))]
+    numbers = [n for n in order if not sweep.axes[n].is_words] or order
+    strongest = []
+    for measure in shown:
+        own = order_of(found[measure]) if measure in found else order
+        strongest.append(next(n for n in own if n in numbers))
+    caption = captions.joined(captions.points(sweep, bool(found)), *marks)
+    yield SweepFigure("points", "metrics over the key that matters most for each", caption,
+                      draw_points(sweep, strongest, shown))  # fmt: skip
+    if len(numbers) < 2:
+        return
+    columns = numbers[:MOST_COLUMNS]
+    group = leading(sweep, shown, MOST_ROWS)
+    caption = captions.joined(captions.scatter(sweep, columns, len(numbers)), marks[0])
+    title = f"{', '.join(one.title for one in group)} over each key"
+    yield SweepFigure("scatter", title, caption, draw_scatter(sweep, columns, group))
 
 
-def maps(sweep: Sweep, shown: Sequence[Measure], told: str) -> SweepFigure:
-    """A sweep along two axes."""
-    first, second = sweep.axes
-    large = [axis for axis in sweep.axes if axis.values.size > MOST_CELLS]
-    thin = "".join(
-        f" Of {axis.values.size} values of {axis.phrase} {MOST_CELLS} are shown." for axis in large
-    )
-    caption = (
-        f"Every metric over {first.phrase} and {second.phrase}, a cell a job. White: lines of "
-        f"equal value, which stand in the scale of colours, too.{thin} {told}"
-    )
-    name = f"metrics over {first.phrase} and {second.phrase}"
-    return SweepFigure("map", name, caption.strip(), draw_maps(sweep, shown))
-
-
-def marks_caption(sweep: Sweep) -> str:
-    """What marks mean, where there are any."""
-    status, chaotic = sweep.status, sweep.chaotic
-    return MARKS if chaotic.any() or np.isin(status, ("failed", "missing")).any() else ""
-
-
-def same_caption(sweep: Sweep, same: Sequence[Measure]) -> str:
-    """The measures that are the same at every job, with their values."""
-    if not same:
-        return ""
-    parts = [
-        f"{m.title} ({shown_value(np.nanmax(sweep.values(m)))} {m.unit}".rstrip() + ")"
-        for m in same
-    ]
-    return f"The same at every job, and not drawn: {'; '.join(parts)}."
+def ranked(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> Iterator[SweepFigure]:
+    """The ranking of the axes, if enough is known for one."""
+    if found and len(sweep.axes) > 1:
+        caption = captions.ranking(sweep, found, shown)
+        yield SweepFigure("ranking", "which key matters for which metric", caption,
+                          draw_ranking(sweep, found))  # fmt: skip

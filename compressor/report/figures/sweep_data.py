@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -57,8 +58,9 @@ class Axis:
     def told(self, number: int) -> str:
         """One of its values in words, such as `rod mass 3 kg`."""
         value = self.values[number]
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        return f"{self.phrase} {spoken(value)}{'' if self.is_words else unit}"
+        if self.is_words:
+            return named(self.phrase, spoken(value))
+        return f"{self.phrase} {spoken(value)}" + (f" {self.unit}" if self.unit != "1" else "")
 
 
 @dataclass(frozen=True)
@@ -101,19 +103,19 @@ class Sweep:
             good &= ~(bars >= abs(values)) | (bars == 0.0)
         return np.where(good, values, math.nan)
 
-    @property
+    @cached_property
     def status(self) -> np.ndarray:
         """How each point's job ended."""
         return np.where(self.place < 0, OUTSIDE, self.of(self.data["status"]))
 
-    @property
+    @cached_property
     def chaotic(self) -> np.ndarray:
         """Whether each point's job is chaotic."""
         if "regime" not in self.data:
             return np.zeros(self.place.shape, bool)
         return self.of(self.data["regime"]) == "chaotic"
 
-    @property
+    @cached_property
     def keys(self) -> np.ndarray | None:
         """The key of each point's job."""
         return self.of(self.data["key"]) if "key" in self.data else None
@@ -143,11 +145,11 @@ def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:
     """An axis of a study with its phrase and unit."""
     attrs = data[name].attrs
     unit, key = str(attrs.get("units", "")), str(attrs.get("case_key", name))
-    own = (name if key == name or "." in key else key).removesuffix(
+    own = (name if unit else key.rpartition(".")[2]).removesuffix(
         "_" + unit.replace("/", "_per_").replace(" ", "_")
     )
     phrase = str(attrs.get("long_name", key))
-    if phrase in (key, name) or len(phrase) > LONG:
+    if phrase in (key, name) or len(phrase) > LONG or values.dtype.kind not in "fiu":
         phrase = own.replace("_", " ")
     return Axis(name, phrase, unit, values)
 
@@ -204,6 +206,11 @@ def spans_decades(values: np.ndarray) -> bool:
     """Whether numbers are all above 0 and span more than LOG_RATIO."""
     finite = values[np.isfinite(values)]
     return bool(finite.size and finite.min() > 0.0 and finite.max() >= LOG_RATIO * finite.min())
+
+
+def named(phrase: str, word: str) -> str:
+    """A word with what it is a value of, unless it says that: `load design`, but `both joints`."""
+    return word if phrase in word else f"{phrase} {word}"
 
 
 def spoken(value: object) -> str:

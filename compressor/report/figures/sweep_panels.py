@@ -14,17 +14,18 @@ from matplotlib.lines import Line2D
 from compressor.report.figures.artists import with_jobs
 from compressor.report.figures.style import BLUE, CYCLE, Line, sheet
 from compressor.report.figures.sweep_data import Axis, spans_decades
-from compressor.report.figures.sweep_metric import FOOT, MARKS, NAMES, Measure
+from compressor.report.figures.sweep_metric import MARKS, NAMES, Measure
 
 COLUMNS = 3
 MOST_LINES = 12  # in a panel
 MOST_KEYS = 2000  # jobs of a study of which a click tells
-ROOM = 0.14  # of a panel's height, below and above its values
+ROOM = 0.18  # of a panel's height, below and above its values
 VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = "osD^v"
+FEET = {"failed": 0.03, "missing": 0.08}  # of a panel's height
 CHAOTIC = "chaotic: a greatest value holds for this run only"
 RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 8,
-                        "markerfacecolor": "none", "color": "#8a1c7c", "markeredgewidth": 1.1,
+                        "markerfacecolor": "none", "color": "#d633a8", "markeredgewidth": 1.1,
                         "zorder": 5}  # fmt: skip
 Keys = np.ndarray | None
 
@@ -79,9 +80,9 @@ def mark_feet(panel: Axes, x: np.ndarray, status: np.ndarray, keys: Keys) -> Non
     for word, mark in MARKS.items():
         here = status == word
         if panel.get_yscale() == "log":
-            foot = low * (high / low) ** FOOT[word]
+            foot = low * (high / low) ** FEET[word]
         else:
-            foot = low + FOOT[word] * (high - low)
+            foot = low + FEET[word] * (high - low)
         mark_points(panel, x[here], np.full(here.sum(), foot),
                     None if keys is None else keys[here], mark, NAMES[word])  # fmt: skip
 
@@ -118,7 +119,8 @@ def scale_y(panel: Axes, values: np.ndarray) -> float:
 
     Values that are all the same stand in the middle.
     """
-    low, high = np.nanmin(values), np.nanmax(values)
+    values = values[np.isfinite(values)]
+    low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
     if spans_decades(values):
         panel.set_yscale("log")
         room = (high / low) ** ROOM

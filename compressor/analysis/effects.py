@@ -1,0 +1,196 @@
+"""Which swept key matters for a quantity, and how the quantity follows it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compressor.analysis.sobol import LEVEL, saltelli_design
+
+MOST_GAPS = 0.2  # of a grid's points
+FILLS = 500  # rounds of filling
+FILLED = 1e-9  # of the values' span: no round changes more
+FEWEST = 8  # points of a ranking or a trend
+MOST_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
+MOST_POINTS = 4000  # of the resampling
+RESAMPLES = 400
+SEED = 1
+ORDER = 2  # of a trend
+
+
+@dataclass(frozen=True)
+class Effects:
+    """How much each of k keys does to a quantity.
+
+    kind: `grid` and `saltelli`: shares of the variance, by the key alone and with its
+    interactions; `rank`: correlations of ranks, of words the correlation ratio; no total.
+    main, total: (k,); *_ends: the ends of the 95 % intervals, (2, k), None where the values are
+    exact. filled: points without a value of their own.
+    """
+
+    kind: str
+    main: np.ndarray
+    total: np.ndarray | None = None
+    main_ends: np.ndarray | None = None
+    total_ends: np.ndarray | None = None
+    filled: int = 0
+
+    @property
+    def strength(self) -> np.ndarray:
+        """By which keys are ranked, (k,): the total effect, or the size of the correlation."""
+        return abs(self.main) if self.total is None else self.total
+
+
+def grid_effects(values: np.ndarray) -> Effects | None:
+    """Main and total effects of a grid's axes; None where too little of it is known.
+
+    values: an axis a key, nan where unknown. Every point of the grid counts alike, so that the
+    decomposition of the variance (Hoeffding 1948; Sobol', Mathematics and Computers in Simulation
+    55, 2001, 271-280) is exact: S_i = V(E(y | x_i)) / V(y) and T_i = 1 - V(E(y | all but x_i)) /
+    V(y) (Saltelli et al., Global Sensitivity Analysis: The Primer, 2008, chapters 1 and 4). Both
+    are nan where all values are the same. Values of an axis at which nothing is known are left
+    out. Other unknown points, at most MOST_GAPS of all, take the sum of their axes' main effects
+    (Healy and Westmacott, Applied Statistics 5, 1956, 203-206).
+    """
+    for axis in range(values.ndim):
+        rest = tuple(n for n in range(values.ndim) if n != axis)
+        values = np.compress(np.isfinite(values).any(axis=rest), values, axis=axis)
+    unknown = ~np.isfinite(values)
+    if not values.size or unknown.mean() > MOST_GAPS:
+        return None
+    values = filled(values, unknown)
+    axes = range(values.ndim)
+    apart = [tuple(n for n in axes if n != axis) for axis in axes]
+    scaled = (values - values.mean()) / (np.ptp(values) or 1.0)
+    whole = scaled.var()
+    if not whole:
+        nothing = np.full(values.ndim, math.nan)
+        return Effects("grid", nothing, nothing, filled=int(unknown.sum()))
+    main = np.array([scaled.mean(axis=others).var() for others in apart]) / whole
+    total = np.array([scaled.var(axis=axis).mean() for axis in axes]) / whole
+    return Effects("grid", main, total, filled=int(unknown.sum()))
+
+
+def filled(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    """Values with unknown points as the sum of their axes' main effects, which this finds."""
+    if not unknown.any():
+        return values
+    found = np.where(unknown, values[~unknown].mean(), values)
+    span = np.ptp(values[~unknown])
+    for _ in range(FILLS):
+        mean = found.mean()
+        expected = np.full_like(found, mean)
+        for axis in range(found.ndim):
+            rest = tuple(n for n in range(found.ndim) if n != axis)
+            expected += found.mean(axis=rest, keepdims=True) - mean
+        change = abs(np.where(unknown, expected - found, 0.0)).max()
+        found = np.where(unknown, expected, found)
+        if change <= FILLED * span:
+            break
+    return found
+
+
+def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effects | None:
+    """The effects of keys of which a design drew values; None where too little is known.
+
+    columns: a key's value at each point, or words; values: (points,), nan where unknown. Of a
+    `saltelli` design Sobol's indices, unknown points having the median, of a large one of
+    its first MOST_BASE points; else correlations, each over the points that have its key.
+    """
+    good = np.isfinite(values)
+    if good.sum() < FEWEST:
+        return None
+    if not np.ptp(values[good]):
+        return Effects("rank", np.full(len(columns), math.nan))
+    numeric = all(column.dtype.kind in "fiu" for column in columns)
+    design = saltelli_design(np.stack(columns, axis=1).astype(float)) if numeric else None
+    if design is not None and good.mean() >= 1.0 - MOST_GAPS:
+        whole = np.where(good, values, np.median(values[good]))
+        found = design.first(MOST_BASE).indices(whole, RESAMPLES)
+        if not all(np.isfinite(row).all() for row in found.values()):
+            return None  # so few points differ that some resamples are all the same
+        ends = {
+            order: np.stack([found[f"{order}_low"], found[f"{order}_high"]])
+            for order in ("first_order", "total_order")
+        }
+        return Effects(
+            "saltelli", found["first_order"], found["total_order"], ends["first_order"],
+            ends["total_order"], int((~good).sum()),
+        )  # fmt: skip
+    there = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
+    rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, there, strict=True)])
+    return Effects("rank", rows[:, 0], main_ends=rows[:, 1:].T, filled=int((~good).sum()))
+
+
+def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
+    """The correlation of ranks of a key and a quantity with the ends of its 95 % interval.
+
+    Of numbers Spearman's, the interval by Bonett and Wright (Psychometrika 65, 2000, 23-28). Of
+    words the correlation ratio of the ranks, which is the root of Kruskal and Wallis' H / (n - 1),
+    with an interval by the bootstrap. nan where the key is the same at all points.
+    """
+    from scipy.stats import norm, spearmanr  # takes half a second
+
+    if values.size < FEWEST:
+        return math.nan, math.nan, math.nan
+    if column.dtype.kind not in "fiu":
+        return correlation_ratio(np.unique(column, return_inverse=True)[1], values)
+    if not np.ptp(column.astype(float)):
+        return math.nan, math.nan, math.nan
+    found = float(spearmanr(column, values).statistic)
+    if abs(found) > 1.0 - 1e-12:
+        return found, found, found
+    reach = float(norm.ppf(0.5 + LEVEL / 2)) * math.sqrt((1 + found**2 / 2) / (values.size - 3))
+    low, high = np.tanh(np.arctanh(found) + np.array([-reach, reach]))
+    return found, float(low), float(high)
+
+
+def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
+    """The correlation ratio of the ranks of values in groups, and the ends of its interval."""
+    from scipy.stats import kruskal, rankdata
+
+    if np.unique(codes).size < 2:
+        return math.nan, math.nan, math.nan
+    groups = [values[codes == code] for code in np.unique(codes)]
+    found = math.sqrt(max(0.0, float(kruskal(*groups).statistic)) / (values.size - 1))
+    rng = np.random.default_rng(SEED)
+    ranks, size = rankdata(values), min(values.size, MOST_POINTS)
+    draws = []
+    for _ in range(RESAMPLES):
+        picked = rng.integers(values.size, size=size)
+        counts = np.bincount(codes[picked])
+        sums = np.bincount(codes[picked], ranks[picked])
+        one = ranks[picked]
+        between = (sums[counts > 0] ** 2 / counts[counts > 0]).sum() / size - one.mean() ** 2
+        draws.append(math.sqrt(max(0.0, between) / (one.var() or 1.0)))
+    low, high = np.quantile(draws, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return found, min(found, float(low)), max(found, float(high))
+
+
+def trend(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...] | None:
+    """A parabola through points by least squares, at places: it and the ends of its 95 % interval.
+
+    x, y: (points,), nan where unknown; None of fewer than FEWEST points or three places. The
+    interval is that of the mean at a place, by Student's t and the covariance HC3, which holds
+    where the scatter differs along x, too (MacKinnon and White, Journal of Econometrics 29, 1985,
+    305-325).
+    """
+    from scipy.stats import t
+
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if x.size < FEWEST or np.unique(x).size <= ORDER:
+        return None
+    middle, half = 0.5 * (x.max() + x.min()), 0.5 * np.ptp(x)
+    powers = np.vander((x - middle) / half, ORDER + 1)
+    places = np.vander((at - middle) / half, ORDER + 1)
+    inverse = np.linalg.pinv(powers.T @ powers)
+    factors = inverse @ powers.T @ y
+    leverage = np.einsum("ij,jk,ik->i", powers, inverse, powers).clip(max=1.0 - 1e-9)
+    rest = (y - powers @ factors) / (1.0 - leverage)
+    spread = inverse @ (powers.T * rest**2) @ powers @ inverse
+    error = np.sqrt(np.einsum("ij,jk,ik->i", places, spread, places).clip(min=0.0))
+    reach = float(t.ppf(0.5 + LEVEL / 2, x.size - ORDER - 1)) * error
+    found = places @ factors
+    return found, found - reach, found + reach

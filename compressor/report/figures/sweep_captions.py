@@ -1,0 +1,170 @@
+"""What is said under the drawings of a sweep. A caption is a claim: each number is of the data."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from compressor.report.figures.sweep_data import Axis, Sweep
+from compressor.report.figures.sweep_maps import MOST_CELLS
+from compressor.report.figures.sweep_metric import Measure, shown_value
+from compressor.report.figures.sweep_multiples import MOST_COLUMNS, MOST_ROWS, Roles
+from compressor.report.figures.sweep_panels import MOST_LINES
+from compressor.report.figures.sweep_ranking import Ranking, told
+from compressor.report.figures.sweep_scatter import MOST_POINTS, grouping
+
+MARKS = (
+    "A cross: a job failed here; an empty grey circle: a job was not run; a ring: a chaotic job, "
+    "whose averages hold within their bars, but whose greatest values hold for that run only."
+)
+VARIANCE = (
+    "The share of each metric's variance over the grid that an axis has by itself (main effect) "
+    "and together with its interactions with others (total effect), from the exact decomposition "
+    "of the variance (Sobol' 2001; Saltelli et al. 2008)."
+)
+INDICES = (
+    "The share of each metric's variance that a key has by itself (main effect) and together with "
+    "its interactions with others (total effect): Sobol's indices with 95 % bootstrap intervals "
+    "(Saltelli et al. 2010)."
+)
+RANKS = (
+    "Spearman's correlation of ranks of each metric with each key, and of words the correlation "
+    "ratio of ranks, with 95 % intervals. An effect that rises and falls again is not seen in it."
+)
+TREND = (
+    "A line: a parabola fitted by least squares, on the panel's scales; a band: the 95 % interval "
+    "of its mean (HC3)."
+)
+
+
+def joined(*parts: str) -> str:
+    """Sentences one after the other."""
+    return " ".join(part for part in parts if part)
+
+
+def parted(sweep: Sweep, known: Sequence[Measure]) -> tuple[list[Measure], list[Measure]]:
+    """The measures that differ between jobs, and those that do not."""
+    varied = [bool(np.ptp(v[np.isfinite(v)])) for v in (sweep.values(m) for m in known)]
+    both = [*zip(known, varied, strict=True)]
+    return [m for m, varies in both if varies], [m for m, varies in both if not varies]
+
+
+def marks_told(sweep: Sweep) -> str:
+    """What marks mean, where there are any."""
+    status, chaotic = sweep.status, sweep.chaotic
+    return MARKS if chaotic.any() or np.isin(status, ("failed", "missing")).any() else ""
+
+
+def same_told(sweep: Sweep, same: Sequence[Measure]) -> str:
+    """The measures that are the same at every job, with their values."""
+    if not same:
+        return ""
+    parts = [
+        f"{m.title} ({shown_value(np.nanmax(sweep.values(m)))} {m.unit}".rstrip() + ")"
+        for m in same
+    ]
+    return f"The same at every job, and not drawn: {'; '.join(parts)}."
+
+
+def curves(sweep: Sweep) -> str:
+    """A sweep along one axis."""
+    return (
+        f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
+        "is long enough to be seen."
+    )
+
+
+def maps(sweep: Sweep) -> str:
+    """A sweep along two axes."""
+    return joined(
+        "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
+        *(thinned_told(axis, MOST_CELLS) for axis in sweep.axes),
+    )
+
+
+def thinned_told(axis: Axis, most: int) -> str:
+    """How many of an axis' values are shown, if not all are."""
+    count = axis.values.size
+    return "" if count <= most else f"Of {count} values of {axis.phrase} {most} are shown."
+
+
+def points_told(sweep: Sweep, role: Roles) -> str:
+    """What a point is: a job, with what its marks mean, or a mean over which axes."""
+    others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
+    if not others:
+        return joined("A point a job.", marks_told(sweep))
+    whole = (sweep.status == "ok") & ~sweep.chaotic
+    left = "" if whole.all() else (
+        f"Up to {int((~whole).sum())} of {whole.size} jobs lack a value that is known within its "
+        "error bar, and are no part of a mean."
+    )  # fmt: skip
+    return joined(f"Each point is the mean over {' and '.join(others)}.", left)
+
+
+def overview(sweep: Sweep, role: Roles) -> str:
+    """Every metric over two of the axes."""
+    color = sweep.axes[role.color]
+    return joined(
+        f"Every metric over {sweep.axes[role.x].phrase}, a colour for each value of "
+        f"{color.phrase}: the axes that matter most on the mean of all metrics."
+        if len(sweep.axes) > 2
+        else f"Every metric over {sweep.axes[role.x].phrase}, a colour for each {color.phrase}.",
+        points_told(sweep, role),
+        thinned_told(color, MOST_LINES),
+    )
+
+
+def multiples(sweep: Sweep, role: Roles) -> str:
+    """Panels for the values of an axis, or of two."""
+    places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
+    limits = zip(role[1:], (MOST_LINES, MOST_COLUMNS, MOST_ROWS), strict=True)
+    return joined(
+        f"A panel for each {' and '.join(places)}, a colour for each value of "
+        f"{sweep.axes[role.color].phrase}.",
+        points_told(sweep, role),
+        *(thinned_told(sweep.axes[n], most) for n, most in limits if n >= 0),
+    )
+
+
+def points(sweep: Sweep, is_ranked: bool) -> str:
+    """Each metric of a list of jobs over a key."""
+    which = "the key that matters most for it" if is_ranked else "a key"
+    return joined(f"Every metric over {which}, a point a job.", *fitted(sweep))
+
+
+def scatter(sweep: Sweep, columns: Sequence[int], keys: int) -> str:
+    """Some metrics of a list of jobs over several keys."""
+    some = f"the {len(columns)} strongest of {keys} keys" if keys > len(columns) else "each key"
+    return joined(f"The metrics that change most over {some}, a point a job.", *fitted(sweep))
+
+
+def fitted(sweep: Sweep) -> Iterator[str]:
+    """What is said of trends and of colours, and how many points are drawn."""
+    yield TREND
+    phrase, _, _ = grouping(sweep)
+    if phrase:
+        yield f"A colour for each {phrase}."
+    count = sweep.place.size
+    if count > MOST_POINTS:
+        yield (
+            f"{MOST_POINTS:,} of {count:,} jobs are drawn; trends and the ranking are those of all."
+        )
+
+
+def ranking(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> str:
+    """Which axis matters for which of the metrics that are shown."""
+    left = [measure.title for measure in shown if measure not in found]
+    kind = next(iter(found.values())).kind
+    unit = "the correlation" if kind == "rank" else "its total effect"
+    most = max(effects.filled for effects in found.values())
+    stands = {
+        "grid": "counts with the sum of its axes' main effects",
+        "saltelli": "counts with the metric's median",
+        "rank": "is left out",
+    }
+    gaps = f"Up to {most} jobs lack a value that is known within its error bar: such a job "
+    return joined(
+        {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
+        f"{told(sweep, found)} In parentheses: {unit}.",
+        gaps + f"{stands[kind]}." if most else "",
+        f"Not ranked, since too few jobs tell of it: {'; '.join(left)}." if left else "",
+    )

@@ -1,0 +1,129 @@
+"""Effects of swept keys, of functions whose effects are known, and trends through points."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+
+from compressor.analysis.effects import correlation, grid_effects, sampled_effects, trend
+from compressor.cases.swept import design
+
+
+def table(function, *axes):
+    return function(*np.meshgrid(*axes, indexing="ij")).astype(float)
+
+
+def test_a_sum_has_no_interactions():
+    """V(a) = 2/3 and V(2 b) = 4 * 5/4 over the points, whose sum is the variance."""
+    values = table(lambda a, b: a + 2 * b, np.arange(3), np.arange(4))
+    found = grid_effects(values)
+    shares = np.array([2 / 3, 5]) / (2 / 3 + 5)
+    assert found.main == pytest.approx(shares)
+    assert found.total == pytest.approx(shares)
+    assert found.strength is found.total
+
+
+def test_a_product_of_signs_is_interaction_alone():
+    found = grid_effects(table(lambda a, b, c: a * b + 0 * c, *[np.array([-1, 1])] * 3))
+    assert found.main == pytest.approx([0, 0, 0])
+    assert found.total == pytest.approx([1, 1, 0])
+
+
+def test_ishigami_s_function_on_a_fine_grid():
+    """Closed forms (Saltelli et al. 2008): main .3139, .4424, 0; total .5576, .4424, .2437."""
+    x = np.pi * (2 * (np.arange(60) + 0.5) / 60 - 1)
+    values = table(lambda a, b, c: np.sin(a) + 7 * np.sin(b) ** 2 + 0.1 * c**4 * np.sin(a), x, x, x)
+    found = grid_effects(values)
+    assert found.main == pytest.approx([0.3139, 0.4424, 0.0], abs=2e-3)
+    assert found.total == pytest.approx([0.5576, 0.4424, 0.2437], abs=2e-3)
+
+
+def test_gaps_of_a_sum_are_filled_rightly():
+    values = table(lambda a, b, c: a + 2 * b + c**2, np.arange(4), np.arange(5), np.arange(3))
+    exact = grid_effects(values)
+    values[0, 1, 2] = values[3, 3, 0] = values[2, 2, 2] = math.nan
+    found = grid_effects(values)
+    assert (exact.filled, found.filled) == (0, 3)
+    assert found.main == pytest.approx(exact.main, abs=1e-6)
+    assert found.total == pytest.approx(exact.total, abs=1e-6)
+    values[:, :2] = math.nan  # values of an axis at which nothing is known
+    assert grid_effects(values).main.sum() == pytest.approx(1.0, abs=1e-6)
+    values[:2, 2:4] = math.nan
+    assert grid_effects(values) is None
+
+
+def test_what_never_changes_has_no_effects():
+    assert np.isnan(grid_effects(np.full((3, 2), 5.0)).main).all()
+    assert np.isnan(sampled_effects([np.arange(9.0)], np.full(9, 5.0)).main).all()
+
+
+def test_saltelli_s_designs_have_indices():
+    points = np.array(design("saltelli", 256, 2, 1))
+    values = points[:, 0] + 2 * points[:, 1]
+    values[5] = math.nan
+    found = sampled_effects([*points.T], values)
+    assert (found.kind, found.filled) == ("saltelli", 1)
+    assert found.total == pytest.approx([0.2, 0.8], abs=0.03)
+    assert (found.main_ends[0] <= found.main).all()
+    assert (found.main_ends[1] >= found.main).all()
+
+
+def test_other_designs_have_correlations_of_ranks():
+    rng = np.random.default_rng(1)
+    x, idle = rng.random((2, 200))
+    load = np.array(["design", "typical"])[rng.integers(2, size=200)]
+    values = np.exp(-5 * x)
+    found = sampled_effects([x, idle, load], values)
+    assert found.kind == "rank"
+    assert found.total is None
+    assert found.main[0] == -1.0
+    assert found.strength[0] == 1.0
+    low, high = found.main_ends
+    assert low[1] < 0 < high[1]
+    assert (low[2] <= found.main[2]) & (found.main[2] <= high[2])
+    assert found.main[2] < 0.3
+    assert sampled_effects([x[:5]], values[:5]) is None
+
+
+def test_of_two_words_the_ratio_is_the_correlation():
+    rng = np.random.default_rng(2)
+    code = rng.integers(2, size=80)
+    values = rng.normal(size=80) + code
+    found, low, high = correlation(np.array(["a", "b"])[code], values)
+    assert found == pytest.approx(spearmanr(code, values).statistic)
+    assert low < found < high
+
+
+def test_intervals_of_correlations_hold_as_often_as_they_say():
+    """Of a bivariate normal Spearman's rho is 6 / pi asin(r / 2); 95 % of 400, within 3 sigma."""
+    rng = np.random.default_rng(3)
+    exact = 6 / np.pi * math.asin(0.6 / 2)
+    held = 0
+    for _ in range(400):
+        x, noise = rng.normal(size=(2, 60))
+        _, low, high = correlation(x, 0.6 * x + 0.8 * noise)
+        held += low <= exact <= high
+    assert held / 400 == pytest.approx(0.95, abs=0.033)
+
+
+def test_a_trend_through_a_parabola_is_it():
+    x = np.linspace(300, 900, 20)
+    at = np.array([300.0, 512.5])
+    found, low, high = trend(x, 2 + 3e-3 * x**2, at)
+    assert found == pytest.approx(2 + 3e-3 * at**2)
+    assert high - low == pytest.approx([0, 0], abs=1e-8)
+    assert trend(x[:5], x[:5], at) is None
+    assert trend(np.tile([1.0, 2.0], 10), x, at) is None
+
+
+def test_a_trend_s_interval_holds_as_often_as_it_says():
+    """Scatter that grows along x, at both ends; 95 % of 400, within 4 sigma."""
+    rng = np.random.default_rng(4)
+    at, held = np.array([0.0, 1.0]), np.zeros(2)
+    for _ in range(400):
+        x = rng.random(60)
+        _, low, high = trend(x, 1 + x - x**2 + (0.1 + x) * rng.normal(size=60), at)
+        exact = np.array([1.0, 1.0])
+        held += (low <= exact) & (exact <= high)
+    assert held / 400 == pytest.approx([0.95, 0.95], abs=0.044)

@@ -1,0 +1,115 @@
+"""Which key matters: bars and sentences say what the effects are."""
+
+import numpy as np
+import pytest
+from swept_made import grid, listed
+
+from compressor.cases.swept import design
+from compressor.report.figures.extract import extract
+from compressor.report.figures.sweep import draw_sweep
+from compressor.report.figures.sweep_data import sweep_of
+from compressor.report.figures.sweep_metric import measures
+from compressor.report.figures.sweep_ranking import leading, ranking
+
+AXES = {"clearance_mm": [1.0, 2.0, 3.0], "speed_rpm": [1.0, 2.0, 3.0, 4.0],
+        "load": ["design", "typical"]}  # fmt: skip
+
+
+def plan(data):
+    return {one.name: one for one in draw_sweep(data)}
+
+
+def bars(drawn):
+    """The shares of an axis' panel by the kind of effect."""
+    return {
+        panel.title: {trace.name.partition("(")[2].rstrip(")"): trace.x for trace in panel.traces}
+        for panel in extract(drawn.figure).panels
+    }
+
+
+def test_bars_and_caption_are_the_exact_shares():
+    """Of c + 2 n + 0 load: V = 2/3 + 5, without interactions. rms is half of it, thus the same."""
+    drawn = plan(grid(AXES, lambda c, n, load: 10 + c + 2 * n + 0 * load))["ranking"]
+    found = bars(drawn)
+    share = 500 / (2 / 3 + 5)
+    assert [*found] == ["speed", "clearance", "load"]  # the strongest first
+    for kind in ("main effect", "total effect"):
+        assert found["speed"][kind] == pytest.approx([share] * 2)
+        assert found["clearance"][kind] == pytest.approx([100 - share] * 2)
+        assert found["load"][kind] == pytest.approx([0, 0])
+    assert f"Speed matters most for peak acceleration ({share:.0f} %)" in drawn.caption
+    panel = extract(drawn.figure).panels[0]
+    assert panel.y.words == {0.0: "peak acceleration", 1.0: "rms acceleration"}
+    assert panel.x.title == "share of variance (%)"
+
+
+def test_interactions_are_in_total_effects_alone():
+    """(c - 2)(n - 2.5), of means 0 over each axis."""
+    found = bars(plan(grid(AXES, lambda c, n, load: 9 + (c - 2) * (n - 2.5) + 0 * load))["ranking"])
+    for axis, total in (("speed", 100), ("clearance", 100), ("load", 0)):
+        assert found[axis]["main effect"] == pytest.approx([0, 0], abs=1e-9)
+        assert found[axis]["total effect"] == pytest.approx([total] * 2)
+
+
+def test_the_caption_follows_the_numbers():
+    def peak(c, n, load):
+        return 10 + 5 * c + n + 0 * load
+
+    assert "Clearance matters most for" in plan(grid(AXES, peak))["ranking"].caption
+    data = grid(AXES, peak)
+    data["rms_acceleration"] = data["rms_acceleration"] * 0 + data["speed_rpm"]
+    caption = plan(data)["ranking"].caption
+    assert "Clearance matters most for peak acceleration (93 %)." in caption  # 25 * 2/3 of 17.92
+    assert "Speed matters most for rms acceleration (100 %)." in caption
+
+
+def test_jobs_without_a_value_are_told():
+    status = np.full((3, 4, 2), "ok", dtype="U7")
+    status[1, 1, 0] = "failed"
+    drawn = plan(grid(AXES, lambda c, n, load: 10 + c + 2 * n + 0 * load, status=status))
+    assert bars(drawn["ranking"])["load"]["total effect"] == pytest.approx([0, 0], abs=1e-6)
+    assert "Up to 1 jobs lack a value" in drawn["ranking"].caption
+
+
+def test_keys_that_overlap_are_not_told_apart():
+    points = np.array(design("lhs", 40, 2, 1))
+    columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
+    drawn = plan(listed(columns, 1 + points[:, 0] + points[:, 1]))["ranking"]
+    assert "(whose intervals overlap) matters most for" in drawn.caption
+    drawn = plan(listed(columns, 1 - 0.9 * points[:, 0] + 0.02 * points[:, 1]))["ranking"]
+    assert "Clearance matters most for peak acceleration (−1.00)" in drawn.caption
+    panel = extract(drawn.figure).panels[0]
+    (found,) = (trace for trace in panel.traces if trace.kind == "bars")
+    assert panel.title == "clearance"
+    assert found.x[0] == pytest.approx(-1.0, abs=0.01)
+    assert found.errors is not None
+
+
+def test_saltelli_s_designs_have_sobol_s_indices():
+    points = np.array(design("saltelli", 64, 2, 1))
+    columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
+    drawn = plan(listed(columns, 1 + points[:, 0] + 3 * points[:, 1]))["ranking"]
+    assert "Sobol's indices" in drawn.caption
+    found = bars(drawn)
+    assert found["speed"]["total effect"] == pytest.approx([90, 90], abs=8)
+    assert found["clearance"]["main effect"] == pytest.approx([10, 10], abs=8)
+
+
+def test_what_changes_most_leads():
+    data = grid(AXES, lambda c, n, load: 10 + c + 2 * n + 0 * load)
+    data["rms_acceleration"] = data["clearance_mm"] ** 4 + 0 * data["peak_acceleration"]
+    sweep = sweep_of(data)
+    assert [m.variable for m in leading(sweep, measures(data), 3)] == [
+        "rms_acceleration", "peak_acceleration",
+    ]  # fmt: skip
+    assert len(leading(sweep, measures(data), 1)) == 1
+
+
+def test_of_a_grid_with_large_gaps_nothing_is_ranked():
+    status = np.full((3, 4, 2), "ok", dtype="U7")
+    status[0] = "missing"
+    status[1, :2] = "failed"
+    data = grid(AXES, lambda c, n, load: 10 + c + 2 * n + 0 * load, status=status)
+    assert ranking(sweep_of(data), measures(data)) == {}
+    assert "ranking" not in plan(data)
+    assert "overview" in plan(data)

@@ -1,0 +1,81 @@
+"""Sampled sweeps: points are jobs, trends are the fit of what is known, and thinning is told."""
+
+import time
+
+import numpy as np
+import pytest
+from swept_made import listed
+
+from compressor.report.figures.extract import extract
+from compressor.report.figures.sweep import draw_sweep
+
+RNG = np.random.default_rng(5)
+CLEARANCE, SPEED = RNG.random((2, 60)) + 1.0
+COLUMNS = {"clearance_mm": CLEARANCE, "speed_rpm": SPEED}
+
+
+def plan(data):
+    return {one.name: one for one in draw_sweep(data)}
+
+
+def traces(panel):
+    return {trace.name: trace for trace in panel.traces}
+
+
+def test_points_are_jobs_and_a_parabola_is_its_own_trend():
+    found = plan(listed(COLUMNS, 2 + SPEED**2))
+    assert [*found] == ["ranking", "points", "scatter"]
+    panel = extract(found["points"].figure).panels[0]
+    assert panel.x.title == "speed (rpm)"  # what matters most
+    one = traces(panel)
+    assert one["a job"].x.tolist() == SPEED.tolist()
+    assert one["a job"].y == pytest.approx(2 + SPEED**2)
+    assert one["a job"].jobs == tuple(f"k{n}" for n in range(60))
+    assert one["trend"].y == pytest.approx(2 + one["trend"].x ** 2)
+    assert one["trend"].x[[0, -1]] == pytest.approx([SPEED.min(), SPEED.max()])
+    assert "a parabola fitted by least squares" in found["points"].caption
+
+
+def test_each_key_has_a_column_and_each_metric_a_row():
+    panels = extract(plan(listed(COLUMNS, 2 + SPEED + CLEARANCE))["scatter"].figure).panels
+    assert [(p.row[0], p.column[0]) for p in panels] == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    for panel, column in zip(panels[2:], (0, 1), strict=True):
+        assert panel.x.title in ("speed (rpm)", "clearance (mm)")
+        assert panels[column].x.words == panel.x.words
+
+
+def test_words_are_colours_with_trends_of_their_own():
+    load = np.array(["design", "typical"] * 30)
+    values = np.where(load == "design", SPEED, 5 - SPEED)
+    panel = extract(plan(listed(COLUMNS | {"load": load}, values))["points"].figure).panels[0]
+    one = traces(panel)
+    assert one["load design"].y == pytest.approx(values[::2])
+    assert one["trend, load design"].color == one["load design"].color
+    assert one["trend, load typical"].color != one["load design"].color
+    assert "95 % interval of the trend, load typical" in one
+
+
+def test_what_is_not_known_is_drawn_but_not_fitted():
+    status, regime = (np.full(60, word, dtype="U11") for word in ("ok", "predictable"))
+    status[3], regime[7] = "failed", "chaotic"
+    values = 2 + SPEED**2
+    values[7] = 60.0
+    panel = extract(plan(listed(COLUMNS, values, status=status, regime=regime))["points"].figure)
+    one = traces(panel.panels[0])
+    assert one["a job failed here"].jobs == ("k3",)
+    ring = next(trace for name, trace in one.items() if name.startswith("chaotic"))
+    assert (ring.y, ring.jobs) == (60.0, ("k7",))
+    assert one["trend"].y == pytest.approx(2 + one["trend"].x ** 2)
+
+
+def test_many_jobs_are_thinned_with_a_word():
+    rng = np.random.default_rng(6)
+    columns = {name: rng.random(100_000) for name in ("clearance_mm", "speed_rpm", "rod_mass_kg")}
+    data = listed(columns, 1 + columns["clearance_mm"] + 0.1 * rng.random(100_000))
+    start = time.process_time()
+    found = plan(data)
+    assert time.process_time() - start < 5.0
+    for name in ("points", "scatter"):
+        for panel in extract(found[name].figure).panels:
+            assert traces(panel)["a job"].x.size == 2000
+        assert "2,000 of 100,000 jobs are drawn" in found[name].caption
