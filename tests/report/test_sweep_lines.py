@@ -63,3 +63,11 @@ def test_where_nothing_ran_nothing_is_drawn():
     data = grid({"clearance_mm": CLEARANCES}, lambda c: c, status=["failed"] * 4)
     assert draw_sweep(data) == []
     assert draw_sweep(grid({"clearance_mm": [0.1]}, lambda c: c)) == []
+
+
+def test_of_very_many_values_some_are_drawn():
+    (drawn,) = draw_sweep(grid({"clearance_mm": np.linspace(0.1, 1, 100_000)}, lambda c: c))
+    (curve,) = extract(drawn.figure).panels[0].traces
+    assert curve.x.size == 1000
+    assert (curve.x[0], curve.x[-1]) == (0.1, 1.0)
+    assert "Of 100000 values of clearance 1000 are shown." in drawn.caption

@@ -113,3 +113,11 @@ def test_of_a_grid_with_large_gaps_nothing_is_ranked():
     assert ranking(sweep_of(data), measures(data)) == {}
     assert "ranking" not in plan(data)
     assert "overview" in plan(data)
+
+
+def test_of_a_large_design_the_first_points_are_told():
+    points = np.array(design("saltelli", 2048, 2, 1))
+    columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
+    drawn = plan(listed(columns, 1 + points[:, 0] + 3 * points[:, 1]))["ranking"]
+    assert "of the first 1,024 points" in drawn.caption
+    assert bars(drawn)["speed"]["total effect"] == pytest.approx([90, 90], abs=1)

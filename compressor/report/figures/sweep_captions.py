@@ -5,9 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from compressor.report.figures.sweep_data import Axis, Sweep
+from compressor.report.figures.sweep_lines import MOST_POINTS as MOST_JOBS
 from compressor.report.figures.sweep_maps import MOST_CELLS
 from compressor.report.figures.sweep_metric import Measure, shown_value
-from compressor.report.figures.sweep_multiples import MOST_COLUMNS, MOST_ROWS, Roles
+from compressor.report.figures.sweep_multiples import MOST_COLUMNS, MOST_PLACES, MOST_ROWS, Roles
 from compressor.report.figures.sweep_panels import MOST_LINES
 from compressor.report.figures.sweep_ranking import Ranking, told
 from compressor.report.figures.sweep_scatter import MOST_POINTS, grouping
@@ -67,9 +68,10 @@ def same_told(sweep: Sweep, same: Sequence[Measure]) -> str:
 
 def curves(sweep: Sweep) -> str:
     """A sweep along one axis."""
-    return (
+    return joined(
         f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
-        "is long enough to be seen."
+        "is long enough to be seen.",
+        thinned_told(sweep.axes[0], MOST_JOBS),
     )
 
 
@@ -109,6 +111,7 @@ def overview(sweep: Sweep, role: Roles) -> str:
         if len(sweep.axes) > 2
         else f"Every metric over {sweep.axes[role.x].phrase}, a colour for each {color.phrase}.",
         points_told(sweep, role),
+        thinned_told(sweep.axes[role.x], MOST_PLACES),
         thinned_told(color, MOST_LINES),
     )
 
@@ -116,7 +119,7 @@ def overview(sweep: Sweep, role: Roles) -> str:
 def multiples(sweep: Sweep, role: Roles) -> str:
     """Panels for the values of an axis, or of two."""
     places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
-    limits = zip(role[1:], (MOST_LINES, MOST_COLUMNS, MOST_ROWS), strict=True)
+    limits = zip(role, (MOST_PLACES, MOST_LINES, MOST_COLUMNS, MOST_ROWS), strict=True)
     return joined(
         f"A panel for each {' and '.join(places)}, a colour for each value of "
         f"{sweep.axes[role.color].phrase}.",
@@ -156,6 +159,7 @@ def ranking(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> str:
     kind = next(iter(found.values())).kind
     unit = "the correlation" if kind == "rank" else "its total effect"
     most = max(effects.filled for effects in found.values())
+    base = max(effects.base for effects in found.values())
     stands = {
         "grid": "counts with the sum of its axes' main effects",
         "saltelli": "counts with the metric's median",
@@ -164,6 +168,7 @@ def ranking(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> str:
     gaps = f"Up to {most} jobs lack a value that is known within its error bar: such a job "
     return joined(
         {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
+        f"They are of the first {base:,} points of the design's sequence." if base else "",
         f"{told(sweep, found)} In parentheses: {unit}.",
         gaps + f"{stands[kind]}." if most else "",
         f"Not ranked, since too few jobs tell of it: {'; '.join(left)}." if left else "",

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -139,6 +139,19 @@ def sweep_of(data: xr.Dataset) -> Sweep:
         place = np.take(place, order, axis=status.dims.index(name))
         found.append(axis_of(data, name, values[order]))
     return Sweep(data, tuple(found), place.reshape([axis.values.size for axis in found]), True)
+
+
+def coarse(sweep: Sweep, axis: int, most: int) -> Sweep:
+    """A grid with at most so many values of an axis, evenly chosen, the ends among them."""
+    size = sweep.axes[axis].values.size
+    if size <= most:
+        return sweep
+    chosen = np.unique(np.linspace(0, size - 1, most).astype(int))
+    axes = [
+        replace(one, values=one.values[chosen]) if n == axis else one
+        for n, one in enumerate(sweep.axes)
+    ]
+    return Sweep(sweep.data, tuple(axes), np.take(sweep.place, chosen, axis), True)
 
 
 def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from compressor.report.figures.style import legend_above, styled
-from compressor.report.figures.sweep_data import Sweep
+from compressor.report.figures.sweep_data import Sweep, coarse
 from compressor.report.figures.sweep_metric import Measure
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
@@ -21,10 +21,16 @@ from compressor.report.figures.sweep_panels import (
     unit_of,
 )
 
+MOST_POINTS = 1000
+
 
 @styled
 def draw_curves(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
-    """Every measure over the one axis of a grid, a point a job; over words without a line."""
+    """Every measure over the one axis of a grid, a point a job; over words without a line.
+
+    Of more than MOST_POINTS jobs as many are drawn.
+    """
+    sweep = coarse(sweep, 0, MOST_POINTS)
     (axis,) = sweep.axes
     x, status, chaotic, keys = axis.places, sweep.status, sweep.chaotic, sweep.keys
     figure, panels = metric_panels(measures, 2.35)

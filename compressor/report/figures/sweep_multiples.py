@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from compressor.report.figures.style import legend_above, sheet, styled
-from compressor.report.figures.sweep_data import Axis, Sweep
+from compressor.report.figures.sweep_data import Axis, Sweep, coarse
 from compressor.report.figures.sweep_metric import Measure
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
@@ -30,6 +30,7 @@ from compressor.report.figures.sweep_panels import (
 )
 
 MOST_COLUMNS, MOST_ROWS = 4, 3
+MOST_PLACES = 200  # in x
 
 
 class Roles(NamedTuple):
@@ -80,6 +81,7 @@ def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Fig
 
     What is not known within its error bar is no part of a mean.
     """
+    sweep = coarse(sweep, role.x, MOST_PLACES)
     figure, panels = metric_panels(measures, 2.35)
     entries: dict[str, Line2D] = {}
     for panel, measure in zip(panels, measures, strict=True):
@@ -106,6 +108,7 @@ def marks_of(sweep: Sweep, role: Roles) -> list[Line2D]:
 @styled
 def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
     """A panel for each value of one axis and, in rows, of another, or for each measure."""
+    sweep = coarse(sweep, role.x, MOST_PLACES)
     columns = chosen_of(sweep.axes[role.column], MOST_COLUMNS)
     has_rows = role.row >= 0
     rows: Sequence[int] = chosen_of(sweep.axes[role.row], MOST_ROWS).tolist() if has_rows else []
