@@ -109,9 +109,10 @@ mutants: install  ## plant bugs and see whether the fast tests catch them (25 mi
 
 measurements: calibration accuracy claims page tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
 
-pages: install  ## write the generated tables of the README pages, and compressor/API.md
+pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py
 	$(BIN)/python tests/api_page.py
+	$(BIN)/python tests/tutorial.py
 
 clean:  ## remove results, report, claims, tradeoff, stress and caches; .venv stays
 	rm -rf results report claims tradeoff stress .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -52,7 +52,8 @@ TOGETHER = {
 LONG = (
     "campaigns/test_chaos_processes",  # compiles the march; the three after it do without
     "sweep/test_execution", "campaigns/test_chaos_files", "cases/test_load",
-    "measure/test_stress", "solve/test_integrate", "test_pages", "sweep/test_cluster",
+    "measure/test_stress", "solve/test_integrate", "test_pages", "test_tutorial",
+    "sweep/test_cluster",
     "sweep/test_sweep", "report/test_report", "cmd/test_cli",
 )  # fmt: skip
 

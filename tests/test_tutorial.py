@@ -1,0 +1,195 @@
+"""The tutorial: each command is run, each output compared, and each number of its words.
+
+Its notebook is run by nbclient, once for both; where that is missing, the page is run by itself.
+"""
+
+import contextlib
+import io
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import tutorial
+from compsim import cli
+
+import compressor
+
+TEXT = tutorial.PAGE.read_text(encoding="utf-8")
+PIECES = tutorial.pieces(TEXT)
+WORDS = " ".join(TEXT.split())
+CELLS = [one for one in PIECES if one.kind != "markdown"]
+NEEDED = ("nbclient", "nbformat", "ipykernel")
+LACKING = [name for name in NEEDED if find_spec(name) is None]
+
+
+def run_notebook(folder):
+    """What each cell of the notebook prints."""
+    import nbformat
+    from nbclient import NotebookClient
+
+    book = nbformat.read(tutorial.NOTEBOOK, as_version=4)
+    nbformat.validate(book)
+    where = {"metadata": {"path": str(folder)}}
+    NotebookClient(book, timeout=600, kernel_name="python3", resources=where).execute()
+    for cell in book.cells:
+        if cell.cell_type == "code":
+            streams = [out for out in cell.outputs if out.output_type == "stream"]
+            printed = "".join(out.text for out in streams if out.name == "stdout")
+            yield printed, "".join(out.text for out in streams if out.name == "stderr")
+
+
+def run_page(folder):
+    """What each block of the page prints."""
+    names = {}
+    for one in CELLS:
+        if one.kind == "console":
+            done = subprocess.run(
+                ["sh", "-e", "-c", one.source],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                check=True,
+            )
+            yield done.stdout, done.stderr
+        else:
+            with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.chdir(folder):
+                exec(one.source, names)
+            yield out.getvalue(), ""
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """The folder in which the tutorial was run, and what each cell printed."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    commands = folder.parent / "tutorial-commands"
+    commands.mkdir()
+    command = commands / "compsim"
+    command.write_text(f'#!/bin/sh\nexec {sys.executable} -m compsim "$@"\n')
+    command.chmod(0o755)
+    with pytest.MonkeyPatch.context() as patch:
+        path = os.pathsep.join(map(str, (commands, Path(sys.executable).parent)))
+        patch.setenv("PATH", f"{path}{os.pathsep}{os.environ['PATH']}")
+        patch.setenv("MPLBACKEND", "agg")
+        patch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+        run = run_page if LACKING else run_notebook
+        return folder, [*run(folder)]
+
+
+def opened(ran, name):
+    """A study of the folder, at the big end."""
+    return compressor.open_study(ran[0] / "results", name).sel(joint="big_end")
+
+
+@pytest.mark.slow
+def test_each_command_prints_what_the_page_says(ran):
+    _, printed = ran
+    assert len(printed) == len(CELLS)
+    for one, (out, err) in zip(CELLS, printed, strict=True):
+        assert tutorial.missing(one.output, out) == "", (one.source, out, err)
+
+
+@pytest.mark.slow
+def test_the_words_about_one_machine_follow_from_the_runs(ran):
+    """Sections 4 to 6, and the answer."""
+    wear = opened(ran, "wear").sel(speed_rpm=700)
+    force, bar = wear.peak_contact_force / 1e3, wear.peak_contact_force_error / 1e3
+    (told,) = re.findall(r"At 0.2 mm the force is ([\d.]+) kN: more than", WORDS)
+    assert f"{force.sel(clearance_mm=0.2).item():.1f}" == told
+    assert "It is a few tenths of a newton here" in WORDS
+    assert 2e-4 < bar.sel(clearance_mm=0.2) < 1e-3
+    assert "The force rises with the clearance all the way" in WORDS
+    assert (force.diff("clearance_mm") > 0).all()
+    assert "It passes 15 kN between 0.15 and 0.2 mm" in WORDS
+    assert force.sel(clearance_mm=0.15) < 15 < force.sel(clearance_mm=0.2)
+
+    found = opened(ran, "wear-find-clearance_mm")
+    force, bar = found.peak_contact_force / 1e3, found.peak_contact_force_error / 1e3
+    safe = found.clearance_mm.where(force + 5 * bar < 15).max().item()
+    unsafe = found.clearance_mm.where(force - 5 * bar > 15).min().item()
+    ((low, high),) = re.findall(
+        r"At ([\d.]+) mm the limit is surely kept, and at ([\d.]+) mm", WORDS
+    )
+    assert safe - 1e-3 < float(low) <= safe
+    assert unsafe <= float(high) < unsafe + 1e-3
+    assert re.findall(r"may have a clearance up to ([\d.]+) mm at 700 rpm", WORDS) == [low]
+    assert WORDS.count("below a thousandth of the force") == 2
+    assert (bar / force < 1e-3).all()
+
+
+@pytest.mark.slow
+def test_the_words_about_what_is_not_known_follow_from_the_runs(ran):
+    """Section 7, and the answer."""
+    drawn = opened(ran, "sampling")
+    count, over = drawn.sizes["job"], drawn.peak_contact_force > 15e3
+    assert (drawn.peak_contact_force_error / drawn.peak_contact_force < 1e-3).all()
+    for name, middle in (("rod_mass_kg", 4.7), ("reciprocating_mass_kg", 14)):
+        assert abs(drawn[name] / middle - 1).max() == pytest.approx(0.2, abs=0.01)
+    (below,) = re.findall(r"No drawn machine with less than ([\d.]+) mm exceeds 15 kN", WORDS)
+    assert not over.where(drawn.clearance_mm < float(below), False).any()
+    assert (drawn.clearance_mm < float(below)).any()
+    (above,) = re.findall(r"every one with more than ([\d.]+) mm does", WORDS)
+    assert over.where(drawn.clearance_mm > float(above), True).all()
+    told = re.findall(r"most machines may have ([\d.]+) mm: of (\d+) drawn ones", WORDS)
+    assert told == [(below, str(count))]
+    assert f"This file draws {count} machines" in WORDS
+
+    pairs = re.findall(r"^(\w+) +([-+][\d.]+)$", ran[1][-2][0], re.MULTILINE)
+    ranked = sorted(dict(pairs), key=lambda name: -abs(float(dict(pairs)[name])))
+    assert ranked[:2] == ["clearance_mm", "reciprocating_mass_kg"]
+    assert "after the clearance, the reciprocating mass matters most" in WORDS
+
+    corners = [[float(n) for n in line.split()] for line in ran[1][-1][0].splitlines()[1:]]
+    exceed = [row for row in corners if row[-1] > 15]
+    assert (len(corners), len(exceed), {row[1] for row in exceed}) == (8, 2, {16.8})
+    assert "Two corners exceed 15 kN at 0.1 mm already, both with the heavy crosshead" in WORDS
+    assert "two of the eight corners exceed it at 0.1 mm" in WORDS
+
+
+@pytest.mark.slow
+def test_the_notebook_runs(ran):
+    if LACKING:
+        pytest.skip(f"not installed: {', '.join(LACKING)}: pip install compsim[dev]")
+    assert (ran[0] / "report" / "index.html").exists()
+
+
+def test_the_notebook_is_made_from_the_page():
+    written = tutorial.NOTEBOOK.read_text(encoding="utf-8")
+    assert written == tutorial.notebook(TEXT), "stale: run make pages"
+
+
+def test_the_page_names_every_command_that_it_should():
+    used = {line.split()[1] for one in CELLS for line in one.source.splitlines()
+            if one.kind == "console" and line.startswith("compsim ")}  # fmt: skip
+    assert used >= {"init", "run", "show", "find", "report"}
+    assert used - {"--version"} <= {*cli.cli.commands}
+    assert set(re.findall(r"`compsim ([a-z]+)`", TEXT)) <= {*cli.cli.commands}
+
+
+def test_links_of_the_page_lead_somewhere():
+    for target in re.findall(r"\]\(([^)\s]+)\)", TEXT):
+        assert (tutorial.FOLDER / target.partition("#")[0]).exists(), target
+
+
+@pytest.mark.parametrize(
+    ("expected", "printed", "told"),
+    [
+        (["a 1.000 b"], "a 1.001 b\n", ""),
+        (["a 1.000 b"], "a 1.01 b\n", "a 1.000 b"),
+        (["a 1.000 b"], "a 1.000 c\n", "a 1.000 b"),
+        (["a", "…", "c 2"], "a\nb\nb\nc 2\n", ""),
+        (["a", "…", "c 2"], "a\nb\nb\nc 3\n", "c 2"),
+        (["a"], "a\nb\n", "more is printed: b"),
+        (["a", "…"], "a\nb\n", ""),
+        (["took … s"], "took 12.3 s", ""),
+        (["5.00 ± 0.02 kN"], "5.001 ± 0.03 kN", ""),
+        (["5.00 ± 0.02 kN"], "5.2 ± 0.02 kN", "5.00 ± 0.02 kN"),
+        (["x ≤ 1e-07 %"], "x ≤ 3e-08 %", ""),
+        (["clearance_mm=0.2"], "clearance_mm=0.3", "clearance_mm=0.2"),
+    ],
+)
+def test_how_outputs_are_compared(expected, printed, told):
+    assert tutorial.missing(tuple(expected), printed) == told
