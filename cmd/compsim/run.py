@@ -32,7 +32,8 @@ from compsim.screen import (
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-    from compressor.sweep import Summary
+    from compressor.sweep import Now, Summary
+    from compsim.watch import Watch
 
 MOST_FAILURES = 20  # listed one by one
 
@@ -67,6 +68,10 @@ class Part(click.ParamType):
               show_default=True, help="Where jobs run: here, or on a dask cluster.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
               help="Of the dask cluster, such as tcp://host:8786.")  # fmt: skip
+@click.option("--watch", is_flag=True,
+              help="Keep the page of the report fresh while jobs run; opens nothing.")  # fmt: skip
+@click.option("--report", default="report", show_default=True, metavar="FOLDER",
+              help="Folder of the page that --watch keeps.")  # fmt: skip
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
 @click.pass_context
@@ -82,6 +87,8 @@ def run(
     part: tuple[int, int] | None,
     backend: str,
     scheduler: str | None,
+    watch: bool,
+    report: str,
     wait: bool,
     quiet: bool,
 ) -> int:
@@ -106,14 +113,12 @@ def run(
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     caution(studies)
     chained = [study for study in studies if study.regimes]
-    if chained and scheduler:
-        raise click.UsageError("regimes run in processes here: leave --backend dask out")
-    if len(chained) == len(studies) and "stale" in rerun:
-        raise click.UsageError("--rerun stale is for jobs, and regimes have none: leave it out")
+    if chained:
+        check_chains(len(chained) == len(studies), scheduler, rerun, watch)
     code = DONE
     if len(chained) < len(studies):
         code = run_jobs(context, [s for s in studies if not s.regimes], output, jobs or cores(),
-                        (rerun, part, wait, scheduler, quiet))  # fmt: skip
+                        (rerun, part, wait, scheduler, report if watch else "", quiet))  # fmt: skip
     if chained:
         from compsim.regimes import run_chains
 
@@ -126,26 +131,44 @@ def run_jobs(
     context: click.Context, studies: "list[Study]", output: str, jobs: int, options: Any
 ) -> int:
     """Run studies of jobs."""
-    rerun, part, wait, scheduler, quiet = options
+    rerun, part, wait, scheduler, page, quiet = options
     tell_changes(studies, output)
     from compressor.sweep import Options, sweep
 
     screen = Screen(quiet)
-    try:
-        with cluster(scheduler) as elsewhere:
-            how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
-                          backend=elsewhere, pulse=screen.stands)  # fmt: skip
-            summary = sweep(studies, output, jobs, screen, how)
-    except BaseException:
+    with watching(output, page, context.obj, quiet) as watch:
+
+        def stands(now: "Now") -> None:
+            screen.stands(now)
+            if watch:
+                watch.stands(now)
+
+        try:
+            with cluster(scheduler) as elsewhere:
+                how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
+                              backend=elsewhere, pulse=stands)  # fmt: skip
+                summary = sweep(studies, output, jobs, screen, how)
+        except BaseException:
+            screen.end()
+            if screen.total:
+                verb = "is" if screen.total == 1 else "are"
+                say(f"{screen.done} of {plural(screen.total)} {verb} stored in {output}; "
+                    "the same command goes on from there")  # fmt: skip
+            raise
         screen.end()
-        if screen.total:
-            verb = "is" if screen.total == 1 else "are"
-            say(f"{screen.done} of {plural(screen.total)} {verb} stored in {output}; "
-                "the same command goes on from there")  # fmt: skip
-        raise
-    screen.end()
-    report_run(summary, output, quiet)
+        report_run(summary, output, page, quiet)
     return SOME_FAILED if summary.failed else DONE
+
+
+def watching(
+    results: str, page: str, command: str, quiet: bool
+) -> "contextlib.AbstractContextManager[Watch | None]":
+    """What keeps a page fresh in a folder; nothing where the folder is ""."""
+    if not page:
+        return contextlib.nullcontext()
+    from compsim.watch import Watch
+
+    return Watch(results, page, command, quiet)
 
 
 def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
@@ -161,6 +184,16 @@ def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None
         raise click.UsageError("--scheduler goes with --backend dask")
 
 
+def check_chains(alone: bool, scheduler: str | None, rerun: tuple[str, ...], watch: bool) -> None:
+    """Usage errors of options that chains of regimes, `alone` or beside jobs, do not know."""
+    if scheduler:
+        raise click.UsageError("regimes run in processes here: leave --backend dask out")
+    if alone and "stale" in rerun:
+        raise click.UsageError("--rerun stale is for jobs, and regimes have none: leave it out")
+    if alone and watch:
+        raise click.UsageError("--watch shows jobs, and regimes have none: compsim plot draws them")
+
+
 def cluster(scheduler: str | None) -> contextlib.AbstractContextManager[Any]:
     """The cluster of a scheduler; none where jobs run here."""
     if scheduler is None:
@@ -170,8 +203,8 @@ def cluster(scheduler: str | None) -> contextlib.AbstractContextManager[Any]:
     return Cluster(scheduler)
 
 
-def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
-    """Say what a run did, what failed and what to do next."""
+def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
+    """Say what a run did, what failed and what to do next: with a page, to look at it."""
     width = max(len(count.study) for count in summary.counts)
     for count in summary.counts:
         where = os.path.join(folder, "studies", f"{count.study}.json")
@@ -189,7 +222,8 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
     report_failures(summary)
     if not quiet:
         tell_stale(summary)
-        say(f"next: compsim report -i {shlex.quote(folder)}")
+        say(f"page: {os.path.join(page, 'index.html')}" if page
+            else f"next: compsim report -i {shlex.quote(folder)}")  # fmt: skip
 
 
 def tell_stale(summary: "Summary") -> None:

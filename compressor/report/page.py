@@ -6,9 +6,10 @@ text that they print.
 
 import json
 import struct
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -56,6 +57,31 @@ class Plate:
         return {f"{self.name}.{kind}": content for kind, content in data.items()}
 
 
+class Running(NamedTuple):
+    """How a run stands while its page is written: its jobs, and seconds, None where unknown."""
+
+    done: int  # failed ones among them
+    failed: int
+    total: int
+    eta_s: float | None = None
+    every_s: float = 5.0  # between two pages
+
+    @property
+    def left(self) -> str:
+        """How long the run will still take, in words; "" where that is not known."""
+        if self.eta_s is None:
+            return ""
+        minutes = round(self.eta_s / 60)
+        if minutes < 1:
+            return "under a minute"
+        return f"about {minutes} min" if minutes < 100 else f"about {minutes / 60:.0f} h"
+
+    @property
+    def written(self) -> str:
+        """The time of day."""
+        return time.strftime("%H:%M:%S")
+
+
 def templates() -> Environment:
     """The page's templates: they escape what they print, and what they lack is an error."""
     return Environment(
@@ -68,10 +94,14 @@ def templates() -> Environment:
     )
 
 
-def document(sections: Sequence[Section], jobs: Mapping[str, Any]) -> str:
+def document(
+    sections: Sequence[Section], jobs: Mapping[str, Any], running: Running | None = None
+) -> str:
     """The whole page: the first section, a list of contents, and the other sections.
 
-    jobs: by key what a click on a job's point tells, as plain data.
+    jobs: by key what a click on a job's point tells, as plain data. running: how the run stands
+    that the page is written beside.
     """
-    facts = json.dumps(jobs).replace("<", "\\u003c")
-    return templates().get_template("page.html").render(sections=sections, jobs=Markup(facts))
+    facts = Markup(json.dumps(jobs).replace("<", "\\u003c"))
+    page = templates().get_template("page.html")
+    return page.render(sections=sections, jobs=facts, running=running)

@@ -42,7 +42,7 @@ from compressor.report.machines_section import (
     machine_sections,
 )
 from compressor.report.mechanism import mechanism_svg, mechanism_words
-from compressor.report.page import Plate, Section, document
+from compressor.report.page import Plate, Running, Section, document
 from compressor.report.paper_runs import PaperRuns, find_paper_runs, is_of_paper
 from compressor.report.paper_sections import missing_sections, paper_sections, spoken
 from compressor.report.provenance import provenance_section
@@ -76,14 +76,21 @@ from compressor.store import (
 KINDS = ("png", "svg", "csv", "js")  # of files beside the page
 
 
-def write_report(results: Folder, report: Folder, command: str = "", claims: Folder = "") -> Path:
+def write_report(
+    results: Folder,
+    report: Folder,
+    command: str = "",
+    claims: Folder = "",
+    running: Running | None = None,
+) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
-    claims: the folder of judged machines (`compsim claims`), if there is one.
+    claims: the folder of judged machines (`compsim claims`), if there is one. running: how the run
+    stands that still adds to the results; the page says so, and loads itself again.
 
     Raises StoreError where there are no results, or the report's folder cannot be written.
     """
-    made = compose(results, command, claims)
+    made = compose(results, command, claims, running)
     folder = Path(report)
     for plate in made.plates:
         for name, content in plate.files.items():
@@ -105,7 +112,7 @@ class Made(NamedTuple):
     page: str
 
 
-def compose(results: Folder, command: str, claims: Folder) -> Made:
+def compose(results: Folder, command: str, claims: Folder, running: Running | None = None) -> Made:
     """Everything of a report, in memory."""
     judged = machine_files(claims) if claims else {}
     studies, stored = read_studies(results), read_store(results).warned()
@@ -145,7 +152,8 @@ def compose(results: Folder, command: str, claims: Folder) -> Made:
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs)}
     for key in series:
         jobs[key]["series"] = series_name(key)
-    return Made(plates, [study.name for study in studies], series, document(sections, jobs))
+    page = document(sections, jobs, running)
+    return Made(plates, [study.name for study in studies], series, page)
 
 
 def drawn_part(

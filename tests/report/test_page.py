@@ -19,7 +19,7 @@ from compressor.report.answer import Answer, Finding, Line
 from compressor.report.assumptions import Assumptions
 from compressor.report.diagnosis_section import DiagnosisContent
 from compressor.report.machines_section import Part
-from compressor.report.page import Plate, Section, document, templates
+from compressor.report.page import Plate, Running, Section, document, templates
 from compressor.report.paper_sections import MissingFigures
 from compressor.report.provenance import Provenance
 from compressor.report.second_sets import Pair, SecondSetContent
@@ -206,3 +206,21 @@ def test_markup_in_python_would_be_seen(planted):
 @pytest.mark.parametrize("fine", ['x = "<"', 'x = "a < b"', "x = a<b", 'x = f"{a} < {b}"'])
 def test_comparisons_are_no_markup(fine):
     assert not markup(fine)
+
+
+@pytest.mark.parametrize(
+    ("eta", "left"),
+    [
+        (None, "7 failed. Written"),
+        (20.0, "7 failed, under a minute left. Written"),
+        (125.0, "7 failed, about 2 min left. Written"),
+        (36000.0, "7 failed, about 10 h left. Written"),
+    ],
+)
+def test_a_page_of_a_run_that_goes_on_says_so_and_loads_itself_again(eta, left):
+    text = document([], {}, Running(120, 7, 400, eta, 12.4))
+    assert '<meta http-equiv="refresh" content="12">' in text
+    assert f"120 of 400 jobs done, {left} at " in " ".join(text.split())
+    assert 'content="30"' in document([], {}, Running(1, 0, 2, None, 500.0))
+    assert "refresh" not in document([], {})
+    assert "running" not in document([], {}).lower()

@@ -1,0 +1,220 @@
+"""`compsim run --watch`: a report that is kept fresh while a sweep runs, by a process of its own.
+
+The process reads how the sweep stands, a line of JSON for each page that it is to write, and
+answers each by a line. When nothing more can come, since the sweep has ended, was interrupted or
+killed, it writes the page once more as `compsim report` does, which no longer loads itself again,
+and ends.
+"""
+
+import contextlib
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import IO, TYPE_CHECKING, Any
+
+from compsim.screen import say
+
+if TYPE_CHECKING:
+    from compressor.sweep import Now
+
+SECONDS = 5.0  # between two pages, at least, and before the first
+SHARE = 20.0  # times what a page takes: how long until the next, so that jobs lose little
+NICENESS = 5  # of the process: jobs go first
+MOST_DEATHS = 3  # of the process, before it is given up
+
+
+class Watch:
+    """Keeps the page of a run fresh; a context manager around the sweep.
+
+    Raises StoreError at once where the report's folder cannot be made.
+    """
+
+    def __init__(self, results: str, report: str, command: str, quiet: bool = False):
+        self.told = {"results": os.path.abspath(results), "report": report, "command": command}
+        self.page = os.path.join(report, "index.html")
+        self.quiet = quiet
+        self.process: subprocess.Popen[str] | None = None
+        self.answers: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        self.idle, self.due, self.every = True, time.monotonic() + SECONDS, SECONDS
+        self.deaths = 0
+        self.problems: set[str] = set()
+
+    def __enter__(self) -> "Watch":
+        from compressor.store import StoreError, make_folder
+
+        folder = Path(self.told["report"]).absolute()
+        make_folder(folder)
+        if not os.access(folder, os.W_OK):
+            raise StoreError(folder, "cannot be written", "choose another folder by --report")
+        if not self.quiet:
+            say(f"{self.page} is kept fresh until the run has ended")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Have the ordinary page written."""
+        if error is not None:
+            again = "" if isinstance(error, Exception) else "; Ctrl-C again ends at once"
+            say(f"writing {self.page} once more{again}")
+        self.hear()
+        while self.deaths < MOST_DEATHS and not self.finished():
+            pass
+
+    def stands(self, now: "Now") -> None:
+        """Have a page written if it is time; called several times a second."""
+        self.hear()
+        if not self.idle or time.monotonic() < self.due or self.deaths >= MOST_DEATHS:
+            return
+        running = {
+            "done": now.done, "failed": now.failed, "total": now.total, "eta_s": now.left,
+            "every_s": self.every,
+        }  # fmt: skip
+        self.idle = False
+        with contextlib.suppress(BrokenPipeError):  # heard of when it is waited for
+            self.pipe().write(json.dumps(running) + "\n")
+            self.pipe().flush()
+
+    def pipe(self) -> IO[str]:
+        """The input of the process, which is started where there is none."""
+        if self.process is None:
+            self.process = started(self.told)
+            threading.Thread(target=self.listen, args=[self.process], daemon=True).start()
+        assert self.process.stdin
+        return self.process.stdin
+
+    def listen(self, process: "subprocess.Popen[str]") -> None:
+        """Take answers of a process until it ends: in a thread."""
+        assert process.stdout
+        for line in process.stdout:
+            self.answers.put(json.loads(line))
+        self.answers.put({"ended": process.wait()})
+
+    def hear(self, wait: bool = False) -> dict[str, Any]:
+        """Act on the answers that have come; with `wait`, on the next one, which is returned."""
+        answer: dict[str, Any] = {}
+        with contextlib.suppress(queue.Empty):
+            while True:
+                answer = self.answers.get(block=wait)
+                self.take(answer)
+                if wait:
+                    break
+        return answer
+
+    def take(self, answer: dict[str, Any]) -> None:
+        """A page was written, or not, or the process has ended."""
+        self.idle = True
+        if "ended" in answer:
+            self.process = None
+            if answer["ended"]:
+                self.deaths += 1
+                self.tell(f"what writes it ended with {ending(answer['ended'])}")
+        self.every = max(SECONDS, SHARE * answer.get("seconds", 0.0))
+        self.due = time.monotonic() + self.every
+        if answer.get("problem"):
+            self.tell(answer["problem"])
+
+    def tell(self, problem: str) -> None:
+        """Say once what is wrong with the page."""
+        if problem not in self.problems:
+            self.problems.add(problem)
+            say(f"{self.page} is not fresh: {problem}; the run does not depend on it")
+
+    def finished(self) -> bool:
+        """Whether the process has written the ordinary page and has ended."""
+        process = self.process
+        with contextlib.suppress(BrokenPipeError):
+            self.pipe().close()
+        process = process or self.process
+        assert process
+        if not self.idle:
+            process.send_signal(signal.SIGINT)  # leave the page that is being written
+        while "ended" not in (answer := self.hear(wait=True)):
+            pass
+        return not answer["ended"]
+
+
+def started(told: dict[str, str]) -> "subprocess.Popen[str]":
+    """The process, in a session of its own: Ctrl-C is for the run."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "compsim.watch", json.dumps(told)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        start_new_session=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+    )  # fmt: skip
+
+
+def ending(code: int) -> str:
+    """The end of a process in words."""
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+
+# ---- the process --------------------------------------------------------------------------------
+
+
+class Left(BaseException):
+    """The page that is being written is out of date; no handler of errors shall take this."""
+
+
+class Writer:
+    """Writes pages; SIGINT leaves the one that is being written."""
+
+    def __init__(self, told: dict[str, str]):
+        self.told = told
+        self.writing = False
+        signal.signal(signal.SIGINT, self.leave)
+
+    def leave(self, *_: object) -> None:
+        """Called by the signal."""
+        if self.writing:
+            self.writing = False
+            raise Left
+
+    def write(self, running: dict[str, Any] | None) -> dict[str, Any]:
+        """Write a page, the ordinary one if nothing is running; what to answer."""
+        answer: dict[str, Any] = {}
+        began = time.process_time()
+        try:
+            from compressor.report import Running, write_report  # loads matplotlib, once
+
+            began = time.process_time()
+            self.writing = running is not None
+            standing = Running(**running) if running else None
+            write_report(
+                self.told["results"], self.told["report"], self.told["command"], "claims", standing
+            )
+        except Left:
+            answer["left"] = True
+        except Exception as error:
+            answer["problem"] = f"{type(error).__name__}: {error}".splitlines()[0]
+        self.writing = False
+        return answer | {"seconds": time.process_time() - began}
+
+
+def main(told: str) -> None:
+    """Write a page for each line of input, and the last one when no more can come."""
+    os.nice(NICENESS)
+    writer = Writer(json.loads(told))
+    for line in sys.stdin:
+        answer(writer.write(json.loads(line)))
+    answer(writer.write(None))
+
+
+def answer(words: dict[str, Any]) -> None:
+    """Answer the run, if it is still there."""
+    with contextlib.suppress(OSError):
+        print(json.dumps(words), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
