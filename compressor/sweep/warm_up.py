@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from compressor.cases import Case
-from compressor.program import library_versions, machine_code_folder
+from compressor.program import COMPILED, library_versions, machine_code_folder
 
 PATIENCE = 2.0  # s of compiling before a remark on it
 COMPILING = "compiling the equations, about a minute: once for each version of the program"
@@ -63,8 +63,9 @@ def load_telling(needs: Needs, remark: Callable[[str], None]) -> None:
 
 def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
     """Compile here what this machine has not compiled before, so that workers need but load it."""
-    versions = str(library_versions(*LIBRARIES))
-    known = hashlib.sha256(versions.encode()).hexdigest()[:8]
+    # numba keeps machine code by the path of its sources: a copied folder brings none of use
+    what = f"{library_versions(*LIBRARIES)} {COMPILED}"
+    known = hashlib.sha256(what.encode()).hexdigest()[:8]
     parts = [*needs.methods, *(["horizon"] if needs.horizon else [])]
     compiled = [machine_code_folder() / f"compiled-{known}-{part}" for part in parts]
     if not all(path.exists() for path in compiled):

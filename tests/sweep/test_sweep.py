@@ -261,6 +261,17 @@ def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch)
     assert "once for each version" in warm_up.COMPILING
 
 
+def test_a_copied_folder_compiles_anew(tmp_path, monkeypatch):
+    """Numba keeps machine code by path: the mark that came with a copy made each worker compile."""
+    loaded = []
+    monkeypatch.setattr(warm_up, "load", loaded.append)
+    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
+    for place in ("here", "here", "copy", "copy", "here"):
+        monkeypatch.setattr(warm_up, "COMPILED", tmp_path / place)
+        warm_up.compile_once(warm_up.Needs(("auto",)), lambda remark: None)
+    assert len(loaded) == 2
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_job_that_cannot_be_stored_ends_the_sweep(workers, studies, tmp_path):
     (tmp_path / "out").mkdir()
