@@ -15,7 +15,6 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
@@ -33,7 +32,7 @@ MOST_DEATHS = 3  # of the process, before it is given up
 class Watch:
     """Keeps the page of a run fresh; a context manager around the sweep.
 
-    Raises StoreError at once where the report's folder cannot be made.
+    Raises WrongName or StoreError at once where the report's folder cannot be made or written.
     """
 
     def __init__(self, results: str, report: str, command: str, quiet: bool = False):
@@ -47,12 +46,9 @@ class Watch:
         self.problems: set[str] = set()
 
     def __enter__(self) -> "Watch":
-        from compressor.store import StoreError, make_folder
+        from compressor.store import writable_folder
 
-        folder = Path(self.told["report"]).absolute()
-        make_folder(folder)
-        if not os.access(folder, os.W_OK):
-            raise StoreError(folder, "cannot be written", "choose another folder by --report")
+        writable_folder(self.told["report"])
         if not self.quiet:
             say(f"{self.page} is kept fresh until the run has ended")
         return self

@@ -26,7 +26,8 @@ class Effects:
     kind: `grid` and `saltelli`: shares of the variance, by the key alone and with its
     interactions; `rank`: correlations of ranks, of words the correlation ratio; no total.
     main, total: (k,); *_ends: the ends of the 95 % intervals, (2, k), None where the values are
-    exact. filled: points without a value of their own.
+    exact. filled: points without a value of their own. base: how many points of each part
+    of a `saltelli` design were taken, where not all were; else 0.
     """
 
     kind: str
@@ -35,6 +36,7 @@ class Effects:
     main_ends: np.ndarray | None = None
     total_ends: np.ndarray | None = None
     filled: int = 0
+    base: int = 0
 
     @property
     def strength(self) -> np.ndarray:
@@ -116,7 +118,7 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
         }
         return Effects(
             "saltelli", found["first_order"], found["total_order"], ends["first_order"],
-            ends["total_order"], int((~good).sum()),
+            ends["total_order"], int((~good).sum()), MOST_BASE if design.a.size > MOST_BASE else 0,
         )  # fmt: skip
     there = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
     rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, there, strict=True)])
