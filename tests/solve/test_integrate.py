@@ -16,7 +16,7 @@ from compressor.solve.si_record import record, scene
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.sizes import absolute_tolerances
 
-NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
+SOME = [("big_end", 0.3), ("small_end", 0.2), ("both", 0.1), ("both", 0.3)]  # of the paper's faults
 
 
 def run(joint, clearance, **solve):
@@ -33,11 +33,11 @@ def residual_bound(found, revolutions=4):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("joint", "clearance"), NINE)
+@pytest.mark.parametrize(("joint", "clearance"), SOME)
 def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance):
-    """Every promise on the nine fault cases over 0.48 s, judged by sympy's equations.
+    """Every promise on fault cases over 0.48 s, judged by sympy's equations.
 
-    With one joint at 0.2 mm SciPy's methods are judged, too.
+    With one joint at 0.2 mm SciPy's methods are judged, too. `make accuracy` draws 1,000 cases.
     """
     params = reference.paper_params("design", joint, clearance * 1e-3)
     words = {word: run(joint, clearance, accuracy=word) for word in ("draft", "standard", "fine")}

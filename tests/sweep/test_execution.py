@@ -278,7 +278,7 @@ def test_a_worker_that_ends_amid_a_message_costs_nothing(number, tmp_path, monke
         if payload == 3 and not (tmp_path / "tried").exists():
             (tmp_path / "tried").touch()
             threading.Thread(target=end_amid_message).start()
-        return bytes(300_000_000) if payload == 3 else payload
+        return bytes(100_000_000) if payload == 3 else payload
 
     ends = list(run_batches(large, named(range(6)), Workers(1, memory=4 * 10**9)))
     assert len(results(ends)) == 6

@@ -93,7 +93,7 @@ def test_studies_share_jobs(studies, tmp_path):
         ({"machine": {"speed_rpm": 500}}, {"machine": {"speed_rpm": 501}}, 1),
     ],
 )
-def test_what_a_changed_case_file_runs_again(first, then, runs, studies, tmp_path):
+def test_what_a_changed_case_file_runs_again(first, then, runs, studies, tmp_path, in_process):
     sweep(studies(one=first), tmp_path / "out", 1)
     assert sweep(studies(one=then), tmp_path / "out", 1).run_now == runs
     assert sweep(studies(one=then), tmp_path / "out", 1).run_now == 0
@@ -113,7 +113,7 @@ def flipped(data):
 
 @pytest.mark.parametrize("damage", [lambda _: b"", lambda _: b"not a job", flipped])
 @pytest.mark.parametrize("kind", ["jobs", "rows", "studies"])
-def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path):
+def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path, in_process):
     made = studies(one={"load": ["none", "design"]})
     sweep(made, tmp_path / "out", 1)
     keys = {case.key for case in made[0].cases}
@@ -133,14 +133,14 @@ def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path):
     assert any(str(victims[0]) in remark for remark in told) == (kind == "rows")
 
 
-def test_failed_jobs_run_again_on_request(studies, tmp_path):
+def test_failed_jobs_run_again_on_request(studies, tmp_path, in_process):
     made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}})
     sweep(made, tmp_path / "out", 1)
     again = sweep(made, tmp_path / "out", 1, options=Options(rerun_failed=True))
     assert (again.done_before, again.run_now, len(again.failed)) == (1, 1, 1)
 
 
-def test_shards_are_one_study_together(studies, tmp_path):
+def test_shards_are_one_study_together(studies, tmp_path, in_process):
     axes = {"load": ["none", "design"], "machine": {"rod_mass_kg": [3, 4, 5, 6]}}
     made = studies(one=axes, same={"load": "none"})
     parts = [
