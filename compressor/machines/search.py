@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import brentq, differential_evolution
 
 from compressor.cases import Axis, Case, Study, design, value_in
 from compressor.machines.judged import Judged
@@ -59,6 +58,8 @@ class Span(NamedTuple):
 
     def share(self, value: float) -> float:
         """The share of the range at which a value lies; the nearest end where it is outside."""
+        from scipy.optimize import brentq  # takes a quarter of a second
+
         low, high = self.spread(0.0), self.spread(1.0)
         if not low < value < high:
             return float(value >= high)
@@ -207,6 +208,8 @@ def least_change(
     as far as they go on holding. Where some hold within their errors alone, a run 20 times as long
     decides. Raises ClaimsError where the study draws nothing.
     """
+    from scipy.optimize import differential_evolution
+
     search = Search(study, folder, workers, progress)
 
     def costs(shares: np.ndarray) -> np.ndarray:

@@ -5,14 +5,16 @@ text that they print.
 """
 
 import json
-import struct
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+
+if TYPE_CHECKING:
+    from compressor.report.figures import Drawing
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,7 @@ class Plate:
     name: str
     heading: str
     caption: str
-    png: bytes
-    svg: bytes
+    figure: "Drawing"
     csv: str
     script: str
     alt: str
@@ -45,16 +46,14 @@ class Plate:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the PNG in pixels, as its head has them."""
-        width, height = struct.unpack(">II", self.png[16:24])
+        """Width and height of the PNG in pixels."""
+        width, height = self.figure.canvas.get_width_height()
         return width, height
 
     @property
-    def files(self) -> dict[str, bytes]:
-        """The files beside the page by their names."""
-        texts = {"csv": self.csv, "js": self.script}
-        data = {"png": self.png, "svg": self.svg} | {k: t.encode() for k, t in texts.items()}
-        return {f"{self.name}.{kind}": content for kind, content in data.items()}
+    def texts(self) -> dict[str, str]:
+        """The files beside the page that are no pictures, by their names."""
+        return {f"{self.name}.csv": self.csv, f"{self.name}.js": self.script}
 
 
 class Running(NamedTuple):

@@ -5,7 +5,6 @@ report which is interrupted leaves the one before as it was.
 """
 
 import contextlib
-import sys
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
@@ -30,8 +29,8 @@ from compressor.report.diagnosis_section import (
 )
 from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures.extract import extract
+from compressor.report.figures.pictures import pictures
 from compressor.report.figures.shown import as_csv
-from compressor.report.figures.style import render
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import described, publish_library, script
 from compressor.report.job_series import job_scripts, series_name
@@ -92,9 +91,15 @@ def write_report(
     """
     made = compose(results, command, claims, running)
     folder = Path(report)
+    drawn = pictures(
+        {plate.name: plate.figure for plate in made.plates},
+        {plate.name: plate.heading for plate in made.plates},
+    )
+    for name, content in drawn.items():
+        publish(folder / name, content)
     for plate in made.plates:
-        for name, content in plate.files.items():
-            publish(folder / name, content)
+        for name, text in plate.texts.items():
+            publish(folder / name, text.encode())
     for key, text in made.series.items():
         publish(folder / f"{series_name(key)}.js", text.encode())
     publish_library(folder)
@@ -250,13 +255,10 @@ def draw_paper(paper: PaperRuns) -> list[Plate]:
 
 
 def draw(name: str, heading: str, caption: str, drawing: Drawing) -> Plate:
-    """A drawing as it is stored and shown; tells of it on stderr."""
-    with contextlib.suppress(OSError):
-        print(f"drawing {heading}", file=sys.stderr, flush=True)
-    png, svg = render(drawing, "png"), render(drawing, "svg")
+    """A drawing with what the page and its data tell of it."""
     sheet = extract(drawing)
     jobs = dict.fromkeys(key for panel in sheet.panels for t in panel.traces for key in t.jobs)
     return Plate(
-        name, heading, caption, png, svg, as_csv(sheet), script(name, sheet), described(sheet),
+        name, heading, caption, drawing, as_csv(sheet), script(name, sheet), described(sheet),
         tuple(jobs),
     )  # fmt: skip

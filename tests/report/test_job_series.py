@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from test_report import forget, part_of
 
-from compressor.report import job_series, report
+from compressor.report import job_series
+from compressor.report.figures import pictures
 from compressor.report.job_series import job_scripts, job_sheet
 from compressor.report.report import write_report
 from compressor.store.reader import read_store
@@ -43,7 +44,7 @@ def test_scripts_lie_beside_the_page_and_stale_ones_go(paper_store, tmp_path, mo
     out = tmp_path / "out"
     out.mkdir()
     (out / "job-old.js").write_text("an earlier report's")
-    monkeypatch.setattr(report, "render", lambda drawing, kind: bytes(24))
+    monkeypatch.setattr(pictures, "render", lambda figure, kind: bytes(24))
     write_report(part, out)
     assert {path.name for path in out.glob("job-*.js")} == {
         f"job-{key}.js" for key in study.keys[1:]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
@@ -101,7 +102,7 @@ def test_the_section_of_the_page_has_words_and_figures(folder, capsys):
     drawings = machine_drawings(machine_files(folder))
     parts = [drawn_part(*found) for found in drawings]
     assert [part.plate is None for part in parts] == [False, False, True]
-    plate = Plate("machines-claims", "h", "c", bytes(24), b"svg", "csv", "js", "alt")
+    plate = Plate("machines-claims", "h", "c", Figure(), "csv", "js", "alt")
     text = document([*machine_sections([replace(part, plate=plate) for part in parts])], {})
     assert "In which machines the paper&#39;s claims hold" in text
     assert "machines-claims.svg" in text

@@ -16,9 +16,9 @@ from compressor.analysis.paper_cases import paper_cases
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases
 from compressor.reasons import Reason
-from compressor.report import report, tables
+from compressor.report import tables
 from compressor.report.diagnosis_section import TITLES
-from compressor.report.figures import FIGURES
+from compressor.report.figures import FIGURES, pictures
 from compressor.report.paper_runs import find_paper_runs, paper_candidates
 from compressor.report.report import KINDS, write_report
 from compressor.store.files import StoreError, StoreWarning
@@ -86,7 +86,7 @@ def full(once, paper_store):
 @pytest.fixture(autouse=True)
 def unpainted(monkeypatch):
     """No pixels are made, which takes seconds, but for `full`, which is made before."""
-    monkeypatch.setattr(report, "render", lambda drawing, kind: bytes(24))
+    monkeypatch.setattr(pictures, "render", lambda figure, kind: bytes(24))
 
 
 @pytest.fixture
@@ -425,7 +425,7 @@ def test_an_interrupted_report_leaves_the_old_one(own, tmp_path, monkeypatch):
     def interrupt(figure, kind):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(report, "render", interrupt)
+    monkeypatch.setattr(pictures, "render", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_report(own, out, "second")
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before

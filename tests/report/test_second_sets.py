@@ -21,7 +21,7 @@ from compressor.analysis.paper_cases import (
 )
 from compressor.cases.case import Case
 from compressor.report import report, second_sets
-from compressor.report.figures import Drawing
+from compressor.report.figures import Drawing, pictures
 from compressor.report.paper_runs import PaperRuns, find_paper_runs
 from compressor.report.report import write_report
 from compressor.report.second_sets import (
@@ -78,7 +78,7 @@ def undrawn(monkeypatch):
     }
     monkeypatch.setattr(report, "FIGURES", figures[report])
     monkeypatch.setattr(second_sets, "SET", figures[second_sets])
-    monkeypatch.setattr(report, "render", lambda drawing, kind: bytes(24))
+    monkeypatch.setattr(pictures, "render", lambda figure, kind: bytes(24))
 
 
 # ---- which studies ----------------------------------------------------------------------------

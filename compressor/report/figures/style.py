@@ -24,6 +24,7 @@ STYLE: dict[str, Any] = {
     "font.size": 9.5,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # found anew for each drawing it takes a tenth of the time
     "axes.labelsize": 9.5,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
@@ -100,7 +101,7 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
 def sheet(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, np.ndarray]:
     """A figure of the common width and its axes, shape (rows, columns); height in inches."""
     layout = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.06, wspace=0.03)
-    figure = Figure(figsize=(WIDTH, height), layout=layout)
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, squeeze=False, **more)
 
@@ -116,9 +117,12 @@ def legend_above(figure: Figure, handles: list[Any]) -> None:
 def render(figure: Figure, kind: str) -> bytes:
     """A figure as the bytes of a `png` or `svg` file, which tell nothing of when they were made.
 
-    Its layout is found once, since that takes as long as to draw it.
+    Its layout is found once, and without drawing: matplotlib draws all once more to find it.
     """
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
     stream = io.BytesIO()
     figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else {})
-    figure.set_layout_engine("none")
     return stream.getvalue()

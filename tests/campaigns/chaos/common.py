@@ -19,9 +19,11 @@ from typing import Any, NamedTuple
 
 import click.utils
 from compsim import cli
+from matplotlib.figure import Figure
 
 from compressor.cases.load import load_studies
 from compressor.report import report
+from compressor.report.figures import pictures
 from compressor.report.page import Plate
 from compressor.store.reader import open_study
 from compressor.store.status import standings
@@ -32,9 +34,10 @@ from compressor.sweep.sweep import sweep
 
 def undrawn():
     """Let reports draw nothing, which takes seconds, and copy no library."""
-    plate = ("caption", bytes(24), b"a drawing", "numbers", "script", "alt")
+    plate = ("caption", Figure(), "numbers", "script", "alt")
     report.draw_sweep = lambda data: []
     report.draw = lambda name, heading, *rest: Plate(name, heading, *plate)
+    pictures.render = lambda figure, kind: b"drawn"
     report.publish_library = lambda folder: None
 
 

@@ -1,0 +1,87 @@
+"""Pictures of figures by two processes: the same bytes, and none lost with a process."""
+
+import os
+import threading
+
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from compressor.report.figures import pictures as module
+from compressor.report.figures.pictures import can_fork, pictures
+from compressor.report.figures.style import render
+
+NAMES = ["one", "two", "three", "four", "five"]
+HEADINGS = {name: f"Figure {name}" for name in NAMES}
+pytestmark = pytest.mark.skipif(not can_fork(), reason="there is one core, or no fork")
+
+
+@pytest.fixture
+def figures():
+    made = {}
+    for number, name in enumerate(NAMES):
+        made[name] = Figure(layout="constrained")
+        FigureCanvasAgg(made[name])
+        panel = made[name].subplots()
+        panel.plot([0, 1], [number, 2])
+        panel.xaxis.set_major_formatter(lambda value, _: f"{value:g} mm")  # cannot be sent
+    return made
+
+
+@pytest.fixture
+def alone(figures):
+    return {f"{n}.{kind}": render(figures[n], kind) for n in NAMES for kind in ("png", "svg")}
+
+
+def test_two_processes_draw_what_one_does(figures, alone, capfd):
+    assert pictures(figures, HEADINGS) == alone
+    told = capfd.readouterr().err.splitlines()
+    assert sorted(told) == sorted(f"drawing Figure {name}" for name in NAMES)
+
+
+def test_another_process_takes_part(figures, monkeypatch, tmp_path):
+    def noted(figure):
+        (tmp_path / str(os.getpid())).touch()
+        return both(figure)
+
+    both = module.both
+    monkeypatch.setattr(module, "both", noted)
+    pictures(figures, HEADINGS)
+    assert {path.name for path in tmp_path.iterdir()} > {str(os.getpid())}
+
+
+def test_a_process_that_dies_costs_nothing(figures, alone, monkeypatch):
+    def deadly(figure):
+        if os.getpid() != here:
+            os._exit(9)
+        return both(figure)
+
+    here, both = os.getpid(), module.both
+    monkeypatch.setattr(module, "both", deadly)
+    assert pictures(figures, HEADINGS) == alone
+
+
+def test_an_error_of_the_other_process_is_raised(figures, monkeypatch):
+    def failing(figure):
+        if os.getpid() != here:
+            raise ZeroDivisionError
+        return both(figure)
+
+    here, both = os.getpid(), module.both
+    monkeypatch.setattr(module, "both", failing)
+    with pytest.raises(ZeroDivisionError):
+        pictures(figures, HEADINGS)
+
+
+def test_beside_threads_nothing_is_forked(figures, alone, monkeypatch):
+    monkeypatch.setattr(module, "by_two", pytest.fail)
+    end = threading.Event()
+    other = threading.Thread(target=end.wait)
+    other.start()
+    try:
+        assert pictures(figures, HEADINGS) == alone
+    finally:
+        end.set()
+        other.join()
+    assert pictures({"one": figures["one"]}, HEADINGS).keys() == {"one.png", "one.svg"}
+    assert pictures({}, {}) == {}
