@@ -296,6 +296,24 @@ def scale_table():
     return "\n".join(lines) + "\n"
 
 
+def page_table():
+    found = kept("page.json")
+    lines = [
+        "| report of | written in, s | page, MB | data of figures, MB | CSV, MB | PNG and SVG, MB "
+        "| opens in, s | first figure live after, s |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, one in found["stores"].items():
+        sizes = (one[f"{kind}_bytes"] / 1e6 for kind in ("page", "data", "csv", "picture"))
+        cells = (f"{one['write_seconds']:.1f}", *(f"{size:.2f}" for size in sizes),
+                 f"{one['open_seconds']:.2f}", f"{one['first_figure_seconds']:.2f}")  # fmt: skip
+        lines.append(f"| {name}, {one['figures']} figures | {' | '.join(cells)} |")
+    library = {one["library_bytes"] for one in found["stores"].values()}
+    (size,) = library
+    lines += ["", f"Beside each page lies plotly.js, {size / 1e6:.1f} MB, loaded with the figures."]
+    return "\n".join(lines) + "\n"
+
+
 MILLION = 10**6
 
 
@@ -758,6 +776,7 @@ PAGES = {
         "throughput": throughput_table,
         "scale": scale_table,
         "million": million_table,
+        "page": page_table,
         "sweep": sweep_table,
         "chaos": chaos_table,
         "fastest": fastest_table,

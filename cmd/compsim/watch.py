@@ -23,14 +23,17 @@ from compsim.screen import say
 if TYPE_CHECKING:
     from compressor.sweep import Now
 
-SECONDS = 5.0  # between two pages, at least, and before the first
-SHARE = 20.0  # times what a page takes: how long until the next, so that jobs lose little
+SECONDS = 5.0  # between two pages, and before the first
+SHARE = 20.0  # times what drawing takes: how long until figures are drawn anew
 NICENESS = 5  # of the process: jobs go first
 MOST_DEATHS = 3  # of the process, before it is given up
 
 
 class Watch:
     """Keeps the page of a run fresh; a context manager around the sweep.
+
+    How the run stands is said anew every few seconds, and figures are drawn as often as costs jobs
+    little: drawing has a twentieth of one core.
 
     Raises WrongName or StoreError at once where the report's folder cannot be made or written.
     """
@@ -41,7 +44,8 @@ class Watch:
         self.quiet = quiet
         self.process: subprocess.Popen[str] | None = None
         self.answers: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
-        self.idle, self.due, self.every = True, time.monotonic() + SECONDS, SECONDS
+        self.idle, self.due = True, time.monotonic() + SECONDS
+        self.draw_due = self.due
         self.deaths = 0
         self.problems: set[str] = set()
 
@@ -74,11 +78,12 @@ class Watch:
             return
         running = {
             "done": now.done, "failed": now.failed, "total": now.total, "eta_s": now.left,
-            "every_s": self.every,
+            "every_s": SECONDS, "at": time.strftime("%H:%M:%S"),
         }  # fmt: skip
+        order = {"draw": time.monotonic() >= self.draw_due, "running": running}
         self.idle = False
         with contextlib.suppress(BrokenPipeError):  # heard of when it is waited for
-            self.pipe().write(json.dumps(running) + "\n")
+            self.pipe().write(json.dumps(order) + "\n")
             self.pipe().flush()
 
     def pipe(self) -> IO[str]:
@@ -115,8 +120,9 @@ class Watch:
             if answer["ended"]:
                 self.deaths += 1
                 self.tell(f"what writes it ended with {ending(answer['ended'])}")
-        self.every = max(SECONDS, SHARE * answer.get("seconds", 0.0))
-        self.due = time.monotonic() + self.every
+        self.due = time.monotonic() + SECONDS
+        if answer.get("drawn", True):
+            self.draw_due = time.monotonic() + SHARE * answer.get("seconds", 0.0)
         if answer.get("problem"):
             self.tell(answer["problem"])
 
@@ -168,6 +174,7 @@ class Writer:
     def __init__(self, told: dict[str, str]):
         self.told = told
         self.writing = False
+        self.shown: Any = None  # how the run stood on the page that lies there
         signal.signal(signal.SIGINT, self.leave)
 
     def leave(self, *_: object) -> None:
@@ -176,25 +183,40 @@ class Writer:
             self.writing = False
             raise Left
 
-    def write(self, running: dict[str, Any] | None) -> dict[str, Any]:
-        """Write a page, the ordinary one if nothing is running; what to answer."""
-        answer: dict[str, Any] = {}
-        began = time.process_time()
-        try:
-            from compressor.report import Running, write_report  # loads matplotlib, once
+    def write(self, running: dict[str, Any] | None, draw: bool = True) -> dict[str, Any]:
+        """Write a page, the ordinary one if nothing is running; what to answer.
 
-            began = time.process_time()
+        draw: figures and tables, too, and not only how the run stands.
+        """
+        answer: dict[str, Any] = {"drawn": draw or self.shown is None}
+        began = spent()
+        try:
+            from compressor.report import Running, restate, write_report  # loads matplotlib, once
+
+            began = spent()
             self.writing = running is not None
-            standing = Running(**running) if running else None
-            write_report(
-                self.told["results"], self.told["report"], self.told["command"], "claims", standing
+            drawn = (
+                running["at"] if running and answer["drawn"] else self.shown and self.shown.drawn
             )
+            now = Running(**running, drawn=drawn) if running else None
+            if now and not answer["drawn"]:
+                restate(self.told["report"], self.shown, now)
+            else:
+                write_report(
+                    self.told["results"], self.told["report"], self.told["command"], "claims", now
+                )
+            self.shown = now
         except Left:
             answer["left"] = True
         except Exception as error:
             answer["problem"] = f"{type(error).__name__}: {error}".splitlines()[0]
         self.writing = False
-        return answer | {"seconds": time.process_time() - began}
+        return answer | {"seconds": spent() - began}
+
+
+def spent() -> float:
+    """Seconds of processor time of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
 
 
 def main(told: str) -> None:
@@ -202,7 +224,7 @@ def main(told: str) -> None:
     os.nice(NICENESS)
     writer = Writer(json.loads(told))
     for line in sys.stdin:
-        answer(writer.write(json.loads(line)))
+        answer(writer.write(**json.loads(line)))
     answer(writer.write(None))
 
 

@@ -7,4 +7,4 @@ from compressor.report.page import Running
 from compressor.report.plot_choice import PlotChoice
 from compressor.report.plots import write_plots
 from compressor.report.regime_plots import write_regime_plots
-from compressor.report.report import write_report
+from compressor.report.report import restate, write_report

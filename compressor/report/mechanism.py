@@ -67,7 +67,7 @@ def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
     insets = tuple(
         Inset(
             SPOKEN[joint], 140.0 + 430.0 * number, height + INSET + 16.0,
-            INSET - GAP * size / most, GAP * size / most, f"{size:g}",
+            INSET - GAP * size / most, GAP * size / most, f"{size:.3g}",
         )
         for number, (joint, size) in enumerate(worn.items())
     )  # fmt: skip

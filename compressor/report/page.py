@@ -5,7 +5,6 @@ text that they print.
 """
 
 import json
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -64,6 +63,8 @@ class Running(NamedTuple):
     total: int
     eta_s: float | None = None
     every_s: float = 5.0  # between two pages
+    at: str = ""  # the time of day
+    drawn: str = ""  # when its figures were
 
     @property
     def left(self) -> str:
@@ -74,11 +75,6 @@ class Running(NamedTuple):
         if minutes < 1:
             return "under a minute"
         return f"about {minutes} min" if minutes < 100 else f"about {minutes / 60:.0f} h"
-
-    @property
-    def written(self) -> str:
-        """The time of day."""
-        return time.strftime("%H:%M:%S")
 
 
 def templates() -> Environment:
@@ -104,3 +100,9 @@ def document(
     facts = Markup(json.dumps(jobs).replace("<", "\\u003c"))
     page = templates().get_template("page.html")
     return page.render(sections=sections, jobs=facts, running=running)
+
+
+def restated(page: str, before: Running, now: Running) -> str:
+    """A page that was written beside a run, with how the run stands now."""
+    status = templates().get_template("status.html")
+    return page.replace(status.render(running=before), status.render(running=now))

@@ -41,7 +41,7 @@ from compressor.report.machines_section import (
     machine_sections,
 )
 from compressor.report.mechanism import mechanism_svg, mechanism_words
-from compressor.report.page import Plate, Running, Section, document
+from compressor.report.page import Plate, Running, Section, document, restated
 from compressor.report.paper_runs import PaperRuns, find_paper_runs, is_of_paper
 from compressor.report.paper_sections import missing_sections, paper_sections, spoken
 from compressor.report.provenance import provenance_section
@@ -106,6 +106,15 @@ def write_report(
     publish(folder / "index.html", made.page.encode())
     remove_stale(folder, made)
     return folder / "index.html"
+
+
+def restate(report: Folder, before: Running, now: Running) -> None:
+    """Say on the page of a report how the run stands now, without drawing anew.
+
+    Raises OSError where the page cannot be read, StoreError where it cannot be written.
+    """
+    path = Path(report) / "index.html"
+    publish(path, restated(path.read_text(encoding="utf-8"), before, now).encode())
 
 
 class Made(NamedTuple):

@@ -32,7 +32,7 @@ solve: {accuracy: draft}
 output: {keep: metrics}
 """
 MANY = """\
-joint: both
+joint: big_end
 clearance_mm: {{linspace: [0.05, 0.3, 50]}}
 machine: {{speed_rpm: {{linspace: [200, 700, {speeds}]}}, rod_mass_kg: {{linspace: [2, 8, 20]}}}}
 solve: {{accuracy: draft, duration_rev: 2}}

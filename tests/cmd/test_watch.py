@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,10 +14,12 @@ import pytest
 from compsim import cli, watch
 from compsim.watch import Watch, Writer
 
+from compressor.report.page import document
 from compressor.sweep.work import Now
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 NOW = Now(12, 3, 400, 125.0)
+STANDS = {"done": 1, "failed": 0, "total": 2, "at": "12:00:00"}
 PATIENCE = 60.0  # s
 # stands in for the process: notes what it is told; what it answers are its arguments, in turn
 CHILD = """
@@ -78,17 +81,23 @@ def answered(one):
 
 def test_the_process_is_told_how_the_sweep_stands_and_ends_with_the_ordinary_page(watched, capsys):
     made, noted = watched
-    with made('{"seconds": 1.5}', '{"seconds": 0.2}') as one:
+    undrawn = '{"seconds": 0.2, "drawn": false}'
+    with made('{"seconds": 1.5}', undrawn, '{"seconds": 0.2}') as one:
         answered(one)
-        assert one.every == 30.0
-        assert one.due - time.monotonic() == pytest.approx(30.0, abs=5)
+        assert one.draw_due - time.monotonic() == pytest.approx(30.0, abs=5)
+        one.due = time.monotonic() + 60
         one.stands(NOW)  # too early
         answered(one)
-    first, second, final = noted()
-    assert json.loads(first) == {
+        one.draw_due = 0.0
+        answered(one)
+    *orders, final = noted()
+    first, second, third = map(json.loads, orders)
+    assert [order["draw"] for order in (first, second, third)] == [True, False, True]
+    at = first["running"].pop("at")
+    assert re.fullmatch(r"\d\d:\d\d:\d\d", at)
+    assert first["running"] == {
         "done": 12, "failed": 3, "total": 400, "eta_s": 125.0, "every_s": 0.0
     }  # fmt: skip
-    assert json.loads(second)["every_s"] == 30.0
     assert final == "final"
     assert capsys.readouterr().err == "report/index.html is kept fresh until the run has ended\n"
 
@@ -181,9 +190,25 @@ def test_a_page_that_cannot_be_written_is_a_problem_in_a_line(writer, monkeypatc
         raise KeyError("a\nb")
 
     monkeypatch.setattr("compressor.report.write_report", broken)
-    answer = writer.write({"done": 1, "failed": 0, "total": 2})
+    answer = writer.write(STANDS)
     assert answer["problem"] == "KeyError: 'a\\nb'"
     assert answer["seconds"] >= 0
+
+
+def test_between_drawings_the_page_says_how_the_run_stands(writer, monkeypatch, tmp_path):
+    def drawn(results, report, command, claims, running):
+        (tmp_path / "index.html").write_text(document([], {}, running))
+
+    monkeypatch.setattr("compressor.report.write_report", drawn)
+    assert writer.write(STANDS, draw=False)["drawn"]  # there is no page yet
+    for done, at in ((5, "12:00:05"), (9, "12:00:10")):
+        answer = writer.write(STANDS | {"done": done, "at": at, "eta_s": 20.0}, draw=False)
+        assert (answer["drawn"], answer.get("problem")) == (False, None)
+        page = " ".join((tmp_path / "index.html").read_text().split())
+        assert f"{done} of 2 jobs done, 0 failed, under a minute left, at {at}." in page
+        assert "Figures and tables are those of 12:00:00;" in page
+    (tmp_path / "index.html").unlink()
+    assert "FileNotFoundError" in writer.write(STANDS, draw=False)["problem"]
 
 
 def test_a_page_that_is_out_of_date_is_left(writer, monkeypatch):
@@ -193,7 +218,7 @@ def test_a_page_that_is_out_of_date_is_left(writer, monkeypatch):
         return "written"
 
     monkeypatch.setattr("compressor.report.write_report", slow)
-    assert writer.write({"done": 1, "failed": 0, "total": 2})["left"]
+    assert writer.write(STANDS)["left"]
     assert "left" not in writer.write(None)  # the last page is never left
 
 
@@ -226,7 +251,7 @@ def test_a_run_is_watched_from_its_first_page_to_its_last(case_file, capsys, mon
     ((now, page),) = pages
     assert now == Now(0, 0, 2)
     assert '<meta http-equiv="refresh" content="' in page
-    words = "<strong>Still running:</strong> 0 of 2 jobs done, 0 failed. Written at "
+    words = "<strong>Still running:</strong> 0 of 2 jobs done, 0 failed, at "
     assert words in " ".join(page.split())
     page = Path("report/index.html").read_text()
     assert "refresh" not in page

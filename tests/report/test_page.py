@@ -111,7 +111,7 @@ def test_every_template_escapes_every_text():
     jobs = {"key": {"values": {"a": "</script><script>alert(1)</script>"}}}
     sections = [Section(evil(), evil(), name, content) for name, content in given.items()]
     text = document(sections, jobs)
-    own = {"page.html", "pieces.html", "style.css", "report.js", "mechanism.svg"}
+    own = {"page.html", "pieces.html", "status.html", "style.css", "report.js", "mechanism.svg"}
     assert {*templates().list_templates()} - {*given} == own
     scripts = re.findall("<script(.*?)>(.*?)</script>", text, re.DOTALL)
     assert [kind for kind, _ in scripts] == ["", ' type="application/json" id="jobs"']
@@ -211,16 +211,15 @@ def test_comparisons_are_no_markup(fine):
 @pytest.mark.parametrize(
     ("eta", "left"),
     [
-        (None, "7 failed. Written"),
-        (20.0, "7 failed, under a minute left. Written"),
-        (125.0, "7 failed, about 2 min left. Written"),
-        (36000.0, "7 failed, about 10 h left. Written"),
+        (None, "7 failed"),
+        (20.0, "7 failed, under a minute left"),
+        (125.0, "7 failed, about 2 min left"),
+        (36000.0, "7 failed, about 10 h left"),
     ],
 )
 def test_a_page_of_a_run_that_goes_on_says_so_and_loads_itself_again(eta, left):
-    text = document([], {}, Running(120, 7, 400, eta, 12.4))
+    text = document([], {}, Running(120, 7, 400, eta, 12.4, "12:00:05", "12:00:00"))
     assert '<meta http-equiv="refresh" content="12">' in text
-    assert f"120 of 400 jobs done, {left} at " in " ".join(text.split())
-    assert 'content="30"' in document([], {}, Running(1, 0, 2, None, 500.0))
+    assert f"120 of 400 jobs done, {left}, at 12:00:05." in " ".join(text.split())
     assert "refresh" not in document([], {})
     assert "running" not in document([], {}).lower()
