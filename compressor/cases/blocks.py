@@ -6,16 +6,16 @@ sampling design. Counts are known first (`draft`); values are made when the coun
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from compressor.cases.checked import checked
+from compressor.cases.combinations import Block, Row
 from compressor.cases.conditions import NoComparison, Test, comparison
-from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.keys import Leaves, covers
+from compressor.cases.keys import Leaves
 from compressor.cases.parameter import Problem, shown
-from compressor.cases.shorthands import row_of, single, stands_for
+from compressor.cases.shorthands import row_of
 from compressor.cases.swept import (
     SAMPLED,
     Sweep,
@@ -24,42 +24,12 @@ from compressor.cases.swept import (
     is_swept,
     sweep_of,
 )
-from compressor.cases.table import OF_JOINTS, WORDS, outside_identity, table
+from compressor.cases.table import WORDS, outside_identity, table
 from compressor.cases.unknown import SWEEP, suggestion
 from compressor.cases.yaml_reader import FileProblem, Node
 
 MAX_EXCLUSIONS = 20
 MAX_SEED = 2**63
-RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
-Row = tuple[Node, ...]
-
-
-@dataclass(frozen=True)
-class Block:
-    """The combinations of a block; `kept` holds the numbers, in C order, of those not excluded."""
-
-    leaves: Leaves
-    fixed: dict[str, Node]
-    factors: tuple[tuple[tuple[str, ...], list[Row]], ...]  # keys, and their values together
-    kept: Sequence[int]
-    is_grid: bool  # whether every key is an axis of its own, and no combination is left out
-
-    def chosen(self, number: int) -> dict[str, Node]:
-        """The values of one combination by dotted key."""
-        found = dict(self.fixed)
-        for keys, rows in reversed(self.factors):
-            number, place = divmod(number, len(rows))
-            found.update(zip(keys, rows[place], strict=True))
-        if "joint" in self.swept and found["joint"].value == "none":
-            gone = [key for key in found if any(covers(group, key) for group in OF_JOINTS)]
-            for key in gone:
-                del found[key]
-        return found
-
-    @property
-    def swept(self) -> list[str]:
-        """The keys of all factors."""
-        return [key for keys, _ in self.factors for key in keys]
 
 
 @dataclass
@@ -103,11 +73,10 @@ class Draft:
         found = Block(self.leaves, self.fixed, factors, range(count), is_grid)
         if not self.exclusions:
             return found
-        readers = ((n, reader(found.chosen(n))) for n in range(count))
-        kept = [n for n, value in readers if not any(test(value) for test in self.exclusions)]
-        if count and not kept:
+        kept = found.where(lambda value: not any(test(value) for test in self.exclusions))
+        if count and not kept.any():
             self.refuse(self.leaves.values["exclude"], "exclude", "leaves no job")
-        return replace(found, kept=kept)
+        return replace(found, kept=kept.nonzero()[0].tolist())
 
     def rows(self, keys: tuple[str, ...]) -> list[Row]:
         """The values of keys that advance together; each wrong one, and repetition, is told."""
@@ -264,29 +233,3 @@ def _exclusions(found: Draft) -> Iterable[Test]:
             yield comparison(text.value)
         except NoComparison as error:
             found.refuse(text, "exclude", str(error))
-
-
-def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
-    """The function that gives a combination's value of a key, or its default, or None."""
-
-    def value(key: str) -> Any:
-        group = key.partition(".")[0]
-        if key in chosen:
-            return chosen[key].value
-        if parts := stands_for(key):
-            return single(chosen[part].value for part in parts if part in chosen)
-        if RIVALS.get(key) in chosen or (key != group and group in chosen):
-            return chosen[group].value if key in stands_for(group) else None
-        return table()[key].default
-
-    return value
-
-
-def columns(blocks: Sequence[Block]) -> list[str]:
-    """The keys by which the jobs of blocks differ: swept in one, or not the same in all."""
-    found = dict.fromkeys(key for block in blocks for key in block.swept)
-    fixed = dict.fromkeys(key for block in blocks for key in block.fixed)
-    for key in [key for key in fixed if key not in outside_identity()]:
-        if len({block.fixed[key].value if key in block.fixed else None for block in blocks}) > 1:
-            found[key] = None
-    return list(found)

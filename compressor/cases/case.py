@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 from typing import Any
@@ -69,16 +69,9 @@ class Case(Settings):
         >>> case.machine.speed_rpm
         700.0
         """
-        problems: list[Problem] = []
-        if not isinstance(values, Mapping):
-            message = f"needs a mapping of keys, such as {EXAMPLE}, not {shown(values)}"
-            raise CaseError([Problem("", message)])
-        whole = expanded(values)
-        parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
-        if problems:
-            raise CaseError(_as_written(values, _everything_wrong(whole, parts, problems)))
+        parts, given = parts_of(values)
         case = cls(**parts)
-        problems = [*conflicts(case, frozenset(keys_given(whole)))]
+        problems = [*conflicts(case, given)]
         if problems:
             raise CaseError(_as_written(values, problems))
         vars(case)["problems"] = ()  # known: see `problems`
@@ -201,7 +194,7 @@ class Case(Settings):
     @cached_property
     def physics_key(self) -> str:
         """Hash of what is simulated, 20 hexadecimal digits: physics and span, not the solver."""
-        return _digest(self._identity(with_solver=False))
+        return digest(canonical(identity(self, with_solver=False)))
 
     @cached_property
     def key(self) -> str:
@@ -210,7 +203,7 @@ class Case(Settings):
         Equal keys have equal results, and a store holds each once. Name, output, time limit and
         error bars are no part of it.
         """
-        return _digest(self._identity(with_solver=True))
+        return digest(canonical(identity(self, with_solver=True)))
 
     def attributes(self) -> dict[str, Any]:
         """What a stored outcome says of its case: `name`, `case` (JSON), `key`, `physics_key`.
@@ -223,23 +216,47 @@ class Case(Settings):
             keys = {"key": self.key, "physics_key": self.physics_key}
         return found | keys
 
-    def _identity(self, with_solver: bool) -> dict[str, Any]:
-        values = self.values()
-        for unread in (*_groups_outside_identity(), "solve"):
-            del values[unread]
-        values["model"] = MODEL_VERSION
-        values["span"] = self._span()
-        if with_solver:
-            accuracy = self.solve.rtol or dict(self.targets) or self.solve.accuracy
-            values["solver"] = [accuracy, self.solve.method, self.solve.max_steps]
-        return values
 
-    def _span(self) -> list[float | str]:
-        """What is integrated and from where on it counts, however it is written."""
-        how = self.solve
-        duration: float | str = self.duration if how.duration_rev != "auto" else "auto"
-        settle: float | str = self.settle if how.settle_rev != "auto" else "auto"
-        return [duration, settle, round(self.steps)]
+def parts_of(values: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
+    """The fields of a case from nested values, each checked alone, and the dotted keys given.
+
+    Raises CaseError with everything that is wrong, and what does not fit together in the rest.
+    """
+    problems: list[Problem] = []
+    if not isinstance(values, Mapping):
+        message = f"needs a mapping of keys, such as {EXAMPLE}, not {shown(values)}"
+        raise CaseError([Problem("", message)])
+    whole = expanded(values)
+    parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
+    if problems:
+        raise CaseError(_as_written(values, _everything_wrong(whole, parts, problems)))
+    return parts, frozenset(keys_given(whole))
+
+
+def identity(case: Case, with_solver: bool) -> dict[str, Any]:
+    """What makes a case's results: nested values whose text a key is the hash of."""
+    values, solve = case.values(), case.solve
+    for unread in (*_groups_outside_identity(), "solve"):
+        del values[unread]
+    values["model"] = MODEL_VERSION
+    # what is integrated and from where on it counts, however it is written
+    duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
+    settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
+    values["span"] = [duration, settle, round(case.steps)]
+    if with_solver:
+        accuracy = solve.rtol or dict(case.targets) or solve.accuracy
+        values["solver"] = [accuracy, solve.method, solve.max_steps]
+    return values
+
+
+def canonical(values: Mapping[str, Any], held: Callable[[Any], str] | None = None) -> str:
+    """The one text of some values; `held`: what stands for those that JSON does not know."""
+    return json.dumps(values, sort_keys=True, separators=(",", ":"), default=held)
+
+
+def digest(text: str) -> str:
+    """Hash of a text, 20 hexadecimal digits."""
+    return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 def _everything_wrong(
@@ -300,8 +317,3 @@ def _groups_outside_identity() -> tuple[str, ...]:
     """The keys at the top of a case file of which nothing is part of a job's identity."""
     inside = {key.partition(".")[0] for key in table().keys() - outside_identity()}
     return tuple(sorted({key.partition(".")[0] for key in outside_identity()} - inside))
-
-
-def _digest(values: Mapping[str, Any]) -> str:
-    text = json.dumps(values, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:20]

@@ -1,7 +1,6 @@
 """What does not fit together in a case whose values are each in range."""
 
 import contextlib
-import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, cast
@@ -159,10 +158,9 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
 
 def _inertia_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     """A default inertia may leave the range that a given one must keep."""
-    key = "machine.rod_inertia_kg_m2"
-    message = table()[key].check(case.machine.rod_inertia_kg_m2)
-    if message:
-        yield Problem(key, f"m L^2 / 12 of the rod: {message}")
+    key, inertia = "machine.rod_inertia_kg_m2", case.machine.rod_inertia_kg_m2
+    if inertia is None or not table()[key].holds(inertia):
+        yield Problem(key, f"m L^2 / 12 of the rod: {table()[key].check(inertia)}")
 
 
 def _geometry_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
@@ -187,7 +185,8 @@ def _clearance_conflicts(case: Settings, given: frozenset[str], joint: str) -> I
     key = f"clearance_mm.{joint}"
     if clearance > pin:
         yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it")
-    shift = math.hypot(*(getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy"))
+    x, y = (getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy")
+    shift = (x * x + y * y) ** 0.5
     if 0 < clearance < shift - IMPLAUSIBLE * pin:
         yield Problem(
             f"initial_offset_mm.{joint}_x",

@@ -6,6 +6,7 @@ An unknown key is told what was probably meant (`unknown`).
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from typing import Any
 
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.shorthands import SHORTHANDS, stands_for
@@ -119,3 +120,15 @@ def _opened(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
 def covers(outer: str, key: str) -> bool:
     """Whether a key is another one, or in the group that the other names."""
     return f"{key}.".startswith(f"{outer}.")
+
+
+def nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
+    """Values by dotted key as a case file has them, group by group."""
+    values: dict[str, Any] = {}
+    for key, node in chosen.items():
+        group, _, name = key.rpartition(".")
+        value = node.value
+        if key == "solve.accuracy" and isinstance(value, tuple):
+            value = dict(value)  # as a case file has it
+        (values.setdefault(group, {}) if group else values)[name] = value
+    return values

@@ -2,37 +2,34 @@
 
 A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
 and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
-before any is made; every combination is then built once, which finds the values that do not fit
-each other. A very large study does not keep its cases: each is built again when it is asked for.
+before any is made. Those that differ in numbers alone are then made and checked at once (`sheet`),
+which finds the values that do not fit each other; a job's own case is built when it is asked for.
 """
 
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
 
 from compressor.cases import blocks, regimes
 from compressor.cases.case import Case
+from compressor.cases.combinations import Block, columns
 from compressor.cases.conditions import NoComparison, Test, comparison
 from compressor.cases.file_error import CaseFileError
-from compressor.cases.keys import Leaves, leaves, merged, overridden, read_overrides
+from compressor.cases.keys import Leaves, leaves, merged, nested, overridden, read_overrides
 from compressor.cases.parameter import CaseError, Problem
 from compressor.cases.regimes import GROUP, Regimes
-from compressor.cases.shorthands import value_of
-from compressor.cases.study import Axis, Cases, Study, nested
+from compressor.cases.study import Axis, Cases, Study, Told, unheard
 from compressor.cases.swept import SAMPLED, counted
 from compressor.cases.table import table
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_file, shortened
 
 MAX_JOBS = 10_000
-MAX_KEPT = 100_000  # cases of a study that stay in memory, each 1 kB
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
-Told = Callable[[str, int, int], object]  # of a study: its name, cases read, cases in all
 
 
 @dataclass(frozen=True)
@@ -45,14 +42,6 @@ class _Draft:
     changes: Mapping[str, Leaves]
     problems: list[FileProblem]
     regimes: Regimes | None = None
-
-
-class _Built(NamedTuple):
-    """The cases of a study where they are kept, the key of each, and its values of some keys."""
-
-    cases: list[Case]
-    keys: list[str]
-    rows: list[tuple[Any, ...]]
 
 
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
@@ -82,7 +71,7 @@ def load_studies(
     max_jobs: int = MAX_JOBS,
     only: str = "",
     follow: bool = True,
-    told: Told = lambda name, done, total: None,
+    told: Told = unheard,
 ) -> list[Study]:
     """The studies of YAML case files; each override, `key=value`, replaces a value in all of them.
 
@@ -181,27 +170,22 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told) -> Study
     cases = Cases(draft.name, found)
     if not draft.problems and not draft.changes:
         _refuse_idle_sample(drafts, draft)
+    _refuse_conflicts(draft, cases)
+    if draft.problems:
+        return Study(draft.name, draft.path, (), ())
     is_grid = len(found) == 1 and found[0].is_grid
-    keys = [] if is_grid else blocks.columns(found)
-    built = _build(draft, cases, keys, told)
+    keys = cases.keys(told)
     if is_grid:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
-        found_columns = zip(*built.rows, strict=True)
         spreads = {k: s.spread for d in drafts for k, s in d.sweeps.items() if s.kind in SAMPLED}
-        axes = [
-            Axis(key, column, spreads.get(key))
-            for key, column in zip(keys, found_columns, strict=False)
-        ]
-    if draft.problems:
-        return Study(draft.name, draft.path, tuple(axes), (), tuple(built.keys), is_grid)
+        axes = [Axis(key, tuple(cases.values(key)), spreads.get(key)) for key in columns(found)]
     chains = _chains(draft, cases, max_jobs) if draft.regimes else ()
     if draft.problems:
-        return Study(draft.name, draft.path, tuple(axes), (), tuple(built.keys), is_grid)
+        return Study(draft.name, draft.path, (), ())
     selected = range(len(cases)) if only is None else cases.where(only)
-    kept = tuple(built.cases) if len(cases) <= MAX_KEPT else cases
     return Study(
-        draft.name, draft.path, tuple(axes), kept, tuple(built.keys), is_grid, selected,
+        draft.name, draft.path, tuple(axes), cases, tuple(keys), is_grid, selected,
         draft.regimes, chains, tuple(nested(block.fixed) for block in found),
     )  # fmt: skip
 
@@ -264,29 +248,19 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
     return False
 
 
-def _build(draft: _Draft, cases: Cases, keys: Sequence[str], told: Told) -> _Built:
-    """What every case of a study is, keyed and with its values of some keys of the file.
-
-    Conflicts in any combination are problems of the draft.
-    """
+def _refuse_conflicts(draft: _Draft, cases: Cases) -> None:
+    """Values that are good alone and do not fit each other, in any combination, are problems."""
     found: dict[Problem, FileProblem] = {}
-    built = _Built([], [], [])
-    for block, chosen in cases.counted(told):
+    for block, chosen in cases.doubtful():
         try:
-            case = cases.case(chosen)
+            cases.case(chosen)
         except CaseError as error:
             for problem in error.problems:
                 found.setdefault(problem, _located(problem, chosen, block, draft.path))
-            continue
-        if len(cases) <= MAX_KEPT:
-            built.cases.append(case)
-        built.keys.append(case.key)
-        built.rows.append(tuple(value_of(case, key) for key in keys))
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         draft.problems.append(FileProblem(Place(draft.path), "", message))
-    return built
 
 
 def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
@@ -313,9 +287,7 @@ def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...
     return tuple(found)
 
 
-def _located(
-    problem: Problem, chosen: Mapping[str, Node], block: blocks.Block, path: str
-) -> FileProblem:
+def _located(problem: Problem, chosen: Mapping[str, Node], block: Block, path: str) -> FileProblem:
     """A case's problem at the value it is about, or at the nearest key, group or block."""
     group = problem.key.partition(".")[0]
     for key in (problem.key, group):

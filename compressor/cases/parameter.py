@@ -151,6 +151,10 @@ class Parameter:
         number = "a whole number" if self.kind == "integer" else "a number"
         return " or ".join([*self.choices, f"{number} in {span} {self.unit}".strip()])
 
+    def holds(self, value: float) -> bool:
+        """Whether a number is in range."""
+        return (value > self.low if self.above else value >= self.low) and value <= self.high
+
     def check(self, value: Any) -> str | None:
         """What is wrong with a scalar value of this parameter, or None."""
         if value is None:
@@ -173,7 +177,7 @@ class Parameter:
             return f"must be finite: {self._refused(value)}"
         if self.kind == "integer" and value != int(value):
             return self._refused(value)
-        if value < self.low or value > self.high or (self.above and value == self.low):
+        if not self.holds(value):
             return f"{value:g} is outside {self.range}" + (f" {self.unit}" if self.unit else "")
         return None
 

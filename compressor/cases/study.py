@@ -4,15 +4,27 @@ import bisect
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, overload
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
-from compressor.cases import blocks
 from compressor.cases.case import Case
+from compressor.cases.combinations import Block
 from compressor.cases.conditions import Test
+from compressor.cases.keys import nested
+from compressor.cases.parameter import CaseError
 from compressor.cases.regimes import Regimes
 from compressor.cases.yaml_reader import Node
 
-TOLD_EVERY = 1000  # cases between two words on progress
+if TYPE_CHECKING:
+    import numpy as np
+
+    from compressor.cases.sheet import Sheet
+
+Told = Callable[[str, int, int], object]  # of a study: its name, cases read, cases in all
+
+
+def unheard(name: str, done: int, total: int) -> None:
+    """Progress that nobody hears of."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +65,10 @@ class Study:
     def jobs(self) -> int:
         return len(self.keys)
 
+    def sheet_of(self, number: int) -> int:
+        """A number that jobs share only if their cases differ in nothing but swept numbers."""
+        return self.cases.sheet_of(number) if isinstance(self.cases, Cases) else number
+
     def shard(self, number: int, of: int) -> "Study":
         """The study with the jobs of one shard selected, 1 <= number <= of.
 
@@ -64,63 +80,106 @@ class Study:
 
 
 class Cases(Sequence[Case]):
-    """The cases of blocks one after the other, each built when it is asked for."""
+    """The cases of blocks one after the other, each built when it is asked for.
 
-    def __init__(self, name: str, parts: Sequence[blocks.Block]):
+    Jobs that differ in numbers alone are one `Sheet`, which is made and checked at once.
+    """
+
+    def __init__(self, name: str, parts: Sequence[Block]):
         self.name, self.parts = name, parts
-        self.ends = list(itertools.accumulate(len(part.kept) for part in parts))
 
     def __len__(self) -> int:
-        return self.ends[-1] if self.ends else 0
+        return sum(len(part.kept) for part in self.parts)
 
     @overload
     def __getitem__(self, index: int) -> Case: ...
     @overload
     def __getitem__(self, index: slice) -> tuple[Case, ...]: ...
     def __getitem__(self, index: int | slice) -> Case | tuple[Case, ...]:
-        if isinstance(index, slice):
-            return tuple(self[n] for n in range(len(self))[index])
-        number = range(len(self))[index]
-        at = bisect.bisect_right(self.ends, number)
-        part = self.parts[at]
-        return self.case(part.chosen(part.kept[number - self.ends[at] + len(part.kept)]))
+        numbers = range(len(self))[index]
+        if isinstance(numbers, range):
+            return tuple(self[number] for number in numbers)
+        sheet, place = self._places
+        return self.sheets[sheet[numbers]].at(int(place[numbers]))
+
+    @cached_property
+    def sheets(self) -> "list[Sheet]":
+        """All cases. Raises CaseError where fixed values of a block do not fit."""
+        from compressor.cases.sheet import Sheet
+
+        found, before = [], 0
+        for part in self.parts:
+            found += [Sheet.of(self.name, jobs, before) for jobs in part.alike()]
+            before += len(part.kept)
+        return found
+
+    def sheet_of(self, number: int) -> int:
+        """The number of a case's sheet."""
+        return self._sheet_of[number]
+
+    @cached_property
+    def _sheet_of(self) -> list[int]:
+        return self._places[0].tolist()
+
+    @cached_property
+    def _places(self) -> "tuple[np.ndarray, np.ndarray]":
+        """Of each case its sheet, and its place there, both (cases,)."""
+        import numpy as np
+
+        sheet, place = np.zeros((2, len(self)), dtype=np.int64)
+        for number, one in enumerate(self.sheets):
+            sheet[one.numbers] = number
+            place[one.numbers] = np.arange(len(one.numbers))
+        return sheet, place
+
+    def keys(self, told: Told = unheard) -> list[str]:
+        """The key of each case; `told` hears how many of how many have been made."""
+        return self._each(lambda sheet: sheet.keys(), told)
+
+    def values(self, key: str) -> list[Any]:
+        """The value of a dotted key in each case, as `value_of` gives it."""
+        return self._each(lambda sheet: sheet.values(key))
+
+    def _each(self, of: "Callable[[Sheet], Sequence[Any]]", told: Told = unheard) -> list[Any]:
+        """What a function gives for the jobs of each sheet, of all cases in their order."""
+        found: list[Any] = [None] * len(self)
+        done = 0
+        for sheet in self.sheets:
+            told(self.name, done, len(self))
+            for number, one in zip(sheet.numbers.tolist(), of(sheet), strict=True):
+                found[number] = one
+            done += len(sheet.numbers)
+        told(self.name, done, len(self))
+        return found
+
+    def doubtful(self) -> Iterator[tuple[Block, dict[str, Node]]]:
+        """Combinations in which a rule may find values that do not fit each other, in order."""
+        try:
+            sheets = self.sheets
+        except CaseError:  # told of each combination
+            yield from self.combinations()
+            return
+        numbers = (sheet.numbers[sheet.doubtful()] for sheet in sheets)
+        ends = list(itertools.accumulate(len(part.kept) for part in self.parts))
+        for number in sorted(itertools.chain.from_iterable(one.tolist() for one in numbers)):
+            at = bisect.bisect_right(ends, number)
+            part = self.parts[at]
+            yield part, part.chosen(part.kept[number - ends[at] + len(part.kept)])
 
     def case(self, chosen: Mapping[str, Node]) -> Case:
         """The case of one combination. Raises CaseError where its values do not fit."""
         return Case.from_values(nested(chosen) | {"name": self.name})
 
-    def combinations(self) -> Iterator[tuple[blocks.Block, dict[str, Node]]]:
+    def combinations(self) -> Iterator[tuple[Block, dict[str, Node]]]:
         """The values of every case by dotted key, and the block that they are of."""
         for part in self.parts:
             for number in part.kept:
                 yield part, part.chosen(number)
 
-    def counted(
-        self, told: Callable[[str, int, int], object]
-    ) -> Iterator[tuple[blocks.Block, dict[str, Node]]]:
-        """`combinations`; now and then `told` hears how many of how many have been given."""
-        for number, one in enumerate(self.combinations()):
-            if number % TOLD_EVERY == 0:
-                told(self.name, number, len(self))
-            yield one
-        told(self.name, len(self), len(self))
-
     def where(self, test: Test) -> list[int]:
         """The numbers of the cases for which a comparison holds."""
-        every = enumerate(self.combinations())
-        return [n for n, (_, chosen) in every if test(blocks.reader(chosen))]
-
-
-def nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
-    """Values by dotted key as a case file has them, group by group."""
-    values: dict[str, Any] = {}
-    for key, node in chosen.items():
-        group, _, name = key.rpartition(".")
-        value = node.value
-        if key == "solve.accuracy" and isinstance(value, tuple):
-            value = dict(value)  # as a case file has it
-        (values.setdefault(group, {}) if group else values)[name] = value
-    return values
+        holds = itertools.chain.from_iterable(part.where(test).tolist() for part in self.parts)
+        return [number for number, held in enumerate(holds) if held]
 
 
 class Jobs(Protocol):

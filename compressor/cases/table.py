@@ -87,13 +87,13 @@ class Settings:
         if self.solve.duration_s is not None:
             return self.solve.duration_s
         given = self.solve.duration_rev
-        return (MOST_REV if given == "auto" else float(given or 0.0)) * self.turn
+        return (MOST_REV if isinstance(given, str) else given or 0.0) * self.turn
 
     @property
     def settle(self) -> float:
         """Time from which metrics count, s; with `settle_rev: auto` 0, until that is known."""
         given = self.solve.settle_rev
-        return 0.0 if given == "auto" else float(given) * self.turn
+        return 0.0 if isinstance(given, str) else given * self.turn
 
     @property
     def settles_itself(self) -> bool:
@@ -105,7 +105,7 @@ class Settings:
         """Output steps in the duration, a whole number in a valid case."""
         if self.solve.output_step_s is not None:
             return self.duration / self.solve.output_step_s
-        return self.duration * self.machine.speed_rpm * 6.0 / float(self.solve.output_step_deg or 1)
+        return self.duration * self.machine.speed_rpm * 6.0 / (self.solve.output_step_deg or 1.0)
 
 
 def parameters(owner: type = Settings, prefix: str = "") -> Iterator[Parameter]:

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 from compsim import cli, screen
 
-from compressor.cases import study as study_module
 from compressor.cases.load import load_studies
 from compressor.sweep import plan
 from compressor.sweep.plan import ROW_BYTES, forecast
@@ -104,7 +103,6 @@ def test_large_files_are_counted_before_they_are_read(command, studies, monkeypa
     studies(one=NINE)
     monkeypatch.setattr(screen, "MANY", 9)
     monkeypatch.setattr(screen, "FIRST_SECONDS", 0)
-    monkeypatch.setattr(study_module, "TOLD_EVERY", 4)
     assert cli.main([command, "one.yaml", "-j", "1"]) == 0
     assert capsys.readouterr().err.startswith("one: 9 jobs\n0 of 9 cases read, 0 %\n")
 

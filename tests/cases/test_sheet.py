@@ -1,0 +1,282 @@
+"""Sheets: what is made of all jobs of a sweep at once is what is made of each job alone."""
+
+import itertools
+import json
+import math
+import operator
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from compressor.cases.case import Case
+from compressor.cases.columns import Column, Mixed, alike, places_where
+from compressor.cases.load import MAX_CONFLICTS, CaseFileError, load_studies
+from compressor.cases.parameter import CaseError
+from compressor.cases.shorthands import value_of
+from compressor.cases.table import outside_identity, table
+
+ROOT = Path(__file__).parents[2]
+FILES = [*(ROOT / "configs").glob("*.yaml"), *(ROOT / "compressor/cases/examples").glob("*.yaml")]
+NUMBERS = st.floats(-1e6, 1e6).filter(lambda x: x == 0 or abs(x) > 1e-6)
+MANY = st.lists(NUMBERS, min_size=1, max_size=8)
+
+
+def alone(study):
+    """The cases of a study, each made by itself."""
+    return [study.cases.case(chosen) for _, chosen in study.cases.combinations()]
+
+
+def assert_same(study):
+    one_by_one = alone(study)
+    assert len(study.cases) == len(one_by_one) == len(study.keys)
+    for case, same, key in zip(study.cases, one_by_one, study.keys, strict=True):
+        assert case == same
+        assert json.dumps(case.values()) == json.dumps(same.values())  # 1.0 is not 1
+        assert case.key == same.key == key
+        assert case.problems == ()
+
+
+# ---- whole files --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_jobs_of_our_files_are_those_made_one_by_one(path):
+    (study,) = load_studies(path)
+    if len(study.cases) > 300:  # making them one by one takes a tenth of a millisecond each
+        numbers = random.Random(1).sample(range(len(study.cases)), 300)
+        every = list(study.cases.combinations())
+        for number in numbers:
+            same = study.cases.case(every[number][1])
+            assert study.cases[number] == same
+            assert study.keys[number] == same.key
+    else:
+        assert_same(study)
+
+
+def drawn(row, draw):
+    """A few values of a key of the table: usual ones, and some that may fit nothing."""
+    if row.kind in ("choice", "boolean"):
+        words = list(row.choices) or [True, False]
+        return draw.sample(words, min(len(words), 2))
+    if row.kind == "accuracy":
+        return ["draft", "fine", {"peak_acceleration": 0.01}][: draw.randint(2, 3)]
+    if row.kind == "materials":
+        return [["steel", "steel"], ["steel", "copper"]]
+    middle = row.default if isinstance(row.default, float) and row.default else 1.0
+    spans = [draw.choice([0.5, 1, 1, 2, 100]) * draw.uniform(0.7, 1.4) for _ in range(3)]
+    values = {float(f"{min(max(middle * span, row.low), row.high):.3g}") for span in spans}
+    if row.kind == "integer":
+        return sorted({10 + int(span * 1000) for span in spans})
+    return sorted(values - {row.low}) + [word for word in row.choices if draw.random() < 0.2]
+
+
+SWEPT = [
+    key for key, row in table().items() if key not in outside_identity() and row.kind != "text"
+]
+
+
+def random_file(seed):
+    """A case file that sweeps some keys, as nested values."""
+    draw = random.Random(seed)
+    found = {"joint": draw.choice(["big_end", "small_end", "both"]), "clearance_mm": 0.2}
+    if draw.random() < 0.3:
+        found["joint"] = ["none", "both"]
+    for key in draw.sample(SWEPT, draw.randint(2, 4)):
+        values = drawn(table()[key], draw)
+        group, _, name = key.rpartition(".")
+        if not values or group == "clearance_mm":
+            found["clearance_mm"] = [0.1, 0.25]
+        elif not group:
+            found[name] = values
+        elif isinstance(found.setdefault(group, {}), dict):
+            found[group][name] = values
+    return found
+
+
+def combinations(found):
+    """The values of each job of a file without blocks, written out."""
+    axes = []
+    for key, value in found.items():
+        if isinstance(value, list):
+            axes.append([(key, "", one) for one in value])
+        elif isinstance(value, dict):
+            axes += [[(key, name, one) for one in many] for name, many in value.items()]
+    for chosen in itertools.product(*axes):
+        values = {key: value for key, value in found.items() if not isinstance(value, list | dict)}
+        for group, name, value in chosen:
+            if name:
+                values.setdefault(group, {})[name] = value
+            else:
+                values[group] = value
+        if values["joint"] == "none":
+            values.pop("clearance_mm")
+        yield values
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_random_sweeps_are_what_their_jobs_are(seed, tmp_path):
+    found = random_file(seed)
+    path = tmp_path / "case.yaml"
+    path.write_text(json.dumps(found))
+    keys, problems = [], {}
+    for values in combinations(found):
+        try:
+            keys.append(Case.from_values(values | {"name": "case"}).key)
+        except CaseError as error:
+            problems |= dict.fromkeys(problem.message for problem in error.problems)
+    if not problems:
+        (study,) = load_studies(path, max_jobs=1_000_000)
+        assert list(study.keys) == keys
+        assert_same(study)
+        return
+    with pytest.raises(CaseFileError) as caught:
+        load_studies(path, max_jobs=1_000_000)
+    told = [problem.message for problem in caught.value.problems]
+    more = f"{len(problems)} conflicts between swept values; the first {MAX_CONFLICTS} are"
+    if len(problems) > MAX_CONFLICTS:
+        told.remove(more)
+    assert sorted(told) == sorted(list(problems)[:MAX_CONFLICTS])
+
+
+def test_random_sweeps_are_of_both_kinds(tmp_path):
+    good = 0
+    for seed in range(60):
+        path = tmp_path / f"{seed}.yaml"
+        path.write_text(json.dumps(random_file(seed)))
+        try:
+            load_studies(path, max_jobs=1_000_000)
+            good += 1
+        except CaseFileError:
+            pass
+    assert 15 < good < 50
+
+
+TOGETHER = """
+joint: [big_end, both]
+clearance_mm: {random: [0.05, 0.4]}
+machine: {rod_length_mm: {random: [400, 800]}, speed_rpm: {random: [300, 900]}}
+contact: {exponent: [1.5, 2.0]}
+sample: {n: 40, seed: 2}
+exclude: [machine.speed_rpm > 700 and clearance_mm < 0.2, clearance_mm.small_end > 0.35]
+"""
+BLOCKS = """
+blocks:
+- {joint: big_end, clearance_mm: [0.1, 0.2], friction: false}
+- {joint: both, clearance_mm: {big_end: [0.1, 0.2], small_end: 0.1}, load: [none, typical]}
+- {joint: none, machine: {speed_rpm: {range: [300, 600, 100]}}}
+"""
+
+
+@pytest.mark.parametrize("text", [TOGETHER, BLOCKS])
+def test_designs_and_blocks_are_what_their_jobs_are(text, tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(text)
+    (study,) = load_studies(path)
+    assert_same(study)
+    for axis in study.axes:
+        assert list(axis.values) == [value_of(case, axis.key) for case in study.cases]
+
+
+def test_a_comparison_selects_as_job_by_job(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(TOGETHER)
+    text = "clearance_mm > 0.2 or not (joint == both and machine.rod_length_mm <= 550)"
+    (study,) = load_studies(path, only=text)
+    expected = [
+        number
+        for number, case in enumerate(study.cases)
+        if case.clearance_mm.big_end > 0.2
+        or not (case.joint == "both" and case.machine.rod_length_mm <= 550)
+    ]
+    assert list(study.selected) == expected
+    assert 0 < len(expected) < len(study.cases)
+    excluded = [
+        case
+        for case in study.cases
+        if (case.machine.speed_rpm > 700 and case.clearance_mm.big_end < 0.2)
+        or case.clearance_mm.small_end > 0.35
+    ]
+    assert not excluded
+
+
+def test_what_no_column_can_do_is_told_job_by_job(tmp_path, monkeypatch):
+    """A rule that cannot take columns leaves every job in doubt, and each is asked."""
+    path = tmp_path / "case.yaml"
+    path.write_text("{joint: big_end, clearance_mm: [0.1, 11], machine: {rod_mass_kg: [3, 4]}}")
+
+    def alone_only(case, given):
+        math.sqrt(case.machine.rod_mass_kg)
+        yield from ()
+
+    monkeypatch.setattr("compressor.cases.sheet.RULES", (alone_only,))
+    with pytest.raises(CaseFileError, match="11 mm exceeds the pin radius"):
+        load_studies(path)
+
+
+# ---- columns ------------------------------------------------------------------------------------
+
+OPERATORS = [operator.add, operator.sub, operator.mul, operator.lt, operator.le, operator.gt,
+             operator.ge, operator.eq, operator.ne]  # fmt: skip
+
+
+@pytest.mark.parametrize("operation", OPERATORS)
+@given(many=MANY, other=NUMBERS)
+def test_columns_calculate_as_numbers_do(operation, many, other):
+    column = Column(np.array(many))
+    assert operation(column, other).numbers.tolist() == [operation(a, other) for a in many]
+    assert operation(other, column).numbers.tolist() == [operation(other, a) for a in many]
+    assert operation(column, column).numbers.tolist() == [operation(a, a) for a in many]
+
+
+@given(many=st.lists(st.floats(1e-3, 1e3), min_size=1, max_size=8), other=st.floats(0.5, 2))
+def test_columns_divide_and_take_powers_as_numbers_do(many, other):
+    column = Column(np.array(many))
+    assert (column / other).numbers.tolist() == [a / other for a in many]
+    assert (other / column).numbers.tolist() == [other / a for a in many]
+    assert (column**other).numbers.tolist() == [a**other for a in many]
+    assert (other**column).numbers.tolist() == [other**a for a in many]
+    assert round(column).numbers.tolist() == [round(a) for a in many]
+    assert abs(-column).numbers.tolist() == many
+
+
+def test_a_condition_that_holds_for_some_alone_is_mixed():
+    column = Column(np.array([1.0, 2.0, 3.0]))
+    assert column > 0
+    assert not column > 3
+    with pytest.raises(Mixed) as caught:
+        bool(column > 1)
+    assert caught.value.holds.tolist() == [False, True, True]
+    assert max(0.5, column) is column
+
+
+def test_what_is_no_number_is_not_compared_by_size():
+    column = Column(np.array([1.0, 2.0]))
+    assert not column == "auto"  # noqa: SIM201
+    assert column != "auto"
+    for wrong in (lambda: {column}, lambda: float(column), lambda: column + "1"):
+        with pytest.raises(TypeError):
+            wrong()
+
+
+def test_places_are_cut_where_conditions_are_mixed():
+    numbers, asked = np.arange(10.0), []
+
+    def test(places):
+        asked.append(len(places))
+        x = Column(numbers[places])
+        return bool(x > 2 and x < 7)
+
+    assert places_where(test, 10).nonzero()[0].tolist() == [3, 4, 5, 6]
+    assert len(asked) == 5  # all, both sides of 2, and both sides of 7
+
+
+def test_jobs_are_alike_that_differ_in_numbers_alone():
+    which = np.array([0, 1, 0, 1])
+    axes = [([1.0, 2.0], which), (["a", 1], np.array([0, 0, 1, 1])), ([True, False], which)]
+    assert sorted(places.tolist() for places in alike(axes, 4)) == [[0], [1], [2], [3]]
+    assert [places.tolist() for places in alike(axes[:1], 4)] == [[0, 1, 2, 3]]
+    assert sorted(places.tolist() for places in alike(axes[:2], 4)) == [[0, 1], [2, 3]]
