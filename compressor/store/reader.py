@@ -15,6 +15,7 @@ import os
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -151,6 +152,29 @@ class Stored:
             words["signals"] == "yes",
             rows.numbers[position],
         )
+
+    def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
+        """Whether each of the jobs at some positions needs no new run for a case, boolean.
+
+        Jobs of one kind, in all that `JobStatus.serves` reads, are asked once.
+        """
+        first, kinds = self._kinds
+        serves = np.array([self.status_at(one).serves(case) for one in first.tolist()], bool)
+        return serves[kinds[positions]] if len(positions) else np.zeros(0, bool)
+
+    @cached_property
+    def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
+        """The position of the first job of each kind, and the kind of each job, (jobs,)."""
+        rows, numbers = self.rows, self.rows.numbers
+        known = [numbers["peak_acceleration_error"], numbers[HORIZON]]
+        read = [rows.columns[name] for name in ("status", "reason", "precision", "signals")]
+        read += [rows.columns["samples"] > 0, *map(np.isnan, known)]
+        code = np.zeros(len(rows), dtype=np.int64)
+        for values in read:
+            _, which = np.unique(values, return_inverse=True)
+            _, code = np.unique(code * (len(rows) + 1) + which, return_inverse=True)
+        _, first, kinds = np.unique(code, return_index=True, return_inverse=True)
+        return first, kinds
 
     def outcome(self, position: int) -> Outcome:
         """The outcome of the job at a position of `rows`."""

@@ -169,9 +169,12 @@ class Writer:
 
     def _discard_unheard_of(self) -> None:
         """Remove time series that no row tells of: replaced, or never acknowledged."""
+        paths = [*(self.place / "jobs").glob("*.h5")]
+        if not paths:
+            return
         columns = Rows.of([s for s in self.found.segments if s.place == self.place]).columns
         known = {*zip(columns["key"].tolist(), columns["digest"].tolist(), strict=True)}
-        for path in (self.place / "jobs").glob("*.h5"):
+        for path in paths:
             name = JOB_NAME.fullmatch(path.name)
             if name and (name[1].encode(), name[2].encode()) not in known:
                 path.unlink()

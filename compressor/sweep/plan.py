@@ -12,7 +12,7 @@ from typing import Any
 
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, read_store, series_file
-from compressor.sweep.sweep import stored, wanted
+from compressor.sweep.wanted import Wanted, stored
 from compressor.sweep.warm_up import Needs, load_telling
 
 ROW_BYTES = 341  # of one job in a file of rows, measured by `make store-bench`
@@ -90,7 +90,7 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
     """
     store = read_store(folder)
     keys = {study.name: dict.fromkeys(study.keys[n] for n in study.selected) for study in studies}
-    done = {*stored(store, wanted(studies, store.keys()))}
+    done = {*stored(store, Wanted(studies, store.keys()))}
     missing: dict[str, list[str]] = {}
     looked_at: set[str] = set()
     ahead: list[Next] = []
@@ -108,7 +108,7 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
     counts = Forecast(
         len(told), len(done), len(told) - len(done), 1, 0.0, 0, tuple(parts), tuple(ahead)
     )
-    return Ahead(counts, missing, wanted(studies, looked_at))
+    return Ahead(counts, missing, dict(Wanted(studies, looked_at)))
 
 
 def next_of(study: Study, keys: set[str], most: int) -> Iterator[Next]:

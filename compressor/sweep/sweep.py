@@ -7,18 +7,19 @@ named reason.
 """
 
 import time
-from collections.abc import Callable, Container, Generator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
-from compressor.store import Folder, Stored, StoreError, Writer, write_study
+from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.batches import Input
 from compressor.sweep.execution import rest, run_batches
 from compressor.sweep.run_job import run_job
+from compressor.sweep.wanted import End, Wanted, stored
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.work import Now, Work
 from compressor.sweep.worker import Done, Lost, Workers
@@ -43,14 +44,6 @@ class Backend(Protocol):
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]: ...
-
-
-class End(NamedTuple):
-    """How a job ended."""
-
-    status: str
-    reason: str
-    detail: str
 
 
 @dataclass(frozen=True)
@@ -137,7 +130,7 @@ def sweep(
     jobs = sum(len(study.selected) for study in studies)
     if jobs > MANY:
         progress(0, jobs, f"preparing {jobs} jobs")
-    cases = wanted(studies)
+    cases = Wanted(studies)
     with Writer(folder, name, options.wait, options.command) as writer:
         ends = stored(writer.found, cases)
         if options.rerun_failed:
@@ -150,7 +143,7 @@ def sweep(
                 position = int(writer.found.rows.find([key])[0])
                 cases[key] = writer.found.status_at(position).kept_by(cases[key])
             stale, gaining = {}, set()
-        missing = [case for key, case in cases.items() if key not in ends]
+        missing = [cases[key] for key in cases if key not in ends]
         for study in studies:
             write_study(folder, study, options.command, writer.found.keys)
         if missing:
@@ -244,58 +237,6 @@ def run_here(
 def as_jobs(cases: Sequence[Case]) -> list[Input]:
     """Cases as workers take them."""
     return [(case, case, case.solve.timeout_s) for case in cases]
-
-
-def wanted(studies: Sequence[Study], among: Container[str] | None = None) -> dict[str, Case]:
-    """Each selected job once, by key; where studies share one, a case that serves them all.
-
-    among: the keys of those that are wanted, if not all; the cases of others are not made.
-    """
-    cases: dict[str, Case] = {}
-    for study in studies:
-        for number in study.selected:
-            key = study.keys[number]
-            if among is None or key in among:
-                case = study.cases[number]
-                cases[key] = serving_both(cases[key], case) if key in cases else case
-    return cases
-
-
-def serving_both(first: Case, second: Case) -> Case:
-    """A case with all that two cases of one key ask for beside it."""
-    keeping = [case.output for case in (first, second) if case.output.keep == "series"]
-    output = first.output
-    if keeping:
-        precision = max("single", *(o.precision for o in keeping), key=("single", "double").index)
-        compress, signals = all(o.compress for o in keeping), any(o.signals for o in keeping)
-        output = replace(
-            output, keep="series", precision=precision, compress=compress, signals=signals
-        )
-    solve = replace(
-        first.solve,
-        error_bars=first.solve.error_bars or second.solve.error_bars,
-        horizon=max(first.solve.horizon, second.solve.horizon, key=(False, "auto", True).index),
-        timeout_s=max(first.solve.timeout_s, second.solve.timeout_s),
-    )
-    return replace(first, output=output, solve=solve)
-
-
-def stored(store: Stored, cases: dict[str, Case]) -> dict[str, End]:
-    """How the jobs ended that need no new run: stored ones that serve, with intact files.
-
-    A case whose job is to be run again goes on keeping the time series that its job has, as exact
-    as they are.
-    """
-    found = {}
-    positions = store.rows.find(list(cases)).tolist()
-    for (key, case), position in zip(list(cases.items()), positions, strict=True):
-        if position >= 0:
-            end = store.status_at(position)
-            if end.serves(case) and store.rows.intact(position):
-                found[key] = End(end.status, end.reason, end.detail)
-            else:
-                cases[key] = end.kept_by(case)
-    return found
 
 
 def endings(

@@ -23,7 +23,7 @@ from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import read_store
-from compressor.sweep.sweep import serving_both
+from compressor.sweep.wanted import serving_both
 
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
 QUICK = {"duration_rev": 1.2, "settle_rev": 0}

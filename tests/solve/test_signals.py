@@ -13,7 +13,8 @@ from compressor.metrics import ROD_LOAD, SERIES
 from compressor.solve.signals import SIGNALS
 from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import open_study, read_store
-from compressor.sweep.sweep import serving_both, sweep
+from compressor.sweep.sweep import sweep
+from compressor.sweep.wanted import serving_both
 
 FINE = {"duration_rev": 0.3, "settle_rev": 0, "output_step_deg": 0.01, "error_bars": False,
         "accuracy": "reference"}  # fmt: skip

@@ -2,6 +2,7 @@
 
 import errno
 import io
+import itertools
 import json
 import os
 import shutil
@@ -218,17 +219,43 @@ SERVING = [  # output of what is stored, its reason, output of the case, serves
 ]
 
 
-@pytest.mark.parametrize("row", SERVING)
-def test_what_a_stored_job_serves(row, ideal, tmp_path):
-    keeps, precision, reason, asks, exact, serves = row
+def stored_as(row, ideal, folder, key):
+    """Store a job under a key as a row of SERVING says."""
+    keeps, precision, reason, *_ = row
     text = json.dumps(
         Case.from_values({"output": {"keep": keeps, "precision": precision}}).values()
     )
     dataset = ideal if keeps == "series" else ideal.drop_dims("time")
     dataset = dataset.assign(status="failed" if reason else "ok", reason=reason)
-    keep(tmp_path, dataset.assign_attrs(case=text))
+    keep(folder, dataset.assign_attrs(case=text, key=key))
+
+
+@pytest.mark.parametrize("row", SERVING)
+def test_what_a_stored_job_serves(row, ideal, tmp_path):
+    *_, asks, exact, serves = row
+    stored_as(row, ideal, tmp_path, ideal.attrs["key"])
     case = Case.from_values({"output": {"keep": asks, "precision": exact}})
     assert store.job_status(tmp_path, ideal.attrs["key"]).serves(case) == serves
+
+
+def test_many_jobs_serve_as_each_does(ideal, tmp_path):
+    """Jobs of one kind are asked once, and kinds differ in all that decides."""
+    for number, row in enumerate([*SERVING, *SERVING[::2]]):
+        stored_as(row, ideal, tmp_path, f"{number:020x}")
+    barless = Case.from_values({"solve": SHORT | {"error_bars": False}})
+    keep(tmp_path, simulate(barless))
+    stored, told = store.read_store(tmp_path), set()
+    positions = np.arange(len(stored.rows))[::-1]
+    for keeps, precision, bars in itertools.product(
+        ("series", "metrics"), ("double", "single"), (True, False)
+    ):
+        output = {"keep": keeps, "precision": precision}
+        case = Case.from_values({"output": output, "solve": {"error_bars": bars}})
+        each = [stored.status_at(position).serves(case) for position in positions]
+        assert stored.serving(positions, case).tolist() == each
+        told |= {*each}
+    assert told == {True, False}
+    assert stored.serving(positions[:0], case).tolist() == []
 
 
 # ---- what a file may hold -----------------------------------------------------------------------

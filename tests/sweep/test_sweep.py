@@ -15,7 +15,8 @@ from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.verify import verify
 from compressor.sweep import warm_up
-from compressor.sweep.sweep import Failure, Options, sweep, wanted
+from compressor.sweep.sweep import Failure, Options, sweep
+from compressor.sweep.wanted import Wanted
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 
@@ -103,7 +104,7 @@ def test_where_studies_share_a_job_the_greater_demand_counts(studies):
     made = studies(
         few={"output": {"keep": "metrics"}}, all={}, less={"output": {"keep": "metrics"}}
     )
-    (case,) = wanted(made).values()
+    (case,) = Wanted(made).values()
     assert case.output.keep == "series"
 
 
@@ -147,7 +148,7 @@ def test_shards_are_one_study_together(studies, tmp_path, in_process):
         sweep(made, tmp_path / "out", 1, options=Options(part=(number, 3))) for number in (1, 2, 3)
     ]
     assert all(part.done_before == 0 for part in parts)
-    assert sum(part.run_now for part in parts) == len(wanted(made)) == 9
+    assert sum(part.run_now for part in parts) == len(Wanted(made)) == 9
     assert sweep(made, tmp_path / "out", 1).run_now == 0
     whole = {key for study in made for key in study.keys}
     assert store.finished_keys(tmp_path / "out") == whole

@@ -19,7 +19,7 @@ from compressor.cases.load import load_studies
 from compressor.store import writer
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
-from compressor.sweep.sweep import stored, wanted
+from compressor.sweep.wanted import Wanted, stored
 
 WHAT = "two to four runs on one store at once"
 MASSES = [4 + n / 100 for n in range(24)]  # rod masses, kg; a study has a stretch of them
@@ -107,8 +107,8 @@ def served(folder, command):
     studies = load_studies(folder / command[0])
     if part:
         studies = [study.shard(int(part[0]), int(part[1])) for study in studies]
-    cases = wanted(studies)
-    return set(stored(read_store(folder / "out"), dict(cases))), set(cases)
+    cases = Wanted(studies)
+    return set(stored(read_store(folder / "out"), cases)), set(cases)
 
 
 def trial(folder, expected, draw, counts, real):
