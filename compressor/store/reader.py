@@ -22,13 +22,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compressor.cases import Case
-from compressor.metrics import HORIZON
 from compressor.outcome import Outcome
 from compressor.reasons import Reason
 from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.names import find_study
-from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
+from compressor.store.rows import Rows
+from compressor.store.segment import NAME, Cut, Segment, read_segment
 from compressor.store.series_file import read_series, read_values
 from compressor.store.stale import stale
 from compressor.store.studies import read_studies
@@ -52,17 +52,15 @@ class JobStatus:
     samples: int  # of the time series; 0 where only metrics are kept
     precision: str  # of the time series: double | single
     signals: bool  # whether they are kept beside the time series
-    numbers: np.void  # dtype schema.ROW
+    bars: bool  # whether metrics have error bars
+    has_horizon: bool  # whether it is known how long the motion can be foretold
+    rows: Rows
+    position: int
 
     @property
-    def bars(self) -> bool:
-        """Whether metrics have error bars."""
-        return not np.isnan(self.numbers["peak_acceleration_error"])
-
-    @property
-    def has_horizon(self) -> bool:
-        """Whether it is known how long the motion can be foretold."""
-        return not np.isnan(self.numbers[HORIZON])
+    def numbers(self) -> np.void:
+        """The job's numbers, dtype ROW."""
+        return self.rows.numbers[self.position]
 
     def serves(self, case: Case) -> bool:
         """Whether a case needs no new run.
@@ -150,7 +148,10 @@ class Stored:
             int(rows.columns["samples"][position]),
             words["precision"],
             words["signals"] == "yes",
-            rows.numbers[position],
+            bool(rows.barred[position]),
+            bool(rows.foretold[position]),
+            rows,
+            position,
         )
 
     def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
@@ -165,10 +166,9 @@ class Stored:
     @cached_property
     def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
         """The position of the first job of each kind, and the kind of each job, (jobs,)."""
-        rows, numbers = self.rows, self.rows.numbers
-        known = [numbers["peak_acceleration_error"], numbers[HORIZON]]
+        rows = self.rows
         read = [rows.columns[name] for name in ("status", "reason", "precision", "signals")]
-        read += [rows.columns["samples"] > 0, *map(np.isnan, known)]
+        read += [rows.columns["samples"] > 0, rows.barred, rows.foretold]
         code = np.zeros(len(rows), dtype=np.int64)
         for values in read:
             _, which = np.unique(values, return_inverse=True)

@@ -6,7 +6,8 @@ import numpy as np
 
 from compressor.metrics import METRICS, ROD_LOAD
 from compressor.program import PROGRAM
-from compressor.store.rows import GIVEN, Rows
+from compressor.store.rows import Rows
+from compressor.store.segment import GIVEN
 
 WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
 
@@ -23,7 +24,7 @@ def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
     positions = positions[positions >= 0]
     old = positions[rows.columns["given"][positions] != GIVEN.encode()]
     old = old[np.argsort(rows.source[old], kind="stable")]  # attributes are read by segment
-    for name, lack in _lacking(rows, old).items():
+    for name, lack in _lacking(rows, old).items() if len(old) else ():
         if lack.any():
             found[name] = {key.decode() for key in rows.columns["key"][old[lack]]}
     others = {

@@ -9,7 +9,8 @@ from compressor.store.files import Folder, StoreError
 from compressor.store.folders import no_results
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import read_store
-from compressor.store.rows import Cut, Rows
+from compressor.store.rows import Rows
+from compressor.store.segment import Cut
 from compressor.store.studies import Again, StoredStudy, owners, read_study, study_paths
 
 FORMER_REMEDY = "delete it: its jobs stay stored"

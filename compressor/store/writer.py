@@ -27,7 +27,8 @@ from compressor.store.files import (
     system_error,
 )
 from compressor.store.reader import places, read_store, segment_paths
-from compressor.store.rows import Rows, encode, merge, of_outcomes, read_segment, segment_name
+from compressor.store.rows import Rows, merge
+from compressor.store.segment import encode, of_outcomes, read_segment, segment_name
 from compressor.store.series_file import NAME as JOB_NAME
 
 MOST_ROWS = 4096  # in a segment that is written at once; one with fewer is small

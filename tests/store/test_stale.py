@@ -10,9 +10,10 @@ from compsim import cli
 
 from compressor.cases.load import load_studies
 from compressor.program import PROGRAM
-from compressor.store import rows as segments
+from compressor.store import segment as segments
 from compressor.store.reader import open_study, read_store
-from compressor.store.rows import GIVEN, encode, read_segment, segment_name
+from compressor.store.rows import merge
+from compressor.store.segment import GIVEN, encode, read_segment, segment_name
 from compressor.store.stale import stale
 from compressor.store.verify import verify
 from compressor.sweep.sweep import Options, sweep
@@ -40,11 +41,11 @@ def made_older(monkeypatch, without=(), program=PROGRAM, words=()):
     fewer = {name: value for name, value in segments.NUMBERS.items() if name not in without}
     for path in sorted(Path("results/rows").glob("*.h5")):
         segment = read_segment(path)
-        lines = segments._unpacked(segment.texts, segment)
+        lines = segments.unpacked(segment.texts, segment)
         texts = [line.replace(PROGRAM.encode(), program.encode()) for line in lines]
         blank = np.full(len(segment), b"", "S1")
         columns = segment.columns | dict.fromkeys(("given", *words), blank)
-        old = replace(segment, columns=columns, texts=segments._packed(texts))
+        old = replace(segment, columns=columns, texts=segments.packed(texts))
         with monkeypatch.context() as patch:
             patch.setattr(segments, "NUMBERS", fewer)
             data = encode(old)
@@ -126,7 +127,7 @@ def test_merged_segments_keep_what_each_row_was_given(wear, monkeypatch):
     made_older(monkeypatch, NEW)
     sweep(wear(), "results", 1)
     paths = sorted(Path("results/rows").glob("*.h5"))
-    merged = segments.merge([read_segment(path) for path in paths])
+    merged = merge([read_segment(path) for path in paths])
     data = encode(merged)
     for path in paths:
         path.unlink()

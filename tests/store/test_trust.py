@@ -15,7 +15,7 @@ from compressor.metrics import METRICS, NUMBERS, QUANTILES, SOMETIMES, STATISTIC
 from compressor.solve.simulate import measure, simulate
 from compressor.store.export import export
 from compressor.store.reader import open_study, read_store
-from compressor.store.rows import LATER, decode, encode, of_outcomes
+from compressor.store.segment import LATER, decode, encode, of_outcomes
 from compressor.store.status import standings
 from compressor.store.studies import write_study
 
@@ -68,7 +68,7 @@ def test_results_of_before_are_read_without_either(plain, tmp_path):
         assert older.columns[name].tolist() == [b""]
         assert newer.columns[name].tolist() != [b""] or name == "signals"
     for name in NUMBERS:
-        np.testing.assert_array_equal(older.numbers[name], newer.numbers[name])
+        np.testing.assert_array_equal(older.numbers()[name], newer.numbers()[name])
 
 
 def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring):

@@ -24,8 +24,9 @@ from compressor.outcome import ROW, Outcome, SeriesFile
 from compressor.solve.simulate import simulate
 from compressor.store import hdf5, writer
 from compressor.store import reader as store
-from compressor.store import rows as segments
+from compressor.store import segment as segments
 from compressor.store.files import StoreError
+from compressor.store.rows import merge
 from compressor.store.series_file import intact, read_values, write_series
 from compressor.store.studies import StoredAxis, StoredStudy, encode
 from compressor.store.verify import verify
@@ -114,7 +115,7 @@ def test_a_better_row_stays_whoever_writes_last(better, worse, shard, tmp_path, 
     expected = segments.of_outcomes([better], 1)
     for name in ("status", "samples", "precision"):
         assert rows.columns[name].tolist() == expected.columns[name].tolist()
-    assert len(segments.merge(store.read_store(tmp_path).segments)) == 1
+    assert len(merge(store.read_store(tmp_path).segments)) == 1
 
 
 def test_xarray_reads_a_segment(tmp_path):
