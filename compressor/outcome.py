@@ -60,6 +60,11 @@ class Outcome:
     attributes: dict[str, Any]
     series: SeriesFile | None = None
 
+    def __reduce__(self) -> Any:
+        """As workers send it: to send the names of all numbers would take most of the time."""
+        parts = self.status, self.reason, self.numbers.tobytes(), self.attributes, self.series
+        return _received, parts
+
     @property
     def key(self) -> str:
         """The job's identity."""
@@ -94,6 +99,10 @@ class Outcome:
                 continue
             named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
         return named
+
+
+def _received(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:
+    return Outcome(status, reason, np.frombuffer(numbers, ROW).copy()[0], *rest)
 
 
 def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more: Any) -> Outcome:

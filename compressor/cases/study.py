@@ -87,6 +87,7 @@ class Cases(Sequence[Case]):
 
     def __init__(self, name: str, parts: Sequence[Block]):
         self.name, self.parts = name, parts
+        self._keys: list[str] = []
 
     def __len__(self) -> int:
         return sum(len(part.kept) for part in self.parts)
@@ -100,7 +101,10 @@ class Cases(Sequence[Case]):
         if isinstance(numbers, range):
             return tuple(self[number] for number in numbers)
         sheet, place = self._places
-        return self.sheets[sheet[numbers]].at(int(place[numbers]))
+        made = self.sheets[sheet[numbers]].at(int(place[numbers]))
+        if self._keys:
+            vars(made)["key"] = self._keys[numbers]  # which would take longer than the case
+        return made
 
     @cached_property
     def sheets(self) -> "list[Sheet]":
@@ -134,7 +138,9 @@ class Cases(Sequence[Case]):
 
     def keys(self, told: Told = unheard) -> list[str]:
         """The key of each case; `told` hears how many of how many have been made."""
-        return self._each(lambda sheet: sheet.keys(), told)
+        if not self._keys:
+            self._keys = self._each(lambda sheet: sheet.keys(), told)
+        return self._keys
 
     def values(self, key: str) -> list[Any]:
         """The value of a dotted key in each case, as `value_of` gives it."""

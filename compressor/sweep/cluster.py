@@ -15,7 +15,7 @@ from typing import Any
 
 from compressor.cases import Case
 from compressor.sweep.shared_folder import received, run_near, visible
-from compressor.sweep.sweep import GRACE, as_jobs
+from compressor.sweep.sweep import GRACE, Jobs
 from compressor.sweep.versions import ClusterError, differences, unfitness, versions
 from compressor.sweep.warm_up import Needs, load
 from compressor.sweep.worker import Done, Lost, Workers
@@ -84,7 +84,7 @@ class Cluster:
         with visible(place) as (token, text):
             rules = Workers(prepare=partial(load, Needs.of(cases)), grace=GRACE)
             work = partial(run_near, place, token, text)
-            remote = Remote(self.client, work, rules, as_jobs(cases))
+            remote = Remote(self.client, work, rules, Jobs(cases))
             remote.remark = remark
             remote.decode = lambda result: received(place, pickle.loads(result))
             yield from remote.ends(pulse)

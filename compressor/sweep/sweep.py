@@ -19,7 +19,7 @@ from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.batches import Input
 from compressor.sweep.execution import rest, run_batches
 from compressor.sweep.run_job import run_job
-from compressor.sweep.wanted import End, Wanted, stored
+from compressor.sweep.wanted import End, Missing, Wanted, stored
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.work import Now, Work
 from compressor.sweep.worker import Done, Lost, Workers
@@ -143,7 +143,7 @@ def sweep(
                 position = int(writer.found.rows.find([key])[0])
                 cases[key] = writer.found.status_at(position).kept_by(cases[key])
             stale, gaining = {}, set()
-        missing = [cases[key] for key in cases if key not in ends]
+        missing = Missing(cases, [key for key in cases if key not in ends])
         for study in studies:
             write_study(folder, study, options.command, writer.found.keys)
         if missing:
@@ -215,7 +215,7 @@ def local(workers: int) -> Backend:
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]:
         needs, work = Needs.of(cases), partial(run_job, place)
-        return run_here(work, as_jobs(cases), needs, workers, remark, pulse)
+        return run_here(work, Jobs(cases), needs, workers, remark, pulse)
 
     return run
 
@@ -234,9 +234,18 @@ def run_here(
     return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), pulse)
 
 
-def as_jobs(cases: Sequence[Case]) -> list[Input]:
-    """Cases as workers take them."""
-    return [(case, case, case.solve.timeout_s) for case in cases]
+class Jobs(Sequence[Any]):
+    """Cases as workers take them, each made when it is taken."""
+
+    def __init__(self, cases: Sequence[Case]):
+        self.cases = cases
+
+    def __len__(self) -> int:
+        return len(self.cases)
+
+    def __getitem__(self, index: Any) -> Any:
+        case = self.cases[index]
+        return case, case, case.solve.timeout_s
 
 
 def endings(

@@ -2,7 +2,7 @@
 
 from collections.abc import Container, Hashable, Iterator, MutableMapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 
@@ -69,6 +69,25 @@ class Wanted(MutableMapping[str, Case]):
             found.setdefault(kind, []).append(key)
         for keys in found.values():
             yield self[keys[0]], keys
+
+
+class Missing(Sequence[Case]):
+    """The cases of some wanted jobs, each built when it is asked for: many take much memory."""
+
+    def __init__(self, wanted: Wanted, keys: Sequence[str]):
+        self.wanted, self.keys = wanted, keys
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+    @overload
+    def __getitem__(self, index: int) -> Case: ...
+    @overload
+    def __getitem__(self, index: slice) -> "Missing": ...
+    def __getitem__(self, index: int | slice) -> "Case | Missing":
+        if isinstance(index, slice):
+            return Missing(self.wanted, self.keys[index])
+        return self.wanted[self.keys[index]]
 
 
 def serving_both(first: Case, second: Case) -> Case:
