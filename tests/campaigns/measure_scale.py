@@ -12,13 +12,11 @@ import functools
 import json
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
-import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-
-from measure_accuracy import provenance
-from measure_throughput import many
 
 from compressor.cases.load import load_studies
 from compressor.store.studies import read_studies
@@ -26,6 +24,17 @@ from compressor.sweep.sweep import sweep
 
 JOBS = 100_000
 PYTHON = {"open_study": "import compressor; compressor.open_study('results').load()"}
+STARTER = """
+import os, sys, time
+began = time.perf_counter()
+pid = os.fork()
+if not pid:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    os.execv(sys.argv[1], sys.argv[1:])
+_, status, usage = os.wait4(pid, 0)
+print(time.perf_counter() - began, usage.ru_maxrss / 1024)
+sys.exit(status != 0)
+"""
 COMMANDS = {
     "run, nothing missing": "run many.yaml --max-jobs {jobs} --quiet",
     "plan": "plan many.yaml --max-jobs {jobs}",
@@ -37,6 +46,13 @@ COMMANDS = {
 }
 
 
+def measured(case):
+    """The outcome of a case."""
+    from compressor.solve.simulate import measure
+
+    return measure(case)
+
+
 def answered(found, place, case):
     """A worker's answer: the outcome of one job under the key of another."""
     attributes = found.attributes | {"key": case.key, "physics_key": case.physics_key}
@@ -45,33 +61,29 @@ def answered(found, place, case):
 
 def stub_sweep(jobs):
     """Sweep many.yaml in this process, with workers that do not simulate."""
-    from compressor.solve.simulate import measure
-
     (study,) = load_studies("many.yaml", max_jobs=jobs)
-    sys.modules["compressor.sweep.sweep"].run_job = functools.partial(
-        answered, measure(study.cases[0])
-    )
+    with ProcessPoolExecutor(1) as other:  # as in a real run, this process has no equations
+        found = other.submit(measured, study.cases[0]).result()
+    sys.modules["compressor.sweep.sweep"].run_job = functools.partial(answered, found)
     sweep([study], "results", 2)
 
 
 def process(*arguments):
-    """Wall time (s) and peak resident set (MB) of a Python process."""
-    began = time.perf_counter()
-    pid = os.fork()
-    if not pid:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        os.execv(sys.executable, [sys.executable, *arguments])
-    _, status, usage = os.wait4(pid, 0)
-    assert status == 0, arguments
-    seconds = time.perf_counter() - began
-    print(
-        f"{seconds:.1f} s, {usage.ru_maxrss / 1024:.0f} MB: {' '.join(arguments)}", file=sys.stderr
-    )
-    return {"seconds": round(seconds, 2), "peak_MB": round(usage.ru_maxrss / 1024)}
+    """Wall time (s) and peak resident set (MB) of a Python process.
+
+    A small process starts it: at its start, the one that it comes from counts as its own memory.
+    """
+    starter = [sys.executable, "-I", "-S", "-c", STARTER, sys.executable, *arguments]
+    said = subprocess.run(starter, check=True, capture_output=True, text=True)
+    seconds, megabytes = map(float, said.stdout.split())
+    print(f"{seconds:.1f} s, {megabytes:.0f} MB: {' '.join(arguments)}", file=sys.stderr)
+    return {"seconds": round(seconds, 2), "peak_MB": round(megabytes)}
 
 
 def scale(jobs):
     """What the sweep and each command take, in the working directory."""
+    from measure_throughput import many  # much memory, which the sweep's process must not have
+
     Path("many.yaml").write_text(many(jobs), encoding="utf-8")
     found = {"sweep": process(__file__, "--sweep", str(jobs))}
     (study,) = read_studies("results")
@@ -85,6 +97,8 @@ def scale(jobs):
 
 
 def main(target, jobs=JOBS):
+    from measure_accuracy import provenance
+
     target, home = Path(target).absolute(), os.getcwd()
     place = tempfile.mkdtemp(prefix="scale-", dir=".")
     os.chdir(place)
