@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import stdtrit
 
 from compressor.metrics import METRICS, QUANTILES
 from compressor.solve.error_bars import Metrics
@@ -85,6 +84,8 @@ def standard_error(means: np.ndarray) -> np.ndarray:
 def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
     """Half the length of the interval that holds in 95 % of cases, by Student's t."""
     batches = len(parts(range(revolutions), MOST_BATCHES, 1))
+    from scipy.special import stdtrit  # takes a tenth of a second, of chaotic motions alone
+
     return np.asarray(error) * float(stdtrit(max(batches - 1, 1), SURE))
 
 
