@@ -1,14 +1,19 @@
 """Measure what a sweep costs beside its physics: starting, and 10,000 jobs without time series.
 
-    python tests/campaigns/measure_throughput.py tests/results/throughput.json [jobs]
+    python tests/campaigns/measure_throughput.py tests/results/throughput.json [jobs] [commit]
 
 All times are of whole processes, medians of a few in turn. The sweep has no error bars, so that
 the wall times which its jobs store are all of the kernel's work; the pure kernel runs the same
 cases in one process and is doubled for two cores.
+
+Then this version and another commit are compared, by the same libraries: each measure of both in
+turn, the first one first and last by turns, and the median of the ratios of neighbours.
 """
 
 import json
 import math
+import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -37,16 +42,66 @@ COMMANDS = {
     "the same with the extra dask installed": ["-c", f"import compressor; {ONE_CASE}"],
     "compsim run configs/*.yaml": ["-m", "compsim", "run", *CONFIGS, "-j", "2", "--quiet"],
 }  # fmt: skip
+BEFORE = "60cbe80"  # with which this version is compared: that before it was made faster
+SOLVER = """
+import json, sys, time
+from compressor.cases import Case
+from compressor.solve.attempts import attempt
+found = {}
+for joint in ("big_end", "small_end", "both"):
+    values = {"joint": joint, "clearance_mm": 0.2, "solve": {"error_bars": False}}
+    case = Case.from_values(values | {"output": {"keep": "metrics"}})
+    times = []
+    for _ in range(60):
+        began = time.perf_counter()
+        run = attempt(case, case.rtol, 60.0, False)
+        times.append(time.perf_counter() - began)
+    found[f"an evaluation, {joint}, ns"] = 1e9 * min(times[1:]) / run.trajectory.evaluations
+print(json.dumps(found))
+"""
+CALLS = """
+import json, time
+from compressor.cases import Case
+from compressor.solve.simulate import measure, simulate
+found = {}
+values = {"joint": "big_end", "clearance_mm": 0.2}
+without = values | {"solve": {"error_bars": False}}
+for name, call, case in (
+    ("measure without bars, ms", measure, without | {"output": {"keep": "metrics"}}),
+    ("measure with bars, ms", measure, values | {"output": {"keep": "metrics"}}),
+    ("simulate without bars, ms", simulate, without),
+    ("simulate with bars, ms", simulate, values),
+):
+    case, times = Case.from_values(case), []
+    for _ in range(60):
+        began = time.perf_counter()
+        call(case)
+        times.append(time.perf_counter() - began)
+    found[name] = 1e3 * min(times[1:])
+print(json.dumps(found))
+"""
+SWEPT = 3_000  # jobs of a sweep that is compared
+PLANNED = 100_000
+TURNS = 4
 ROUNDS = 5
 WORKERS = 2
 SAMPLE = 100  # cases that the pure kernel runs
 
 
-def wall(arguments, folder):
-    """Wall time (s) of a Python process."""
+def wall(arguments, folder, tree=ROOT):
+    """Wall time (s) of a Python process, with the sources of a tree."""
     began = time.perf_counter()
-    subprocess.run([sys.executable, *arguments], cwd=folder, check=True, capture_output=True)
+    said(arguments, folder, tree)
     return time.perf_counter() - began
+
+
+def said(arguments, folder, tree):
+    """What a Python process says, with the sources of a tree."""
+    where = os.environ | {"PYTHONPATH": f"{tree}{os.pathsep}{tree / 'cmd'}"}
+    command = [sys.executable, *arguments]
+    return subprocess.run(
+        command, cwd=folder, check=True, capture_output=True, text=True, env=where
+    ).stdout
 
 
 def starting():
@@ -61,7 +116,7 @@ def starting():
     return {name: round(statistics.median(found), 3) for name, found in times.items()}
 
 
-def many(jobs):
+def many(jobs, bars=False):
     """A study of big-end jobs without time series, as a case file."""
     side = next(n for n in range(math.isqrt(jobs), 0, -1) if jobs % n == 0)
     return json.dumps(
@@ -70,10 +125,62 @@ def many(jobs):
             "joint": "big_end",
             "clearance_mm": np.linspace(0.1, 0.3, side).tolist(),
             "machine": {"rod_mass_kg": np.linspace(3, 5, jobs // side).tolist()},
-            "solve": {"error_bars": False},
+            "solve": {"error_bars": bars},
             "output": {"keep": "metrics"},
         }
     )
+
+
+def measures(tree):
+    """What is compared, measured once with the sources of a tree: by name, a number."""
+    found = {}
+    with tempfile.TemporaryDirectory(dir=".") as folder:
+        for script in (SOLVER, CALLS):
+            found |= json.loads(said(["-c", script], folder, tree))
+        first = COMMANDS["first simulate in a new process"]
+        found["first simulate in a new process, s"] = wall(first, folder, tree)
+        for name, text, words in (
+            ("plan", many(PLANNED), ["plan", "--max-jobs", str(PLANNED)]),
+            ("sweep without bars", many(SWEPT), ["run", "-j", str(WORKERS), "--quiet"]),
+            ("sweep with bars", many(SWEPT // 3, True), ["run", "-j", str(WORKERS), "--quiet"]),
+        ):
+            Path(folder, "many.yaml").write_text(text, encoding="utf-8")
+            command = ["-m", "compsim", words[0], "many.yaml", *words[1:], "-o", name]
+            seconds = wall(command, folder, tree)
+            if name == "plan":
+                found[f"plan of {PLANNED:,} jobs, s"] = seconds
+            else:
+                jobs = len(read_store(Path(folder, name)).rows)
+                found[f"{name}, ms a job"] = 1e3 * seconds / jobs
+    return found
+
+
+def compared(commit):
+    """This version and another commit: the median of each measure, and of the ratios in turn."""
+    with tempfile.TemporaryDirectory() as folder:
+        other = Path(folder, "other")
+        git = ["git", "-C", str(ROOT), "worktree"]
+        subprocess.run([*git, "add", "--detach", str(other), commit], check=True)
+        try:
+            for tree in (ROOT, other):  # compiled before anything counts
+                said(["-c", SOLVER], folder, tree)
+                said(["-c", CALLS], folder, tree)
+            pairs = []
+            for turn in range(TURNS):
+                trees = (ROOT, other) if turn % 2 else (other, ROOT)
+                found = {tree: measures(tree) for tree in trees}
+                pairs.append((found[ROOT], found[other]))
+        finally:
+            subprocess.run([*git, "remove", "--force", str(other)], check=True)
+    median = statistics.median
+    return {
+        name: {
+            "now": median(now[name] for now, _ in pairs),
+            "before": median(before[name] for _, before in pairs),
+            "times as fast": median(before[name] / now[name] for now, before in pairs),
+        }
+        for name in pairs[0][0]
+    }
 
 
 def sweeping(jobs):
@@ -81,7 +188,10 @@ def sweeping(jobs):
     with tempfile.TemporaryDirectory(dir=".") as folder:
         path = Path(folder, "many.yaml")
         path.write_text(many(jobs), encoding="utf-8")
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds = wall(["-m", "compsim", "run", "many.yaml", "-j", str(WORKERS), "--quiet"], folder)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        busy = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
         numbers = read_store(Path(folder, "results")).rows.numbers
         again = wall(["-m", "compsim", "run", "many.yaml", "--quiet"], folder)
         (study,) = load_studies(path)
@@ -96,12 +206,15 @@ def sweeping(jobs):
         "jobs_per_s": round(len(numbers) / seconds, 1),
         "kernel_share": round(kernel / WORKERS / seconds, 3),
         "kernel_ms": round(1e3 * kernel / len(numbers), 3),
+        "other_share": round((busy - kernel) / WORKERS / seconds, 3),
+        "idle_share": round(1 - busy / WORKERS / seconds, 3),
         "alone_jobs_per_s": round(WORKERS / alone, 1),
     }
 
 
-def main(target, jobs=10_000):
+def main(target, jobs=10_000, commit=BEFORE):
     kept = {**provenance("make throughput"), "start": starting(), "sweep": sweeping(int(jobs))}
+    kept |= {"before": commit, "compared": compared(commit)}
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(kept, indent=1))
 

@@ -1,6 +1,8 @@
 """Pictures of figures by two processes: the same bytes, and none lost with a process."""
 
 import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -33,12 +35,26 @@ def alone(figures):
     return {f"{n}.{kind}": render(figures[n], kind) for n in NAMES for kind in ("png", "svg")}
 
 
+@pytest.fixture
+def threadless(request):
+    """No thread in this process; where other tests have left some, a process without runs it."""
+    if threading.active_count() == 1:
+        return
+    test = f"{__file__}::{request.node.name}"
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", test]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    pytest.skip("passed in a process without threads")
+
+
+@pytest.mark.usefixtures("threadless")
 def test_two_processes_draw_what_one_does(figures, alone, capfd):
     assert pictures(figures, HEADINGS) == alone
     told = capfd.readouterr().err.splitlines()
     assert sorted(told) == sorted(f"drawing Figure {name}" for name in NAMES)
 
 
+@pytest.mark.usefixtures("threadless")
 def test_another_process_takes_part(figures, monkeypatch, tmp_path):
     def noted(figure):
         (tmp_path / str(os.getpid())).touch()
@@ -50,6 +66,7 @@ def test_another_process_takes_part(figures, monkeypatch, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} > {str(os.getpid())}
 
 
+@pytest.mark.usefixtures("threadless")
 def test_a_process_that_dies_costs_nothing(figures, alone, monkeypatch):
     def deadly(figure):
         if os.getpid() != here:
@@ -61,6 +78,7 @@ def test_a_process_that_dies_costs_nothing(figures, alone, monkeypatch):
     assert pictures(figures, HEADINGS) == alone
 
 
+@pytest.mark.usefixtures("threadless")
 def test_an_error_of_the_other_process_is_raised(figures, monkeypatch):
     def failing(figure):
         if os.getpid() != here:
