@@ -185,6 +185,29 @@ def test_no_width_needs_to_scroll_sideways(page, tmp_path, width, dark):
         assert (sum(map(int, re.findall(r"\d+", ground)[:3])) < 200) == dark
 
 
+CUT = """
+return [...document.querySelectorAll(".plot")].flatMap(plot => {
+  const room = plot.getBoundingClientRect();
+  return [...plot.querySelectorAll(".ytick text, .xtick text, .annotation-text")].filter(text => {
+    const one = text.getBoundingClientRect();
+    return one.left < room.left - 1 || one.right > room.right + 1;
+  }).map(text => plot.closest("figure").id + ": " + text.textContent);
+});
+"""
+
+
+@pytest.mark.parametrize("width", [1400, 800, 360])
+def test_no_word_in_a_figure_is_cut(page, own, tmp_path, width):
+    with browser(tmp_path, width, 900) as driven:
+        for folder in (own, page):
+            opened(driven, folder)
+            names = "return [...document.querySelectorAll('figure')].map(f => f.id)"
+            for name in driven.execute_script(names):
+                live(driven, name)
+            assert driven.execute_script("return document.querySelectorAll('.ytick').length") > 10
+            assert not (cut := driven.execute_script(CUT)), "\n".join(cut)
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_axe_finds_no_serious_violation(page, own, tmp_path, dark):
     axe = axe_script()

@@ -199,3 +199,16 @@ def test_the_library_lies_beside_the_page(tmp_path):
     path.write_bytes(b"of another version")
     publish_library(tmp_path)
     assert path.stat().st_size > 1e6
+
+
+def test_a_word_beside_a_line_stands_where_the_line_does():
+    figure = Figure()
+    panel = figure.subplots()
+    panel.set_xlim(0, 200)
+    panel.annotate(
+        "order 12", (12, 1), (4, -4), xycoords=panel.get_xaxis_transform(),
+        textcoords="offset points",
+    )  # fmt: skip
+    (note,) = extract(figure).panels[0].notes
+    assert (note.text, note.inside) == ("order 12", True)
+    assert (note.x, note.y) == pytest.approx((0.06, 1.0))

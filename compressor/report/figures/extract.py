@@ -9,6 +9,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 from matplotlib.ticker import MultipleLocator
+from matplotlib.transforms import Transform
 
 from compressor.report.figures.artists import Names, every_trace, in_data, legend_names, pattern
 from compressor.report.figures.shown import Note, Panel, Scale, Sheet
@@ -110,6 +111,10 @@ def notes(axes: Axes) -> Iterator[Note]:
             if isinstance(text, Annotation) and text.xycoords == "data":
                 x, y = map(float, text.xy)
                 yield Note(words, x, y, to_hex(text.get_color()))
+            elif isinstance(text, Annotation) and isinstance(text.xycoords, Transform):
+                place = text.xycoords.transform(text.xy)
+                x, y = map(float, axes.transAxes.inverted().transform(place))
+                yield Note(words, x, y, to_hex(text.get_color()), inside=True)
             else:
                 inside = not in_data(axes, text)
                 yield Note(words, x, y, to_hex(text.get_color()), inside=inside)

@@ -155,6 +155,17 @@ const escaped = (text) =>
   text.replace(/[&<>]/g, (letter) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[letter])
     .replace(/\b([A-Za-zδ])_([A-Za-z0-9]{1,3})\b/g, "$1<sub>$2</sub>");
 
+// Text in lines that some pixels hold; a letter takes half the size of its font, or a little more.
+const LETTER = 0.56;
+const wrapped = (text, room, size) => {
+  const most = Math.max(8, Math.floor(room / (LETTER * size)));
+  return text.split("\n").flatMap((part) => part.split(" ").reduce((lines, word) => {
+    const last = lines.pop();
+    const longer = last === "" ? word : `${last} ${word}`;
+    return longer.length > most && last ? [...lines, last, word] : [...lines, longer];
+  }, [""])).map(escaped).join("<br>");
+};
+
 // the printed figures' colours, made light enough for a dark ground
 const ON_DARK = {
   "#000000": "#f2f2f2", "#1f4488": "#86aef5", "#d0583b": "#f08a6f", "#ecb44a": "#f2c46d",
@@ -300,6 +311,11 @@ class Figure {
       const sum = (part) => part.reduce((a, b) => a + b, 0);
       return [sum(sizes.slice(0, first)) / sum(sizes), sum(sizes.slice(0, last)) / sum(sizes)];
     };
+    // What words at an axis take; those of the first column are given room by all columns.
+    const letters = (panel) => Math.max(0, ...(panel.y.words ?? []).map(([, t]) => t.length));
+    const room = (panel) => Math.max(62, 24 + 6.6 * letters(panel));
+    const first = panels.filter((panel) => panel.column[0] === 0 && !panel.y.bare);
+    const lead = narrow ? 0 : Math.min(0.4 * width, Math.max(62, ...first.map(room))) - 62;
     return { total, narrow, boxes: panels.map((panel, n) => {
       const [across, down] = [n % columns, Math.floor(n / columns)];
       const [left, right] = narrow ? [across / columns, (across + 1) / columns]
@@ -307,12 +323,14 @@ class Figure {
       const [top, bottom] = narrow ? [down / rows, (down + 1) / rows] : share(heights, panel.row);
       const scale = panel.traces.some((trace) => trace.kind === "map") ? 62 : 0;
       const bare = panel.y.bare && !narrow;
-      const words = bare ? 0 : Math.max(0, ...(panel.y.words ?? []).map(([, t]) => t.length));
-      const wide = bare ? 24
-        : Math.min(0.55 * width * (right - left), Math.max(62, 24 + 6.6 * words));
-      const box = { x: [left * width + wide, right * width - 14 - scale],
+      const [from, to] = [left, right].map((share) => lead + share * (width - lead));
+      const led = !narrow && panel.column[0] === 0;
+      const wide = bare ? 24 : led ? 62 : Math.min(0.6 * (to - from), room(panel));
+      const given = wide + (led ? lead : 0) - 24;
+      const box = { x: [from + wide, to - 14 - scale],
         y: [(1 - bottom) * total + 48, (1 - top) * total - 30] };
-      return { x: box.x.map((at) => at / width), y: box.y.map((at) => at / total) };
+      return { x: box.x.map((at) => at / width), y: box.y.map((at) => at / total),
+        font: Math.max(8, 12 * Math.min(1, given / Math.max(1, 6.6 * letters(panel)))) };
     }) };
   }
 
@@ -347,6 +365,7 @@ class Figure {
           title: { text: titled ? escaped(scale.title) : "", standoff: 6, font: { size: 12 } },
         };
         if (way === "x") made.unifiedhovertitle = { text: `%{x:.6~g} ${escaped(scale.unit)}` };
+        if (way === "y" && scale.words) made.tickfont = { size: boxes[n].font };
         if (scale.words) {
           made.tickmode = "array";
           made.tickvals = scale.words.map(([at]) => at);
@@ -366,10 +385,11 @@ class Figure {
       layout[`yaxis${n ? n + 1 : ""}`] = axis("y", boxes[n].y, x, true);
       if (panel.square) layout[`yaxis${n ? n + 1 : ""}`].scaleanchor = x;
       if (panel.title) {
-        layout.annotations.push({ text: `<b>${escaped(panel.title)}</b>`, showarrow: false,
+        const room = width * (boxes[n].x[1] - boxes[n].x[0]);
+        const size = Math.max(9.5, Math.min(13, 1.75 * room / panel.title.length));
+        layout.annotations.push({ text: `<b>${wrapped(panel.title, room + 12, size)}</b>`,
           xref: "paper", yref: "paper", x: boxes[n].x[0], y: boxes[n].y[1], xanchor: "left",
-          yanchor: "bottom", yshift: 4, font: { size: Math.max(9.5, Math.min(13,
-            1.75 * width * (boxes[n].x[1] - boxes[n].x[0]) / panel.title.length)) } });
+          yanchor: "bottom", yshift: 4, align: "left", showarrow: false, font: { size } });
       }
       panel.traces.forEach((trace) => {
         const made = this.trace(trace, panel, boxes[n]);
@@ -377,7 +397,7 @@ class Figure {
         made.yaxis = y;
         data.push(made);
       });
-      panel.notes.forEach((note) => this.note(note, layout, x, y, panel));
+      panel.notes.forEach((note) => this.note(note, layout, x, y, panel, boxes[n].x));
     });
     layout.hovermode = this.sheet.unified ? "x unified" : "closest";
     return { data, layout };
@@ -449,7 +469,7 @@ class Figure {
     return made;
   }
 
-  note(note, layout, x, y, panel) {
+  note(note, layout, x, y, panel, [left, right]) {
     const color = tone(note.color);
     const log = (value, scale) => (scale.log ? Math.log10(value) : value);
     if (!note.text) {
@@ -461,11 +481,17 @@ class Figure {
         line: { color, width: 1, dash: note.dash.length ? "dash" : "solid" } });
       return;
     }
-    const inside = note.inside;
-    layout.annotations.push({ text: escaped(note.text), showarrow: false,
+    const [inside, size] = [note.inside, 11];
+    const [low, high] = panel.x.range.map((end) => log(end, panel.x));
+    const share = inside ? note.x : (log(note.x, panel.x) - low) / (high - low);
+    const at = this.width * (left + share * (right - left)); // px from the figure's left
+    const long = LETTER * size * Math.max(...note.text.split("\n").map((line) => line.length));
+    const before = inside && note.x > 0.5 || (at > this.width / 2 && at + long > this.width);
+    layout.annotations.push({ showarrow: false, align: "left", font: { size, color },
+      text: wrapped(note.text, (before ? at : this.width - at) - 6, size),
       xref: inside ? `${x} domain` : x, yref: inside ? `${y} domain` : y,
       x: inside ? note.x : log(note.x, panel.x), y: inside ? note.y : log(note.y, panel.y),
-      xanchor: inside && note.x > 0.5 ? "right" : "left", font: { size: 11, color } });
+      xanchor: before ? "right" : "left" });
   }
 }
 
