@@ -76,9 +76,6 @@ class Column:
     def __abs__(self) -> "Column":
         return Column(np.abs(self.numbers))
 
-    def __neg__(self) -> "Column":
-        return Column(-self.numbers)
-
     __add__, __radd__ = _by(operator.add)
     __sub__, __rsub__ = _by(operator.sub)
     __mul__, __rmul__ = _by(operator.mul)

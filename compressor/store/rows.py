@@ -97,12 +97,16 @@ class Rows:
     @cached_property
     def barred(self) -> np.ndarray:
         """Whether metrics have error bars, (jobs,)."""
-        return ~np.isnan(self._numbers("peak_acceleration_error")["peak_acceleration_error"])
+        return ~np.isnan(self._estimates["peak_acceleration_error"])
 
     @cached_property
     def foretold(self) -> np.ndarray:
         """Whether it is known how long a job's motion can be foretold, (jobs,)."""
-        return ~np.isnan(self._numbers(HORIZON)[HORIZON])
+        return ~np.isnan(self._estimates[HORIZON])
+
+    @cached_property
+    def _estimates(self) -> np.ndarray:
+        return self._numbers("peak_acceleration_error", HORIZON)
 
     def _numbers(self, *names: str) -> np.ndarray:
         found: np.ndarray | None = None

@@ -212,8 +212,8 @@ def decode(data: bytes, path: Path) -> Segment:
                 raise ValueError(name)
         for name in NUMBERS:
             if name in file:
-                shape, kind = (rows, *ROW[name].shape), file[name].dtype.kind
-                if file[name].shape != shape or kind != "f":
+                values = file[name][()]  # not kept: what cannot be read is told now
+                if values.shape != (rows, *ROW[name].shape) or values.dtype.kind != "f":
                     raise ValueError(name)
         blobs = (file[name][()].tobytes() for name in ("attributes", "details"))
         return Segment(path, columns, data, *blobs)

@@ -15,7 +15,7 @@ from compressor.store import Folder, read_store, series_file
 from compressor.sweep.wanted import Wanted, stored
 from compressor.sweep.warm_up import Needs, load_telling
 
-ROW_BYTES = 341  # of one job in a file of rows, measured by `make store-bench`
+ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
 MOST_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
 
 

@@ -1,6 +1,6 @@
 """The jobs that studies want, each once, and how those of them ended that are stored."""
 
-from collections.abc import Container, Hashable, Iterator, MutableMapping, Sequence
+from collections.abc import Container, Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, overload
 
@@ -21,7 +21,7 @@ class End(NamedTuple):
 WELL = End("ok", "", "")
 
 
-class Wanted(MutableMapping[str, Case]):
+class Wanted(Mapping[str, Case]):
     """Each selected job once, by key; its case is built when it is asked for.
 
     Where studies share a job, its case serves them all. A case can be changed in what is no part of
@@ -50,10 +50,6 @@ class Wanted(MutableMapping[str, Case]):
 
     def __setitem__(self, key: str, case: Case) -> None:
         self.own[key] = case
-
-    def __delitem__(self, key: str) -> None:
-        del self.places[key]
-        self.own.pop(key, None)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.places)
@@ -126,9 +122,10 @@ def stored(store: Stored, wanted: Wanted) -> dict[str, End]:
         ):
             key = keys[at]
             if serves and rows.intact(position):
-                well = rows.columns["status"][position] == b"ok"
-                end = WELL if well else store.status_at(position)
-                found[key] = End(end.status, end.reason, end.detail)
+                found[key] = WELL
+                if rows.columns["status"][position] != b"ok":
+                    end = store.status_at(position)
+                    found[key] = End(end.status, end.reason, end.detail)
             else:
                 wanted[key] = store.status_at(position).kept_by(wanted[key])
     return found

@@ -240,7 +240,7 @@ def test_columns_divide_and_take_powers_as_numbers_do(many, other):
     assert (column**other).numbers.tolist() == [a**other for a in many]
     assert (other**column).numbers.tolist() == [other**a for a in many]
     assert round(column).numbers.tolist() == [round(a) for a in many]
-    assert abs(-column).numbers.tolist() == many
+    assert abs(0.0 - column).numbers.tolist() == many
 
 
 def test_a_condition_that_holds_for_some_alone_is_mixed():

@@ -14,6 +14,7 @@ from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, NUMBERS, QUANTILES, SOMETIMES, STATISTICS
 from compressor.solve.simulate import measure, simulate
 from compressor.store.export import export
+from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import open_study, read_store
 from compressor.store.segment import LATER, decode, encode, of_outcomes
 from compressor.store.status import standings
@@ -69,6 +70,20 @@ def test_results_of_before_are_read_without_either(plain, tmp_path):
         assert newer.columns[name].tolist() != [b""] or name == "signals"
     for name in NUMBERS:
         np.testing.assert_array_equal(older.numbers()[name], newer.numbers()[name])
+
+
+def test_numbers_that_cannot_be_read_are_told_when_the_file_is(plain, tmp_path):
+    """They are read again when they are asked for: a file of many jobs must not fail then."""
+    stream = io.BytesIO(encode(of_outcomes([plain] * 50, 1)))
+    with h5py.File(stream, "r+") as file:
+        del file["rms_acceleration"]
+        file.create_dataset("rms_acceleration", data=np.arange(50.0), compression="gzip")
+        place = file["rms_acceleration"].id.get_chunk_info(0).byte_offset
+    decode(stream.getvalue(), tmp_path / "rows/000000001-0.h5")
+    data = bytearray(stream.getvalue())
+    data[place : place + 4] = b"\xff" * 4
+    with pytest.raises(DamagedJob):
+        decode(bytes(data), tmp_path / "rows/000000001-0.h5")
 
 
 def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring):

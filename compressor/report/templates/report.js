@@ -159,11 +159,11 @@ const escaped = (text) =>
 const LETTER = 0.56;
 const wrapped = (text, room, size) => {
   const most = Math.max(8, Math.floor(room / (LETTER * size)));
-  return text.split("\n").flatMap((part) => part.split(" ").reduce((lines, word) => {
+  return text.split(" ").reduce((lines, word) => {
     const last = lines.pop();
-    const longer = last === "" ? word : `${last} ${word}`;
+    const longer = last ? `${last} ${word}` : word;
     return longer.length > most && last ? [...lines, last, word] : [...lines, longer];
-  }, [""])).map(escaped).join("<br>");
+  }, [""]).map(escaped).join("<br>");
 };
 
 // the printed figures' colours, made light enough for a dark ground
@@ -313,7 +313,7 @@ class Figure {
     };
     // What words at an axis take; those of the first column are given room by all columns.
     const letters = (panel) => Math.max(0, ...(panel.y.words ?? []).map(([, t]) => t.length));
-    const room = (panel) => Math.max(62, 24 + 6.6 * letters(panel));
+    const room = (panel) => Math.max(62, 24 + LETTER * 12 * letters(panel));
     const first = panels.filter((panel) => panel.column[0] === 0 && !panel.y.bare);
     const lead = narrow ? 0 : Math.min(0.4 * width, Math.max(62, ...first.map(room))) - 62;
     return { total, narrow, boxes: panels.map((panel, n) => {
@@ -330,7 +330,7 @@ class Figure {
       const box = { x: [from + wide, to - 14 - scale],
         y: [(1 - bottom) * total + 48, (1 - top) * total - 30] };
       return { x: box.x.map((at) => at / width), y: box.y.map((at) => at / total),
-        font: Math.max(8, 12 * Math.min(1, given / Math.max(1, 6.6 * letters(panel)))) };
+        font: Math.max(8, 12 * Math.min(1, given / Math.max(1, LETTER * 12 * letters(panel)))) };
     }) };
   }
 
@@ -485,8 +485,8 @@ class Figure {
     const [low, high] = panel.x.range.map((end) => log(end, panel.x));
     const share = inside ? note.x : (log(note.x, panel.x) - low) / (high - low);
     const at = this.width * (left + share * (right - left)); // px from the figure's left
-    const long = LETTER * size * Math.max(...note.text.split("\n").map((line) => line.length));
-    const before = inside && note.x > 0.5 || (at > this.width / 2 && at + long > this.width);
+    const long = at + LETTER * size * note.text.length > this.width;
+    const before = inside && note.x > 0.5 || (long && at > this.width / 2);
     layout.annotations.push({ showarrow: false, align: "left", font: { size, color },
       text: wrapped(note.text, (before ? at : this.width - at) - 6, size),
       xref: inside ? `${x} domain` : x, yref: inside ? `${y} domain` : y,
