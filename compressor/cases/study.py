@@ -87,10 +87,11 @@ class Cases(Sequence[Case]):
 
     def __init__(self, name: str, parts: Sequence[Block]):
         self.name, self.parts = name, parts
+        self.ends = list(itertools.accumulate(len(part.kept) for part in parts))
         self._keys: list[str] = []
 
     def __len__(self) -> int:
-        return sum(len(part.kept) for part in self.parts)
+        return self.ends[-1] if self.ends else 0
 
     @overload
     def __getitem__(self, index: int) -> Case: ...
@@ -166,11 +167,10 @@ class Cases(Sequence[Case]):
             yield from self.combinations()
             return
         numbers = (sheet.numbers[sheet.doubtful()] for sheet in sheets)
-        ends = list(itertools.accumulate(len(part.kept) for part in self.parts))
         for number in sorted(itertools.chain.from_iterable(one.tolist() for one in numbers)):
-            at = bisect.bisect_right(ends, number)
+            at = bisect.bisect_right(self.ends, number)
             part = self.parts[at]
-            yield part, part.chosen(part.kept[number - ends[at] + len(part.kept)])
+            yield part, part.chosen(part.kept[number - self.ends[at] + len(part.kept)])
 
     def case(self, chosen: Mapping[str, Node]) -> Case:
         """The case of one combination. Raises CaseError where its values do not fit."""
