@@ -3,9 +3,9 @@
 from compressor.physics.contact_laws import Law, Power, elastic_form
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.loads import (
+    complete,
     gas_corners,
     greatest_load,
-    load_corners,
     sample_segments,
     segments,
     static_load,
@@ -19,11 +19,10 @@ from compressor.physics.observe import (
     observe,
     observe_all,
 )
-from compressor.physics.record import FREEDOMS, STATE_NAMES, Load, Scene, derive, new_record
+from compressor.physics.record import FREEDOMS, STATE_NAMES, Load, Scene, new_record
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
 from compressor.physics.tally import (
-    TALLY,
     add_flows,
     contact_within,
     lobatto,
@@ -33,4 +32,4 @@ from compressor.physics.tally import (
     tally_step,
 )
 from compressor.physics.twin import march_twins, new_rows
-from compressor.physics.walker import WALKER, Status, Work, new_walker, new_work
+from compressor.physics.walker import Status, Work, new_walker, new_work

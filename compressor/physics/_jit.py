@@ -18,7 +18,6 @@ from compressor.program import machine_code_folder
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 ENABLED = os.environ.get("COMPSIM_JIT", "1") != "0"
-FUSED = {"contract"}  # of what numba calls fast-math, this alone
 
 
 def discard_other_code(folder: Path) -> None:
@@ -74,7 +73,7 @@ def _compiled(function: Function, **options: Any) -> Function:
     def make() -> Any:
         import numba
 
-        how: Any = {"cache": True, "error_model": "numpy", "fastmath": FUSED, **options}
+        how: Any = {"cache": True, "error_model": "numpy", **options}
         return numba.njit(**how)(function)
 
     deferred: Any = Deferred(make, function)
@@ -84,9 +83,10 @@ def _compiled(function: Function, **options: Any) -> Function:
 def jit(function: Function) -> Function:
     """Compile `function` on its first call and keep the machine code on disk.
 
-    Arithmetic is IEEE's, in the order written, but that a product and a sum may be fused, rounded
-    once; that takes a tenth off a step. A division by zero gives inf or nan, not an exception, so
-    that the caller can judge a state that went wrong. As it is with ``COMPSIM_JIT=0``.
+    Arithmetic is IEEE's, in the order written, so that a run has the same bits by itself and in a
+    lane beside others; fusing products and sums would take a tenth off a step. A division by zero
+    gives inf or nan, not an exception, so that the caller can judge a state that went wrong. As it
+    is with ``COMPSIM_JIT=0``.
     """
     return _compiled(function)
 

@@ -10,8 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import inlined, jit
+from compressor.physics.elementary import direction
 
-SIXTH, TWELFTH, THIRTIETH, FORTY_SECOND = 1 / 6, 1 / 12, 1 / 30, 1 / 42  # faster than to divide
+SMALL = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
+# their coefficients: faster than to divide
+S3, S5, S7, S9 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880
+C4, C6, C8 = 1 / 24, -1 / 720, 1 / 40320
 
 
 class Motion(NamedTuple):
@@ -53,24 +57,24 @@ def ideal_at(cos_theta, sin_theta, p):
 
 
 @inlined
-def small_angle(angle):
-    """Sine and cosine; below a hundredth of a radian by their series, which are exact there."""
-    if abs(angle) > 0.01:
-        sine, cosine = math.sin(angle), math.cos(angle)
-    else:
-        square = angle * angle
-        sine = angle * (
-            1.0 - square * SIXTH * (1.0 - square * 0.05 * (1.0 - square * FORTY_SECOND))
-        )
-        cosine = 1.0 - square * 0.5 * (1.0 - square * TWELFTH * (1.0 - square * THIRTIETH))
+def small_angle(angle, p):
+    """Sine and cosine of an angle (rad); up to SMALL by their series, which are exact there.
+
+    Where the record says that no angle is `wide`, there is nothing but the series.
+    """
+    if p.wide and abs(angle) > SMALL:
+        return math.sin(angle), math.cos(angle)
+    s = angle * angle
+    q = s * s
+    sine = angle + angle * s * ((S3 + s * S5) + q * (S7 + s * S9))
+    cosine = 1.0 - (0.5 * s - q * (C4 + (s * C6 + q * C8)))
     return sine, cosine
 
 
 @inlined
 def crank_direction(t, p):
     """Cosine and sine of the crank angle at time t (s)."""
-    theta = p.omega * t
-    return math.cos(theta), math.sin(theta)
+    return direction(p.omega * t)
 
 
 @inlined
@@ -79,7 +83,7 @@ def ideal_after(base, span, p):
 
     A step turns the crank by little, so that these need no sine and cosine of their own.
     """
-    sine, cosine = small_angle(p.omega * span)
+    sine, cosine = small_angle(p.omega * span, p)
     return ideal_at(base[0] * cosine - base[1] * sine, base[1] * cosine + base[0] * sine, p)
 
 

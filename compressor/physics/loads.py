@@ -12,7 +12,7 @@ import numpy as np
 
 from compressor.physics._jit import jit
 from compressor.physics.kinematics import angle_at
-from compressor.physics.record import Load
+from compressor.physics.record import Load, derive
 
 TYPICAL = int(Load.TYPICAL)
 DESIGN = int(Load.DESIGN)
@@ -126,6 +126,12 @@ def load_corners(p, pressure_ratio, printed):
     if p["load"] == Load.DESIGN:
         return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
     return printed_corners() if printed else gas_corners(p, pressure_ratio)
+
+
+def complete(p, pressure_ratio, printed):
+    """Fill the fields of a record that follow from its others, its corners as `load_corners`."""
+    p["corners"] = load_corners(p, pressure_ratio, printed)
+    derive(p)
 
 
 def segments(p, duration):

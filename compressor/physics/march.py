@@ -22,7 +22,6 @@ from compressor.physics.observe import (
 )
 from compressor.physics.onset import change, first_onset
 from compressor.physics.runge_kutta import (
-    MIDWAY,
     STAGES,
     combine,
     error_norm,
@@ -32,20 +31,22 @@ from compressor.physics.runge_kutta import (
     weights_at,
 )
 from compressor.physics.step_control import (
+    LEAST_STEP,
     choose_method,
     controlled,
     first_step,
     refuse,
 )
 from compressor.physics.tally import (
-    lobatto,
     near_record,
     share_apart,
     tally_energy,
     tally_step,
 )
 from compressor.physics.walker import (
+    COARSE_WEIGHTS,
     DONE,
+    NODE_WEIGHTS,
     NODES,
     NON_FINITE,
     PENETRATION_IMPLAUSIBLE,
@@ -55,11 +56,8 @@ from compressor.physics.walker import (
     Work,
 )
 
-LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
 MIDDLE = NODES.size // 2
-COARSE_WEIGHTS = np.zeros(NODES.size)
-COARSE_WEIGHTS[::MIDDLE] = lobatto(3)[1]
 INWARD = np.array([2, 1, 3])  # nodes between a step's ends, the middle first
 
 rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
@@ -100,43 +98,6 @@ def may_change(rows, p):
 
 
 @inlined
-def look_at_step(w, base, h, z, work, phase, p, tally):
-    """Observe the step's interpolant at its nodes; returns every which one.
-
-    An explicit step is looked at in its middle and at its ends, where its last stage has gauged
-    it already; also between them if contact may change or a peak be beaten, for which the
-    interpolant is laid.
-    """
-    last = NODES.size - 1
-    n = work.y.size
-    if w.stiff:
-        rosenbrock_extend(z, work.new, work.k[1:], work.dense)
-        gauge(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
-    w.laid = w.stiff
-    if w.observed:  # the last step's end is this step's begin
-        for j in range(ACCELERATION, COLUMNS):
-            work.rows[0, j] = work.row[j]
-    else:
-        glance(ideal(w.t, p), z[:n], phase, p, work.rows[0])
-    every = 1 if w.stiff else MIDDLE
-    for i in INWARD:
-        if w.laid:
-            interpolate(NODES[i], work.dense, work.y)
-        elif i == MIDDLE:
-            combine(MIDWAY[w.pair], h, z, work.k, work.y)
-        else:
-            break
-        glance(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
-        if i == MIDDLE and not w.stiff:
-            beaten = w.t >= w.settle and near_record(work.rows, MIDDLE, tally)
-            if beaten or may_change(work.rows, p):
-                every = 1
-                extend(w.pair, h, z, work.k, work.dense)
-                w.laid = 1
-    return every
-
-
-@inlined
 def may_touch(rows, p):
     """Whether contact may begin within a step, by the nearness at its nodes.
 
@@ -155,6 +116,47 @@ def may_touch(rows, p):
 
 
 @inlined
+def look_at_step(w, base, h, z, work, phase, p, tally):
+    """Observe the step's interpolant at its nodes; returns every which one.
+
+    An explicit step is looked at in its middle and at its ends, where its last stage has gauged
+    it already; also between them if a peak may be beaten, or if contact may change, for which the
+    interpolant is laid.
+    """
+    last = NODES.size - 1
+    n = work.y.size
+    if w.stiff:
+        rosenbrock_extend(z, work.new, work.k[1:], work.dense)
+        gauge(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
+    w.laid = w.stiff
+    if w.observed:  # the last step's end is this step's begin
+        for j in range(ACCELERATION, COLUMNS):
+            work.rows[0, j] = work.row[j]
+    else:
+        glance(ideal(w.t, p), z[:n], phase, p, work.rows[0])
+    every = 1 if w.stiff else MIDDLE
+    for i in INWARD:
+        if w.stiff:
+            interpolate(NODES[i], work.dense, work.y)
+        elif i == MIDDLE or every == 1:
+            combine(NODE_WEIGHTS[w.pair, i], h, z, work.k, work.y)
+        else:
+            break
+        glance(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
+        if i == MIDDLE and not w.stiff:
+            if may_change(work.rows, p):
+                every = 1
+                extend(w.pair, h, z, work.k, work.dense)
+                w.laid = 1
+            elif w.t >= w.settle and near_record(work.rows, MIDDLE, tally):
+                every = 1
+    if every == 1 and not w.laid and may_touch(work.rows, p):
+        extend(w.pair, h, z, work.k, work.dense)
+        w.laid = 1
+    return every
+
+
+@inlined
 def onset_ahead(w, h, every, work, phase, p):
     """Whether contact begins within the step just taken; it is then to be taken again, to there.
 
@@ -162,7 +164,7 @@ def onset_ahead(w, h, every, work, phase, p):
     within the pulse that begins, or to the contact's own time scale.
     """
     found = False
-    if w.watch and every == 1 and may_touch(work.rows, p):
+    if w.watch and w.laid and may_touch(work.rows, p):
         begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
         if begin < 1.0 and not (w.landed and begin < LANDED):
             found = True

@@ -36,9 +36,9 @@ class Turn(NamedTuple):
 
 
 @jit
-def turned(motion, eta, eta_rate):
+def turned(motion, eta, eta_rate, p):
     """`Turn` of the rod from the ideal angle phi by the deviation eta, without cancellation."""
-    sin_half, cos_half = small_angle(0.5 * eta)
+    sin_half, cos_half = small_angle(0.5 * eta, p)
     dc = -2.0 * sin_half * (motion.sin_phi * cos_half + motion.cos_phi * sin_half)
     ds = 2.0 * sin_half * (motion.cos_phi * cos_half - motion.sin_phi * sin_half)
     dc_rate = -ds * motion.rate - (motion.sin_phi + ds) * eta_rate
@@ -81,7 +81,7 @@ def eccentricities_both(y, turn, p):
 @jit
 def load_force(phase, y, motion, p):
     """Piston force (N) in the state y around the ideal motion."""
-    n = y.size // 2
+    n = p.freedoms
     return piston_force(phase, motion.x + y[0], motion.v + y[n], y[0], y[n], p)
 
 
@@ -187,8 +187,8 @@ def evaluate(motion, y, phase, p):
 
     motion: `Motion` at the time; y: zeros (4) in the ideal scene.
     """
-    n = y.size // 2
-    turn = turned(motion, y[n - 1], y[2 * n - 1])
+    n = p.freedoms
+    turn = turned(motion, y[n - 1], y[2 * n - 1], p)
     load = load_force(phase, y, motion, p)
     big = NO_CONTACT
     small = NO_CONTACT
@@ -209,17 +209,29 @@ def evaluate(motion, y, phase, p):
 
 
 @inlined
-def write_derivative(now, y, p, out):
-    """Write dy/dt at an evaluated instant into out."""
-    n = y.size // 2
-    for i in range(n):
-        out[i] = y[n + i]
-    out[n] = now.a - now.motion.a
+def deviating(now, p):
+    """Accelerations (x, X, Y, phi) at an evaluated instant less the ideal motion's.
+
+    Those of the rod's centre are 0 unless it is an unknown of the scene.
+    """
+    x, y = 0.0, 0.0
     if p.scene == BOTH:
         ideal_x, ideal_y = ideal_centre_acceleration(now.motion, p)
-        out[n + 1] = now.centre_x - ideal_x
-        out[n + 2] = now.centre_y - ideal_y
-    out[2 * n - 1] = now.spin_up - now.motion.spin_up
+        x, y = now.centre_x - ideal_x, now.centre_y - ideal_y
+    return now.a - now.motion.a, x, y, now.spin_up - now.motion.spin_up
+
+
+@inlined
+def write_derivative(now, y, p, out):
+    """Write dy/dt at an evaluated instant into out."""
+    n = p.freedoms
+    for i in range(n):
+        out[i] = y[n + i]
+    accelerations = deviating(now, p)
+    out[n] = accelerations[0]
+    if p.scene == BOTH:
+        out[n + 1], out[n + 2] = accelerations[1], accelerations[2]
+    out[2 * n - 1] = accelerations[3]
 
 
 @jit

@@ -83,7 +83,7 @@ def centre_velocity(now, y, p):
     motion = now.motion
     sin_phi = motion.sin_phi + now.turn.ds
     cos_phi = motion.cos_phi + now.turn.dc
-    rate = motion.rate + y[y.size - 1]
+    rate = motion.rate + y[2 * p.freedoms - 1]
     crank = p.crank_radius * p.omega
     if p.scene == BIG_END:
         b = p.rod_length - p.rod_centre
@@ -105,7 +105,7 @@ def centre_acceleration(now, y, p):
     motion = now.motion
     sin_phi = motion.sin_phi + now.turn.ds
     cos_phi = motion.cos_phi + now.turn.dc
-    rate = motion.rate + y[y.size - 1]
+    rate = motion.rate + y[2 * p.freedoms - 1]
     if p.scene == BIG_END:
         b = p.rod_length - p.rod_centre
         ax = now.a + b * (cos_phi * rate * rate + sin_phi * now.spin_up)
@@ -150,46 +150,57 @@ def damping_power(contact):
 
 
 @inlined
-def write_powers(now, y, forces, p, out):
-    """Write the four powers (W) into out[0:4]: of crank and load, lost to damping and friction."""
+def powers(now, y, forces, p):
+    """The four powers (W): of crank and load, lost to damping and friction."""
     motion, big, small = now.motion, now.big, now.small
     crank = p.crank_radius * p.omega
-    out[0] = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
+    turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
     if p.clearance[0] > 0.0:
-        out[0] -= p.omega * (p.pin_radius - big.penetration) * big.friction
-    out[1] = -now.load * (motion.v + y[y.size // 2])
-    out[2] = damping_power(big) + damping_power(small)
-    out[3] = -big.friction * big.slip - small.friction * small.slip
+        turning -= p.omega * (p.pin_radius - big.penetration) * big.friction
+    pressing = -now.load * (motion.v + y[p.freedoms])
+    damping = damping_power(big) + damping_power(small)
+    return turning, pressing, damping, -big.friction * big.slip - small.friction * small.slip
 
 
-@jit
-def write_energies(now, y, p, row):
-    """Write kinetic and potential energy (J) into the row."""
-    v = now.motion.v + y[y.size // 2]
-    rate = now.motion.rate + y[y.size - 1]
+@inlined
+def write_powers(now, y, forces, p, out):
+    """Write the four `powers` (W) into out[0:4]."""
+    out[0], out[1], out[2], out[3] = powers(now, y, forces, p)
+
+
+@inlined
+def energies(now, y, p):
+    """Kinetic and potential energy (J)."""
+    v = now.motion.v + y[p.freedoms]
+    rate = now.motion.rate + y[2 * p.freedoms - 1]
     kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
     vx, vy, height = centre_velocity(now, y, p)
     kinetic += p.rod_mass * (vx * vx + vy * vy)
-    row[KINETIC] = 0.5 * kinetic
     big, small = now.big, now.small
     potential = elastic_energy(big.elastic, big.penetration, p)
     potential += elastic_energy(small.elastic, small.penetration, p)
-    row[POTENTIAL] = potential + p.rod_mass * p.gravity * height
+    return 0.5 * kinetic, potential + p.rod_mass * p.gravity * height
+
+
+@inlined
+def glanced(now, forces, p):
+    """The columns from ACCELERATION to NEARNESS."""
+    big, small = now.big, now.small
+    return (
+        now.a, forces[0], forces[1], forces[2], forces[3],
+        math.sqrt(forces[0] * forces[0] + forces[1] * forces[1]),
+        math.sqrt(forces[2] * forces[2] + forces[3] * forces[3]),
+        now.a - now.motion.a, big.penetration, small.penetration, big.normal, small.normal,
+        nearness(big, p.stiffness[0], p), nearness(small, p.stiffness[1], p),
+    )  # fmt: skip
 
 
 @inlined
 def write_glanced(now, forces, p, row):
     """Write the columns from ACCELERATION to NEARNESS into the row."""
-    row[ACCELERATION] = now.a
-    for i in range(4):
-        row[FORCE + i] = forces[i]
-    row[FORCE_SIZE] = math.sqrt(forces[0] * forces[0] + forces[1] * forces[1])
-    row[FORCE_SIZE + 1] = math.sqrt(forces[2] * forces[2] + forces[3] * forces[3])
-    row[DEVIATION] = now.a - now.motion.a
-    row[PENETRATION], row[PENETRATION + 1] = now.big.penetration, now.small.penetration
-    row[NORMAL], row[NORMAL + 1] = now.big.normal, now.small.normal
-    row[NEARNESS] = nearness(now.big, p.stiffness[0], p)
-    row[NEARNESS + 1] = nearness(now.small, p.stiffness[1], p)
+    columns = glanced(now, forces, p)
+    for i in range(CRANK_POWER - ACCELERATION):
+        row[ACCELERATION + i] = columns[i]
 
 
 @inlined
@@ -197,7 +208,7 @@ def write_gauged(now, y, forces, p, row):
     """Write the columns from ACCELERATION on into the row."""
     write_glanced(now, forces, p, row)
     write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
-    write_energies(now, y, p, row)
+    row[KINETIC], row[POTENTIAL] = energies(now, y, p)
 
 
 @jit
@@ -210,7 +221,7 @@ def observe(t, y, phase, p, row):
     now = evaluate(motion, y, phase, p)
     turn = now.turn
     row[DISPLACEMENT] = motion.x + y[0]
-    row[VELOCITY] = motion.v + y[y.size // 2]
+    row[VELOCITY] = motion.v + y[p.freedoms]
     row[ROD_ANGLE] = math.atan2(motion.sin_phi + turn.ds, motion.cos_phi + turn.dc)
     row[PISTON_FORCE] = now.load
     eccentricity_row(y, turn, p, row)

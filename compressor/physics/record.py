@@ -49,6 +49,8 @@ RECORD = np.dtype(
         ("load", "i8"),
         ("law", "i8"),  # of contact_laws
         ("friction", "i8"),
+        ("freedoms", "i8"),  # positions in a state; two in the ideal scene, zeros
+        ("wide", "i8"),  # whether angles may be beyond the series of `small_angle`
         # mechanism
         ("omega", "f8"),  # crank speed, rad/s
         ("crank_radius", "f8"),  # R, m
@@ -101,6 +103,7 @@ def new_record() -> np.record:
 
 def derive(p: np.record) -> None:
     """Fill the fields of a record that follow from its others."""
+    p["freedoms"], p["wide"] = FREEDOMS[Scene(int(p["scene"]))] or 2, 1
     p["crank_ratio"] = p["crank_radius"] / p["rod_length"]
     for name in ("rod_mass", "rod_inertia", "reciprocating_mass", "full_damping"):
         p[f"per_{name}"] = 1.0 / p[name]

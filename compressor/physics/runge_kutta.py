@@ -63,6 +63,7 @@ _TSIT5 = _lower(
 
 A = np.array([_DOPRI5, _TSIT5])  # the last row holds the weights of the step
 C = A.sum(axis=2)
+C[:, -2:] = 1.0  # whose sums they are to rounding
 E = np.array(
     [
         [-71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40],
@@ -97,7 +98,6 @@ P = np.array(
         ],
     ]
 )  # fmt: skip
-MIDWAY = P @ 0.5 ** np.arange(1, 5)
 
 
 @inlined

@@ -11,12 +11,14 @@ import numpy as np
 
 from compressor.physics import rosenbrock
 from compressor.physics._jit import inlined, jit
+from compressor.physics.elementary import exponential, logarithm
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
 LEAST_ERROR = math.log(1e-4)  # that the control remembers
+LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 # stiffness: an explicit step is held by stability where h |lambda| exceeds the limit
 STABILITY_LIMIT = 3.25  # of both pairs on the negative real axis, about
@@ -82,8 +84,8 @@ def first_step(w, z, work, atol, phase, p, end):
 def controlled(w, h, error):
     """The next step's length after an accepted step (PI control)."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
-    now = math.log(max(error, 1e-10))
-    factor = SAFETY * math.exp((INTEGRAL * w.error - PROPORTIONAL * now) / order)
+    now = logarithm(max(error, 1e-10))
+    factor = SAFETY * exponential((INTEGRAL * w.error - PROPORTIONAL * now) / order)
     w.error = max(now, LEAST_ERROR)
     return h * min(GROW, max(SHRINK, factor))
 
@@ -93,7 +95,8 @@ def refuse(w, h, error):
     """Shorten the step after a refused attempt; a step that makes no way ends the walk."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
     w.rejected += 1
-    w.h = h * (max(SHRINK, SAFETY * error ** (-1.0 / order)) if error < math.inf else 0.1)
+    shorter = SAFETY * exponential(-logarithm(error) / order) if error < math.inf else 0.1
+    w.h = h * max(SHRINK if error < math.inf else 0.1, shorter)
 
 
 @jit

@@ -34,9 +34,9 @@ def new_rows():
 def separation(t, y, other, p, rows):
     """Greatest distance of two states' eccentricities, over the joint's clearance."""
     motion = ideal(t, p)
-    n = y.size // 2
-    eccentricity_row(y, turned(motion, y[n - 1], y[2 * n - 1]), p, rows[0])
-    eccentricity_row(other, turned(motion, other[n - 1], other[2 * n - 1]), p, rows[1])
+    n = p.freedoms
+    eccentricity_row(y, turned(motion, y[n - 1], y[2 * n - 1], p), p, rows[0])
+    eccentricity_row(other, turned(motion, other[n - 1], other[2 * n - 1], p), p, rows[1])
     worst = 0.0
     for joint in range(2):
         if p.clearance[joint] > 0.0:

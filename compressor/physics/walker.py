@@ -6,11 +6,16 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics.observe import COLUMNS
-from compressor.physics.runge_kutta import FLOWS, STAGES
+from compressor.physics.runge_kutta import FLOWS, STAGES, A, P, Pair
 from compressor.physics.step_control import LEAST_ERROR, REST, Mode
 from compressor.physics.tally import lobatto
 
 NODES, WEIGHTS = lobatto(5)  # at which a step is observed
+COARSE_WEIGHTS = np.zeros(NODES.size)  # at its ends and in its middle alone
+COARSE_WEIGHTS[::2] = lobatto(3)[1]
+# of the stages of each explicit pair, at these nodes: (pair, node, stage)
+NODE_WEIGHTS = np.array([[P[pair] @ s ** np.arange(1, 5) for s in NODES] for pair in Pair])
+NODE_WEIGHTS[:, -1] = A[:, -1]
 
 
 class Status(IntEnum):

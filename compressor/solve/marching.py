@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import IMPLAUSIBLE
-from compressor.physics import FLOWS, TALLY, WALKER, Mode, Pair, Work, march, new_walker, new_work
+from compressor.physics import FLOWS, Mode, Pair, Work, march, new_tally, new_walker, new_work
 from compressor.solve.request import Request
 
 COMPILED = {
@@ -15,6 +15,7 @@ COMPILED = {
     "TSIT5": (Mode.EXPLICIT, Pair.TSIT5),
     "RODAS": (Mode.STIFF, Pair.DOPRI5),
 }
+LANE_METHODS = ("auto", "TSIT5")
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 
 
@@ -64,13 +65,16 @@ class Snapshot(NamedTuple):
         work = new_work(self.z.size - FLOWS)
         work.k[0], work.row[:] = self.rates, self.row
         return Standing(
-            unpacked(self.walker, WALKER), self.z.copy(), work, unpacked(self.tally, TALLY)
+            unpacked(self.walker, new_walker(0)),
+            self.z.copy(),
+            work,
+            unpacked(self.tally, new_tally()),
         )
 
 
-def unpacked(data: bytes, dtype: np.dtype) -> np.record:
-    """A record that compiled code may write, from its bytes."""
-    return np.frombuffer(bytearray(data), dtype).view(np.recarray)[0]
+def unpacked(data: bytes, like: np.record) -> np.record:
+    """A record like another that compiled code may write, from its bytes."""
+    return np.frombuffer(bytearray(data), like.dtype).view(np.recarray)[0]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from compressor.cases import Case, contact_stiffness, to_si
 from compressor.metrics import JOINTS
-from compressor.physics import Law, Load, Scene, derive, load_corners, new_record
+from compressor.physics import Law, Load, Scene, complete, new_record
 
 
 def scene(case: Case) -> Scene:
@@ -28,8 +28,7 @@ def record(case: Case) -> np.record:
     _gas(case, p)
     _spring(case, p)
     ratio = case.gas.discharge_MPa / case.gas.suction_MPa
-    p["corners"] = load_corners(p, ratio, printed=case.gas.switching == "paper")
-    derive(p)
+    complete(p, ratio, printed=case.gas.switching == "paper")
     return p
 
 

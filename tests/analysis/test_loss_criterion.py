@@ -103,18 +103,21 @@ def test_hits_false_alarms_and_misses():
     ]  # fmt: skip
 
 
-def simulated(joint, **machine):
+def simulated(joint, clearance=0.3, **machine):
     return simulate(
         Case.from_values(
-            {"joint": joint, "clearance_mm": 0.3, "machine": machine,
+            {"joint": joint, "clearance_mm": clearance, "machine": machine,
              "contact": {"damping_N_s_per_mm": 1}}
         )
     )  # fmt: skip
 
 
 def test_losses_at_the_small_end_are_foretold():
-    """Where the small end's force reverses, its direction turns fast: both times it lets go."""
-    found = compare_losses(simulated("both", speed_rpm=1500))
+    """Where the small end's force reverses, its direction turns fast: both times it lets go.
+
+    With 0.3 mm the motion is chaotic, and lets go once or twice.
+    """
+    found = compare_losses(simulated("both", 0.26, speed_rpm=1500))
     small = found["joint_of"].values == "small_end"
     assert found["outcome"].values[small].tolist() == ["hit", "hit"]
     near = [(60.0, 90.0), (270.0, 300.0)]

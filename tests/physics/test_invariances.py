@@ -139,8 +139,8 @@ DIMENSIONS = {
     "head_clearance": (1, 0, 0), "spring_stiffness": (0, 1, -2), "spring_damping": (0, 1, -1),
     "preload": (1, 1, -2), "spring_stroke": (1, 0, 0),
 }  # fmt: skip
-PURE_NUMBERS = {"scene", "load", "law", "friction", "exponent", "static", "dynamic", "corners",
-                "gas_exponent"}  # fmt: skip
+PURE_NUMBERS = {"scene", "load", "law", "friction", "freedoms", "wide", "exponent", "static",
+                "dynamic", "corners", "gas_exponent"}  # fmt: skip
 DERIVED = {"crank_ratio", "per_rod_mass", "per_rod_inertia", "per_reciprocating_mass",
            "per_full_damping", "per_stiction", "per_transition"}  # fmt: skip
 

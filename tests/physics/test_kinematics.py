@@ -8,6 +8,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics.kinematics import (
+    SMALL,
     angle_at,
     exact_motion,
     ideal,
@@ -55,22 +56,24 @@ def test_compiled_equals_array_form():
 
 
 def test_sine_and_cosine_of_a_small_angle_are_exact():
-    """To the last digit on both sides of the change from series to library, at 0.01 rad."""
-    for angle in np.concatenate((np.linspace(-0.0105, 0.0105, 401), [1e-9, -2.0, 0.7])):
+    """To the last digit on both sides of the change from series to library, at SMALL."""
+    p = record(Case())
+    near = np.linspace(-1.05 * SMALL, 1.05 * SMALL, 401)
+    for angle in np.concatenate((near, [1e-9, -2.0, 0.7])):
         with mpmath.workdps(30):
             exact = [float(f(mpmath.mpf(float(angle)))) for f in (mpmath.sin, mpmath.cos)]
-        for found, e in zip(small_angle(angle), exact, strict=True):
+        for found, e in zip(small_angle(angle, p), exact, strict=True):
             assert abs(found - e) <= np.spacing(abs(e))
 
 
 def test_the_series_of_a_small_angle_lacks_no_term():
-    """Just below 0.01 rad, where a last term would be missed most: by more than its last digit."""
-    biases = np.zeros(2)
-    angles = np.linspace(0.0099, 0.00999, 200)
+    """Just below SMALL, where a last term would be missed most: by more than its last digit."""
+    p, biases = record(Case()), np.zeros(2)
+    angles = np.linspace(0.99 * SMALL, 0.999 * SMALL, 200)
     with mpmath.workdps(30):
         for angle in angles:
             exact = mpmath.sin(mpmath.mpf(float(angle))), mpmath.cos(mpmath.mpf(float(angle)))
-            for k, (found, e) in enumerate(zip(small_angle(angle), exact, strict=True)):
+            for k, (found, e) in enumerate(zip(small_angle(angle, p), exact, strict=True)):
                 biases[k] += float((mpmath.mpf(found) - e) / np.spacing(float(e)))
     assert biases / angles.size == pytest.approx(0, abs=0.25)
 

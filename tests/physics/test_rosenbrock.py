@@ -80,7 +80,7 @@ def test_a_singular_system_is_told():
 
 STIFF = {
     "viscous contact": {"contact": {"damping_N_s_per_mm": 336e3}},
-    "tiny stiction velocity": {"friction": {"stiction_velocity_mm_per_s": 0.01}},
+    "tiny stiction velocity": {"friction": {"stiction_velocity_mm_per_s": 0.001}},
 }
 
 

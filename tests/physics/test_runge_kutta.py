@@ -8,7 +8,6 @@ from compressor.physics.kinematics import crank_direction
 from compressor.physics.observe import COLUMNS, derivative_with_flows
 from compressor.physics.runge_kutta import (
     FLOWS,
-    MIDWAY,
     STAGES,
     A,
     C,
@@ -22,6 +21,7 @@ from compressor.physics.runge_kutta import (
     take_step,
     weights_at,
 )
+from compressor.physics.walker import NODE_WEIGHTS, NODES
 from compressor.solve.si_record import record
 
 # a wide clearance and a short flight: a smooth motion without contact
@@ -90,10 +90,11 @@ def test_stages_combine_to_the_interpolant(pair, s):
 
 
 @pytest.mark.parametrize("pair", Pair)
-def test_the_middles_weights_are_stored(pair):
+def test_the_weights_of_the_nodes_are_stored(pair):
     weights = np.zeros(STAGES)
-    weights_at(pair, 0.5, weights)
-    assert MIDWAY[pair] == pytest.approx(weights, abs=1e-15)
+    for node, stored in zip(NODES, NODE_WEIGHTS[pair], strict=True):
+        weights_at(pair, node, weights)
+        assert stored == pytest.approx(weights, abs=1e-13)
 
 
 @pytest.mark.parametrize("pair", Pair)
