@@ -2,6 +2,7 @@
 
 from compressor.physics.contact_laws import Law, Power, elastic_form
 from compressor.physics.kinematics import exact_motion, series_motion
+from compressor.physics.lane_runs import Run, march_side_by_side
 from compressor.physics.loads import (
     complete,
     gas_corners,

@@ -1,7 +1,9 @@
 """One run of a case at one tolerance, and another one to estimate its errors by."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -72,6 +74,10 @@ class Solution:
         return journal_distance(self.p, self.samples, other.samples)
 
 
+Ahead = Mapping[float, Solution]  # attempts of a case that were made before, by tolerance
+NOTHING_AHEAD: Ahead = {}
+
+
 def attempt(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
     state: np.ndarray | None = None,
@@ -82,51 +88,89 @@ def attempt(
     without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
     top dead centre (`physics.STATE_NAMES`), in place of the case's own; no ideal scene has one.
     """
-    p = record(case)
-    samples = finer(case) * round(case.steps) if sampled else 1
-    times = case.duration * (np.arange(samples + 1) / samples)
-    compared = compared_times(case) if case.wants_bars else times[:0]
-    loaded = reversal_times(case)
-    stay = np.union1d(times, compared)
-    grid = np.union1d(stay, loaded)
+    p, times = record(case), times_of(case, sampled)
     if scene(case) == Scene.IDEAL:
         pieces = round(PIECES * (case.rtol / rtol) ** FINER)
-        trajectory = closed_form(p, grid, case.settle, pieces, timeout)
-    else:
-        y = np.zeros(2 * FREEDOMS[scene(case)])
-        if state is None:
-            start(offsets(case), y, p)
-        else:
-            y[:] = state
-        how = case.solve
-        trajectory = integrate(
-            Request(p, y, grid, case.settle, rtol, how.method, how.max_steps, timeout, cuts)
-        )
+        return concluded(rtol, p, times, closed_form(p, times.all, case.settle, pieces, timeout))
+    asked = request(case, rtol, p, times, state)
+    asked.timeout, asked.cuts = timeout, cuts
+    trajectory = integrate(asked)
     turns = cuts.turns if cuts else []
     if turns:
         trajectory.tally = merged([*turns, trajectory.tally])
-    loads = take_samples(p, trajectory, loaded, stay) if loaded.size else np.empty((0, COLUMNS))
-    taken = take_samples(p, trajectory, compared, times)
-    found = {} if trajectory.reason else metrics(p, trajectory.tally)
+    made = concluded(rtol, p, times, trajectory)
+    made.turns = turns
+    return made
+
+
+class Times(NamedTuple):
+    """Times (s) of a run: settled; its output, its comparison, its rod load; all of them."""
+
+    settle: float
+    output: np.ndarray
+    compared: np.ndarray
+    loaded: np.ndarray
+    all: np.ndarray
+
+
+def times_of(case: Case, sampled: bool) -> Times:
+    """The times at which a run of a case is sampled."""
+    samples = finer(case) * round(case.steps) if sampled else 1
+    output = case.duration * (np.arange(samples + 1) / samples)
+    compared = compared_times(case) if case.wants_bars else output[:0]
+    loaded = reversal_times(case)
+    every = np.union1d(np.union1d(output, compared), loaded)
+    return Times(case.settle, output, compared, loaded, every)
+
+
+def request(
+    case: Case, rtol: float, p: np.record, times: Times, state: np.ndarray | None = None
+) -> Request:
+    """What `attempt` asks to be integrated, without a limit in wall time."""
+    how = case.solve
+    y = np.zeros(2 * FREEDOMS[scene(case)])
+    if state is None:
+        start(offsets(case), y, p)
+    else:
+        y[:] = state
+    return Request(p, y, times.all, times.settle, rtol, how.method, how.max_steps)
+
+
+def concluded(rtol: float, p: np.record, times: Times, trajectory: Trajectory) -> Solution:
+    """What an attempt's trajectory tells."""
+    loads = np.empty((0, COLUMNS))
+    if times.loaded.size:
+        stay = np.union1d(times.output, times.compared)
+        loads = take_samples(p, trajectory, times.loaded, stay)
+    taken = take_samples(p, trajectory, times.compared, times.output)
     reason, detail = trajectory.reason, trajectory.detail
-    made = Solution(p, trajectory, rtol, case.settle, found, taken, reason, detail, turns=turns)
+    found = {} if reason else metrics(p, trajectory.tally)
+    made = Solution(p, trajectory, rtol, times.settle, found, taken, reason, detail)
     made.loads = loads
     made.reversal = {} if reason else reversal(loads)
     return made
 
 
-def companion(case: Case, solution: Solution, timeout: float) -> Solution:
+def companion_rtol(rtol: float) -> float | None:
+    """The tolerance of a run's `companion`, if that is by the run's own method and tighter."""
+    return rtol / TIGHTER if 0.99 * TIGHTER * TIGHTEST <= rtol <= LOOSE else None
+
+
+def companion(
+    case: Case, solution: Solution, timeout: float, ahead: Ahead = NOTHING_AHEAD
+) -> Solution:
     """The run that a run's errors are estimated by, where no looser one is there: a tighter one.
 
     At the tightest tolerance, a looser one. Where the tolerance is so loose that explicit steps
     may run over friction's fast modes, the stiff method is asked.
     """
+    tighter = companion_rtol(solution.rtol)
+    if tighter is not None:
+        return ahead.get(tighter) or attempt(case, tighter, timeout, False)
     if solution.rtol > LOOSE:
         stiff = replace(case, solve=replace(case.solve, method="RODAS"))
         return attempt(stiff, solution.rtol / STIFF_TIGHTER, timeout, False)
-    if solution.rtol < 0.99 * TIGHTER * TIGHTEST:
-        return attempt(case, 10.0 * solution.rtol, timeout, False)
-    return attempt(case, solution.rtol / TIGHTER, timeout, False)
+    return attempt(case, 10.0 * solution.rtol, timeout, False)
 
 
 def estimate_errors(solution: Solution, other: Solution | None) -> None:

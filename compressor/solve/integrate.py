@@ -24,8 +24,8 @@ from compressor.solve.request import Request, Stop, Trajectory
 from compressor.solve.scipy_driver import step_through
 
 
-def integrate(request: Request) -> Trajectory:
-    """Integrate a scene with clearance over its output grid; a run that fails is returned too."""
+def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndarray]:
+    """What a request begins with: an empty trajectory, the load's edges and phases, the motion."""
     edges, phases = segments(request.p, float(request.times[-1]))
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)
@@ -34,6 +34,12 @@ def integrate(request: Request) -> Trajectory:
     row = np.empty(COLUMNS)
     observe(0.0, request.start, int(phases[0]), request.p, row)
     tally_energy(row, z[-FLOWS:], result.tally)
+    return result, edges, phases, z
+
+
+def integrate(request: Request) -> Trajectory:
+    """Integrate a scene with clearance over its output grid; a run that fails is returned too."""
+    result, edges, phases, z = ready(request)
     began = time.perf_counter()
     try:
         # a trial step may leave the finite numbers; the steps taken are checked

@@ -2,7 +2,7 @@
 
 from compressor.cases import TIGHTEST, Case
 from compressor.reasons import Reason
-from compressor.solve.attempts import Solution, attempt, companion, estimate_errors
+from compressor.solve.attempts import Ahead, Solution, attempt, companion, estimate_errors
 from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
 from compressor.solve.error_bars import beyond, closeness, ratio_of, unmet
 from compressor.solve.regime import DOUBTFUL, Search
@@ -17,7 +17,7 @@ AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 LEAST, MOST = 10.0, 1000.0  # times tighter that the next run may be
 
 
-def climb(case: Case, search: Search) -> Solution:
+def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
     """The first run that balances and keeps its promise, or the last whole one as a failed job.
 
     A first run is compared with one a little tighter. Each further one is as much tighter as its
@@ -31,7 +31,7 @@ def climb(case: Case, search: Search) -> Solution:
     )
     unsound = 0  # runs that did not balance
     while True:
-        now = attempt(case, rtol, search.left, case.output.keep == "series")
+        now = ahead.get(rtol) or attempt(case, rtol, search.left, case.output.keep == "series")
         if now.reason:
             return cut_short(case, best, now)
         best = now
@@ -44,7 +44,7 @@ def climb(case: Case, search: Search) -> Solution:
         if not case.wants_bars:
             return now
         if before is None:
-            other = companion(case, now, search.left)
+            other = companion(case, now, search.left, ahead)
         else:
             other = before
         estimate_errors(now, other)

@@ -12,7 +12,7 @@ from compressor.outcome import ROW, Outcome, Table, without_run
 from compressor.physics import FLOWS, STATE_NAMES
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
-from compressor.solve.attempts import Solution
+from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
 from compressor.solve.foundation import foundation
 from compressor.solve.request import NONE, Trajectory
 from compressor.solve.series import block, finer, rows_of
@@ -64,12 +64,12 @@ def simulate(case: Case) -> "xr.Dataset":
     return xr.Dataset(table.variables, attrs=table.attrs)
 
 
-def observe(case: Case) -> tuple[Outcome, Table]:
+def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, Table]:
     """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
     if case.problems:
         found = refused(case)
         return found, found.table({})
-    return with_series(case, solve(case))
+    return with_series(case, solve(case, ahead))
 
 
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
@@ -79,9 +79,9 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
     return found, found.table(series(case, solution) if kept else {})
 
 
-def measure(case: Case) -> Outcome:
+def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
     """Simulate one case for its `Outcome` alone: what `simulate` gives less the time series."""
-    return refused(case) if case.problems else outcome(case, solve(case))
+    return refused(case) if case.problems else outcome(case, solve(case, ahead))
 
 
 def refused(case: Case) -> Outcome:

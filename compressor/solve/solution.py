@@ -5,7 +5,7 @@ import math
 from compressor.cases import Case
 from compressor.outcome import Regime
 from compressor.reasons import Reason
-from compressor.solve.attempts import Solution, attempt, estimate_errors
+from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution, attempt, estimate_errors
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.ladder import balanced, climb, lost, over_promise, short_of, unbalanced
 from compressor.solve.regime import Search, doubtful, repeats
@@ -13,15 +13,21 @@ from compressor.solve.settling import with_span
 from compressor.solve.statistics import chaotic_bars, statistics
 from compressor.solve.turns import Cuts, revolutions
 
+EVALUATION = 1e-7  # s, about, of an attempt made alone: what twins may take is a share of it
 CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 
 
-def solve(case: Case) -> Solution:
-    """A case's motion, with errors, regime and horizon as far as they are wanted."""
+def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
+    """A case's motion, with errors, regime and horizon as far as they are wanted.
+
+    ahead: of its attempts those that `side_by_side` has made.
+    """
     search = Search(case)
+    for made in ahead.values():
+        search.began -= made.trajectory.evaluations * EVALUATION
     settling = with_span(case, search)
     case = search.case = settling.case
-    solution = climb(case, search)
+    solution = climb(case, search, ahead)
     solution.settled = settling.settled
     if solution.reason not in ("", Reason.ACCURACY_NOT_REACHED):
         return solution

@@ -1,0 +1,301 @@
+"""Runs that march side by side, a lane each: `march` for all of them, to rounding.
+
+Steps in which nothing begins or ends are taken in all lanes at once (`lanes`, `lane_control`). For
+any other step a lane is given to `march` itself: at corners of the load, where contact may begin
+or end, where the stiff partner is at work. A lane whose run has ended takes the next one.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from compressor.physics._jit import inlined, jit
+from compressor.physics.kinematics import SMALL, crank_direction
+from compressor.physics.lane_control import control, move_on
+from compressor.physics.lane_rows import (
+    ALIVE,
+    ATOL,
+    BUDGET,
+    CALL,
+    COS,
+    DEEPEST,
+    END,
+    ENERGY,
+    FIRST_FIELD,
+    FLOWN,
+    HELD,
+    IMBALANCE,
+    IMPACTS,
+    LANES,
+    LOSS_SECONDS,
+    MAX_PENETRATION,
+    NEXT_SAMPLE,
+    PEAK,
+    PEAK_KINETIC,
+    PEAKED,
+    PHASE,
+    PLAIN,
+    REFUSED,
+    RELEASES,
+    REMEMBERED,
+    REST,
+    RTOL,
+    SECONDS,
+    SETTLE,
+    SIN,
+    SIZE,
+    SQUARE_ACCELERATION,
+    SQUARE_DEVIATION,
+    STAGE_COUNT,
+    STATE,
+    STEPS,
+    TOO_DEEP,
+    TOUCHING,
+    H,
+    K,
+    T,
+    Z,
+)  # fmt: skip
+from compressor.physics.lane_steps import BETWEEN, PAIR, R0, attempt_lanes, look
+from compressor.physics.lane_tally import judge, judge_closer, tally_lanes
+from compressor.physics.march import march
+from compressor.physics.observe import ACCELERATION, CRANK_POWER
+from compressor.physics.runge_kutta import FLOWS, STAGES, weights_at
+from compressor.physics.step_control import AUTO, STIFF_STEPS
+from compressor.physics.walker import RUNNING, Work
+
+NO_TEST = 1e300  # steps without a test for stiffness, where another method is not wanted
+
+
+class Runs(NamedTuple):
+    """Runs of one scene, m of them, in arrays.
+
+    Edges and phases of the segments, times and states of the output samples stand one run after
+    the other; `places` tells where each one's begin.
+    """
+
+    walkers: np.ndarray  # (m,) of WALKER
+    records: np.ndarray  # (m,) of RECORD
+    tallies: np.ndarray  # (m,) of TALLY
+    z: np.ndarray  # (m, n + 4)
+    atol: np.ndarray  # (m, n)
+    size: np.ndarray  # (m, n)
+    fields: np.ndarray  # (m, FIELDS): the records' numbers that are rows
+    places: np.ndarray  # (m, 4): first segment, how many; first sample, how many
+    edges: np.ndarray
+    phases: np.ndarray
+    times: np.ndarray
+    states: np.ndarray  # (samples, n)
+    works: Work  # each array with a first axis more, (m,)
+
+
+@inlined
+def end_of(runs, job):
+    """When the segment ends that a run is in."""
+    return runs.edges[runs.places[job, 0] + job + runs.walkers[job].segment + 1]
+
+
+@jit
+def plain_ahead(w, omega, end):
+    """Whether the next step is an explicit one in which nothing is known to begin or end."""
+    ready = not w.fresh and w.observed and not w.stiff and w.landing == 0.0 and w.h > 0.0
+    return ready and w.t + 1.01 * w.h < end and omega * w.h <= SMALL
+
+
+@jit
+def march_alone(runs, job, work, most):
+    """Have a run marched by itself until its next step is a plain one; False where it has ended."""
+    w, p = runs.walkers[job], runs.records[job]
+    first, count = runs.places[job, 0], runs.places[job, 1]
+    begin, samples = runs.places[job, 2], runs.places[job, 3]
+    edges = runs.edges[first + job : first + job + count + 1]
+    phases = runs.phases[first : first + count]
+    times, states = runs.times[begin : begin + samples], runs.states[begin : begin + samples]
+    while True:
+        march(
+            w, p, runs.z[job], work, runs.atol[job], runs.size[job], edges, phases, times, states,
+            runs.tallies[job], np.int64(1),
+        )  # fmt: skip
+        if w.status != RUNNING or w.steps + w.rejected + w.onsets >= most:
+            return False
+        if plain_ahead(w, p.omega, edges[w.segment + 1]):
+            return True
+
+
+@jit
+def next_sample(runs, job):
+    """Time of a run's next output sample."""
+    sample, samples = runs.walkers[job].sample, runs.places[job, 3]
+    return runs.times[runs.places[job, 2] + sample] if sample < samples else math.inf
+
+
+@jit
+def load(W, j, runs, job, work, most):
+    """Put a run as it stands into a lane."""
+    w, p, tally = runs.walkers[job], runs.records[job], runs.tallies[job]
+    n = runs.size.shape[1]
+    for i in range(runs.fields.shape[1]):
+        W[FIRST_FIELD + i * LANES + j] = runs.fields[job, i]
+    W[COS + j], W[SIN + j] = crank_direction(w.t, p)
+    W[T + j], W[H + j], W[END + j] = w.t, w.h, end_of(runs, job)
+    W[PHASE + j] = runs.phases[runs.places[job, 0] + w.segment]
+    W[RTOL + j], W[SETTLE + j], W[TOO_DEEP + j] = w.rtol, w.settle, w.deepest
+    W[NEXT_SAMPLE + j] = next_sample(runs, job)
+    W[REMEMBERED + j], W[HELD + j] = w.error, w.held
+    W[REST + j] = w.rest if w.mode == AUTO else NO_TEST
+    W[STEPS + j], W[REFUSED + j] = w.steps, 0.0
+    W[BUDGET + j] = most - w.rejected - w.onsets
+    W[ALIVE + j], W[CALL + j] = 1.0, 0.0
+    for i in range(n):
+        W[ATOL + i * LANES + j] = runs.atol[job, i]
+        W[SIZE + i * LANES + j] = runs.size[job, i]
+    for i in range(n + FLOWS):
+        W[Z + i * LANES + j] = runs.z[job, i]
+        W[K + i * LANES + j] = work.k[0, i]
+        for s in range(1, STAGE_COUNT):  # a weight of zero does not mend a nan
+            W[K + (s * STATE + i) * LANES + j] = 0.0
+    for i in range(CRANK_POWER - ACCELERATION):
+        W[R0 + i * LANES + j] = work.row[ACCELERATION + i]
+    W[SECONDS + j] = tally.seconds
+    W[SQUARE_ACCELERATION + j] = tally.square_acceleration
+    W[SQUARE_DEVIATION + j] = tally.square_deviation
+    for i in range(PEAKED):
+        W[PEAK + i * LANES + j] = tally.peak[i]
+    for joint in range(2):
+        c = joint * LANES + j
+        W[MAX_PENETRATION + c] = tally.max_penetration[joint]
+        W[LOSS_SECONDS + c] = tally.loss_seconds[joint]
+        W[IMPACTS + c], W[RELEASES + c] = tally.impacts[joint], tally.releases[joint]
+        W[TOUCHING + c], W[FLOWN + c] = tally.touching[joint], tally.flown[joint]
+    W[DEEPEST + j], W[ENERGY + j] = tally.deepest, tally.energy
+    W[IMBALANCE + j], W[PEAK_KINETIC + j] = tally.worst_imbalance, tally.peak_kinetic
+
+
+@jit
+def unload(W, j, runs, job, work):
+    """Take a run as it stands from a lane."""
+    w, tally = runs.walkers[job], runs.tallies[job]
+    n = runs.size.shape[1]
+    steps, refused = np.int64(W[STEPS + j]), np.int64(W[REFUSED + j])
+    w.evaluations += (STAGES - 1) * (steps - w.steps + refused)
+    if steps > w.steps:
+        w.landed = 0
+    w.t, w.h, w.error, w.steps = W[T + j], W[H + j], W[REMEMBERED + j], steps
+    w.rejected += refused
+    w.held = np.int64(W[HELD + j])
+    if w.held >= STIFF_STEPS:
+        w.stiff, w.held, w.calm, w.gain = 1, 0, 0, 0.0
+    if w.mode == AUTO:
+        w.rest = np.int64(W[REST + j])
+    w.laid = 0
+    for i in range(n + FLOWS):
+        runs.z[job, i] = W[Z + i * LANES + j]
+        work.k[0, i] = W[K + i * LANES + j]
+    for i in range(CRANK_POWER - ACCELERATION):
+        work.row[ACCELERATION + i] = W[R0 + i * LANES + j]
+    tally.seconds = W[SECONDS + j]
+    tally.square_acceleration = W[SQUARE_ACCELERATION + j]
+    tally.square_deviation = W[SQUARE_DEVIATION + j]
+    for i in range(PEAKED):
+        tally.peak[i] = W[PEAK + i * LANES + j]
+    for joint in range(2):
+        c = joint * LANES + j
+        tally.max_penetration[joint] = W[MAX_PENETRATION + c]
+        tally.loss_seconds[joint] = W[LOSS_SECONDS + c]
+        tally.impacts[joint] = np.int64(W[IMPACTS + c])
+        tally.releases[joint] = np.int64(W[RELEASES + c])
+        tally.touching[joint] = np.int64(W[TOUCHING + c])
+        tally.flown[joint] = np.int64(W[FLOWN + c])
+    tally.deepest, tally.worst_imbalance = W[DEEPEST + j], W[IMBALANCE + j]
+    tally.peak_kinetic = W[PEAK_KINETIC + j]
+    tally.crank_work, tally.load_work = runs.z[job, n], runs.z[job, n + 1]
+    tally.damping_loss, tally.friction_loss = runs.z[job, n + 2], runs.z[job, n + 3]
+
+
+@jit
+def sample_lane(W, j, runs, job, work):
+    """Fill a run's output samples within the step that its lane has just attempted."""
+    w = runs.walkers[job]
+    t, h = W[T + j], W[H + j]
+    begin, samples = runs.places[job, 2], runs.places[job, 3]
+    while w.sample < samples and runs.times[begin + w.sample] <= t + h:
+        s = min(1.0, max(0.0, (runs.times[begin + w.sample] - t) / h))
+        weights_at(PAIR, s, work.weights)
+        for i in range(runs.size.shape[1]):
+            total = 0.0
+            for stage in range(STAGES):
+                total += work.weights[stage] * W[K + (stage * STATE + i) * LANES + j]
+            runs.states[begin + w.sample, i] = W[Z + i * LANES + j] + h * total
+        w.sample += 1
+    W[NEXT_SAMPLE + j] = next_sample(runs, job)
+
+
+@jit
+def work_of(runs, job):
+    """What `march` works in for a run."""
+    w = runs.works
+    return Work(
+        w.k[job], w.new[job], w.column[job], w.jacobian[job], w.dense[job], w.weights[job],
+        w.y[job], w.rows[job], w.apart[job], w.row[job],
+    )  # fmt: skip
+
+
+@jit
+def next_run(W, j, runs, lane_jobs, begun, most):
+    """Give a lane whose run has ended the next one that gets to a plain step; returns how many
+    runs have begun by then. Without one the lane is empty, of which -1 tells.
+    """
+    while begun < runs.size.shape[0]:
+        begun += 1
+        if march_alone(runs, begun - 1, work_of(runs, begun - 1), most):
+            lane_jobs[j] = begun - 1
+            load(W, j, runs, begun - 1, work_of(runs, begun - 1), most)
+            return begun
+    lane_jobs[j] = -1
+    W[ALIVE + j], W[CALL + j] = 0.0, 0.0
+    return begun
+
+
+@jit
+def attend(W, j, runs, job, most):
+    """Have the run of a lane marched by itself over what is ahead; False where it has ended."""
+    work, w = work_of(runs, job), runs.walkers[job]
+    unload(W, j, runs, job, work)
+    if w.steps + w.rejected + w.onsets >= most or not march_alone(runs, job, work, most):
+        return False
+    load(W, j, runs, job, work, most)
+    return True
+
+
+@jit
+def march_lanes(scene, W, k, runs, lane_jobs, most):
+    """March all runs, k at a time; a walker that is still RUNNING then has taken too many steps.
+
+    scene: a tuple of as many zeros as the scene's number: machine code is made for each. W: of
+    `new_lanes`; lane_jobs: (k,) integers, the run in each lane, at first -1; most: attempts of a
+    step that a run may take.
+    """
+    begun = 0
+    for j in range(k):
+        W[CALL + j] = 1.0
+    while True:
+        empty = 0
+        for j in range(k):
+            if W[CALL + j] > 0.0 and not (
+                lane_jobs[j] >= 0 and attend(W, j, runs, lane_jobs[j], most)
+            ):
+                begun = next_run(W, j, runs, lane_jobs, begun, most)
+            empty += lane_jobs[j] < 0
+        if empty == k:
+            return
+        attempt_lanes(scene, W, k)
+        if judge(scene, W, k):
+            look(scene, W, k, BETWEEN)
+            judge_closer(scene, W, k)
+        tally_lanes(scene, W, k)
+        for j in range(k):
+            if W[PLAIN + j] > 0.0 and W[NEXT_SAMPLE + j] <= W[T + j] + W[H + j]:
+                sample_lane(W, j, runs, lane_jobs[j], work_of(runs, lane_jobs[j]))
+        control(scene, W, k)
+        move_on(scene, W, k)

@@ -1,0 +1,297 @@
+"""A step of several runs side by side: loops over lanes, which LLVM makes vector code of."""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import borrowed, inlined, jit
+from compressor.physics.contact_laws import Law
+from compressor.physics.kinematics import ideal_after
+from compressor.physics.lane_rows import (
+    ATOL,
+    COS,
+    DESIGN,
+    ERROR,
+    FIRST_FIELD,
+    LANES,
+    NEW,
+    NODE_ROWS,
+    OUT,
+    PHASE,
+    RTOL,
+    SEEN,
+    SEEN_COUNT,
+    SIN,
+    STATE,
+    H,
+    K,
+    LaneRecord,
+    Z,
+)  # fmt: skip
+from compressor.physics.motion import deviating, evaluate
+from compressor.physics.observe import energies, glanced, joint_forces, powers
+from compressor.physics.runge_kutta import STAGES, A, C, E, Pair
+from compressor.physics.walker import NODE_WEIGHTS as ALL_NODE_WEIGHTS
+from compressor.physics.walker import NODES
+
+PAIR, IMPACT = int(Pair.TSIT5), int(Law.IMPACT)
+NO_CORNERS = (0.0, 0.0, 0.0)  # of the load: a lane ends at each
+STEP_WEIGHTS, FRACTIONS, ERROR_WEIGHTS = A[PAIR], C[PAIR], E[PAIR]
+NODE_WEIGHTS = ALL_NODE_WEIGHTS[PAIR]
+OUTER, BETWEEN = np.array([2, 4]), np.array([1, 3])  # nodes: middle and end; the others
+ROW = SEEN_COUNT * LANES
+R0, R1, R2, R3, R4 = (NODE_ROWS + i * ROW for i in range(5))
+
+
+@inlined
+def record_of(scene, W, j):
+    """The record of lane j, its scene being the length of the tuple.
+
+    Choices that are constants leave of the equations of motion what the scene needs.
+    """
+    b = FIRST_FIELD + j
+    number = len(scene)
+    freedoms = 4 if number == 3 else 2
+    clearance = W[b + 9 * LANES], W[b + 10 * LANES]
+    stiffness = W[b + 11 * LANES], W[b + 12 * LANES]
+    return LaneRecord(  # type: ignore[call-arg]
+        number, DESIGN, IMPACT, 1, freedoms, 0,
+        W[b], W[b + LANES], W[b + 2 * LANES], W[b + 3 * LANES], W[b + 4 * LANES], W[b + 5 * LANES],
+        W[b + 6 * LANES], W[b + 7 * LANES], W[b + 8 * LANES], clearance, stiffness, 1.5,
+        W[b + 13 * LANES], W[b + 14 * LANES], W[b + 15 * LANES], W[b + 16 * LANES],
+        W[b + 17 * LANES], W[b + 18 * LANES], NO_CORNERS,
+        W[b + 19 * LANES], W[b + 20 * LANES], W[b + 21 * LANES], W[b + 22 * LANES],
+        W[b + 23 * LANES], W[b + 24 * LANES], W[b + 25 * LANES], W[b + 26 * LANES],
+        W[b + 27 * LANES], W[b + 28 * LANES], W[b + 29 * LANES], W[b + 30 * LANES],
+        W[b + 31 * LANES], W[b + 32 * LANES], W[b + 33 * LANES], W[b + 34 * LANES],
+    )  # fmt: skip
+
+
+@inlined
+def combined(W, i, j, w):
+    """Number i of the state of lane j where the stages have the weights w, (7,)."""
+    u = LANES * i + j
+    return W[Z + u] + W[H + j] * (
+        w[0] * W[K + u]
+        + w[1] * W[K + 12 * LANES + u]
+        + w[2] * W[K + 24 * LANES + u]
+        + w[3] * W[K + 36 * LANES + u]
+        + w[4] * W[K + 48 * LANES + u]
+        + w[5] * W[K + 60 * LANES + u]
+        + w[6] * W[K + 72 * LANES + u]
+    )
+
+
+@inlined
+def state_of(scene, W, j, w):
+    """The motion of lane j where the stages have the weights w, eight numbers."""
+    y0, y1 = combined(W, 0, j, w), combined(W, 1, j, w)
+    y2, y3 = combined(W, 2, j, w), combined(W, 3, j, w)
+    y4, y5, y6, y7 = 0.0, 0.0, 0.0, 0.0
+    if len(scene) == 3:
+        y4, y5 = combined(W, 4, j, w), combined(W, 5, j, w)
+        y6, y7 = combined(W, 6, j, w), combined(W, 7, j, w)
+    return y0, y1, y2, y3, y4, y5, y6, y7
+
+
+@inlined
+def put_rates(scene, W, j, y, d, q):
+    """Write dz/dt into OUT: rates, accelerations, powers."""
+    if len(scene) == 3:
+        W[OUT + j], W[OUT + 1 * LANES + j], W[OUT + 2 * LANES + j], W[OUT + 3 * LANES + j] = (
+            y[4],
+            y[5],
+            y[6],
+            y[7],
+        )
+        (
+            W[OUT + 4 * LANES + j],
+            W[OUT + 5 * LANES + j],
+            W[OUT + 6 * LANES + j],
+            W[OUT + 7 * LANES + j],
+        ) = d
+        (
+            W[OUT + 8 * LANES + j],
+            W[OUT + 9 * LANES + j],
+            W[OUT + 10 * LANES + j],
+            W[OUT + 11 * LANES + j],
+        ) = q
+    else:
+        W[OUT + j], W[OUT + 1 * LANES + j] = y[2], y[3]
+        W[OUT + 2 * LANES + j], W[OUT + 3 * LANES + j] = d[0], d[3]
+        (
+            W[OUT + 4 * LANES + j],
+            W[OUT + 5 * LANES + j],
+            W[OUT + 6 * LANES + j],
+            W[OUT + 7 * LANES + j],
+        ) = q
+
+
+@inlined
+def put_seen(W, j, g, energy):
+    s = SEEN + j
+    W[s], W[s + 1 * LANES], W[s + 2 * LANES], W[s + 3 * LANES] = g[0], g[1], g[2], g[3]
+    W[s + 4 * LANES], W[s + 5 * LANES], W[s + 6 * LANES], W[s + 7 * LANES] = g[4], g[5], g[6], g[7]
+    W[s + 8 * LANES], W[s + 9 * LANES], W[s + 10 * LANES], W[s + 11 * LANES] = (
+        g[8],
+        g[9],
+        g[10],
+        g[11],
+    )
+    W[s + 12 * LANES], W[s + 13 * LANES] = g[12], g[13]
+    W[s + 14 * LANES], W[s + 15 * LANES] = energy
+
+
+@inlined
+def move(W, k, a, o):
+    """Copy eight rows from o to a: constants, or LLVM takes one number at a time."""
+    for j in range(k):
+        W[a + j] = W[o + j]
+        W[a + LANES + j] = W[o + LANES + j]
+        W[a + 2 * LANES + j] = W[o + 2 * LANES + j]
+        W[a + 3 * LANES + j] = W[o + 3 * LANES + j]
+        W[a + 4 * LANES + j] = W[o + 4 * LANES + j]
+        W[a + 5 * LANES + j] = W[o + 5 * LANES + j]
+        W[a + 6 * LANES + j] = W[o + 6 * LANES + j]
+        W[a + 7 * LANES + j] = W[o + 7 * LANES + j]
+
+
+@inlined
+def keep(scene, W, k, a):
+    move(W, k, a, OUT)
+    if len(scene) == 3:
+        move(W, k, a + 4 * LANES, OUT + 4 * LANES)
+
+
+@jit
+def keep_stage(scene, W, k, s):
+    W = borrowed(W)
+    if s == 1:
+        keep(scene, W, k, K + STATE * LANES)
+    elif s == 2:
+        keep(scene, W, k, K + 2 * STATE * LANES)
+    elif s == 3:
+        keep(scene, W, k, K + 3 * STATE * LANES)
+    elif s == 4:
+        keep(scene, W, k, K + 4 * STATE * LANES)
+    elif s == 5:
+        keep(scene, W, k, K + 5 * STATE * LANES)
+    else:
+        keep(scene, W, k, K + 6 * STATE * LANES)
+
+
+@inlined
+def keep_glance(W, k, a):
+    move(W, k, a, SEEN)
+    move(W, k, a + 8 * LANES, SEEN + 8 * LANES)
+
+
+@jit
+def keep_seen(W, k, i):
+    W = borrowed(W)
+    if i == 1:
+        keep_glance(W, k, R1)
+    elif i == 2:
+        keep_glance(W, k, R2)
+    elif i == 3:
+        keep_glance(W, k, R3)
+    else:
+        keep_glance(W, k, R4)
+
+
+@jit
+def stage_rates(scene, W, k, fraction, w, s):
+    """dz/dt where the stages have the weights w, at a fraction of the steps: stage s."""
+    W = borrowed(W)
+    for j in range(k):
+        p = record_of(scene, W, j)
+        motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
+        y = state_of(scene, W, j, w)
+        now = evaluate(motion, y, int(W[PHASE + j]), p)
+        put_rates(scene, W, j, y, deviating(now, p), powers(now, y, joint_forces(now, y, p), p))
+    keep_stage(scene, W, k, s)
+
+
+@jit
+def look_at_node(scene, W, k, fraction, w, i):
+    """What is seen at node i of the steps."""
+    W = borrowed(W)
+    for j in range(k):
+        p = record_of(scene, W, j)
+        motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
+        y = state_of(scene, W, j, w)
+        now = evaluate(motion, y, int(W[PHASE + j]), p)
+        put_seen(W, j, glanced(now, joint_forces(now, y, p), p), energies(now, y, p))
+    keep_seen(W, k, i)
+
+
+@jit
+def finish_step(scene, W, k, w):
+    """State, flows and crank direction at the ends of the steps, and their errors."""
+    W = borrowed(W)
+    n = 8 if len(scene) == 3 else 4
+    for j in range(k):
+        W[NEW + j], W[NEW + LANES + j] = combined(W, 0, j, w), combined(W, 1, j, w)
+        W[NEW + 2 * LANES + j] = combined(W, 2, j, w)
+        W[NEW + 3 * LANES + j] = combined(W, 3, j, w)
+        W[NEW + 4 * LANES + j] = combined(W, 4, j, w)
+        W[NEW + 5 * LANES + j] = combined(W, 5, j, w)
+        W[NEW + 6 * LANES + j] = combined(W, 6, j, w)
+        W[NEW + 7 * LANES + j] = combined(W, 7, j, w)
+        if len(scene) == 3:
+            W[NEW + 8 * LANES + j] = combined(W, 8, j, w)
+            W[NEW + 9 * LANES + j] = combined(W, 9, j, w)
+            W[NEW + 10 * LANES + j] = combined(W, 10, j, w)
+            W[NEW + 11 * LANES + j] = combined(W, 11, j, w)
+    for j in range(k):
+        e = (
+            part_of_error(W, 0, j) + part_of_error(W, 1, j)
+            + part_of_error(W, 2, j) + part_of_error(W, 3, j)
+        )  # fmt: skip
+        if len(scene) == 3:
+            e += (
+                part_of_error(W, 4, j) + part_of_error(W, 5, j)
+                + part_of_error(W, 6, j) + part_of_error(W, 7, j)
+            )  # fmt: skip
+        W[ERROR + j] = W[H + j] * math.sqrt(e / n)
+
+
+@inlined
+def part_of_error(W, i, j):
+    """Square of the estimated error of number i over its tolerance, over the step's length."""
+    u = LANES * i + j
+    e = (
+        ERROR_WEIGHTS[0] * W[K + u]
+        + ERROR_WEIGHTS[1] * W[K + STATE * LANES + u]
+        + ERROR_WEIGHTS[2] * W[K + 2 * STATE * LANES + u]
+        + ERROR_WEIGHTS[3] * W[K + 3 * STATE * LANES + u]
+        + ERROR_WEIGHTS[4] * W[K + 4 * STATE * LANES + u]
+        + ERROR_WEIGHTS[5] * W[K + 5 * STATE * LANES + u]
+        + ERROR_WEIGHTS[6] * W[K + 6 * STATE * LANES + u]
+    )
+    e /= W[ATOL + u] + W[RTOL + j] * max(abs(W[Z + u]), abs(W[NEW + u]))
+    return e * e
+
+
+@inlined
+def weights_of(table, i):
+    """Row i of a table of weights of the stages as a tuple."""
+    return (
+        table[i, 0], table[i, 1], table[i, 2], table[i, 3], table[i, 4], table[i, 5], table[i, 6]
+    )  # fmt: skip
+
+
+@jit
+def look(scene, W, k, nodes):
+    """What is seen at some nodes of the steps."""
+    for i in nodes:
+        look_at_node(scene, W, k, NODES[i], weights_of(NODE_WEIGHTS, i), i)
+
+
+@jit
+def attempt_lanes(scene, W, k):
+    """A step's stages in each lane, its error, and what is seen in its middle and at its end."""
+    for s in range(1, STAGES):
+        stage_rates(scene, W, k, FRACTIONS[s], weights_of(STEP_WEIGHTS, s), s)
+    look(scene, W, k, OUTER)
+    finish_step(scene, W, k, weights_of(STEP_WEIGHTS, STAGES - 1))

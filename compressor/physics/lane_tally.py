@@ -1,0 +1,259 @@
+"""Whether steps of lanes are taken, and what is tallied of them.
+
+The rules of `march` and `tally` for a step in which nothing begins or ends. A lane in which
+something may is left as it was before the step.
+"""
+
+import numpy as np
+
+from compressor.physics._jit import borrowed, inlined, jit
+from compressor.physics.contact_laws import in_contact
+from compressor.physics.lane_rows import (
+    ALIVE,
+    DEEPEST,
+    ENERGY,
+    ERROR,
+    FLOWN,
+    IMBALANCE,
+    IMPACTS,
+    LANES,
+    LOSS_SECONDS,
+    MAX_PENETRATION,
+    MEASURED,
+    NEAR,
+    NEW,
+    PEAK,
+    PEAK_KINETIC,
+    PEAKED,
+    PLAIN,
+    RELEASES,
+    SECONDS,
+    SETTLE,
+    SQUARE_ACCELERATION,
+    SQUARE_DEVIATION,
+    TOUCHING,
+    H,
+    T,
+)  # fmt: skip
+from compressor.physics.lane_steps import R0, R1, R2, R3, R4
+from compressor.physics.tally import NEAR as NEAR_SHARE
+from compressor.physics.tally import vertex
+from compressor.physics.walker import COARSE_WEIGHTS, NODES, WEIGHTS
+
+N1, N2, N3 = (float(node) for node in NODES[1:4])
+F0, F1, F2, F3, F4 = (float(weight) for weight in WEIGHTS)
+G0, _, G2, _, G4 = (float(weight) for weight in COARSE_WEIGHTS)
+# widths of the step's parts, added as `march.measure_apart` does
+FINE_WHOLE = sum(float(width) for width in np.diff(NODES))
+COARSE_WHOLE = sum(float(width) for width in np.diff(NODES[::2]))
+DEVIATION, PENETRATION, NORMAL, NEARNESS = 7 * LANES, 8 * LANES, 10 * LANES, 12 * LANES
+KINETIC, POTENTIAL = 14 * LANES, 15 * LANES
+
+
+@inlined
+def touches(scene, joint):
+    """Whether a joint of the scene has clearance."""
+    return len(scene) == 3 or len(scene) == joint + 1
+
+
+@inlined
+def nears(W, j, column):
+    """Whether the greatest size of a column may be beaten within the step."""
+    c = column * LANES + j
+    top = max(abs(W[R0 + c]), abs(W[R2 + c]), abs(W[R4 + c]))
+    return (top >= NEAR_SHARE * W[PEAK + c]) & (top > 0.0)
+
+
+@inlined
+def deepens(W, j, joint):
+    """Whether the greatest penetration of a joint may be beaten within the step."""
+    c = joint * LANES + j
+    top = max(W[R0 + PENETRATION + c], W[R2 + PENETRATION + c], W[R4 + PENETRATION + c])
+    return (top > 0.0) & (top >= NEAR_SHARE * W[MAX_PENETRATION + c])
+
+
+@inlined
+def changes(W, j, joint):
+    """Whether contact may begin or end at a joint within the step, as `march.may_change`."""
+    c = NEARNESS + joint * LANES + j
+    low = min(W[R0 + c], W[R2 + c], W[R4 + c])
+    high = max(W[R0 + c], W[R2 + c], W[R4 + c])
+    beyond = 2.0 * (high - low)
+    return (low - beyond <= 0.0) & (high + beyond > 0.0)
+
+
+@jit
+def judge(scene, W, k):
+    """Which lanes take their step (PLAIN), and which of these are to be looked at closer (NEAR).
+
+    Returns whether any is.
+    """
+    W = borrowed(W)
+    for j in range(k):
+        near = nears(W, j, 0) | nears(W, j, 1) | nears(W, j, 2) | nears(W, j, 3)
+        near = near | nears(W, j, 4) | nears(W, j, 5) | nears(W, j, 6)
+        near = near | deepens(W, j, 0) | deepens(W, j, 1)
+        change = False
+        if touches(scene, 0):
+            change = changes(W, j, 0)
+        if touches(scene, 1):
+            change = change | changes(W, j, 1)
+        measured = W[T + j] >= W[SETTLE + j]
+        plain = (W[ERROR + j] <= 1.0) & (not change) & (W[ALIVE + j] > 0.0)
+        W[MEASURED + j] = 1.0 if measured else 0.0
+        W[PLAIN + j] = 1.0 if plain else 0.0
+        W[NEAR + j] = 1.0 if near & measured & plain else 0.0
+    total = 0.0
+    for j in range(k):
+        total += W[NEAR + j]
+    return total > 0.0
+
+
+@inlined
+def may_touch(W, j, joint):
+    """`march.may_touch` at a joint, by all nodes."""
+    c = NEARNESS + joint * LANES + j
+    low = min(min(min(W[R0 + c], W[R1 + c]), min(W[R2 + c], W[R3 + c])), W[R4 + c])
+    high = max(max(max(W[R0 + c], W[R1 + c]), max(W[R2 + c], W[R3 + c])), W[R4 + c])
+    return (low <= 0.0) & (high + (high - low) > 0.0)
+
+
+@jit
+def judge_closer(scene, W, k):
+    """After a closer look at the lanes that are NEAR: they are left alone if contact may begin."""
+    W = borrowed(W)
+    for j in range(k):
+        near = W[NEAR + j] > 0.0
+        touch = False
+        if touches(scene, 0):
+            touch = may_touch(W, j, 0)
+        if touches(scene, 1):
+            touch = touch | may_touch(W, j, 1)
+        plain = W[PLAIN + j]
+        W[PLAIN + j] = 0.0 if near & touch else plain
+        W[NEAR + j] = 1.0 if near & (not touch) else 0.0
+
+
+@inlined
+def rises(a, b, c, d, e, fine):
+    """As `tally.peak_of`: the top of the nodes' values and of the parabola through the best."""
+    top = max(max(a, e), c)
+    top = max(top, max(b, d)) if fine else top
+    # the best is the first one of the greatest; the parabola stands on an inner node
+    early = (a == top) | (b == top)
+    middle = (not early) & (c == top)
+    if fine:
+        before = a if early else (b if middle else c)
+        here = b if early else (c if middle else d)
+        after = c if early else (d if middle else e)
+        left = -N1 if early else (N1 - N2 if middle else N2 - N3)
+        right = N2 - N1 if early else (N3 - N2 if middle else 1.0 - N3)
+    else:
+        before, here, after, left, right = a, c, e, -0.5, 0.5
+    return top, vertex(left, right, before, here, after)
+
+
+@inlined
+def passed(touching, flown, impacts, releases, normal, depth, counts, measured):
+    """Touching, flown, impacts and releases after a node, if it counts."""
+    now = in_contact(normal)
+    off = flown | (depth < 0.0)
+    begins = counts & measured & now & (not touching)
+    impacts += 1.0 if begins & off else 0.0
+    releases += 1.0 if begins & (not off) else 0.0
+    touching = now if counts else touching
+    flown = (off & (not now)) if counts else flown
+    return touching, flown, impacts, releases
+
+
+@inlined
+def tally_joint(W, j, joint, plain, fine, measured):
+    """Contact loss, impacts, releases and penetration of a step at one joint."""
+    c = joint * LANES + j
+    d, n, x = PENETRATION + c, NORMAL + c, NEARNESS + c
+    touching, flown = W[TOUCHING + c] > 0.0, W[FLOWN + c] > 0.0
+    hits, leaves = W[IMPACTS + c], W[RELEASES + c]
+    touching, flown, hits, leaves = passed(
+        touching, flown, hits, leaves, W[R0 + n], W[R0 + d], True, measured
+    )
+    touching, flown, hits, leaves = passed(
+        touching, flown, hits, leaves, W[R1 + n], W[R1 + d], fine, measured
+    )
+    touching, flown, hits, leaves = passed(
+        touching, flown, hits, leaves, W[R2 + n], W[R2 + d], True, measured
+    )
+    touching, flown, hits, leaves = passed(
+        touching, flown, hits, leaves, W[R3 + n], W[R3 + d], fine, measured
+    )
+    touching, flown, hits, leaves = passed(
+        touching, flown, hits, leaves, W[R4 + n], W[R4 + d], True, measured
+    )
+    W[TOUCHING + c] = (1.0 if touching else 0.0) if plain else W[TOUCHING + c]
+    W[FLOWN + c] = (1.0 if flown else 0.0) if plain else W[FLOWN + c]
+    W[IMPACTS + c] = hits if plain else W[IMPACTS + c]
+    W[RELEASES + c] = leaves if plain else W[RELEASES + c]
+    top, rise = rises(W[R0 + d], W[R1 + d], W[R2 + d], W[R3 + d], W[R4 + d], fine)
+    known = W[MAX_PENETRATION + c]
+    best = max(top, known)
+    best = best if 2.0 * top < known else max(best, rise)
+    W[MAX_PENETRATION + c] = best if plain & measured else known
+    W[DEEPEST + j] = max(W[DEEPEST + j], top) if plain else W[DEEPEST + j]
+    # contact does not change within the step
+    whole = FINE_WHOLE if fine else COARSE_WHOLE
+    more = whole * W[H + j] if W[R2 + x] <= 0.0 else 0.0
+    W[LOSS_SECONDS + c] += more if plain & measured else 0.0
+
+
+@inlined
+def squared(W, c, total, h, fine):
+    """The square of a column added to a total at the nodes, by their weights."""
+    b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
+    total += h * (F0 if fine else G0) * W[R0 + c] ** 2
+    total += h * F1 * b**2
+    total += h * (F2 if fine else G2) * W[R2 + c] ** 2
+    total += h * F3 * d**2
+    return total + h * (F4 if fine else G4) * W[R4 + c] ** 2
+
+
+@jit
+def tally_lanes(scene, W, k):
+    """Tally the steps of plain lanes: as `tally_energy` and `tally_step`."""
+    W = borrowed(W)
+    f = (8 if len(scene) == 3 else 4) * LANES
+    for j in range(k):
+        plain = W[PLAIN + j] > 0.0
+        kinetic = W[R4 + KINETIC + j]
+        put_in = kinetic + W[R4 + POTENTIAL + j] - W[ENERGY + j]
+        put_in = put_in - W[NEW + f + j] - W[NEW + f + LANES + j]
+        imbalance = abs(put_in + W[NEW + f + 2 * LANES + j] + W[NEW + f + 3 * LANES + j])
+        worst = W[IMBALANCE + j]
+        W[IMBALANCE + j] = imbalance if plain & (not (imbalance <= worst)) else worst
+        most = W[PEAK_KINETIC + j]
+        W[PEAK_KINETIC + j] = max(most, kinetic) if plain else most
+    for j in range(k):
+        plain, measured = W[PLAIN + j] > 0.0, W[MEASURED + j] > 0.0
+        fine = W[NEAR + j] > 0.0
+        if touches(scene, 0):
+            tally_joint(W, j, 0, plain, fine, measured)
+        if touches(scene, 1):
+            tally_joint(W, j, 1, plain, fine, measured)
+    for j in range(k):
+        counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
+        fine = W[NEAR + j] > 0.0
+        h = W[H + j] if counts else 0.0
+        W[SECONDS + j] += h
+        W[SQUARE_ACCELERATION + j] = squared(W, j, W[SQUARE_ACCELERATION + j], h, fine)
+        W[SQUARE_DEVIATION + j] = squared(W, DEVIATION + j, W[SQUARE_DEVIATION + j], h, fine)
+    for column in range(PEAKED):
+        o = column * LANES
+        for j in range(k):
+            counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
+            fine = W[NEAR + j] > 0.0
+            c = o + j
+            top, rise = rises(
+                abs(W[R0 + c]), abs(W[R1 + c]), abs(W[R2 + c]), abs(W[R3 + c]), abs(W[R4 + c]),
+                fine,
+            )  # fmt: skip
+            known = W[PEAK + c]
+            best = max(known, max(top, rise)) if 2.0 * top >= known else known
+            W[PEAK + c] = best if counts else known

@@ -1,0 +1,134 @@
+"""Runs side by side: to the bit what each gives by itself, whoever its neighbours are."""
+
+import re
+
+import numpy as np
+import pytest
+from random_cases import strangers
+
+from compressor.cases.case import Case
+from compressor.metrics import JOINTS
+from compressor.physics import lane_rows as rows
+from compressor.physics import lane_steps
+from compressor.physics.lane_runs import fits
+from compressor.physics.record import RECORD
+from compressor.solve.si_record import record
+from compressor.solve.side_by_side import MOST_ATTEMPTS, side_by_side
+from compressor.solve.simulate import measure, observe
+
+SCENES = {"big_end": 1, "small_end": 2, "both": 3}
+pytestmark = pytest.mark.compiled
+
+
+def cases(joint, count=20, **more):
+    """As a stranger would draw them, with a load that lanes take."""
+    values = [one for one in strangers(1515, 40 * count) if one["joint"] == joint]
+    loads = ("design", "none", "design", "design")
+    solve = {"duration_rev": 2, "timeout_s": 60, **more}
+    return [
+        Case.from_values({**one, "load": loads[i % 4], "solve": solve})
+        for i, one in enumerate(values[:count])
+    ]
+
+
+def told(outcome):
+    """All that is stored of an outcome but the wall time of its run."""
+    numbers = outcome.numbers.copy()
+    numbers["seconds"] = 0.0
+    return outcome.status, outcome.reason, numbers.tobytes(), outcome.attributes
+
+
+@pytest.mark.parametrize("joint", [*JOINTS, "both"])
+def test_an_outcome_has_the_same_bits(joint):
+    """Metrics, error bars, ledger and counts of random cases; the first in a lane of its own."""
+    some = cases(joint)
+    ahead = side_by_side(some, (SCENES[joint],))
+    assert sum(len(made) == 2 for made in ahead) >= 0.8 * len(some)  # the run and its companion
+    for case, made in zip(some, ahead, strict=True):
+        assert told(measure(case, made)) == told(measure(case))
+    alone = side_by_side(some[:1], (SCENES[joint],))
+    for rtol, made in alone[0].items():
+        assert made.trajectory.tally.tobytes() == ahead[0][rtol].trajectory.tally.tobytes()
+
+
+def test_time_series_have_the_same_bits():
+    case = cases("big_end", 1)[0]
+    (made,) = side_by_side([case], (1,))
+    (_, ours), (_, theirs) = observe(case, made), observe(case)
+    for name, (_, values, *_) in theirs.variables.items():
+        if name != "seconds":
+            assert np.asarray(ours.variables[name][1]).tobytes() == np.asarray(values).tobytes()
+
+
+def test_a_run_that_fails_touches_no_neighbour():
+    """One is too soft and stops at an implausible penetration; another takes too many steps."""
+    sound = cases("small_end", 3)
+    soft = Case.from_values(
+        {"joint": "small_end", "clearance_mm": 0.2, "contact": {"stiffness_N_per_mm15": 10}}
+    )
+    long = Case.from_values(
+        {"joint": "small_end", "clearance_mm": 0.2, "solve": {"duration_rev": 2000}}
+    )
+    ahead = side_by_side([soft, sound[0], long, *sound[1:]], (2,))
+    assert (ahead[0], ahead[2]) == ({}, {})
+    by_themselves = side_by_side(sound, (2,))
+    for one, other in zip([ahead[1], *ahead[3:]], by_themselves, strict=True):
+        assert one.keys() == other.keys() != set()
+        for rtol in one:
+            assert one[rtol].trajectory.tally.tobytes() == other[rtol].trajectory.tally.tobytes()
+    assert measure(soft, ahead[0]).reason == "penetration_implausible"
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"load": "typical"},
+        {"contact": {"exponent": 1.4}},
+        {"clearance_mm": 0.0},
+        {"solve": {"method": "DOPRI5"}},
+        {"solve": {"settle_rev": "auto"}},
+        {"solve": {"timeout_s": 1}},
+        {"solve": {"max_steps": MOST_ATTEMPTS - 1}},
+        {"solve": {"output_step_deg": 0.001}},
+    ],
+)
+def test_what_does_not_suit_is_left_to_itself(values):
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **values})
+    (made,) = side_by_side([case], (1, 2, 3))
+    assert all(rtol != case.rtol for rtol in made)
+
+
+def test_scenes_that_are_not_named_are_left_alone():
+    assert side_by_side(cases("both", 2), (1,)) == [{}, {}]
+
+
+def test_lanes_know_every_field_of_the_record():
+    """Rows are filled with their own numbers: each field of a lane's record is the row it names."""
+    W = np.arange(rows.TOTAL * rows.LANES, dtype=float)
+    made = lane_steps.record_of.__wrapped__((0, 0), W, 3)
+    places = {field: rows.FIRST_FIELD + i * rows.LANES + 3 for i, field in enumerate(rows.FIELDS)}
+    choices = {"scene": 2, "load": rows.DESIGN, "law": 0, "friction": 1, "freedoms": 2, "wide": 0,
+               "exponent": 1.5, "corners": (0.0, 0.0, 0.0)}  # fmt: skip
+    assert {*choices} == {*rows.CHOICES}
+    for name in RECORD.names:
+        if name in choices:
+            expected = choices[name]
+        elif RECORD[name].shape:
+            expected = tuple(W[places[name, joint]] for joint in range(2))
+        else:
+            expected = W[places[name, 0]]
+        assert getattr(made, name) == expected, name
+    assert fits(record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2})))
+
+
+def test_loops_over_lanes_are_vector_code():
+    """Square roots and divisions of several lanes at once, where the processor is known."""
+    numba = pytest.importorskip("numba")
+    weights = (0.1,) * 7
+    fresh = numba.njit(error_model="numpy")(lane_steps.stage_rates.made.py_func)
+    fresh((0,), rows.new_lanes(), rows.LANES, 0.5, weights, 1)
+    (code,) = fresh.inspect_asm().values()
+    if not re.search(r"\b[xyz]mm\d", code):
+        pytest.skip("no x86 machine code to look at")
+    assert re.search(r"v?sqrtpd", code)
+    assert re.search(r"v?divpd", code)
