@@ -3,7 +3,7 @@
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from compressor.cases import Case
 from compressor.outcome import Outcome
@@ -18,10 +18,11 @@ class Carried(NamedTuple):
     data: bytes
 
 
-def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
+def run_job(place: Path | None, case: Case, ahead: Any = None) -> Outcome | Carried | StoreError:
     """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
 
-    Without a place, what is to be stored comes back. A StoreError is returned: it ends the sweep,
+    Without a place, what is to be stored comes back. ahead: what `run_ahead` has made of it. A
+    StoreError is returned: it ends the sweep,
     while an exception is a failure of the job.
     """
     from compressor.solve import measure, observe  # needs numba: only to simulate
@@ -29,8 +30,8 @@ def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
         if case.output.keep == "metrics":
-            return measure(case)
-        found, dataset = observe(case)
+            return measure(case, ahead or {})
+        found, dataset = observe(case, ahead or {})
     if found.reason == Reason.INVALID_INPUT:
         return found
     if place is None:
@@ -40,3 +41,10 @@ def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
         return replace(found, series=write_series(place, dataset, case.output))
     except StoreError as error:
         return error
+
+
+def run_ahead(scenes: tuple[int, ...], cases: list[Case]) -> list[Any]:
+    """What can be made of several cases at once: the first attempts of those of some scenes."""
+    from compressor.solve import side_by_side
+
+    return side_by_side(cases, scenes)

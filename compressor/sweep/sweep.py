@@ -18,7 +18,7 @@ from compressor.outcome import Outcome, without_run
 from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.batches import Input
 from compressor.sweep.execution import rest, run_batches
-from compressor.sweep.run_job import run_job
+from compressor.sweep.run_job import run_ahead, run_job
 from compressor.sweep.wanted import End, Missing, Wanted, stored
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.work import Now, Work
@@ -214,7 +214,7 @@ def local(workers: int) -> Backend:
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[Done | Lost, None, None]:
-        needs, work = Needs.of(cases), partial(run_job, place)
+        needs, work = Needs.of(cases).with_lanes(cases), partial(run_job, place)
         return run_here(work, Jobs(cases), needs, workers, remark, pulse)
 
     return run
@@ -228,10 +228,16 @@ def run_here(
     remark: Callable[[str], None],
     pulse: Callable[[], object] = lambda: None,
 ) -> Generator[Done | Lost, None, None]:
-    """`run_batches` in processes that load the equations, compiled before if there is a job."""
+    """`run_batches` in processes that load the equations, compiled before if there is a job.
+
+    Where the needs name scenes for lanes, jobs are cases, and `work` takes what `run_ahead` gives.
+    """
     if jobs:
         compile_once(needs, remark)
-    return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), pulse)
+    ahead = partial(run_ahead, needs.lanes) if needs.lanes else None
+    return run_batches(
+        work, jobs, Workers(workers, partial(load, needs), ahead, grace=GRACE), pulse
+    )
 
 
 class Jobs(Sequence[Any]):

@@ -7,7 +7,9 @@ change of either compiles anew, once.
 import hashlib
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from compressor.cases import Case
@@ -15,14 +17,18 @@ from compressor.program import COMPILED, library_versions, machine_code_folder
 
 PATIENCE = 2.0  # s of compiling before a remark on it
 COMPILING = "compiling the equations, about a minute: once for each version of the program"
+LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes of which runs march side by side
+FEWEST, MANY = 16, 4000  # jobs of a scene that lanes are loaded for, and compiled for
+SEEN = 1000  # jobs that are looked at for it
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
 
 class Needs(NamedTuple):
-    """What some cases need of the equations: methods, and twins for a horizon."""
+    """What some cases need of the equations: methods, twins for a horizon, scenes in lanes."""
 
     methods: tuple[str, ...] = ()
     horizon: bool = False
+    lanes: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, cases: Iterable[Case]) -> "Needs":
@@ -30,16 +36,36 @@ class Needs(NamedTuple):
         methods = tuple(sorted({"auto"} | {solve.method for solve in solves}))
         return cls(methods, any(solve.horizon is True for solve in solves))
 
+    def with_lanes(self, cases: Sequence[Case]) -> "Needs":
+        """With the scenes of which there are jobs enough to march side by side.
+
+        Results are the same to the bit without: where no lanes have been compiled yet, many more
+        jobs are asked for than where they need but be loaded.
+        """
+        from compressor.solve import scene
+
+        step = max(1, len(cases) // SEEN)
+        seen = Counter(int(scene(cases[i])) for i in range(0, len(cases), step))
+        least = {of: FEWEST if marker(f"lanes-{of}").exists() else MANY for of in LANES}
+        return self._replace(lanes=tuple(of for of in LANES if seen[of] * step >= least[of]))
+
 
 def load(needs: Needs) -> None:
     """Load the equations, or compile them, by runs that are as short as can be."""
-    from compressor.solve import measure  # needs numba: only where something is simulated
+    from compressor.solve import (
+        measure,
+        side_by_side,
+    )  # needs numba: only where something is simulated
 
     solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
     measure(Case.from_values({"solve": solve}))
     hows: list[dict[str, object]] = [{"method": method} for method in needs.methods]
     if needs.horizon:
         hows.append({"horizon": True})
+    if needs.lanes:
+        short = {"clearance_mm": 0.1, "solve": solve}
+        cases = [Case.from_values({"joint": joint, **short}) for joint in LANES.values()]
+        side_by_side(cases, needs.lanes)
     for how in hows:
         values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | how}
         measure(Case.from_values(values))
@@ -61,13 +87,18 @@ def load_telling(needs: Needs, remark: Callable[[str], None]) -> None:
         remark(f"compiled in {seconds:.0f} s")
 
 
-def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
-    """Compile here what this machine has not compiled before, so that workers need but load it."""
+def marker(part: str) -> Path:
+    """The file that says that a part of the equations has been compiled on this machine."""
     # numba keeps machine code by the path of its sources: a copied folder brings none of use
     what = f"{library_versions(*LIBRARIES)} {COMPILED}"
     known = hashlib.sha256(what.encode()).hexdigest()[:8]
+    return machine_code_folder() / f"compiled-{known}-{part}"
+
+
+def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
+    """Compile here what this machine has not compiled before, so that workers need but load it."""
     parts = [*needs.methods, *(["horizon"] if needs.horizon else [])]
-    compiled = [machine_code_folder() / f"compiled-{known}-{part}" for part in parts]
+    compiled = [marker(part) for part in (*parts, *(f"lanes-{of}" for of in needs.lanes))]
     if not all(path.exists() for path in compiled):
         load_telling(needs, remark)
         for path in compiled:

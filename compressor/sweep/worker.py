@@ -13,6 +13,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from compressor.reasons import Reason
@@ -51,13 +52,15 @@ class Lost:
 class Workers:
     """Worker processes: how many, and the rules for them.
 
-    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
-    job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
-    itself.
+    `prepare` is called once in each, before its clocks and limits are set. `ahead`: called with
+    all jobs of a batch before the first one is done; what it gives for each is its work's second
+    argument. `memory`: bytes that a job may add (by default `memory_share`). `grace`: s beyond its
+    time in which a job may end by itself.
     """
 
     count: int = 2
     prepare: Callable[[], object] = int
+    ahead: Callable[[list[Any]], Sequence[Any]] | None = None
     memory: int | None = None
     grace: float = 1.0
     target_seconds: float = 0.2
@@ -106,9 +109,12 @@ def do_batch(place: int, payloads: Sequence[bytes]) -> tuple[int, list[Done | Lo
     """Do the jobs of a batch: its place, and how jobs ended, all but a rest that is given back."""
     found: list[Done | Lost] = []
     began = start = time.monotonic()
-    for position, payload in enumerate(payloads):
+    NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), 0, start)
+    jobs, each = look_ahead(payloads), (time.monotonic() - start) / len(payloads)
+    for position, job in enumerate(jobs):
+        start = time.monotonic()
         NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), position, start)
-        found.append(perform(payload, start))
+        found.append(perform(job, start - each))
         start = time.monotonic()
         NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), position, -start)
         if start - began > OVERRUN * HERE["rules"].target_seconds:
@@ -116,10 +122,27 @@ def do_batch(place: int, payloads: Sequence[bytes]) -> tuple[int, list[Done | Lo
     return place, found
 
 
-def perform(payload: bytes, start: float) -> Done | Lost:
+def look_ahead(payloads: Sequence[bytes]) -> Sequence[Callable[[], tuple[Any, ...]]]:
+    """For each job of a batch a call that gives the arguments of its work."""
+    if HERE["rules"].ahead is None:
+        return [partial(only, payload) for payload in payloads]
+    try:
+        jobs = [pickle.loads(payload) for payload in payloads]
+        known = HERE["rules"].ahead(jobs)
+    except MemoryError:  # each job by itself will need less, or tell of it
+        return [partial(only, payload) for payload in payloads]
+    return [partial(tuple, pair) for pair in zip(jobs, known, strict=True)]
+
+
+def only(payload: bytes) -> tuple[Any]:
+    """The single argument of a job's work."""
+    return (pickle.loads(payload),)
+
+
+def perform(job: Callable[[], tuple[Any, ...]], start: float) -> Done | Lost:
     """Do one job; its result is pickled."""
     try:
-        result = pickle.dumps(HERE["work"](pickle.loads(payload)), pickle.HIGHEST_PROTOCOL)
+        result = pickle.dumps(HERE["work"](*job()), pickle.HIGHEST_PROTOCOL)
         return Done(None, result, time.monotonic() - start)
     except MemoryError:
         most = f"needs more than the {HERE['rules'].memory / 1e9:.3g} GB that a worker may add"

@@ -262,6 +262,34 @@ def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch)
     assert "once for each version" in warm_up.COMPILING
 
 
+def test_jobs_in_lanes_are_stored_with_the_same_bits(studies, tmp_path, monkeypatch):
+    """Side by side in workers, or each by itself: the rows differ by wall times alone."""
+    lengths = [round(0.1 + 0.005 * k, 3) for k in range(30)]
+    made = studies(many={"joint": "both", "clearance_mm": lengths, "output": {"keep": "metrics"}})
+    rows = []
+    for name, fewest in (("lanes", 1), ("alone", 10**9)):
+        monkeypatch.setattr(warm_up, "FEWEST", fewest)
+        monkeypatch.setattr(warm_up, "MANY", fewest)
+        needs = warm_up.Needs.of(made[0].cases).with_lanes(made[0].cases)
+        assert needs.lanes == ((3,) if name == "lanes" else ())
+        sweep(made, tmp_path / name, 2)
+        data = store.open_study(tmp_path / name, "many").load()
+        rows.append(data.drop_vars(["seconds"]))
+    assert (rows[0]["status"] == "ok").all()
+    assert rows[0].equals(rows[1])
+
+
+def test_lanes_are_compiled_for_many_jobs_alone(studies, tmp_path, monkeypatch):
+    """Where they have been compiled before, a few jobs are enough to load them."""
+    few = studies(few={**BOTH, "clearance_mm": [0.1 + 0.001 * k for k in range(20)]})[0].cases
+    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
+    assert warm_up.Needs().with_lanes(few).lanes == ()
+    assert warm_up.Needs().with_lanes([few[0]] * warm_up.MANY).lanes == (3,)
+    warm_up.marker("lanes-3").touch()
+    assert warm_up.Needs().with_lanes(few).lanes == (3,)
+    assert warm_up.Needs().with_lanes([few[0]]).lanes == ()
+
+
 def test_a_copied_folder_compiles_anew(tmp_path, monkeypatch):
     """Numba keeps machine code by path: the mark that came with a copy made each worker compile."""
     loaded = []
