@@ -290,6 +290,17 @@ def throughput_table():
         f"| {name} | {one['now']:.3g} | {one['before']:.3g} | {one['times as fast']:.2f} |"
         for name, one in found["compared"].items()
     ]
+    lines += [
+        "",
+        "| random cases with error bars | jobs | differ in a bit | ms a job alone | side by side "
+        "| times as fast |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {joint} | {one['cases']} | {one['differ']} | {one['alone_ms']:.3g} "
+        f"| {one['lanes_ms']:.3g} | {one['times as fast']:.2f} |"
+        for joint, one in found["lanes"].items()
+    ]
     return "\n".join(lines) + "\n"
 
 

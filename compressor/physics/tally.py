@@ -64,9 +64,9 @@ TALLY = np.dtype(
 def new_tally():
     """An empty tally; a joint counts as touching until it is seen apart."""
     tally = np.zeros(1, dtype=TALLY).view(np.recarray)[0]
-    tally.touching[:] = 1
-    tally.max_penetration[:] = -math.inf
-    tally.deepest = -math.inf
+    tally["touching"] = 1
+    tally["max_penetration"] = -math.inf
+    tally["deepest"] = -math.inf
     return tally
 
 

@@ -85,11 +85,11 @@ class Work(NamedTuple):
 def new_walker(mode):
     """A walker at the start of its first segment."""
     walker = np.zeros(1, dtype=WALKER).view(np.recarray)[0]
-    walker.fresh = 1
-    walker.error = LEAST_ERROR
-    walker.mode = mode
-    walker.pause = REST // 2
-    walker.stiff = mode == Mode.STIFF
+    walker["fresh"] = 1
+    walker["error"] = LEAST_ERROR
+    walker["mode"] = mode
+    walker["pause"] = REST // 2
+    walker["stiff"] = mode == Mode.STIFF
     return walker
 
 

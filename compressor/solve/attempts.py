@@ -119,7 +119,10 @@ def times_of(case: Case, sampled: bool) -> Times:
     output = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else output[:0]
     loaded = reversal_times(case)
-    every = np.union1d(np.union1d(output, compared), loaded)
+    every = output
+    for more in (compared, loaded):
+        if more.size:
+            every = np.union1d(every, more)
     return Times(case.settle, output, compared, loaded, every)
 
 

@@ -20,7 +20,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     deadline = time.monotonic() + request.timeout
     size = natural_sizes(request.p)
     walker = ready_walker(request, size)
-    edges, phases, walker.settle = with_edge(edges, phases, request.settle)
+    edges, phases, walker["settle"] = with_edge(edges, phases, request.settle)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
     march = March(request, size, edges, phases, result.states)
     now = Standing(walker, z, new_work(size.size), result.tally)

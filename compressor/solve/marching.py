@@ -107,7 +107,7 @@ def ready_walker(request: Request, size: np.ndarray) -> np.record:
     """A walker at the start of a run by a compiled method; `size` as of `natural_sizes`."""
     mode, pair = COMPILED[request.method]
     walker = new_walker(mode)
-    walker.pair, walker.rtol = pair, request.rtol
-    walker.watch, walker.contact_step = 1, CONTACT_STEP * size[0] / size[size.size // 2]
-    walker.deepest = IMPLAUSIBLE * request.p.pin_radius
+    walker["pair"], walker["rtol"] = pair, request.rtol
+    walker["watch"], walker["contact_step"] = 1, CONTACT_STEP * size[0] / size[size.size // 2]
+    walker["deepest"] = IMPLAUSIBLE * request.p["pin_radius"]
     return walker

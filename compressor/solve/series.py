@@ -6,6 +6,7 @@ vector its length counts.
 """
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -81,12 +82,35 @@ def take_samples(p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndar
 
     times, kept: subsets of `run.times`, s.
     """
-    at, stay = np.searchsorted(run.times, times), np.searchsorted(run.times, kept)
-    whole = run.times, run.states, run.phases
-    run.times, run.states, run.phases = (array[at] for array in whole)
-    rows = rows_of(p, run)
-    run.times, run.states, run.phases = (array[stay] for array in whole)
+    whole, rows = (run.times, run.states, run.phases), np.empty((0, COLUMNS))
+    if times.size:
+        at = np.searchsorted(run.times, times)
+        run.times, run.states, run.phases = (array[at] for array in whole)
+        rows = rows_of(p, run)
+    if kept.size < whole[0].size:
+        stay = np.searchsorted(whole[0], kept)
+        whole = whole[0][stay], whole[1][stay], whole[2][stay]
+    run.times, run.states, run.phases = whole
     return rows
+
+
+@cache
+def places() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
+    """Where `distances` finds what it sums: columns, where each sum begins, and sums by name.
+
+    A vector's squares are one sum; a series over joints has two.
+    """
+    columns: list[int] = []
+    starts: list[int] = []
+    sums: dict[str, int | slice] = {}
+    for name, (dims, _, _) in SERIES.items():
+        count = math.prod(SIZES[dim] for dim in dims)
+        joints = SIZES["joint"] if "joint" in dims else 1
+        begin = len(starts)
+        starts += range(len(columns), len(columns) + count, count // joints)
+        columns += range(COLUMN[name], COLUMN[name] + count)
+        sums[name] = slice(begin, begin + joints) if "joint" in dims else begin
+    return np.array(columns), np.array(starts), sums
 
 
 def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
@@ -94,15 +118,12 @@ def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
 
     ours, theirs: observed rows at the same times, (m, COLUMNS). 0 where both are 0.
     """
-    away = ((ours - theirs) ** 2).sum(axis=0, keepdims=True)
-    size = (ours**2).sum(axis=0, keepdims=True)
-    found = {}
-    for name, (dims, _, _) in SERIES.items():
-        one, other = (block(name, sums)[0] for sums in (away, size))
-        if "axis" in dims:
-            one, other = one.sum(axis=-1), other.sum(axis=-1)
-        found[name] = np.sqrt(np.divide(one, other, out=np.zeros_like(one), where=other > 0.0))
-    return found
+    columns, starts, sums = places()
+    apart = ours - theirs
+    away = np.add.reduceat(np.einsum("ij,ij->j", apart, apart)[columns], starts)
+    size = np.add.reduceat(np.einsum("ij,ij->j", ours, ours)[columns], starts)
+    found = np.sqrt(np.divide(away, size, out=np.zeros_like(away), where=size > 0.0))
+    return {name: found[place] for name, place in sums.items()}
 
 
 def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:

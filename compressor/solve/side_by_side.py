@@ -3,7 +3,9 @@
 They are those that each would make by itself, to the bit: what cannot be made so is left to it.
 """
 
+import time
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -54,10 +56,13 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
     for attempts in asked.values():
         if not attempts:
             continue
+        began = time.perf_counter()
         ended = march_side_by_side([one.run for one in attempts], MOST_ATTEMPTS)
+        whole = sum(int(run.walker["evaluations"]) for run in ended if run)
+        each = (time.perf_counter() - began) / max(whole, 1)
         for one, run in zip(attempts, ended, strict=True):
             if run:
-                found[one.case][one.rtol] = made(one, run)
+                found[one.case][one.rtol] = made(one, run, each)
     return list(found)
 
 
@@ -71,16 +76,22 @@ def suits(case: Case) -> bool:
 def attempts_of(number: int, case: Case) -> list[Asked]:
     """What a case's first attempt needs, and its companion's."""
     case = spanned(case, float(case.solve.settle_rev), 1)
-    p = record(case)
-    rtols = [(case.rtol, case.output.keep == "series")]
+    p, sampled = record(case), case.output.keep == "series"
+    found = [asked(number, case, case.rtol, p, times_of(case, sampled))]
     if case.wants_bars and (tighter := companion_rtol(case.rtol)):
-        rtols.append((tighter, False))
-    found = []
-    for rtol, sampled in rtols:
-        times = times_of(case, sampled)
-        if times.all.size <= MOST_SAMPLES:
-            found.append(asked(number, case, rtol, p, times))
-    return found
+        if sampled:
+            found.append(asked(number, case, tighter, p, times_of(case, False)))
+        else:  # all but the tolerance is the same
+            found.append(tightened(found[0], tighter))
+    return [one for one in found if one.times.all.size <= MOST_SAMPLES]
+
+
+def tightened(one: Asked, rtol: float) -> Asked:
+    """The same attempt at another tolerance."""
+    walker = one.run.walker.copy()
+    walker["rtol"] = rtol
+    run, trajectory = one.run._replace(walker=walker), replace(one.trajectory)
+    return one._replace(rtol=rtol, run=run, trajectory=trajectory)
 
 
 def asked(number: int, case: Case, rtol: float, p: np.record, times: Times) -> Asked:
@@ -89,15 +100,16 @@ def asked(number: int, case: Case, rtol: float, p: np.record, times: Times) -> A
     trajectory, edges, phases, z = ready(wanted)
     size = natural_sizes(p)
     walker = ready_walker(wanted, size)
-    edges, phases, walker.settle = with_edge(edges, phases, wanted.settle)
+    edges, phases, walker["settle"] = with_edge(edges, phases, wanted.settle)
     run = Run(walker, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
     return Asked(number, rtol, times, run, trajectory)
 
 
-def made(one: Asked, run: Run) -> Solution:
-    """An attempt whose run has reached its end."""
+def made(one: Asked, run: Run, each: float) -> Solution:
+    """An attempt whose run has reached its end; each: wall time (s) of an evaluation."""
     walker, trajectory = run.walker, one.trajectory
     trajectory.states, trajectory.tally = run.states, run.tally
     trajectory.steps, trajectory.rejected = int(walker["steps"]), int(walker["rejected"])
     trajectory.evaluations = int(walker["evaluations"])
+    trajectory.seconds = each * trajectory.evaluations
     return concluded(one.rtol, run.p, one.times, trajectory)

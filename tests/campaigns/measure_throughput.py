@@ -23,10 +23,14 @@ from pathlib import Path
 
 import numpy as np
 from measure_accuracy import provenance
+from random_cases import strangers
 
+from compressor.cases.case import Case
 from compressor.cases.load import load_studies
+from compressor.solve.side_by_side import side_by_side
 from compressor.solve.simulate import measure
 from compressor.store.reader import read_store
+from compressor.sweep.warm_up import LANES
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted(map(str, (ROOT / "configs").glob("*.yaml")))
@@ -42,6 +46,7 @@ COMMANDS = {
     "the same with the extra dask installed": ["-c", f"import compressor; {ONE_CASE}"],
     "compsim run configs/*.yaml": ["-m", "compsim", "run", *CONFIGS, "-j", "2", "--quiet"],
 }  # fmt: skip
+SEED, RUNS = 1516, 48  # of the random cases that march side by side
 BEFORE = "60cbe80"  # with which this version is compared: that before it was made faster
 SOLVER = """
 import json, sys, time
@@ -212,8 +217,46 @@ def sweeping(jobs):
     }
 
 
+def lanes():
+    """Random cases with error bars, job by job and side by side: bits that differ, and speed."""
+    found = {}
+    for scene, joint in LANES.items():
+        drawn = [one for one in strangers(SEED, 10 * RUNS) if one["joint"] == joint][:RUNS]
+        values = {"load": "design", "output": {"keep": "metrics"}}
+        cases = [Case.from_values(one | values) for one in drawn]
+        measure(cases[0], side_by_side(cases[:1], (scene,))[0])  # compiled before anything counts
+        times, differ = [], 0
+        for turn in range(TURNS):
+            seconds, outcomes = {}, {}
+            for way in ("alone", "lanes") if turn % 2 else ("lanes", "alone"):
+                began = time.process_time()
+                ahead = side_by_side(cases, (scene,)) if way == "lanes" else [{}] * len(cases)
+                pairs = zip(cases, ahead, strict=True)
+                outcomes[way] = [told(measure(case, made)) for case, made in pairs]
+                seconds[way] = time.process_time() - began
+            times.append(seconds)
+            ours = zip(outcomes["alone"], outcomes["lanes"], strict=True)
+            differ = max(differ, sum(one != other for one, other in ours))
+        found[joint] = {
+            "cases": len(cases),
+            "differ": differ,
+            "alone_ms": 1e3 * statistics.median(one["alone"] for one in times) / len(cases),
+            "lanes_ms": 1e3 * statistics.median(one["lanes"] for one in times) / len(cases),
+            "times as fast": statistics.median(one["alone"] / one["lanes"] for one in times),
+        }
+    return found
+
+
+def told(outcome):
+    """All that is stored of an outcome but the wall time of its run."""
+    numbers = outcome.numbers.copy()
+    numbers["seconds"] = 0.0
+    return outcome.status, outcome.reason, numbers.tobytes(), outcome.attributes
+
+
 def main(target, jobs=10_000, commit=BEFORE):
-    kept = {**provenance("make throughput"), "start": starting(), "sweep": sweeping(int(jobs))}
+    kept = {**provenance("make throughput"), "lanes": lanes()}  # first: compiled for all
+    kept |= {"start": starting(), "sweep": sweeping(int(jobs))}
     kept |= {"before": commit, "compared": compared(commit)}
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(kept, indent=1))
