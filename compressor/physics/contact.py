@@ -6,18 +6,18 @@ physics/README.md, Contact and Friction (Eq. 14-16).
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import fused, inlined, merged
 from compressor.physics.contact_laws import elastic_force, in_contact, normal_force, rise
 
 
-@jit
+@merged
 def friction_coefficient(slip, p):
     """Signed friction coefficient mu(v_t), odd in the slip (m/s): ADAMS's smoothed Coulomb law.
 
     Rises from 0 to `static` over the stiction velocity, falls to `dynamic` at the friction one.
     """
     fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
-    size = p.static + (p.dynamic - p.static) * fall
+    size = fused(p.dynamic - p.static, fall, p.static)
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
@@ -45,28 +45,29 @@ def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
     angular momentum balances. Concentric circles exert no force.
     """
     clearance = p.clearance[joint]
-    distance = math.sqrt(ex * ex + ey * ey)
+    distance = math.sqrt(fused(ex, ex, ey * ey))
     penetration = distance - clearance
     if distance == 0.0:
         return Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0)
     per_distance = 1.0 / distance
     nx = ex * per_distance
     ny = ey * per_distance
-    rate = ex_rate * nx + ey_rate * ny
+    rate = fused(ex_rate, nx, ey_rate * ny)
     bore = p.pin_radius + clearance
     arm = p.pin_radius - penetration
-    slip = ey_rate * nx - ex_rate * ny + journal_spin * arm - rod_spin * bore
+    turning = fused(journal_spin, arm, -(rod_spin * bore))
+    slip = fused(ey_rate, nx, fused(-ex_rate, ny, turning))
     normal, elastic, unclamped = normal_force(penetration, rate, p.stiffness[joint], p)
     friction = 0.0
     if p.friction and in_contact(normal):
         friction = -friction_coefficient(slip, p) * normal
-    fx = normal * nx + friction * ny
-    fy = normal * ny - friction * nx
+    fx = fused(normal, nx, friction * ny)
+    fy = fused(normal, ny, -(friction * nx))
     moment = -bore * friction
     return Contact(fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped)
 
 
-@jit
+@merged
 def nearness(contact, stiffness, p):
     """Positive in contact; otherwise how far from it: the gap (m), or the clamped force as one.
 

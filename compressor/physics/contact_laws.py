@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from compressor.physics._jit import inlined, jit, plain
+from compressor.physics._jit import fused, inlined, merged, plain
 
 
 class Law(IntEnum):
@@ -22,7 +22,7 @@ class Law(IntEnum):
     IMPACT = 0  # ADAMS's: K delta^p, and damping that rises with the penetration (Eq. 14)
 
 
-@jit
+@merged
 def rise(s):
     """ADAMS's STEP from 0 at s = 0 to 1 at s = 1: a cubic, constant outside."""
     if s <= 0.0:
@@ -32,7 +32,7 @@ def rise(s):
     return s * s * (3.0 - 2.0 * s)
 
 
-@jit
+@merged
 def power(base, exponent):
     """base ** exponent for base >= 0; a square root does for Hertz's 1.5."""
     if exponent == 1.5:
@@ -40,35 +40,35 @@ def power(base, exponent):
     return base**exponent
 
 
-@jit
+@merged
 def impact_elastic(penetration, stiffness, p):
     """Elastic force (N) of ADAMS's IMPACT: K delta^p."""
     return stiffness * power(penetration, p.exponent)
 
 
-@jit
+@merged
 def impact(penetration, rate, stiffness, p):
     """`normal_force` by ADAMS's IMPACT, damped by C_max STEP(delta / d_max) (N s/m)."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = impact_elastic(penetration, stiffness, p)
-    unclamped = elastic + p.damping * rise(penetration * p.per_full_damping) * rate
+    unclamped = fused(p.damping * rise(penetration * p.per_full_damping), rate, elastic)
     return max(0.0, unclamped), elastic, unclamped
 
 
-@jit
+@merged
 def elastic_force(penetration, stiffness, p):
     """Elastic force (N) of the record's law at a positive penetration (m)."""
     return impact_elastic(penetration, stiffness, p)
 
 
-@jit
+@merged
 def elastic_energy(elastic, penetration, p):
     """Energy (J) that is stored where the elastic force (N) has reached a penetration (m)."""
     return elastic * penetration / (p.exponent + 1.0)
 
 
-@jit
+@merged
 def normal_force(penetration, rate, stiffness, p):
     """F_N, its elastic part, and F_N before its lower bound (N), by the record's law.
 

@@ -1,14 +1,14 @@
 """Elementary functions without a branch or a call, so that loops over lanes become vector code.
 
 They give the same bits on every machine, which libraries do not promise. Polynomials are summed in
-pairs: a step waits for them.
+pairs, each with one rounding: a step waits for them.
 """
 
 import math
 
 import numpy as np
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import fused, merged
 
 LOG_2 = math.log(2.0)
 PER_LOG_2 = 1.0 / LOG_2
@@ -26,7 +26,7 @@ C1, C2, C3 = 4.16666666666666019037e-2, -1.38888888888741095749e-3, 2.4801587289
 C4, C5, C6 = -2.75573143513906633035e-7, 2.08757232129817482790e-9, -1.13596475577881948265e-11
 
 
-@jit
+@merged
 def logarithm(x):
     """Natural logarithm of a normal positive number, to 1e-8: enough to choose a step by.
 
@@ -41,34 +41,34 @@ def logarithm(x):
     f = (m - 1.0) / (m + 1.0)
     s = f * f
     q = s * s
-    return exponent * LOG_2 + 2.0 * f * (
-        (1.0 + s * THIRD) + q * ((FIFTH + s * SEVENTH) + q * NINTH)
-    )
+    series = fused(q, fused(q, NINTH, fused(s, SEVENTH, FIFTH)), fused(s, THIRD, 1.0))
+    return fused(np.float64(exponent), LOG_2, 2.0 * f * series)
 
 
-@jit
+@merged
 def exponential(y):
     """e^y for |y| < 700, to 1e-8: 2^k times a Taylor series of the rest."""
     k = math.floor(y * PER_LOG_2 + 0.5)
-    r = y - k * LOG_2
+    r = fused(-k, LOG_2, y)
     s = r * r
-    low = (1.0 + r) + s * (0.5 + r * SIXTH)
-    high = (PER_24 + r * PER_120) + s * (PER_720 + r * PER_5040)
+    low = fused(s, fused(r, SIXTH, 0.5), 1.0 + r)
+    high = fused(s, fused(r, PER_5040, PER_720), fused(r, PER_120, PER_24))
     scale = np.int64((np.int64(k) + BIAS) << FRACTION_BITS).view(np.float64)
-    return (low + s * s * high) * scale
+    return fused(s * s, high, low) * scale
 
 
-@jit
+@merged
 def direction(angle):
     """Cosine and sine of an angle (rad), to their last digit up to some 1e5 turns."""
     quarters = math.floor(angle * PER_QUARTER + 0.5)
     r = (angle - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW
     z = r * r
     q = z * z
-    sine = r + z * r * ((S1 + z * S2) + q * ((S3 + z * S4) + q * (S5 + z * S6)))
+    tail = fused(q, fused(z, S6, S5), fused(z, S4, S3))
+    sine = fused(z * r, fused(q, tail, fused(z, S2, S1)), r)
     half = 0.5 * z
     rest = 1.0 - half
-    tail = q * ((C1 + z * C2) + q * ((C3 + z * C4) + q * (C5 + z * C6)))
+    tail = q * fused(q, fused(q, fused(z, C6, C5), fused(z, C4, C3)), fused(z, C2, C1))
     cosine = rest + (((1.0 - rest) - half) + tail)
     turned = np.int64(quarters) & 3
     odd = (turned & 1) == 1

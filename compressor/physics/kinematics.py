@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import fused, inlined, jit
 from compressor.physics.elementary import direction
 
 SMALL = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
@@ -66,8 +66,8 @@ def small_angle(angle, p):
         return math.sin(angle), math.cos(angle)
     s = angle * angle
     q = s * s
-    sine = angle + angle * s * ((S3 + s * S5) + q * (S7 + s * S9))
-    cosine = 1.0 - (0.5 * s - q * (C4 + (s * C6 + q * C8)))
+    sine = fused(angle * s, fused(q, fused(s, S9, S7), fused(s, S5, S3)), angle)
+    cosine = 1.0 - fused(-q, fused(q, C8, fused(s, C6, C4)), 0.5 * s)
     return sine, cosine
 
 
@@ -84,7 +84,8 @@ def ideal_after(base, span, p):
     A step turns the crank by little, so that these need no sine and cosine of their own.
     """
     sine, cosine = small_angle(p.omega * span, p)
-    return ideal_at(base[0] * cosine - base[1] * sine, base[1] * cosine + base[0] * sine, p)
+    cos_theta = fused(base[0], cosine, -(base[1] * sine))
+    return ideal_at(cos_theta, fused(base[1], cosine, base[0] * sine), p)
 
 
 def exact_motion(theta, crank_radius, rod_length, omega):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import fused, inlined, jit
 from compressor.physics.kinematics import SMALL, crank_direction
 from compressor.physics.lane_control import control, move_on
 from compressor.physics.lane_rows import (
@@ -225,8 +225,8 @@ def sample_lane(W, j, runs, job, work):
         for i in range(runs.size.shape[1]):
             total = 0.0
             for stage in range(STAGES):
-                total += work.weights[stage] * W[K + (stage * STATE + i) * LANES + j]
-            runs.states[begin + w.sample, i] = W[Z + i * LANES + j] + h * total
+                total = fused(work.weights[stage], W[K + (stage * STATE + i) * LANES + j], total)
+            runs.states[begin + w.sample, i] = fused(h, total, W[Z + i * LANES + j])
         w.sample += 1
     W[NEXT_SAMPLE + j] = next_sample(runs, job)
 

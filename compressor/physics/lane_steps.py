@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import borrowed, inlined, jit
+from compressor.physics._jit import borrowed, fused, inlined, jit
 from compressor.physics.contact_laws import Law
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.lane_rows import (
@@ -71,15 +71,10 @@ def record_of(scene, W, j):
 def combined(W, i, j, w):
     """Number i of the state of lane j where the stages have the weights w, (7,)."""
     u = LANES * i + j
-    return W[Z + u] + W[H + j] * (
-        w[0] * W[K + u]
-        + w[1] * W[K + 12 * LANES + u]
-        + w[2] * W[K + 24 * LANES + u]
-        + w[3] * W[K + 36 * LANES + u]
-        + w[4] * W[K + 48 * LANES + u]
-        + w[5] * W[K + 60 * LANES + u]
-        + w[6] * W[K + 72 * LANES + u]
-    )
+    total = fused(w[1], W[K + 12 * LANES + u], fused(w[0], W[K + u], 0.0))
+    total = fused(w[3], W[K + 36 * LANES + u], fused(w[2], W[K + 24 * LANES + u], total))
+    total = fused(w[5], W[K + 60 * LANES + u], fused(w[4], W[K + 48 * LANES + u], total))
+    return fused(W[H + j], fused(w[6], W[K + 72 * LANES + u], total), W[Z + u])
 
 
 @inlined
@@ -244,33 +239,24 @@ def finish_step(scene, W, k, w):
             W[NEW + 10 * LANES + j] = combined(W, 10, j, w)
             W[NEW + 11 * LANES + j] = combined(W, 11, j, w)
     for j in range(k):
-        e = (
-            part_of_error(W, 0, j) + part_of_error(W, 1, j)
-            + part_of_error(W, 2, j) + part_of_error(W, 3, j)
-        )  # fmt: skip
+        e = part_of_error(W, 1, j, part_of_error(W, 0, j, 0.0))
+        e = part_of_error(W, 3, j, part_of_error(W, 2, j, e))
         if len(scene) == 3:
-            e += (
-                part_of_error(W, 4, j) + part_of_error(W, 5, j)
-                + part_of_error(W, 6, j) + part_of_error(W, 7, j)
-            )  # fmt: skip
+            e = part_of_error(W, 5, j, part_of_error(W, 4, j, e))
+            e = part_of_error(W, 7, j, part_of_error(W, 6, j, e))
         W[ERROR + j] = W[H + j] * math.sqrt(e / n)
 
 
 @inlined
-def part_of_error(W, i, j):
-    """Square of the estimated error of number i over its tolerance, over the step's length."""
-    u = LANES * i + j
-    e = (
-        ERROR_WEIGHTS[0] * W[K + u]
-        + ERROR_WEIGHTS[1] * W[K + STATE * LANES + u]
-        + ERROR_WEIGHTS[2] * W[K + 2 * STATE * LANES + u]
-        + ERROR_WEIGHTS[3] * W[K + 3 * STATE * LANES + u]
-        + ERROR_WEIGHTS[4] * W[K + 4 * STATE * LANES + u]
-        + ERROR_WEIGHTS[5] * W[K + 5 * STATE * LANES + u]
-        + ERROR_WEIGHTS[6] * W[K + 6 * STATE * LANES + u]
-    )
-    e /= W[ATOL + u] + W[RTOL + j] * max(abs(W[Z + u]), abs(W[NEW + u]))
-    return e * e
+def part_of_error(W, i, j, total):
+    """A total and the square of number i's estimated error over its tolerance and the step."""
+    u, w = LANES * i + j, ERROR_WEIGHTS
+    e = fused(w[1], W[K + 12 * LANES + u], fused(w[0], W[K + u], 0.0))
+    e = fused(w[3], W[K + 36 * LANES + u], fused(w[2], W[K + 24 * LANES + u], e))
+    e = fused(w[5], W[K + 60 * LANES + u], fused(w[4], W[K + 48 * LANES + u], e))
+    e = fused(w[6], W[K + 72 * LANES + u], e)
+    e /= fused(W[RTOL + j], max(abs(W[Z + u]), abs(W[NEW + u])), W[ATOL + u])
+    return fused(e, e, total)
 
 
 @inlined

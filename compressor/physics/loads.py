@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import merged
 from compressor.physics.kinematics import angle_at
 from compressor.physics.record import Load, derive
 
@@ -19,7 +19,7 @@ DESIGN = int(Load.DESIGN)
 EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
 
 
-@jit
+@merged
 def typical_force(phase, x, p):
     """Gas force (N) with the crosshead at x (m): Eq. 6, isentropic, less the back pressure."""
     if phase == 1:
@@ -36,7 +36,7 @@ def typical_force(phase, x, p):
     return force * (full / space) ** p.gas_exponent - p.back_force
 
 
-@jit
+@merged
 def design_force(phase, x, v, deviation, deviation_rate, p):
     """Spring force (N) between piston and cam follower: Eq. 8-10, with the cam closed.
 
@@ -58,7 +58,7 @@ def design_force(phase, x, v, deviation, deviation_rate, p):
     return p.preload + p.spring_stiffness * shortening + p.spring_damping * rate
 
 
-@jit
+@merged
 def piston_force(phase, x, v, deviation, deviation_rate, p):
     """Piston force (N), positive towards the crank, of the record's load."""
     if p.load == DESIGN:

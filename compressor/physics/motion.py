@@ -12,7 +12,7 @@ subtracting two cosines, so that a clearance of a nanometre keeps its digits.
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import fused, inlined, jit, merged
 from compressor.physics.contact import Contact, joint_contact
 from compressor.physics.kinematics import Motion, ideal, small_angle
 from compressor.physics.loads import piston_force
@@ -35,57 +35,62 @@ class Turn(NamedTuple):
     ds_rate: float
 
 
-@jit
+@merged
 def turned(motion, eta, eta_rate, p):
     """`Turn` of the rod from the ideal angle phi by the deviation eta, without cancellation."""
     sin_half, cos_half = small_angle(0.5 * eta, p)
-    dc = -2.0 * sin_half * (motion.sin_phi * cos_half + motion.cos_phi * sin_half)
-    ds = 2.0 * sin_half * (motion.cos_phi * cos_half - motion.sin_phi * sin_half)
-    dc_rate = -ds * motion.rate - (motion.sin_phi + ds) * eta_rate
-    ds_rate = dc * motion.rate + (motion.cos_phi + dc) * eta_rate
+    dc = -2.0 * sin_half * fused(motion.sin_phi, cos_half, motion.cos_phi * sin_half)
+    ds = 2.0 * sin_half * fused(motion.cos_phi, cos_half, -(motion.sin_phi * sin_half))
+    dc_rate = -fused(ds, motion.rate, (motion.sin_phi + ds) * eta_rate)
+    ds_rate = fused(dc, motion.rate, (motion.cos_phi + dc) * eta_rate)
     return Turn(dc, ds, dc_rate, ds_rate)
 
 
-@jit
+@merged
 def eccentricity_big_end(y, turn, p):
     """Journal centre less bore centre at the big end and its rate, small end ideal (m, m/s)."""
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
-    return -y[0] + length * dc, -length * ds, -y[2] + length * dc_rate, -length * ds_rate
+    return fused(length, dc, -y[0]), -length * ds, fused(length, dc_rate, -y[2]), -length * ds_rate
 
 
-@jit
+@merged
 def eccentricity_small_end(y, turn, p):
     """Journal centre less bore centre at the small end and its rate, big end ideal (m, m/s)."""
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
-    return y[0] - length * dc, length * ds, y[2] - length * dc_rate, length * ds_rate
+    return fused(-length, dc, y[0]), length * ds, fused(-length, dc_rate, y[2]), length * ds_rate
 
 
-@jit
+@merged
 def eccentricities_both(y, turn, p):
     """The same at the big end, then the small end, of a rod that is free in the plane."""
     dc, ds, dc_rate, ds_rate = turn
     a = p.rod_centre
     b = p.rod_length - a
-    big = (a * dc - y[1], -a * ds - y[2], a * dc_rate - y[5], -a * ds_rate - y[6])
+    big = (
+        fused(a, dc, -y[1]),
+        fused(-a, ds, -y[2]),
+        fused(a, dc_rate, -y[5]),
+        fused(-a, ds_rate, -y[6]),
+    )
     small = (
-        y[0] - y[1] - b * dc,
-        b * ds - y[2],
-        y[4] - y[5] - b * dc_rate,
-        b * ds_rate - y[6],
+        fused(-b, dc, y[0] - y[1]),
+        fused(b, ds, -y[2]),
+        fused(-b, dc_rate, y[4] - y[5]),
+        fused(b, ds_rate, -y[6]),
     )
     return big, small
 
 
-@jit
+@merged
 def load_force(phase, y, motion, p):
     """Piston force (N) in the state y around the ideal motion."""
     n = p.freedoms
     return piston_force(phase, motion.x + y[0], motion.v + y[n], y[0], y[n], p)
 
 
-@jit
+@merged
 def solve_big_end(y, motion, turn, load, contact, p):
     """Accelerations (x, phi) of the rod hung on the crosshead and struck at the big end."""
     sin_phi = motion.sin_phi + turn.ds
@@ -96,21 +101,21 @@ def solve_big_end(y, motion, turn, load, contact, p):
     mass = p.reciprocating_mass + p.rod_mass
     inertia = p.rod_inertia + p.rod_mass * b * b
     push = contact.fx - load - p.rod_mass * b * cos_phi * rate * rate
-    moment = p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
+    moment = p.rod_length * fused(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
     moment -= p.rod_mass * p.gravity * b * cos_phi
-    per_determinant = 1.0 / (mass * inertia - coupling * coupling)
-    a = (inertia * push - coupling * moment) * per_determinant
-    spin_up = (mass * moment - coupling * push) * per_determinant
+    per_determinant = 1.0 / fused(mass, inertia, -(coupling * coupling))
+    a = fused(inertia, push, -(coupling * moment)) * per_determinant
+    spin_up = fused(mass, moment, -(coupling * push)) * per_determinant
     return a, spin_up
 
 
-@jit
+@merged
 def solve_small_end(motion, turn, load, contact, p):
     """Accelerations (x, phi) of the rod hung on the crankpin and struck at the small end."""
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
     a = (-load - contact.fx) * p.per_reciprocating_mass
-    moment = -p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
+    moment = -p.rod_length * fused(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
     pin = p.crank_radius * p.omega * p.omega  # the crankpin's centripetal acceleration
     carried = pin * (sin_phi * motion.cos_theta + cos_phi * motion.sin_theta)
     moment += p.rod_mass * p.rod_centre * (p.gravity * cos_phi - carried)
@@ -118,7 +123,7 @@ def solve_small_end(motion, turn, load, contact, p):
     return a, moment / inertia
 
 
-@jit
+@merged
 def solve_both(motion, turn, load, big, small, p):
     """Accelerations (x, X, Y, phi) of a rod between two clearance joints."""
     sin_phi = motion.sin_phi + turn.ds
@@ -127,8 +132,8 @@ def solve_both(motion, turn, load, big, small, p):
     per_mass = p.per_rod_mass
     centre_x = (big.fx + small.fx) * per_mass
     centre_y = (big.fy + small.fy) * per_mass - p.gravity
-    moment = p.rod_centre * (cos_phi * big.fy + sin_phi * big.fx)
-    moment -= (p.rod_length - p.rod_centre) * (cos_phi * small.fy + sin_phi * small.fx)
+    moment = p.rod_centre * fused(cos_phi, big.fy, sin_phi * big.fx)
+    moment -= (p.rod_length - p.rod_centre) * fused(cos_phi, small.fy, sin_phi * small.fx)
     moment -= big.moment + small.moment
     return a, centre_x, centre_y, moment * p.per_rod_inertia
 
@@ -157,7 +162,7 @@ def contacts_both(y, motion, turn, p):
     return at_big, at_small
 
 
-@jit
+@merged
 def ideal_centre_acceleration(motion, p):
     """Acceleration (m/s^2) of the rod's centre in the ideal motion, x and y."""
     pin = p.crank_radius * p.omega * p.omega

@@ -7,7 +7,7 @@ The right-hand side records nothing. `observe` writes one row of quantities; the
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import inlined, jit, merged
 from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
@@ -143,7 +143,7 @@ def joint_forces(now, y, p):
     return big_x, up - small_y, small_x, small_y
 
 
-@jit
+@merged
 def damping_power(contact):
     """Power (W) a contact loses in its normal direction, the clamp's included; never negative."""
     return (contact.normal - contact.elastic) * contact.rate

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import inlined
+from compressor.physics._jit import fused, inlined
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.observe import derivative_and_gauge, write_flowing_derivative
 
@@ -117,14 +117,14 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
             for j in range(stage):
                 weight = A[pair, stage, j]
-                a += weight * k[j, i]
-                b += weight * k[j, i + 1]
-                c += weight * k[j, i + 2]
-                d += weight * k[j, i + 3]
-            new[i] = z[i] + h * a
-            new[i + 1] = z[i + 1] + h * b
-            new[i + 2] = z[i + 2] + h * c
-            new[i + 3] = z[i + 3] + h * d
+                a = fused(weight, k[j, i], a)
+                b = fused(weight, k[j, i + 1], b)
+                c = fused(weight, k[j, i + 2], c)
+                d = fused(weight, k[j, i + 3], d)
+            new[i] = fused(h, a, z[i])
+            new[i + 1] = fused(h, b, z[i + 1])
+            new[i + 2] = fused(h, c, z[i + 2])
+            new[i + 3] = fused(h, d, z[i + 3])
         if stage < STAGES - 1:
             write_flowing_derivative(motion, new, phase, p, k[stage])
         else:
@@ -140,15 +140,15 @@ def error_norm(pair, h, z, new, k, rtol, atol):
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for j in range(STAGES):
             weight = E[pair, j]
-            a += weight * k[j, i]
-            b += weight * k[j, i + 1]
-            c += weight * k[j, i + 2]
-            d += weight * k[j, i + 3]
-        a /= atol[i] + rtol * max(abs(z[i]), abs(new[i]))
-        b /= atol[i + 1] + rtol * max(abs(z[i + 1]), abs(new[i + 1]))
-        c /= atol[i + 2] + rtol * max(abs(z[i + 2]), abs(new[i + 2]))
-        d /= atol[i + 3] + rtol * max(abs(z[i + 3]), abs(new[i + 3]))
-        total += a * a + b * b + c * c + d * d
+            a = fused(weight, k[j, i], a)
+            b = fused(weight, k[j, i + 1], b)
+            c = fused(weight, k[j, i + 2], c)
+            d = fused(weight, k[j, i + 3], d)
+        a /= fused(rtol, max(abs(z[i]), abs(new[i])), atol[i])
+        b /= fused(rtol, max(abs(z[i + 1]), abs(new[i + 1])), atol[i + 1])
+        c /= fused(rtol, max(abs(z[i + 2]), abs(new[i + 2])), atol[i + 2])
+        d /= fused(rtol, max(abs(z[i + 3]), abs(new[i + 3])), atol[i + 3])
+        total = fused(d, d, fused(c, c, fused(b, b, fused(a, a, total))))
     return h * np.sqrt(total / n)
 
 
@@ -158,7 +158,7 @@ def weights_at(pair, s, weights):
     for stage in range(STAGES):
         a, b = P[pair, stage, 0], P[pair, stage, 1]
         c, d = P[pair, stage, 2], P[pair, stage, 3]
-        weights[stage] = s * (a + s * (b + s * (c + s * d)))
+        weights[stage] = s * fused(s, fused(s, fused(s, d, c), b), a)
 
 
 @inlined
@@ -168,14 +168,14 @@ def combine(weights, h, z, k, out):
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for stage in range(STAGES):
             weight = weights[stage]
-            a += weight * k[stage, i]
-            b += weight * k[stage, i + 1]
-            c += weight * k[stage, i + 2]
-            d += weight * k[stage, i + 3]
-        out[i] = z[i] + h * a
-        out[i + 1] = z[i + 1] + h * b
-        out[i + 2] = z[i + 2] + h * c
-        out[i + 3] = z[i + 3] + h * d
+            a = fused(weight, k[stage, i], a)
+            b = fused(weight, k[stage, i + 1], b)
+            c = fused(weight, k[stage, i + 2], c)
+            d = fused(weight, k[stage, i + 3], d)
+        out[i] = fused(h, a, z[i])
+        out[i + 1] = fused(h, b, z[i + 1])
+        out[i + 2] = fused(h, c, z[i + 2])
+        out[i + 3] = fused(h, d, z[i + 3])
 
 
 @inlined
@@ -188,10 +188,10 @@ def extend(pair, h, z, k, dense):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
             for stage in range(STAGES):
                 weight = P[pair, stage, j]
-                a += weight * k[stage, i]
-                b += weight * k[stage, i + 1]
-                c += weight * k[stage, i + 2]
-                d += weight * k[stage, i + 3]
+                a = fused(weight, k[stage, i], a)
+                b = fused(weight, k[stage, i + 1], b)
+                c = fused(weight, k[stage, i + 2], c)
+                d = fused(weight, k[stage, i + 3], d)
             dense[j + 1, i] = h * a
             dense[j + 1, i + 1] = h * b
             dense[j + 1, i + 2] = h * c
@@ -204,8 +204,8 @@ def interpolate(s, dense, out):
     for i in range(0, out.size, LANES):
         a, b, c, d = dense[4, i], dense[4, i + 1], dense[4, i + 2], dense[4, i + 3]
         for j in range(3, -1, -1):
-            a = a * s + dense[j, i]
-            b = b * s + dense[j, i + 1]
-            c = c * s + dense[j, i + 2]
-            d = d * s + dense[j, i + 3]
+            a = fused(a, s, dense[j, i])
+            b = fused(b, s, dense[j, i + 1])
+            c = fused(c, s, dense[j, i + 2])
+            d = fused(d, s, dense[j, i + 3])
         out[i], out[i + 1], out[i + 2], out[i + 3] = a, b, c, d

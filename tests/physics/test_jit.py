@@ -4,12 +4,14 @@ import json
 import os
 import subprocess
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from compressor import program
 from compressor.physics import _jit
+from compressor.physics._jit import fused
 
 PROBE = """
 import json
@@ -72,3 +74,21 @@ def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
     assert first.exists()
     _jit.discard_other_code(program.machine_code_folder())
     assert not first.exists()
+
+
+@pytest.mark.compiled
+def test_a_fused_product_is_rounded_once():
+    numba = pytest.importorskip("numba")
+    _jit.load_numba()
+
+    @numba.njit
+    def compiled(a, b, c):
+        return fused(a, b, c)
+
+    draw = np.random.default_rng(7)
+    for _ in range(200):
+        a, b = draw.normal(size=2)
+        c = -a * b * (1 + draw.integers(-3, 4) * 2.0**-50)  # most of the sum cancels
+        exact = float(Fraction(a) * Fraction(b) + Fraction(c))
+        assert compiled(a, b, c) == exact
+        assert fused(a, b, c) == a * b + c  # from Python
