@@ -43,6 +43,10 @@ CONFIGS = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))
 
 # one process runs them after each other: only there is compiled, or derived, what they share
 TOGETHER = {
+    "tests/physics/test_contact_laws.py": "laws",
+    "tests/physics/test_friction_laws.py": "laws",
+    "tests/physics/test_restitution.py": "laws",
+    "tests/solve/test_chosen_laws.py": "laws",
     "tests/campaigns/test_chaotic.py": "twins",
     "tests/measure/test_stress.py": "twins",
     "tests/solve/test_horizon.py": "twins",

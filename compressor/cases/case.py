@@ -12,6 +12,7 @@ from typing import Any
 from compressor.cases.accuracy import ACCURACY, Targets, first_rung
 from compressor.cases.checked import checked_part, keys_given
 from compressor.cases.conflicts import conflicts
+from compressor.cases.laws import CONTACT_LAWS, with_law
 from compressor.cases.parameter import CaseError, Problem, shown
 from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
 from compressor.cases.swept import FORMS
@@ -113,7 +114,9 @@ class Case(Settings):
             contact = replace(contact, stiffness_N_per_mm15=None)
         if contact.geometry == "external":  # as without the key
             contact = replace(contact, geometry=None)
-        resolved = {"machine": machine, "solve": solve, "contact": contact}
+        friction = with_law("friction", self.friction) if self.friction else self.friction
+        contact = with_law("contact", contact)
+        resolved = {"machine": machine, "solve": solve, "contact": contact, "friction": friction}
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
             resolved["clearance_mm"] = replace(self.clearance_mm, **unused)
@@ -190,6 +193,11 @@ class Case(Settings):
     def wants_bars(self) -> bool:
         """Whether metrics are to have error bars; accuracy by number cannot do without."""
         return self.solve.error_bars or bool(self.targets)
+
+    @property
+    def chooses_laws(self) -> bool:
+        """Whether contact or friction has another law than the default one."""
+        return self.contact.law != CONTACT_LAWS[0] or bool(self.friction and self.friction.law)
 
     @cached_property
     def physics_key(self) -> str:

@@ -5,8 +5,10 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, cast
 
+from compressor.cases.groups import COMPILED
+from compressor.cases.laws import READ_BY, RESTITUTING, law_of
 from compressor.cases.one_way import back_action, moving_mass
-from compressor.cases.parameter import IMPLAUSIBLE, Problem
+from compressor.cases.parameter import IMPLAUSIBLE, Problem, listed
 from compressor.cases.table import GROUPS, Settings, table
 from compressor.metrics import AXES, JOINTS
 
@@ -98,12 +100,38 @@ def _contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Proble
 
 def _friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     friction = case.friction
-    if friction and friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
+    if not friction or law_of(friction) not in READ_BY["friction"]["friction_velocity_mm_per_s"]:
+        return
+    if friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
         yield Problem(
             "friction.friction_velocity_mm_per_s",
             f"{friction.friction_velocity_mm_per_s:g} mm/s must exceed the "
             f"stiction_velocity_mm_per_s, {friction.stiction_velocity_mm_per_s:g} mm/s",
         )
+
+
+def _law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Keys of a law that was not named, and what a law cannot do without."""
+    for name, keys in READ_BY.items():
+        group = getattr(case, name)
+        if not group or f"{name}.law" in given:
+            continue
+        for key, readers in keys.items():
+            if f"{name}.{key}" in given and law_of(group) not in readers:
+                message = f"is read with {name}.law: {listed(readers)}: add the law"
+                yield Problem(f"{name}.{key}", message)
+    law = case.contact.law
+    if law not in RESTITUTING:
+        return
+    if case.contact.restitution is None:
+        message = f"is needed with contact.law: {law}; give it, such as 0.9"
+        yield Problem("contact.restitution", message)
+    if case.solve.method not in COMPILED:
+        message = (
+            f"{case.solve.method} does not stop where journal and bore meet, as contact.law: {law} "
+            f"needs: choose one of {', '.join(COMPILED)}"
+        )
+        yield Problem("solve.method", message)
 
 
 def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
@@ -307,5 +335,5 @@ RULES: tuple[Rule, ...] = (
     *(partial(rule, joint=joint) for joint in JOINTS
       for rule in (_missing_clearance, _clearance_conflicts)),
     _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts, _output_conflicts,
-    _contact_conflicts, _friction_conflicts,
+    _law_conflicts, _contact_conflicts, _friction_conflicts,
 )  # fmt: skip

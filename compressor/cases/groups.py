@@ -7,10 +7,11 @@ units, which stand in the field's name; `compressor.solve.si_record` turns them 
 from dataclasses import dataclass
 
 from compressor.cases.accuracy import ACCURACY
+from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.cases.parameter import choice, documented, parameter
 
-# those that `compressor.solve` has compiled, and then SciPy's
-METHODS = ("auto", "DOPRI5", "TSIT5", "RODAS", "LSODA", "Radau", "BDF", "DOP853", "RK45")
+COMPILED = ("auto", "DOPRI5", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
+METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
 @documented
@@ -146,18 +147,25 @@ class Spring:
 @documented
 @dataclass(frozen=True)
 class Contact:
-    """The normal contact law of both joints, ADAMS's IMPACT (Eq. 14); a case's `contact`.
+    """The normal contact law of both joints; a case's `contact`.
 
-    F = K d^p + C(d) d' with the penetration d; C grows to C_max up to the depth of full damping.
-    Two materials may stand in place of the stiffness K (Eq. 15, Table 2):
+    ADAMS's IMPACT (Eq. 14) by default: F = K d^p + C(d) d' with the penetration d; C grows to C_max
+    up to the depth of full damping. Others damp by K d^p times the penetration's rate over the
+    speed at which journal and bore met; the name of one and a coefficient of restitution choose it:
 
     >>> import compressor
+    >>> values = {"contact": {"law": "flores", "restitution": 0.7}}
+    >>> compressor.Case.from_values(values).contact.least_approach_mm_per_s
+    10.0
+
+    Two materials may stand in place of the stiffness K (Eq. 15, Table 2):
+
     >>> values = {"contact": {"materials": ["steel", "copper"]}}
     >>> compressor.Case.from_values(values).contact.materials
     ('steel', 'copper')
     """
 
-    law: str = choice("impact", ("impact",), "Eq. 14", "contact law (ADAMS's IMPACT)")
+    law: str = choice("impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)")
     stiffness_N_per_mm15: float | None = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True,
@@ -178,12 +186,26 @@ class Contact:
     full_damping_mm: float = parameter(
         0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True
     )
+    restitution: float | None = parameter(
+        None, "", (0, 1), "ours", "coefficient of restitution, of the laws that damp by it",
+        above=True, optional=True,
+    )  # fmt: skip
+    least_approach_mm_per_s: float | None = parameter(
+        None, "mm/s", (0, 1e6), "ours",
+        "speed of meeting below which such a law damps as at this one; 10 by default",
+        above=True, optional=True,
+    )  # fmt: skip
 
 
 @documented
 @dataclass(frozen=True)
 class Friction:
-    """ADAMS's Coulomb friction at the joints (Table 3); a case's `friction`, None without.
+    """Friction at the joints, by default ADAMS's smoothed Coulomb law (Table 3); a case's
+    `friction`, None without.
+
+    coulomb_tanh, threlfall and ambrosio go to the dynamic coefficient, the first two over the
+    stiction velocity, the last from there to the friction velocity. lugre sticks by bristles; its
+    stiction velocity is Stribeck's.
 
     `False` leaves it out:
 
@@ -202,6 +224,21 @@ class Friction:
     friction_velocity_mm_per_s: float = parameter(
         100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True
     )
+    law: str | None = choice(
+        None, FRICTION_LAWS, "Eq. 16", "friction law (adams where none is named)", optional=True
+    )
+    bristle_stiffness_per_mm: float | None = parameter(
+        None, "1/mm", (0, 1e9), "ours", "LuGre's sigma_0 over the normal force; 100 by default",
+        above=True, optional=True,
+    )  # fmt: skip
+    bristle_damping_s_per_mm: float | None = parameter(
+        None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_1 over the normal force; 0.03 by default",
+        optional=True,
+    )  # fmt: skip
+    viscous_s_per_mm: float | None = parameter(
+        None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_2 over the normal force; 0 by default",
+        optional=True,
+    )  # fmt: skip
 
 
 @documented

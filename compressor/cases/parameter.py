@@ -36,6 +36,8 @@ UNITS = {
     "N/mm^p": ("N/m^p", 1, 1),  # times 1000^exponent: see compressor.solve.si_record
     "N s/mm": ("N s/m", 1000, 1),
     "mm/s": ("m/s", 1, 1000),
+    "1/mm": ("1/m", 1000, 1),
+    "s/mm": ("s/m", 1000, 1),
     "s": ("s", 1, 1),
     "deg": ("rad", math.pi, 180),
     "Hz": ("Hz", 1, 1),

@@ -15,7 +15,8 @@ import xarray as xr
 from compressor.cases import ACCURACY, Case, Study, points
 from compressor.measure.features import FEATURES, Effect, Feature, compare
 from compressor.measure.work_precision import SLOW, complete, faulty
-from compressor.physics import FREEDOMS, STATE_NAMES, Scene
+from compressor.metrics import JOINTS
+from compressor.physics import Scene, state_names
 from compressor.solve import (
     JointScales,
     expected_cost,
@@ -95,7 +96,7 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
         jobs=len(study.cases),
         point=next(points(study)),
         scene=SCENES[scene(case)],
-        unknowns=STATE_NAMES[scene(case)][: FREEDOMS[scene(case)]],
+        unknowns=unknowns(case),
         active=active,
         absent=absent,
         scales=joints,
@@ -113,6 +114,16 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
         workers=workers,
         sweep_seconds=seconds * len(study.cases) / min(workers, len(study.cases)),
         advice=tuple(advise(case, repeats)) if ended else (),
+    )
+
+
+def unknowns(case: Case) -> tuple[str, ...]:
+    """Names of what is integrated: a scene's freedoms, and bristles where friction has them."""
+    p = record(case)
+    names = state_names(p)
+    bristles = names[-2:] if p["bristle_stiffness"] > 0.0 else ()
+    return names[: p["freedoms"]] + tuple(
+        name for name, joint in zip(bristles, JOINTS, strict=False) if joint in faulty(case)
     )
 
 
@@ -161,10 +172,10 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     active["clearance"] = ", ".join(widths)
     stiffness = contact.stiffness_N_per_mm15
     material = f"K = {stiffness:g} N/mm^p" if stiffness else " on ".join(contact.materials or ())
-    active["contact"] = (
-        f"{contact.law}, {material}, p = {contact.exponent:g}, "
-        f"C_max = {contact.damping_N_s_per_mm:g} N s/mm"
-    )
+    damped = f"C_max = {contact.damping_N_s_per_mm:g} N s/mm"
+    if contact.law != "impact":
+        damped = "undamped" if contact.law == "hertz" else f"restitution {contact.restitution:g}"
+    active["contact"] = f"{contact.law}, {material}, p = {contact.exponent:g}, {damped}"
     return active, absent
 
 
@@ -172,7 +183,8 @@ def spoken(case: Case, feature: Feature) -> str:
     """The value by which a case pays for a feature."""
     group, dot, name = feature.key.partition(".")
     if feature.key == "friction" and case.friction:
-        return f"static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
+        law = f"{case.friction.law}, " if case.friction.law else ""
+        return f"{law}static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
     value = getattr(getattr(case, group), name) if dot else getattr(case, group)
     return f"{feature.key} = {value}"
 

@@ -1,6 +1,8 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
-from compressor.physics.contact_laws import Law, Power, elastic_form
+from compressor.physics.contact import choose_laws
+from compressor.physics.contact_laws import Power, elastic_form
+from compressor.physics.friction_laws import steepest
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.lane_runs import Run, march_side_by_side
 from compressor.physics.loads import (
@@ -20,7 +22,7 @@ from compressor.physics.observe import (
     observe,
     observe_all,
 )
-from compressor.physics.record import FREEDOMS, STATE_NAMES, Load, Scene, new_record
+from compressor.physics.record import Load, Scene, new_record, state_names
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
 from compressor.physics.tally import (

@@ -7,18 +7,35 @@ import math
 from typing import NamedTuple
 
 from compressor.physics._jit import fused, inlined, merged
-from compressor.physics.contact_laws import elastic_force, in_contact, normal_force, rise
+from compressor.physics.contact_laws import (
+    HYSTERESIS,
+    Law,
+    elastic_force,
+    has_chosen_laws,
+    in_contact,
+    normal_force,
+)
+from compressor.physics.friction_laws import FrictionLaw, friction_coefficient
+
+
+def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
+    """Set a record's laws by their names, and what the coefficient of restitution makes.
+
+    Raises KeyError where there is no law of a name.
+    """
+    p["law"], p["friction"] = law, _ = Law[contact.upper()], FrictionLaw[friction.upper()]
+    if law in HYSTERESIS:
+        p["hysteresis"] = HYSTERESIS[law](restitution)
 
 
 @merged
-def friction_coefficient(slip, p):
-    """Signed friction coefficient mu(v_t), odd in the slip (m/s): ADAMS's smoothed Coulomb law.
-
-    Rises from 0 to `static` over the stiction velocity, falls to `dynamic` at the friction one.
+def carried_by(joint, y, p):
+    """What a joint's contact carries in the state: the speed (m/s) at which the bodies met, and the
+    mean deflection (m) of the bristles. Nothing with the default laws.
     """
-    fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
-    size = fused(p.dynamic - p.static, fall, p.static)
-    return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
+    if has_chosen_laws(p):
+        return y[2 * p.freedoms + joint], y[2 * p.freedoms + 2 + joint]
+    return 0.0, 0.0
 
 
 class Contact(NamedTuple):
@@ -37,12 +54,12 @@ class Contact(NamedTuple):
 
 
 @inlined
-def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
+def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, carried, p):
     """Contact between a joint's journal and the rod's bore.
 
-    Takes the eccentricity (journal centre minus bore centre, m), its rate (m/s) and both spins
-    (rad/s, counter-clockwise). Returns a `Contact`; one contact point serves both bodies, so that
-    angular momentum balances. Concentric circles exert no force.
+    Takes the eccentricity (journal centre minus bore centre, m), its rate (m/s), both spins (rad/s,
+    counter-clockwise) and what the contact carries (`carried_by`). Returns a `Contact`; one contact
+    point serves both bodies, so that angular momentum balances. Concentric circles exert no force.
     """
     clearance = p.clearance[joint]
     distance = math.sqrt(fused(ex, ex, ey * ey))
@@ -57,10 +74,11 @@ def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, p):
     arm = p.pin_radius - penetration
     turning = fused(journal_spin, arm, -(rod_spin * bore))
     slip = fused(ey_rate, nx, fused(-ex_rate, ny, turning))
-    normal, elastic, unclamped = normal_force(penetration, rate, p.stiffness[joint], p)
+    approach, bristle = carried
+    normal, elastic, unclamped = normal_force(penetration, rate, approach, p.stiffness[joint], p)
     friction = 0.0
     if p.friction and in_contact(normal):
-        friction = -friction_coefficient(slip, p) * normal
+        friction = -friction_coefficient(slip, bristle, p) * normal
     fx = fused(normal, nx, friction * ny)
     fy = fused(normal, ny, -(friction * nx))
     moment = -bore * friction

@@ -1,15 +1,17 @@
 """Contact laws: the force, damping and elastic energy of each, its depths, and the choice of one.
 
-A law is a member of `Law`, named by `contact.law` in small letters; functions like `impact_elastic`
-and `impact`; and a branch in each of `normal_force`, `elastic_force`, `elastic_energy` and
-`elastic_form`. Nothing else knows of it but the choices of `contact.law` in the table of parameters
-(physics/README.md, Contact).
+A law is a member of `Law`, named by `contact.law` in small letters (physics/README.md, Contact). If
+it damps by chi times the elastic force over the approach speed, it is a line in `HYSTERESIS`. If
+not, it needs functions like `impact_elastic` and `impact`, and a branch in each of `normal_force`,
+`elastic_force`, `elastic_energy` and `elastic_form`. Nothing else knows of a law but the choices of
+`contact.law` in the table of parameters (`cases.laws`).
 
-In compiled functions the last law stands without a condition: comparing takes 3 to 10 % off the
-speed of the march, and a record with another number cannot be built (`Law[...]`).
+For the default law nothing is compared: that took 3 to 10 % off the speed of the march. Whether a
+record's laws are chosen ones is its type (`record.CHOSEN`).
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -20,6 +22,31 @@ class Law(IntEnum):
     """The normal contact laws."""
 
     IMPACT = 0  # ADAMS's: K delta^p, and damping that rises with the penetration (Eq. 14)
+    HERTZ = 1  # K delta^p alone
+    HUNT_CROSSLEY = 2
+    LANKARANI_NIKRAVESH = 3
+    FLORES = 4
+    GONTHIER = 5
+    HU_GUO = 6
+
+
+# chi by the coefficient of restitution e, where F = K delta^p (1 + chi delta' / delta'_0) with the
+# speed delta'_0 at which the bodies met
+HYSTERESIS: dict[Law, Callable[[float], float]] = {
+    Law.HERTZ: lambda e: 0.0,
+    Law.HUNT_CROSSLEY: lambda e: 1.5 * (1.0 - e),  # J. Appl. Mech. 42 (1975)
+    Law.LANKARANI_NIKRAVESH: lambda e: 0.75 * (1.0 - e**2),  # J. Mech. Des. 112 (1990)
+    Law.FLORES: lambda e: 1.6 * (1.0 - e) / e,  # Multibody Syst. Dyn. 25 (2011)
+    Law.GONTHIER: lambda e: (1.0 - e**2) / e,  # Multibody Syst. Dyn. 11 (2004)
+    Law.HU_GUO: lambda e: 1.5 * (1.0 - e) / e,  # J. Sound Vib. 340 (2015)
+}
+IMPACT = int(Law.IMPACT)  # numba wants plain integers
+
+
+@merged
+def has_chosen_laws(p):
+    """Whether laws other than the default ones may be a record's: a constant of its type."""
+    return len(p.laws) > 1
 
 
 @merged
@@ -69,12 +96,24 @@ def elastic_energy(elastic, penetration, p):
 
 
 @merged
-def normal_force(penetration, rate, stiffness, p):
+def hysteretic(penetration, rate, approach, stiffness, p):
+    """`normal_force` by a law of HYSTERESIS: K delta^p (1 + chi delta' / delta'_0)."""
+    if penetration <= 0.0:
+        return 0.0, 0.0, 0.0
+    elastic = impact_elastic(penetration, stiffness, p)
+    unclamped = fused(elastic * p.hysteresis / approach, rate, elastic)
+    return max(0.0, unclamped), elastic, unclamped
+
+
+@merged
+def normal_force(penetration, rate, approach, stiffness, p):
     """F_N, its elastic part, and F_N before its lower bound (N), by the record's law.
 
-    At a penetration (m) and its rate (m/s): the elastic force with damping times rate added, but
-    never pulling. All are 0 unless the penetration is positive.
+    At a penetration (m), its rate and the speed at which the bodies met (m/s): the elastic force
+    with damping times rate added, but never pulling. All are 0 unless the penetration is positive.
     """
+    if has_chosen_laws(p) and p.law != IMPACT:
+        return hysteretic(penetration, rate, approach, stiffness, p)
     return impact(penetration, rate, stiffness, p)
 
 
@@ -86,7 +125,9 @@ def in_contact(normal):
 
 @dataclass(frozen=True)
 class Power:
-    """An elastic force K delta^p in closed form, and the damping beside it; SI."""
+    """An elastic force K delta^p in closed form, and the damping beside it, as far as it is known
+    before a run; SI.
+    """
 
     stiffness: float
     exponent: float
@@ -123,4 +164,6 @@ def elastic_form(stiffness: float, p) -> Power:
     """The record's law in closed form with a joint's stiffness, for scales before a run."""
     if p["law"] == Law.IMPACT:
         return Power(stiffness, p["exponent"], p["damping"], p["per_full_damping"])
+    if p["law"] in HYSTERESIS:  # whose damping depends on how fast the bodies will meet
+        return Power(stiffness, p["exponent"])
     raise ValueError(f"no contact law has the number {p['law']}")

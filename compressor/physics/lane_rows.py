@@ -36,7 +36,9 @@ def _rows(count=1):
     return first
 
 
-CHOICES = ("scene", "load", "law", "friction", "freedoms", "wide", "exponent", "corners")
+CHOICES = ("scene", "load", "law", "friction", "freedoms", "wide", "exponent", "corners",
+           "hysteresis", "least_approach", "bristle_stiffness", "bristle_damping", "viscous",
+           "laws")  # fmt: skip
 # fields of the record that are rows, in its order; those of a joint are two
 FIELDS = tuple(
     (name, joint)

@@ -64,6 +64,7 @@ def record_of(scene, W, j):
         W[b + 23 * LANES], W[b + 24 * LANES], W[b + 25 * LANES], W[b + 26 * LANES],
         W[b + 27 * LANES], W[b + 28 * LANES], W[b + 29 * LANES], W[b + 30 * LANES],
         W[b + 31 * LANES], W[b + 32 * LANES], W[b + 33 * LANES], W[b + 34 * LANES],
+        0.0, 0.0, 0.0, 0.0, 0.0, (0.0,),
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from compressor.physics import rosenbrock
 from compressor.physics._jit import borrowed, inlined, jit
+from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
 from compressor.physics.observe import (
     ACCELERATION,
@@ -20,7 +21,7 @@ from compressor.physics.observe import (
     gauge,
     glance,
 )
-from compressor.physics.onset import change, first_onset
+from compressor.physics.onset import LANDED, change, first_onset, remember
 from compressor.physics.runge_kutta import (
     STAGES,
     combine,
@@ -56,7 +57,6 @@ from compressor.physics.walker import (
     Work,
 )
 
-LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
 MIDDLE = NODES.size // 2
 INWARD = np.array([2, 1, 3])  # nodes between a step's ends, the middle first
 
@@ -230,6 +230,15 @@ def take_in(w, h, every, work, phase, p, tally):
     tally_step(h, NODES, weights, work.rows, every, work.apart, measured, tally, p)
 
 
+@inlined
+def land(w, h, work, phase, p, tally):
+    """Note that a step of length h has ended on an onset; whether joints carry new speeds."""
+    w.landing = 0.0
+    w.landed = 1
+    w.onsets += 1
+    return has_chosen_laws(p) and remember(w, w.t + h, work, phase, p, tally)
+
+
 @jit
 def finite(new):
     """Whether every number of a state is finite."""
@@ -240,14 +249,17 @@ def finite(new):
 
 
 @inlined
-def advance(w, z, work, reached, was_stiff, at_edge, segments):
-    """Move the walker to the end of the step that was taken, and into the next segment."""
+def advance(w, z, work, reached, fresh, at_edge, segments):
+    """Move the walker to the end of the step that was taken, and into the next segment.
+
+    fresh: whether its last stage is not the next step's first.
+    """
     for i in range(z.size):
         z[i] = work.new[i]
         work.k[0, i] = work.k[STAGES - 1, i]  # of an explicit pair: the next step's first stage
     w.t = reached
     w.steps += 1
-    w.fresh = 1 if was_stiff or at_edge else 0
+    w.fresh = 1 if fresh or at_edge else 0
     if at_edge:
         w.observed = 0
         w.segment += 1
@@ -298,11 +310,8 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             longer = controlled(w, h, error)
             w.h = max(w.h, longer) if h < w.h else longer
         every = look_at_step(w, base, h, z, work, phase, p, tally)
-        if landing:
-            w.landing = 0.0
-            w.landed = 1
-            w.onsets += 1
-        elif onset_ahead(w, h, every, work, phase, p):
+        met = landing and land(w, h, work, phase, p, tally)
+        if not landing and onset_ahead(w, h, every, work, phase, p):
             continue
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h
@@ -311,7 +320,9 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         w.taken = h
         was_stiff = w.stiff
         choose_method(w, h, z, work, size)
-        advance(w, z, work, reached, was_stiff, at_edge, phases.size)
+        advance(w, z, work, reached, was_stiff or met, at_edge, phases.size)
+        if met:  # what is seen at t is not what the step saw at its end
+            w.observed = 0
         if tally.deepest > w.deepest:
             w.status = PENETRATION_IMPLAUSIBLE
         elif not finite(z):

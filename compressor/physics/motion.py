@@ -2,9 +2,10 @@
 
 physics/README.md, Scenes and Contact.
 
-State y: the deviations, then their rates. Big end and small end: (x, phi); both joints: (x, X, Y,
-phi) with (X, Y) the rod's centre. Eccentricities come from difference identities, never from
-subtracting two cosines, so that a clearance of a nanometre keeps its digits.
+State y: the deviations, then their rates, then what contacts carry where laws were chosen. Big end
+and small end: (x, phi); both joints: (x, X, Y, phi) with (X, Y) the rod's centre. Eccentricities
+come from difference identities, never from subtracting two cosines, so that a clearance of a
+nanometre keeps its digits.
 
 `derivative` is what integrators call; `observe` recomputes outputs by the same functions.
 """
@@ -13,7 +14,9 @@ import math
 from typing import NamedTuple
 
 from compressor.physics._jit import fused, inlined, jit, merged
-from compressor.physics.contact import Contact, joint_contact
+from compressor.physics.contact import Contact, carried_by, joint_contact
+from compressor.physics.contact_laws import has_chosen_laws
+from compressor.physics.friction_laws import LUGRE, bristle_rate
 from compressor.physics.kinematics import Motion, ideal, small_angle
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END as AT_BIG_END
@@ -142,14 +145,18 @@ def solve_both(motion, turn, load, big, small, p):
 def contact_big_end(y, motion, turn, p):
     """`joint_contact` of the big end in scene big_end."""
     ex, ey, ex_rate, ey_rate = eccentricity_big_end(y, turn, p)
-    return joint_contact(AT_BIG_END, ex, ey, ex_rate, ey_rate, p.omega, -motion.rate - y[3], p)
+    kept = carried_by(AT_BIG_END, y, p)
+    spin = -motion.rate - y[3]
+    return joint_contact(AT_BIG_END, ex, ey, ex_rate, ey_rate, p.omega, spin, kept, p)
 
 
 @inlined
 def contact_small_end(y, motion, turn, p):
     """`joint_contact` of the small end in scene small_end."""
     ex, ey, ex_rate, ey_rate = eccentricity_small_end(y, turn, p)
-    return joint_contact(AT_SMALL_END, ex, ey, ex_rate, ey_rate, 0.0, -motion.rate - y[3], p)
+    kept = carried_by(AT_SMALL_END, y, p)
+    spin = -motion.rate - y[3]
+    return joint_contact(AT_SMALL_END, ex, ey, ex_rate, ey_rate, 0.0, spin, kept, p)
 
 
 @inlined
@@ -157,8 +164,12 @@ def contacts_both(y, motion, turn, p):
     """`joint_contact` of the big end and of the small end in scene both."""
     big, small = eccentricities_both(y, turn, p)
     spin = -motion.rate - y[7]
-    at_big = joint_contact(AT_BIG_END, big[0], big[1], big[2], big[3], p.omega, spin, p)
-    at_small = joint_contact(AT_SMALL_END, small[0], small[1], small[2], small[3], 0.0, spin, p)
+    kept = carried_by(AT_BIG_END, y, p)
+    at_big = joint_contact(AT_BIG_END, big[0], big[1], big[2], big[3], p.omega, spin, kept, p)
+    kept = carried_by(AT_SMALL_END, y, p)
+    at_small = joint_contact(
+        AT_SMALL_END, small[0], small[1], small[2], small[3], 0.0, spin, kept, p
+    )
     return at_big, at_small
 
 
@@ -227,6 +238,21 @@ def deviating(now, p):
 
 
 @inlined
+def write_carried_rates(now, y, p, out):
+    """Write the rates of what contacts carry: an approach speed stays until the bodies meet again.
+
+    Bristles bend while the bodies slide, also where they do not touch.
+    """
+    place = 2 * p.freedoms
+    out[place], out[place + 1], out[place + 2], out[place + 3] = 0.0, 0.0, 0.0, 0.0
+    if p.friction == LUGRE:
+        if p.clearance[0] > 0.0:
+            out[place + 2] = bristle_rate(now.big.slip, y[place + 2], p)
+        if p.clearance[1] > 0.0:
+            out[place + 3] = bristle_rate(now.small.slip, y[place + 3], p)
+
+
+@inlined
 def write_derivative(now, y, p, out):
     """Write dy/dt at an evaluated instant into out."""
     n = p.freedoms
@@ -237,13 +263,16 @@ def write_derivative(now, y, p, out):
     if p.scene == BOTH:
         out[n + 1], out[n + 2] = accelerations[1], accelerations[2]
     out[2 * n - 1] = accelerations[3]
+    if has_chosen_laws(p):
+        write_carried_rates(now, y, p, out)
 
 
 @jit
 def derivative(t, y, phase, p, out):
     """Write dy/dt of the record's scene into `out`.
 
-    y and out: length 4 (one clearance joint) or 8 (both); `phase`: the load's phase, 0 to 3.
+    y and out: length 4 (one clearance joint) or 8 (both), with chosen laws four more; `phase`: the
+    load's phase, 0 to 3.
     """
     write_derivative(evaluate(ideal(t, p), y, phase, p), y, p, out)
 
@@ -263,6 +292,9 @@ def start(offset, y, p):
     """
     for i in range(y.size):
         y[i] = 0.0
+    if has_chosen_laws(p):
+        for joint in range(2):
+            y[2 * p.freedoms + joint] = p.least_approach
     if p.scene == BIG_END:
         eta = math.asin(-offset[0, 1] / p.rod_length)
         y[0] = -offset[0, 0] - p.rod_length * versine(eta)

@@ -6,10 +6,11 @@ turns positive. Both are watched on the step's interpolant while F_N = 0. Where 
 step goes on; how much of it was without contact is told to the metrics.
 """
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import inlined, jit
 from compressor.physics.contact import nearness
 from compressor.physics.kinematics import ideal
-from compressor.physics.motion import evaluate
+from compressor.physics.motion import derivative, evaluate
+from compressor.physics.observe import PENETRATION
 from compressor.physics.runge_kutta import interpolate
 
 SAMPLES = 12  # intervals of a step that are looked at
@@ -17,6 +18,7 @@ EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or 
 LOOKS = SAMPLES + 2
 HALVINGS = 40
 PLACED = 1e-5  # of a step: as well as a change of contact is placed for the metrics
+LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NEVER = 2.0  # a fraction of the step beyond its end
 
 
@@ -144,3 +146,43 @@ def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
         else:
             low, at_low = s, now
     return 0.5 * (low + high)
+
+
+@jit
+def meeting(joint, t, y, phase, p, rates, before):
+    """How near a joint's contact is to its begin, at a time and a state within a hair of it.
+
+    Returns its penetration (m) there, and the speed (m/s) at which its gap closes, at the moment
+    when it does: two motions that are a little apart meet a little apart in time. rates, before:
+    scratch, (n,).
+    """
+    now = evaluate(ideal(t, p), y, phase, p)
+    depth = now.big.penetration if joint == 0 else now.small.penetration
+    rate = now.big.rate if joint == 0 else now.small.rate
+    since = depth / rate if rate > 0.0 else 0.0
+    derivative(t, y, phase, p, rates)
+    for i in range(y.size):
+        before[i] = y[i] - since * rates[i]
+    then = evaluate(ideal(t - since, p), before, phase, p)
+    return depth, then.big.rate if joint == 0 else then.small.rate
+
+
+@inlined
+def remember(w, t, work, phase, p, tally):
+    """Have joints that meet again after a flight carry the speed at which they do.
+
+    At the time of a landing: a joint meets where its gap closes within LANDED of the next step.
+    Returns whether one does.
+    """
+    met = False
+    n = work.y.size
+    for joint in range(2):
+        begin, middle = work.rows[0], work.rows[work.rows.shape[0] // 2]
+        apart = min(begin[PENETRATION + joint], middle[PENETRATION + joint])
+        flown = tally.flown[joint] > 0 or apart < 0.0
+        if p.clearance[joint] > 0.0 and flown and not tally.touching[joint]:
+            depth, speed = meeting(joint, t, work.new[:n], phase, p, work.y, work.column[:n])
+            if depth + LANDED * w.h * speed > 0.0:
+                work.new[2 * p.freedoms + joint] = max(speed, p.least_approach)
+                met = True
+    return met

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from compressor.physics._jit import inlined, jit
+from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.march import attempt, march
 from compressor.physics.motion import turned
@@ -21,6 +22,7 @@ from compressor.physics.observe import (
     derivative_with_flows,
     eccentricity_row,
 )
+from compressor.physics.onset import meeting
 from compressor.physics.runge_kutta import STAGES
 from compressor.physics.walker import DONE, RUNNING
 
@@ -61,6 +63,19 @@ def follow(w, fellow, twin, work, atol, size, phase, p):
     fellow.fresh = w.fresh
 
 
+@inlined
+def meet(w, z, twin, work, phase, p):
+    """Have the twin's contacts carry the speeds at which they meet where the first motion's do."""
+    n = work.y.size
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            place = 2 * p.freedoms + joint
+            _, speed = meeting(joint, w.t, z[:n], phase, p, work.y, work.column[:n])
+            if z[place] == max(speed, p.least_approach):  # it has met just now
+                _, speed = meeting(joint, w.t, twin[:n], phase, p, work.y, work.column[:n])
+                twin[place] = max(speed, p.least_approach)
+
+
 @jit
 def march_twins(
     w, fellow, p, z, twin, work, twin_work, atol, size, edges, phases, times, states, tally,
@@ -81,6 +96,8 @@ def march_twins(
         march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))
         if w.steps > steps:
             follow(w, fellow, twin, twin_work, atol, size, phase, p)
+            if has_chosen_laws(p) and w.landed:
+                meet(w, z, twin, twin_work, phase, p)
             if not separation(w.t, z[:n], twin[:n], p, rows) <= far:
                 fellow.status = DONE
                 return

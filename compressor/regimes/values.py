@@ -12,10 +12,10 @@ from compressor.analysis import MODES, contact_modes, impacts, mode_shares
 from compressor.cases import Case, Regimes
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Regime
-from compressor.physics import STATE_NAMES
+from compressor.physics import state_names
 from compressor.regimes.exponent import exponent
 from compressor.regimes.periods import MORE, period_of, places, tolerance
-from compressor.solve import Leg, Stretch, follow, record, scene, settle, with_samples
+from compressor.solve import Leg, Stretch, follow, record, settle, with_samples
 
 COORDINATES = (*AXES, *(f"{axis}_rate" for axis in AXES))
 SAMPLED = 16  # rev, at most, of which contact modes and impacts are told
@@ -91,7 +91,7 @@ def sizes(asked: Regimes, case: Case) -> dict[str, int]:
         "joint": len(JOINTS),
         "coordinate": len(COORDINATES),
         "mode": len(MODES),
-        "number": len(STATE_NAMES[scene(case)]),
+        "number": len(state_names(record(case))),
     }
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import TIGHTEST, Case
-from compressor.physics import COLUMNS, FREEDOMS, Scene, start
+from compressor.physics import COLUMNS, Scene, start, state_names
 from compressor.solve.energy_audit import energy_residual
 from compressor.solve.error_bars import Companion, Metrics, bars, series_errors
 from compressor.solve.ideal_scene import closed_form
@@ -86,7 +86,7 @@ def attempt(
 
     `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
     without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
-    top dead centre (`physics.STATE_NAMES`), in place of the case's own; no ideal scene has one.
+    top dead centre (`physics.state_names`), in place of the case's own; no ideal scene has one.
     """
     p, times = record(case), times_of(case, sampled)
     if scene(case) == Scene.IDEAL:
@@ -131,7 +131,7 @@ def request(
 ) -> Request:
     """What `attempt` asks to be integrated, without a limit in wall time."""
     how = case.solve
-    y = np.zeros(2 * FREEDOMS[scene(case)])
+    y = np.zeros(len(state_names(p)))
     if state is None:
         start(offsets(case), y, p)
     else:

@@ -18,7 +18,6 @@ import numpy as np
 from compressor.cases import Case
 from compressor.physics import (
     FLOWS,
-    FREEDOMS,
     Scene,
     Status,
     march_twins,
@@ -27,6 +26,7 @@ from compressor.physics import (
     new_work,
     segments,
     start,
+    state_names,
 )
 from compressor.solve.march_driver import CHUNK, check_march
 from compressor.solve.marching import ready_walker
@@ -74,7 +74,7 @@ def part(case: Case, span: float, rtol: float, close: float, timeout: float) -> 
     if scene(case) == Scene.IDEAL:
         return Parting(span, False, True)
     p = record(case)
-    moved, shifted = (np.zeros(2 * FREEDOMS[scene(case)]) for _ in range(2))
+    moved, shifted = (np.zeros(len(state_names(p))) for _ in range(2))
     start(offsets(case), moved, p)
     start(offsets(case) + close * p["clearance"][:, None] / math.sqrt(2.0), shifted, p)
     ends = np.array([0.0, span])

@@ -1,6 +1,6 @@
 """Legs of a motion that goes on: whole revolutions from a state, with their Poincaré points.
 
-A state is the motion as the solver holds it (`physics.STATE_NAMES`) at top dead centre, where the
+A state is the motion as the solver holds it (`physics.state_names`) at top dead centre, where the
 load's segments begin; the crank angle of the Poincaré section lies inside the revolutions. Steps
 end on the section and at top dead centre, so that both are the solver's own numbers, and a leg that
 is cut short and begun again at a revolution's end goes on like any other.

@@ -13,7 +13,7 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import JOINTS
-from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load
+from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load, steepest
 from compressor.solve.marching import COMPILED
 from compressor.solve.si_record import record, scene
 
@@ -35,7 +35,7 @@ class JointScales:
     penetration: float  # m, at rest under the force
     damping_ratio: float  # of the lighter body on the contact at rest; above 1 it does not ring
     swing_frequency: float  # Hz, of the journal swinging about the line of the force in its bore
-    friction_rate: float  # 1/s: 1.5 mu_s F / (m v_s)
+    friction_rate: float  # 1/s: dmu/dv F / m where it is greatest; 1.5 mu_s F / (m v_s) of ADAMS's
     explicit_step: float  # s, the stability limit by the fastest of stiffness, damping, friction
     limited_by: str
     implicit_step: float  # s: the contact's own time scale, which no method can do without
@@ -69,8 +69,8 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
     depth = float(contact.static_depth(force))
     natural = math.sqrt(contact.tangent(depth) / mass)
     friction = 0.0
-    if p["friction"]:  # the smoothed law is steepest where nothing slides
-        friction = 1.5 * p["static"].item() * force / (p["stiction_velocity"].item() * mass)
+    if p["friction"]:
+        friction = steepest(p) * force / mass
     rates = {
         "contact stiffness": natural,
         "contact damping": contact.damping(depth) / mass,

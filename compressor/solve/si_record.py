@@ -9,7 +9,15 @@ import numpy as np
 
 from compressor.cases import Case, contact_stiffness, to_si
 from compressor.metrics import JOINTS
-from compressor.physics import Law, Load, Scene, complete, new_record
+from compressor.physics import (
+    Load,
+    Scene,
+    choose_laws,
+    complete,
+    new_record,
+)
+
+NO_APPROACH = 1000.0  # mm/s: of laws that damp by none, and divide nothing by it
 
 
 def scene(case: Case) -> Scene:
@@ -20,9 +28,9 @@ def scene(case: Case) -> Scene:
 
 def record(case: Case) -> np.record:
     """The record of a case, every number in SI."""
-    p = new_record()
+    p = new_record(case.chooses_laws)
     p["scene"] = scene(case)
-    p["load"], p["law"] = Load[case.load.upper()], Law[case.contact.law.upper()]
+    p["load"] = Load[case.load.upper()]
     _machine(case, p)
     _contact(case, p)
     _gas(case, p)
@@ -67,14 +75,19 @@ def _contact(case: Case, p: np.record) -> None:
     p["exponent"] = contact.exponent
     p["damping"] = to_si(contact.damping_N_s_per_mm, "N s/mm")
     p["full_damping"] = to_si(contact.full_damping_mm, "mm")
+    p["least_approach"] = to_si(contact.least_approach_mm_per_s or NO_APPROACH, "mm/s")
+    law = (friction.law or "adams") if friction else "none"
+    choose_laws(p, contact.law, contact.restitution or 1.0, law)
     for i, joint in enumerate(JOINTS):
         p["clearance"][i] = to_si(getattr(case.clearance_mm, joint), "mm")
         p["stiffness"][i] = stiffness_of(case, joint)
     if friction:
-        p["friction"] = 1
         p["static"], p["dynamic"] = friction.static, friction.dynamic
         p["stiction_velocity"] = to_si(friction.stiction_velocity_mm_per_s, "mm/s")
         p["friction_velocity"] = to_si(friction.friction_velocity_mm_per_s, "mm/s")
+        p["bristle_stiffness"] = to_si(friction.bristle_stiffness_per_mm or 0.0, "1/mm")
+        p["bristle_damping"] = to_si(friction.bristle_damping_s_per_mm or 0.0, "s/mm")
+        p["viscous"] = to_si(friction.viscous_s_per_mm or 0.0, "s/mm")
 
 
 def _gas(case: Case, p: np.record) -> None:

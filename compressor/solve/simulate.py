@@ -9,14 +9,14 @@ import numpy as np
 from compressor.cases import MODEL_VERSION, Case
 from compressor.metrics import SERIES
 from compressor.outcome import ROW, Outcome, Table, without_run
-from compressor.physics import FLOWS, STATE_NAMES
+from compressor.physics import FLOWS, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
 from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
 from compressor.solve.foundation import foundation
 from compressor.solve.request import NONE, Trajectory
 from compressor.solve.series import block, finer, rows_of
-from compressor.solve.si_record import scene
+from compressor.solve.si_record import record
 from compressor.solve.signals import SIGNALS, signals
 from compressor.solve.solution import solve
 from compressor.solve.tallied import ledger
@@ -154,7 +154,7 @@ def attributes(case: Case, solution: Solution) -> dict[str, object]:
 
 def stop_attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
     """Where a run stopped, in which state, and how its last steps went."""
-    history, names = trajectory.history, STATE_NAMES[scene(case)]
+    history, names = trajectory.history, state_names(record(case))
     flows = ("energy flow, J",) * FLOWS
     return {
         "stop_time": trajectory.stop_time,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from compressor.physics import FLOWS, FREEDOMS, Scene, elastic_form, static_load
+from compressor.physics import FLOWS, elastic_form, state_names, static_load
 
 
 def length_and_speed(p: np.record) -> tuple[float, float]:
@@ -23,14 +23,23 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
 
 
 def natural_sizes(p: np.record) -> np.ndarray:
-    """Size of each number of the motion, shape (2 n,): deviations (m, rad), their rates (per s)."""
+    """Size of each number of the state: deviations (m, rad), their rates (per s), shape (2 n,).
+
+    With chosen laws also of what contacts carry (`state_names`): speeds, bristles as they slide.
+    """
     length, speed = length_and_speed(p)
-    per_unit = np.ones(FREEDOMS[Scene(int(p["scene"]))])
+    per_unit = np.ones(p["freedoms"])
     per_unit[-1] = 1.0 / p["rod_length"]  # the last freedom is an angle
-    return np.concatenate((length * per_unit, speed * per_unit))
+    sizes = np.concatenate((length * per_unit, speed * per_unit))
+    more = len(state_names(p)) - sizes.size
+    if not more:
+        return sizes
+    stiffness = float(p["bristle_stiffness"])
+    bent = float(p["dynamic"]) / stiffness if stiffness and p["dynamic"] else length
+    return np.concatenate((sizes, np.full(2, speed), np.full(2, bent)))
 
 
 def absolute_tolerances(p: np.record, rtol: float) -> np.ndarray:
-    """SciPy's atol, shape (2 n + 4,), for the scene's deviations, their rates, energy flows."""
+    """SciPy's atol, for the numbers of the state, and energy flows."""
     energy = (p.reciprocating_mass + p.rod_mass) * (p.crank_radius * p.omega) ** 2 / 2
     return rtol * np.concatenate((natural_sizes(p), np.full(FLOWS, energy)))

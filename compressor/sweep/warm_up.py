@@ -24,17 +24,27 @@ LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
 
 class Needs(NamedTuple):
-    """What some cases need of the equations: methods, twins for a horizon, scenes in lanes."""
+    """What some cases need of the equations: methods, twins for a horizon, scenes in lanes, laws
+    other than the default ones.
+    """
 
     methods: tuple[str, ...] = ()
     horizon: bool = False
     lanes: tuple[int, ...] = ()
+    laws: bool = False
 
     @classmethod
     def of(cls, cases: Iterable[Case]) -> "Needs":
-        solves = [case.solve for case in cases]
-        methods = tuple(sorted({"auto"} | {solve.method for solve in solves}))
-        return cls(methods, any(solve.horizon is True for solve in solves))
+        some = list(cases)
+        methods = tuple(sorted({"auto"} | {case.solve.method for case in some}))
+        twins = any(case.solve.horizon is True for case in some)
+        return cls(methods, twins, laws=any(case.chooses_laws for case in some))
+
+    @property
+    def parts(self) -> list[str]:
+        """The parts of the equations that are needed, by name."""
+        lanes = [f"lanes-{of}" for of in self.lanes]
+        return [*self.methods, *["horizon"] * self.horizon, *lanes, *["laws"] * self.laws]
 
     def with_lanes(self, cases: Sequence[Case]) -> "Needs":
         """With the scenes of which there are jobs enough to march side by side.
@@ -66,9 +76,11 @@ def load(needs: Needs) -> None:
         short = {"clearance_mm": 0.1, "solve": solve}
         cases = [Case.from_values({"joint": joint, **short}) for joint in LANES.values()]
         side_by_side(cases, needs.lanes)
+    values = {"joint": "both", "clearance_mm": 0.1}
     for how in hows:
-        values = {"joint": "both", "clearance_mm": 0.1, "solve": solve | how}
-        measure(Case.from_values(values))
+        measure(Case.from_values({**values, "solve": solve | how}))
+    if needs.laws:
+        measure(Case.from_values({**values, "contact": {"law": "hertz"}, "solve": solve}))
 
 
 def load_telling(needs: Needs, remark: Callable[[str], None]) -> None:
@@ -97,8 +109,7 @@ def marker(part: str) -> Path:
 
 def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
     """Compile here what this machine has not compiled before, so that workers need but load it."""
-    parts = [*needs.methods, *(["horizon"] if needs.horizon else [])]
-    compiled = [marker(part) for part in (*parts, *(f"lanes-{of}" for of in needs.lanes))]
+    compiled = [marker(part) for part in needs.parts]
     if not all(path.exists() for path in compiled):
         load_telling(needs, remark)
         for path in compiled:

@@ -5,7 +5,7 @@ from mutation import planted
 BUGS = [
     # contact
     ("friction pushes along the slip", "physics/contact.py",
-     "-friction_coefficient(slip, p) * normal", "friction_coefficient(slip, p) * normal"),
+     "-friction_coefficient(slip, bristle", "friction_coefficient(slip, bristle"),
     ("K a hundredth too large", "physics/contact_laws.py",
      "return stiffness * power", "return 1.01 * stiffness * power"),
     ("STEP is a parabola", "physics/contact_laws.py", "(3.0 - 2.0 * s)", "1.0"),
@@ -14,7 +14,8 @@ BUGS = [
     ("the bore's radius is the pin's", "physics/contact.py",
      "bore = p.pin_radius + clearance", "bore = p.pin_radius"),
     ("journal and bearing swapped in the slip", "physics/contact.py",
-     "journal_spin * arm - rod_spin * bore", "rod_spin * bore - journal_spin * arm"),
+     "fused(journal_spin, arm, -(rod_spin * bore))",
+     "fused(rod_spin, bore, -(journal_spin * arm))"),
     # motion
     ("the rod's centripetal term lost", "physics/motion.py",
      "contact.fx - load - p.rod_mass * b * cos_phi * rate * rate", "contact.fx - load"),
@@ -22,7 +23,7 @@ BUGS = [
     ("friction's moment at the small end turned", "physics/motion.py",
      "big.moment + small.moment", "big.moment - small.moment"),
     ("journal and bearing swapped at the small end", "physics/motion.py",
-     "ey_rate, 0.0, -motion.rate - y[3], p)", "ey_rate, -motion.rate - y[3], 0.0, p)"),
+     "ey_rate, 0.0, spin, kept, p)", "ey_rate, spin, 0.0, kept, p)"),
     ("the rod's inertia about its mass centre", "physics/motion.py",
      "p.rod_inertia + p.rod_mass * b * b", "p.rod_inertia"),
     ("an offset the other way", "physics/motion.py",
@@ -47,7 +48,7 @@ BUGS = [
      "math.pi * to_si(gas.piston_radius_mm", "math.pi / 4 * to_si(gas.piston_radius_mm"),
     # march, control, onset, tally, observe, integrate
     ("no restart at a corner", "physics/march.py",
-     "if was_stiff or at_edge else", "if was_stiff else"),
+     "if fresh or at_edge else", "if fresh else"),
     ("steps a hundred times too long accepted", "physics/march.py",
      "if not error <= 1.0", "if not error <= 100.0"),
     ("the control's order as its power", "physics/step_control.py",

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.groups import Machine
+from compressor.cases.laws import USUAL
 from compressor.cases.parameter import CaseError, Problem, shown, to_si
 from compressor.cases.table import table
 from compressor.metrics import JOINTS
@@ -163,6 +164,14 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
          "contact.exponent", "needs exponent 1.5"),
         ({"friction": {"stiction_velocity_mm_per_s": 100}},
          "friction.friction_velocity_mm_per_s", "must exceed"),
+        ({"friction": {"law": "ambrosio", "stiction_velocity_mm_per_s": 100}},
+         "friction.friction_velocity_mm_per_s", "must exceed"),
+        ({"friction": {"bristle_stiffness_per_mm": 10}},
+         "friction.bristle_stiffness_per_mm", "is read with friction.law: lugre: add the law"),
+        ({"contact": {"restitution": 0.9}}, "contact.restitution", "gonthier or hu_guo: add the"),
+        ({"contact": {"law": "flores"}}, "contact.restitution", "is needed with contact.law: flor"),
+        ({"contact": {"law": "flores", "restitution": 0.9}, "solve": {"method": "BDF"}},
+         "solve.method", "choose one of auto, DOPRI5, TSIT5, RODAS"),
         ({"spring": {"stroke_mm": 240}}, "spring.stroke_mm", "less than the piston's stroke"),
         ({"load": "typical", "gas": {"discharge_MPa": 0.1}}, "gas.discharge_MPa", "must exceed"),
         ({"load": "typical", "gas": {"exponent": 1.3}}, "gas.switching", "set switching: exact"),
@@ -190,6 +199,8 @@ def test_values_that_do_not_fit_each_other(values, key, message):
         {"load": "typical", "gas": {"exponent": 1.3, **EXACT_GAS}},
         {"load": "typical", "gas": {"piston_radius_mm": 60, "back_pressure_MPa": 0.1}},
         {"friction": False},
+        {"friction": {"law": "threlfall", "stiction_velocity_mm_per_s": 100}},
+        {"contact": {"law": "hertz"}, "solve": {"method": "BDF"}},
         {"joint": "both", "clearance_mm": 0},
         {**BIG_END, "initial_offset_mm": {"big_end_x": 1.09, "small_end_x": 5}},
         {"joint": "both", "clearance_mm": 0.3, "gas": {"head_clearance_mm": 0.6}},
@@ -288,6 +299,28 @@ def test_the_paper_s_geometry_is_the_default():
     assert cases[0].key == cases[1].key
 
 
+@pytest.mark.parametrize(
+    ("group", "other", "unread"),
+    [
+        ("contact", {"law": "hertz"}, {"damping_N_s_per_mm": 5, "restitution": 0.5}),
+        ("contact", {"law": "flores", "restitution": 0.5}, {"full_damping_mm": 0.2}),
+        ("contact", {"law": "impact"}, {"restitution": 0.5}),
+        ("friction", {"law": "coulomb_tanh"}, {"static": 0.5, "friction_velocity_mm_per_s": 70}),
+        ("friction", {"law": "adams"}, {"bristle_damping_s_per_mm": 1}),
+    ],
+)
+def test_what_a_named_law_does_not_read_makes_no_other_job(group, other, unread):
+    """So that laws are swept beside the keys of any of them."""
+    one, more = (Case.from_values({group: {**other, **keys}}) for keys in ({}, unread))
+    assert one.key == more.key
+    assert Case.from_values(more.values()) == one
+
+
+def test_default_laws_have_the_keys_of_old():
+    """Stores that were written before laws could be chosen are read on."""
+    assert Case.from_values(BIG_END).key == "c49fa35e10aa0539b4ba"
+
+
 EVERYTHING = {
     "joint": "both",
     "clearance_mm": {"big_end": 0.1, "small_end": 0.2},
@@ -322,6 +355,8 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "machine.rod_inertia_kg_m2": 0.1,
     "contact.materials": ["steel", "copper"],
     "contact.geometry": "internal",
+    "contact.law": "hertz",
+    "friction.law": "threlfall",
     "solve.accuracy": "fine",
     "solve.duration_rev": 5,
     "solve.duration_s": 0.6,
@@ -340,6 +375,7 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "sensor.seed": 2,
 }
 CLEARANCES = {"big_end": 0.1, "small_end": 0.1}
+OF_LAWS = {*USUAL, "restitution"}  # keys that the default laws do not read
 
 
 def other_value(key):
@@ -351,7 +387,7 @@ def other_value(key):
     return 0.9 * row.default if row.default else 0.01
 
 
-@pytest.mark.parametrize("key", sorted(table().keys() - {"contact.law"}))  # there is one law
+@pytest.mark.parametrize("key", sorted(table()))
 def test_the_table_says_which_values_make_another_job(key):
     base = {"joint": "both", "clearance_mm": CLEARANCES}
     group, _, name = key.rpartition(".")
@@ -359,6 +395,9 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"contact": {"materials": ["steel", "steel"]}}
     if group == "sensor":
         base |= {"body": True, "sensor": True}
+    if name in OF_LAWS:
+        law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}
+        base |= {group: law}
     there = base.get(group, {})
     there = {} if there is True else there
     values = {group: there | {name: other_value(key)}} if group else {}

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case
+from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import parameter_table
 from compressor.cases.study import Axis
@@ -548,6 +549,15 @@ def group(name: str, *left_out: str):
     return st.fixed_dictionaries({}, optional=optional)
 
 
+# keys that need the name of a law beside them; the law itself
+OF_LAWS = ["law", "restitution", *USUAL]
+
+
+def as_hertz(values):
+    """With a law that any method takes."""
+    return values | {"law": "hertz"}
+
+
 TIMES = [
     {"duration_rev": 3, "output_step_deg": 0.5},
     {"duration_s": 0.6, "output_step_s": 1e-4, "settle_rev": 0},
@@ -564,10 +574,13 @@ CASES = st.fixed_dictionaries(
         "machine": group("machine"),
         "gas": group("gas", "switching").map(lambda gas: gas | {"switching": "exact"}),
         "spring": group("spring"),
-        "contact": group("contact", "materials", "exponent", "geometry")
+        "contact": group("contact", "materials", "exponent", "geometry", *OF_LAWS)
+        | group("contact", "materials", "geometry", "restitution").map(as_hertz)
         | st.just({"materials": ["steel", "copper"]})
         | st.just({"materials": ["steel", "steel"], "geometry": "internal"}),
-        "friction": st.just(False) | group("friction"),
+        "friction": st.just(False)
+        | group("friction", *OF_LAWS)
+        | group("friction").map(lambda values: {"law": "lugre"} | values),
         "solve": st.sampled_from([a | b for a in TIMES for b in SOLVES]),
         "output": group("output", "signals") | st.just({"keep": "series", "signals": True}),
     },

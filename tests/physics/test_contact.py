@@ -10,11 +10,13 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
-from compressor.physics.contact import friction_coefficient, joint_contact
+from compressor.physics.contact import joint_contact
 from compressor.physics.contact_laws import normal_force, rise
+from compressor.physics.friction_laws import friction_coefficient
 from compressor.solve.si_record import record
 
 K = 3.36e5 * 1000**1.5
+NOTHING = (0.0, 0.0)  # that the contact carries
 finite = st.floats(-1e3, 1e3)
 
 
@@ -46,8 +48,8 @@ def test_rise_is_constant_outside_to_the_bit(s):
 @given(st.floats(-10, 10))
 def test_friction_is_odd_and_bounded(slip):
     p = law()
-    mu = friction_coefficient(slip, p)
-    assert mu == pytest.approx(-friction_coefficient(-slip, p), abs=1e-15)
+    mu = friction_coefficient(slip, 0.0, p)
+    assert mu == pytest.approx(-friction_coefficient(-slip, 0.0, p), abs=1e-15)
     assert abs(mu) <= 0.23
     assert mu * slip >= -1e-15
 
@@ -56,26 +58,26 @@ def test_friction_is_odd_and_bounded(slip):
     ("slip", "mu"), [(0, 0), (0.005, 0.158125), (0.01, 0.23), (0.055, 0.19), (0.1, 0.15), (3, 0.15)]
 )
 def test_friction_values(slip, mu):
-    assert friction_coefficient(slip, law()) == pytest.approx(mu)
+    assert friction_coefficient(slip, 0.0, law()) == pytest.approx(mu)
 
 
 @pytest.mark.parametrize(("force", "depth_mm"), [(825, 0.018), (3087, 0.044)])
 def test_static_penetration(force, depth_mm):
     assert (force / K) ** (2 / 3) * 1e3 == pytest.approx(depth_mm, abs=5e-4)
-    assert normal_force((force / K) ** (2 / 3), 0.0, K, law())[0] == pytest.approx(force)
+    assert normal_force((force / K) ** (2 / 3), 0.0, 1.0, K, law())[0] == pytest.approx(force)
 
 
 def test_the_clamp_never_pulls():
-    assert normal_force(1e-5, -100.0, K, law())[0] == 0.0
-    assert normal_force(0.0, 5.0, K, law())[0] == 0.0
-    assert normal_force(-1e-9, 5.0, K, law())[0] == 0.0
+    assert normal_force(1e-5, -100.0, 1.0, K, law())[0] == 0.0
+    assert normal_force(0.0, 5.0, 1.0, K, law())[0] == 0.0
+    assert normal_force(-1e-9, 5.0, 1.0, K, law())[0] == 0.0
 
 
 def bounce(speed, p, mass=5.0):
     """Contact time, exit speed and depth of a mass that strikes the contact at `speed`."""
 
     def derivative(_, y):
-        return [y[1], -normal_force(y[0], y[1], K, p)[0] / mass]
+        return [y[1], -normal_force(y[0], y[1], 1.0, K, p)[0] / mass]
 
     def leaves(_, y):
         return y[0]
@@ -115,7 +117,7 @@ vectors = st.tuples(
 def test_joint_contact_balances_angular_momentum(state):
     ex, ey, *rates = state
     p = law()
-    found = joint_contact(0, ex, ey, *rates, p)
+    found = joint_contact(0, ex, ey, *rates, NOTHING, p)
     # the journal's moment about its own centre, moved to the bore's centre with its force there
     journal = (p.pin_radius - found.penetration) * found.friction
     moved = journal + ex * -found.fy - ey * -found.fx
@@ -126,18 +128,18 @@ def test_joint_contact_balances_angular_momentum(state):
 
 @given(vectors)
 def test_joint_contact_only_loses_energy_to_friction(state):
-    found = joint_contact(0, *state, law())
+    found = joint_contact(0, *state, NOTHING, law())
     assert found.friction * found.slip <= 0
     assert found.normal >= 0
     assert (found.normal > 0) <= (found.penetration > 0)
 
 
 def test_concentric_circles_exert_no_force():
-    assert joint_contact(0, 0.0, 0.0, 1.0, 1.0, 50.0, 3.0, law())[:5] == (0, 0, 0, 0, 0)
+    assert joint_contact(0, 0.0, 0.0, 1.0, 1.0, 50.0, 3.0, NOTHING, law())[:5] == (0, 0, 0, 0, 0)
 
 
 def test_contact_pushes_the_journal_back():
-    found = joint_contact(0, 2.5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, law())
+    found = joint_contact(0, 2.5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, NOTHING, law())
     assert found.fx == pytest.approx(
         K * (0.5e-4) ** 1.5
     )  # on the rod; the journal gets its opposite
@@ -145,7 +147,7 @@ def test_contact_pushes_the_journal_back():
 
 
 def test_no_friction_is_no_tangential_force():
-    found = joint_contact(0, 2.5e-4, 0.0, 0.0, 1.0, 50.0, 0.0, law(friction=False))
+    found = joint_contact(0, 2.5e-4, 0.0, 0.0, 1.0, 50.0, 0.0, NOTHING, law(friction=False))
     assert found.friction == 0
     assert found.fy == 0
 

@@ -210,7 +210,7 @@ def test_an_ideal_joint_never_touches():
 @pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
 def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     p = parameters()
-    normal, elastic, unclamped = normal_force(penetration, rate, p.stiffness[1], p)
+    normal, elastic, unclamped = normal_force(penetration, rate, 1.0, p.stiffness[1], p)
     contact = Contact(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
     assert (nearness(contact, p.stiffness[1], p) > 0) == (normal > 0)
 
@@ -293,7 +293,7 @@ def release(rng, length, joint, t, y, phase, p):
     stiffness = p.stiffness[joint]
 
     def force(speed):
-        return normal_force(speed * length, -speed, stiffness, p)[2]
+        return normal_force(speed * length, -speed, 1.0, stiffness, p)[2]
 
     speed = brentq(force, 1e-3, 0.5 * p.full_damping / length)
     y = with_radial_rate(joint, t, y, phase, p, -speed)

@@ -1,0 +1,132 @@
+"""Bodies that meet: what each law that damps by a coefficient of restitution gives back.
+
+For F = K delta^p (1 + chi delta' / delta'_0) a free body leaves at e times the speed delta'_0 at
+which it came, where chi (1 + e) = ln((1 + chi) / (1 - chi e)), whatever K, p and mass are: energy
+balance of the loading and of the unloading, each integrated exactly.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from compressor.cases.case import Case
+from compressor.physics.contact_laws import HYSTERESIS, Law
+from compressor.physics.observe import COLUMNS, Column, observe
+from compressor.physics.record import CARRIED, state_names
+from compressor.solve.attempts import attempt
+from compressor.solve.si_record import record
+
+# by law: what comes back with 0.9, 0.7, 0.5 and 0.3 asked for, from the closed form
+GIVEN = {
+    "lankarani_nikravesh": (0.9132, 0.7960, 0.7252, 0.6842),
+    "hunt_crossley": (0.9090, 0.7680, 0.6630, 0.5813),
+    "flores": (0.8939, 0.6832, 0.4704, 0.2562),
+    "gonthier": (0.8764, 0.6696, 0.4877, 0.3042),
+    "hu_guo": (0.8999, 0.6973, 0.4877, 0.2707),
+}
+ASKED = (0.9, 0.7, 0.5, 0.3)
+EACH = [(law, e, out) for law, many in GIVEN.items() for e, out in zip(ASKED, many, strict=True)]
+CLEARANCE = 2e-4  # m
+pytestmark = pytest.mark.compiled
+
+
+def drop(joint, speed, method="auto", mass=5.0, rtol=1e-8, **contact):
+    """The crosshead flying at a speed (m/s) against the rod's end, along the rod, at almost no
+    crank speed: the rows observed at 400 times until it has come and gone.
+    """
+    depth = (1.25 * mass * speed**2 / (3.36e5 * 1000**1.5)) ** 0.4
+    span = 2.0 * CLEARANCE / speed + 2.0 * 2.9432 * depth / speed  # there and back; Hertz's contact
+    values = {
+        "joint": joint,
+        "clearance_mm": 1000 * CLEARANCE,
+        "load": "none",
+        "friction": False,
+        "contact": contact,
+        "machine": {"speed_rpm": 1e-3, "reciprocating_mass_kg": mass},
+        "solve": {"duration_s": span, "settle_rev": 0, "rtol": rtol, "method": method,
+                  "output_step_s": span / 400, "error_bars": False},
+    }  # fmt: skip
+    case = Case.from_values(values)
+    p = record(case)
+    state = np.zeros(len(state_names(p)))
+    state[p["freedoms"]] = speed if joint == "small_end" else -speed
+    if state.size > 2 * p["freedoms"]:
+        state[2 * p["freedoms"] :][:2] = p["least_approach"]
+    run = attempt(case, case.rtol, 60.0, True, state=state)
+    assert run.reason == ""
+    rows = np.empty((run.trajectory.times.size, COLUMNS))
+    for i, (t, y) in enumerate(zip(run.trajectory.times, run.trajectory.states, strict=True)):
+        observe(t, y, int(run.trajectory.phases[i]), p, rows[i])
+    return run, rows
+
+
+def given_back(rows):
+    """Share of the speed after the first contact in that before it."""
+    touching = rows[:, Column.NORMAL + 1] > 0.0
+    after = np.flatnonzero(touching[:-1] & ~touching[1:])[0] + 1
+    return -rows[after, Column.VELOCITY] / rows[0, Column.VELOCITY]
+
+
+@pytest.mark.parametrize(("law", "asked", "given"), EACH)
+def test_the_closed_form_gives_what_is_tabled(law, asked, given):
+    chi = HYSTERESIS[Law[law.upper()]](asked)
+    most = min(1.0, 1.0 / chi) * (1 - 1e-12)
+    out = brentq(lambda e: chi * (1 + e) - math.log((1 + chi) / (1 - chi * e)), 1e-9, most)
+    assert out == pytest.approx(given, abs=6e-5)
+
+
+@pytest.mark.parametrize(("law", "asked", "given"), EACH)
+def test_a_drop_through_the_whole_solver_gives_it_back(law, asked, given):
+    run, rows = drop("small_end", 0.3, law=law, restitution=asked)
+    assert given_back(rows) == pytest.approx(given, abs=1e-3)
+    approach = run.trajectory.states[-1, 4 + CARRIED.index("approach speed at the small end, m/s")]
+    assert approach == pytest.approx(0.3, rel=1e-5)
+
+
+@pytest.mark.parametrize("law", ["flores", "hunt_crossley"])
+@pytest.mark.parametrize(
+    ("speed", "mass", "exponent", "method"),
+    [(0.02, 5.0, 1.5, "auto"), (2.0, 5.0, 1.5, "DOPRI5"), (0.3, 0.5, 1.2, "auto"),
+     (0.3, 5.0, 1.5, "RODAS")],
+)  # fmt: skip
+def test_it_depends_on_neither_speed_nor_mass_nor_exponent(law, speed, mass, exponent, method):
+    more = {"law": law, "restitution": 0.7, "exponent": exponent}
+    _, rows = drop("small_end", speed, method, mass, rtol=1e-7, **more)
+    assert given_back(rows) == pytest.approx(dict(GIVEN)[law][1], abs=1e-3)
+
+
+def test_hertz_gives_all_back():
+    _, rows = drop("small_end", 0.3, law="hertz")
+    assert given_back(rows) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_the_damping_s_loss_is_the_lost_energy():
+    """Of a drop: m v^2 (1 - e^2) / 2, by the flow that is integrated beside the motion."""
+    run, rows = drop("small_end", 0.3, law="flores", restitution=0.7)
+    lost = 0.5 * 5.0 * 0.3**2 * (1.0 - given_back(rows) ** 2)
+    assert run.trajectory.tally["damping_loss"] == pytest.approx(lost, rel=1e-5)
+
+
+def test_below_the_least_approach_less_is_damped():
+    """The speed is divided by the least approach instead: chi is smaller by their ratio."""
+    _, rows = drop("small_end", 0.02, law="flores", restitution=0.5, least_approach_mm_per_s=80)
+    chi = HYSTERESIS[Law.FLORES](0.5) * 0.02 / 0.08
+    out = brentq(lambda e: chi * (1 + e) - math.log((1 + chi) / (1 - chi * e)), 1e-9, 1.0)
+    assert given_back(rows) == pytest.approx(out, abs=1e-3)
+
+
+def test_each_joint_and_each_impact_has_its_own_speed():
+    """Of a rod that is free between two joints, until it has met both ends often."""
+    values = {"joint": "both", "clearance_mm": 0.3, "contact": {"law": "flores",
+              "restitution": 0.6}, "load": "none", "solve": {"duration_rev": 2}}  # fmt: skip
+    case = Case.from_values(values)
+    run = attempt(case, 1e-7, 60.0, True)
+    assert run.reason == ""
+    carried = run.trajectory.states[:, 8:10]
+    floor = case.contact.least_approach_mm_per_s / 1000
+    assert (carried >= floor).all()
+    for joint in range(2):
+        assert np.unique(carried[:, joint]).size > 2
+    assert not np.array_equal(carried[:, 0], carried[:, 1])
