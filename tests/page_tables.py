@@ -633,8 +633,31 @@ def stress_table():
         + f". Of the ok ones, {found['unforeseeable']} go on beyond their horizon. Slowest ok run: "
         f"{slow['seconds']:.2g} s (`{slow['command']}`); longest scene with all judges: "
         f"{found['slowest_judging_s']:.0f} s; peak memory of a worker: "
-        f"{found['peak_memory_MiB']} MiB.\n"
+        f"{found['peak_memory_MiB']} MiB.\n" + fresh_scenes(found["fresh"])
     )
+
+
+def fresh_scenes(found):
+    """What became of scenes of other seeds, which chose nothing."""
+    if not found:
+        return ""
+    scenes, wrong = sum(one["scenes"] for one in found), silent(found)
+    seeds = " and ".join(str(one["seed"]) for one in found)
+    commands = ", ".join(
+        f"`{row['command']}` ({row['worst_metric']} off by {row['error']:.1e}, "
+        f"bar {row['bar']:.1e})"
+        for one in found
+        for row in one["silent_wrong"]
+    )
+    return (
+        f"\n**Of {scenes:,} fresh scenes**, of the seeds {seeds}, {wrong or 'none'} "
+        f"{'was' if wrong == 1 else 'were'} wrong in silence{f': {commands}' if wrong else ''}.\n"
+    )
+
+
+def silent(found):
+    """How many fresh scenes were wrong in silence."""
+    return sum(len(one["silent_wrong"]) for one in found)
 
 
 def worst_table():
@@ -723,7 +746,8 @@ def numbers_list():
         f"**Extremes.** Of {stress['scenes']:,} extreme cases, half of them inside the supported "
         f"range, {range_['ok'] / sum(range_.values()):.1%} of that half ran to a result. The "
         f"others failed with a named reason. Silently wrong ([meaning]({link})): "
-        f"{stress['silent_wrong'] or 'none'}. Not judged: {unjudged}.",
+        f"{stress['silent_wrong'] or 'none'}; of {sum(one['scenes'] for one in stress['fresh']):,} "
+        f"others, drawn afterwards, {silent(stress['fresh']) or 'none'}. Not judged: {unjudged}.",
         f"**Kills.** Of {kills['trials']} sweeps killed at random and resumed, "
         f"{kills['failed'] or 'none'} had lost or changed a result. A sweep of {sweep['jobs']:,} "
         f"jobs, killed {len(sweep['kills'])} times and resumed, equals the undisturbed one "

@@ -1,7 +1,8 @@
 """Keep what `compsim stress` finds, for the README (make stress, within the hour).
 
 Runs the command and writes a small JSON file and, beside it, the map of outcomes. A campaign that
-was interrupted goes on from its folder.
+was interrupted goes on from its folder. With --fresh the outcomes of scenes of another seed, which
+chose nothing, are kept in the file beside those of the whole campaign.
 """
 
 import argparse
@@ -70,16 +71,42 @@ def found(study):
     }
 
 
-def main(target, count, seed, jobs, folder):
+def fresh(study):
+    """What is kept of scenes of another seed: how many, how they ended, and which were wrong."""
+    wrong = study.isel(scene=study["verdict"].values == "silent_wrong")
+    return {
+        "seed": int(study.attrs["seed"]),
+        "scenes": study.sizes["scene"],
+        "ends": counts(study),
+        "silent_wrong": [
+            described(study, wrong.isel(scene=i)) for i in range(wrong.sizes["scene"])
+        ],
+    }
+
+
+def beside(target, made):
+    """A campaign's file with fresh scenes in it, in place of earlier ones of their seed."""
+    kept = json.loads(target.read_text(encoding="utf-8"))
+    others = [one for one in kept.get("fresh", []) if one["seed"] != made["seed"]]
+    return kept | {"fresh": sorted([*others, made], key=lambda one: one["seed"])}
+
+
+def main(target, count, seed, jobs, folder, aside):
     words = ["stress", "-n", str(count), "--seed", str(seed), "-j", str(jobs), "-o", folder]
     code = cli.main(words)
     if code not in (DONE, SOME_FAILED):
         raise SystemExit(code)
     study = xr.load_dataset(Path(folder, FILE), engine="h5netcdf").isel(scene=slice(count))
     seconds = float(study["judging_seconds"].sum())  # of all runs of the command that it took
-    kept = {**provenance("make stress"), "workers": jobs, "work_s": plain(seconds), **found(study)}
-    Path(target).write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    shutil.copyfile(Path(folder, "stress.png"), Path(target).with_suffix(".png"))
+    target = Path(target)
+    if aside:
+        kept = beside(target, provenance("make stress") | fresh(study))
+    else:
+        kept = {**provenance("make stress"), "workers": jobs, "work_s": plain(seconds)}
+        before = json.loads(target.read_text(encoding="utf-8")) if target.exists() else {}
+        kept |= found(study) | {"fresh": before.get("fresh", [])}
+        shutil.copyfile(Path(folder, "stress.png"), target.with_suffix(".png"))
+    target.write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     raise SystemExit(code)
 
 
@@ -90,5 +117,6 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-j", "--jobs", type=int, default=2, help="worker processes")
     parser.add_argument("-o", "--output", default="stress", help="folder of the campaign")
+    parser.add_argument("--fresh", action="store_true", help="keep them beside the file's own")
     asked = parser.parse_args()
-    main(asked.target, asked.scenes, asked.seed, asked.jobs, asked.output)
+    main(asked.target, asked.scenes, asked.seed, asked.jobs, asked.output, asked.fresh)
