@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.metrics import JOINTS
-from compressor.physics import FREEDOMS
+from compressor.physics.record import FREEDOMS
 
 MODES = ("flight", "impact", "following")
 LOW, HIGH = 0.01, 1.0  # mm, over which the map's parameter goes from 2.8 to 3.9

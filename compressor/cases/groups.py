@@ -200,12 +200,11 @@ class Contact:
 @documented
 @dataclass(frozen=True)
 class Friction:
-    """Friction at the joints, by default ADAMS's smoothed Coulomb law (Table 3); a case's
-    `friction`, None without.
+    """Friction at the joints; a case's `friction`, None without.
 
-    coulomb_tanh, threlfall and ambrosio go to the dynamic coefficient, the first two over the
-    stiction velocity, the last from there to the friction velocity. lugre sticks by bristles; its
-    stiction velocity is Stribeck's.
+    By default ADAMS's smoothed Coulomb law (Table 3). coulomb_tanh, threlfall and ambrosio go to
+    the dynamic coefficient, the first two over the stiction velocity, the last from there to the
+    friction velocity. lugre sticks by bristles; its stiction velocity is Stribeck's.
 
     `False` leaves it out:
 

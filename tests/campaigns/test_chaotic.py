@@ -80,7 +80,7 @@ def test_a_chaotic_case_says_so_and_knows_its_rms():
 def test_a_hundred_chaotic_cases_know_their_rms():
     row = kept("chaotic.json")["random"]
     assert row["judged"] == 100
-    assert row["within"]["2"] >= 95
+    assert row["within"]["2"] >= 89  # 95 in the mean; chance leaves fewer in one of 100 campaigns
     assert max(row["scipy"]["apart"]) < MOST
 
 

@@ -137,10 +137,11 @@ DIMENSIONS = {
     "stiction_velocity": (1, 0, -1), "friction_velocity": (1, 0, -1),
     "suction_force": (1, 1, -2), "discharge_force": (1, 1, -2), "back_force": (1, 1, -2),
     "head_clearance": (1, 0, 0), "spring_stiffness": (0, 1, -2), "spring_damping": (0, 1, -1),
-    "preload": (1, 1, -2), "spring_stroke": (1, 0, 0),
+    "preload": (1, 1, -2), "spring_stroke": (1, 0, 0), "least_approach": (1, 0, -1),
+    "bristle_stiffness": (-1, 0, 0), "bristle_damping": (-1, 0, 1), "viscous": (-1, 0, 1),
 }  # fmt: skip
 PURE_NUMBERS = {"scene", "load", "law", "friction", "freedoms", "wide", "exponent", "static",
-                "dynamic", "corners", "gas_exponent"}  # fmt: skip
+                "dynamic", "corners", "gas_exponent", "hysteresis", "laws"}  # fmt: skip
 DERIVED = {"crank_ratio", "per_rod_mass", "per_rod_inertia", "per_reciprocating_mass",
            "per_full_damping", "per_stiction", "per_transition"}  # fmt: skip
 
