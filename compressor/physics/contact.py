@@ -23,7 +23,8 @@ def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
 
     Raises KeyError where there is no law of a name.
     """
-    p["law"], p["friction"] = law, _ = Law[contact.upper()], FrictionLaw[friction.upper()]
+    law = Law[contact.upper()]
+    p["law"], p["friction"] = law, FrictionLaw[friction.upper()]
     if law in HYSTERESIS:
         p["hysteresis"] = HYSTERESIS[law](restitution)
 

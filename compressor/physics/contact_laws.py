@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from compressor.physics._jit import fused, inlined, merged, plain
+from compressor.physics._jit import fused, inlined, jit, merged, plain
 
 
 class Law(IntEnum):
@@ -95,7 +95,7 @@ def elastic_energy(elastic, penetration, p):
     return elastic * penetration / (p.exponent + 1.0)
 
 
-@merged
+@jit
 def hysteretic(penetration, rate, approach, stiffness, p):
     """`normal_force` by a law of HYSTERESIS: K delta^p (1 + chi delta' / delta'_0)."""
     if penetration <= 0.0:

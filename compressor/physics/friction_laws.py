@@ -2,13 +2,13 @@
 
 A law is a member of `FrictionLaw`, named by `friction.law` in small letters, and a branch of
 `chosen_coefficient` (physics/README.md, Friction). ADAMS's is the default, for which nothing is
-compared.
+compared; the others are no part of its machine code, or it would take half as long again to make.
 """
 
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import fused, merged
+from compressor.physics._jit import fused, jit, merged
 from compressor.physics.contact_laws import has_chosen_laws, rise
 
 SATURATED = 1.0 - math.exp(-3.0)  # Threlfall's curve at its knee
@@ -37,42 +37,42 @@ def adams(slip, p):
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
-@merged
+@jit
 def threlfall(slip, p):
     """Threlfall's law: an exponential rise (Mech. Mach. Theory 13, 1978)."""
     speed = min(1.0, abs(slip) / p.stiction_velocity)
     return math.copysign(p.dynamic * (1.0 - math.exp(-3.0 * speed)) / SATURATED, slip)
 
 
-@merged
+@jit
 def ambrosio(slip, p):
     """Ambrosio's law: nothing below the stiction velocity, then a line up to the friction one."""
     share = (abs(slip) - p.stiction_velocity) * p.per_transition
     return math.copysign(p.dynamic * min(1.0, max(0.0, share)), slip)
 
 
-@merged
+@jit
 def stribeck(slip, p):
     """LuGre's coefficient in steady sliding without its viscous part."""
     ratio = slip / p.stiction_velocity
     return fused(p.static - p.dynamic, math.exp(-ratio * ratio), p.dynamic)
 
 
-@merged
+@jit
 def bristle_rate(slip, bristle, p):
     """How fast LuGre's bristles bend (m/s), of a mean deflection (m)."""
     held = p.bristle_stiffness * abs(slip) * bristle / stribeck(slip, p)
     return slip - held
 
 
-@merged
+@jit
 def lugre(slip, bristle, p):
     """LuGre's law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995)."""
     bending = p.bristle_damping * bristle_rate(slip, bristle, p)
     return fused(p.bristle_stiffness, bristle, fused(p.viscous, slip, bending))
 
 
-@merged
+@jit
 def chosen_coefficient(slip, bristle, p):
     """The coefficient by the law that a record has chosen."""
     if p.friction == COULOMB_TANH:

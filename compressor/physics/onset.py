@@ -149,6 +149,15 @@ def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
 
 
 @jit
+def gap(joint, t, y, phase, p):
+    """Penetration (m) and its rate (m/s) of a joint at a time and state."""
+    now = evaluate(ideal(t, p), y, phase, p)
+    if joint == 0:
+        return now.big.penetration, now.big.rate
+    return now.small.penetration, now.small.rate
+
+
+@jit
 def meeting(joint, t, y, phase, p, rates, before):
     """How near a joint's contact is to its begin, at a time and a state within a hair of it.
 
@@ -156,15 +165,13 @@ def meeting(joint, t, y, phase, p, rates, before):
     when it does: two motions that are a little apart meet a little apart in time. rates, before:
     scratch, (n,).
     """
-    now = evaluate(ideal(t, p), y, phase, p)
-    depth = now.big.penetration if joint == 0 else now.small.penetration
-    rate = now.big.rate if joint == 0 else now.small.rate
+    depth, rate = gap(joint, t, y, phase, p)
     since = depth / rate if rate > 0.0 else 0.0
     derivative(t, y, phase, p, rates)
     for i in range(y.size):
         before[i] = y[i] - since * rates[i]
-    then = evaluate(ideal(t - since, p), before, phase, p)
-    return depth, then.big.rate if joint == 0 else then.small.rate
+    _, speed = gap(joint, t - since, before, phase, p)
+    return depth, speed
 
 
 @inlined

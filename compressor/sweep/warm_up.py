@@ -35,10 +35,12 @@ class Needs(NamedTuple):
 
     @classmethod
     def of(cls, cases: Iterable[Case]) -> "Needs":
-        some = list(cases)
-        methods = tuple(sorted({"auto"} | {case.solve.method for case in some}))
-        twins = any(case.solve.horizon is True for case in some)
-        return cls(methods, twins, laws=any(case.chooses_laws for case in some))
+        methods, twins, laws = {"auto"}, False, False
+        for case in cases:  # which may be made one by one
+            methods.add(case.solve.method)
+            twins = twins or case.solve.horizon is True
+            laws = laws or case.chooses_laws
+        return cls(tuple(sorted(methods)), twins, laws=laws)
 
     @property
     def parts(self) -> list[str]:
@@ -55,7 +57,8 @@ class Needs(NamedTuple):
         from compressor.solve import scene
 
         step = max(1, len(cases) // SEEN)
-        seen = Counter(int(scene(cases[i])) for i in range(0, len(cases), step))
+        looked = (cases[i] for i in range(0, len(cases), step))
+        seen = Counter(int(scene(case)) for case in looked if not case.chooses_laws)
         least = {of: FEWEST if marker(f"lanes-{of}").exists() else MANY for of in LANES}
         return self._replace(lanes=tuple(of for of in LANES if seen[of] * step >= least[of]))
 

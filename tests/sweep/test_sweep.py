@@ -6,7 +6,9 @@ import os
 import re
 import signal
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import compressor.store.writer
@@ -288,6 +290,22 @@ def test_lanes_are_compiled_for_many_jobs_alone(studies, tmp_path, monkeypatch):
     warm_up.marker("lanes-3").touch()
     assert warm_up.Needs().with_lanes(few).lanes == (3,)
     assert warm_up.Needs().with_lanes([few[0]]).lanes == ()
+    chosen = [replace(case, contact=replace(case.contact, law="hertz")) for case in few]
+    assert warm_up.Needs().with_lanes(chosen).lanes == ()  # which do not march in them
+    assert warm_up.Needs.of(chosen).parts == ["auto", "laws"]
+    assert warm_up.Needs.of(few).parts == ["auto"]
+
+
+def test_laws_are_an_axis_of_a_sweep(studies, tmp_path):
+    """What one law alone reads stands beside it for all; equal jobs are run once."""
+    contact = {"law": ["impact", "hertz", "flores"], "restitution": [0.5, 0.9]}
+    made = studies(laws={**BOTH, "clearance_mm": 0.2, "contact": contact})
+    assert len({case.key for case in made[0].cases}) == 4
+    sweep(made, tmp_path / "found", 2)
+    data = store.open_study(tmp_path / "found", "laws").load()
+    assert (data["status"] == "ok").all()
+    peaks = data["peak_acceleration"].sel(restitution=0.5)
+    assert np.unique(peaks.values).size == 3
 
 
 def test_a_copied_folder_compiles_anew(tmp_path, monkeypatch):
