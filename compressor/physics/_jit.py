@@ -7,6 +7,7 @@ what it calls in another file.
 """
 
 import functools
+import math
 import os
 import shutil
 from collections.abc import Callable
@@ -74,7 +75,8 @@ def load_numba() -> None:
         return cpu_target.typing_context.resolve_value_type(value.made)
 
     # to be known before anything is compiled
-    vars(borrowed)["made"], vars(fused)["made"] = _borrowed(), _fused()
+    for intrinsic in (borrowed, fused, square_root):
+        vars(intrinsic)["made"] = vars(intrinsic)["make"]()
 
 
 def _compiled(function: Function, **options: Any) -> Function:
@@ -100,16 +102,16 @@ def jit(function: Function) -> Function:
 
 
 def merged(function: Function) -> Function:
-    """`jit`, written by LLVM into each caller, whatever its size: loops over lanes become vector
-    code where nothing is called in them.
+    """`jit`, written by LLVM into each caller, whatever its size: at a small part of the time that
+    `inlined` takes to compile.
     """
     return _compiled(function, forceinline=True)
 
 
 def inlined(function: Function) -> Function:
-    """`jit`, written into each caller: for what a hot loop calls with arrays or tuples.
-
-    Passing them took, with `borrowed` missing, about half of a step of the march.
+    """`jit`, written into each caller by numba, with its types: for what loops over lanes call with
+    tuples or arrays. `merged` into one another, LLVM sees too late that nothing is called there,
+    and makes no vector code of the loop.
     """
     return _compiled(function, inline="always")
 
@@ -158,9 +160,28 @@ def _fused() -> Any:
     return intrinsic(fused)
 
 
+def _square_root() -> Any:
+    from numba.core import types
+    from numba.extending import intrinsic
+
+    def square_root(typing_context: Any, a: Any) -> Any:
+        def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            root = builder.module.declare_intrinsic("llvm.sqrt", [values[0].type])
+            return builder.call(root, values)
+
+        return types.float64(types.float64), lower
+
+    return intrinsic(square_root)
+
+
 def fused(a: float, b: float, c: float) -> float:
     """a b + c, rounded once: one instruction instead of two. Python itself rounds twice."""
     return a * b + c
+
+
+def square_root(a: float) -> float:
+    """The square root, by one instruction: numba's own calls the C library, which sets errno."""
+    return math.sqrt(a)
 
 
 def borrowed(array: Any) -> Any:
@@ -173,4 +194,5 @@ def borrowed(array: Any) -> Any:
 
 if ENABLED:
     fused = Intrinsic(_fused, fused)  # type: ignore[assignment]
+    square_root = Intrinsic(_square_root, square_root)  # type: ignore[assignment]
     borrowed = Intrinsic(_borrowed, borrowed)  # type: ignore[assignment]

@@ -3,10 +3,9 @@
 physics/README.md, Contact and Friction (Eq. 14-16).
 """
 
-import math
 from typing import NamedTuple
 
-from compressor.physics._jit import fused, inlined, merged
+from compressor.physics._jit import fused, inlined, merged, square_root
 from compressor.physics.contact_laws import (
     HYSTERESIS,
     Law,
@@ -55,15 +54,16 @@ class Contact(NamedTuple):
 
 
 @inlined
-def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, carried, p):
+def joint_contact(eccentricity, spins, clearance, stiffness, carried, p):
     """Contact between a joint's journal and the rod's bore.
 
-    Takes the eccentricity (journal centre minus bore centre, m), its rate (m/s), both spins (rad/s,
-    counter-clockwise) and what the contact carries (`carried_by`). Returns a `Contact`; one contact
-    point serves both bodies, so that angular momentum balances. Concentric circles exert no force.
+    eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); spins of
+    journal and rod (rad/s, counter-clockwise); the joint's clearance (m) and stiffness (N/m^p);
+    carried: as by `carried_by`. Returns a `Contact`; one contact point serves both bodies, so that
+    angular momentum balances. Concentric circles exert no force.
     """
-    clearance = p.clearance[joint]
-    distance = math.sqrt(fused(ex, ex, ey * ey))
+    ex, ey, ex_rate, ey_rate = eccentricity
+    distance = square_root(fused(ex, ex, ey * ey))
     penetration = distance - clearance
     if distance == 0.0:
         return Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0)
@@ -73,10 +73,11 @@ def joint_contact(joint, ex, ey, ex_rate, ey_rate, journal_spin, rod_spin, carri
     rate = fused(ex_rate, nx, ey_rate * ny)
     bore = p.pin_radius + clearance
     arm = p.pin_radius - penetration
+    journal_spin, rod_spin = spins
     turning = fused(journal_spin, arm, -(rod_spin * bore))
     slip = fused(ey_rate, nx, fused(-ex_rate, ny, turning))
     approach, bristle = carried
-    normal, elastic, unclamped = normal_force(penetration, rate, approach, p.stiffness[joint], p)
+    normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, p)
     friction = 0.0
     if p.friction and in_contact(normal):
         friction = -friction_coefficient(slip, bristle, p) * normal

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from compressor.physics._jit import fused, inlined, jit, merged, plain
+from compressor.physics._jit import fused, inlined, jit, merged, plain, square_root
 
 
 class Law(IntEnum):
@@ -63,7 +63,7 @@ def rise(s):
 def power(base, exponent):
     """base ** exponent for base >= 0; a square root does for Hertz's 1.5."""
     if exponent == 1.5:
-        return base * math.sqrt(base)
+        return base * square_root(base)
     return base**exponent
 
 

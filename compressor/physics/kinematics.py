@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import fused, inlined, jit
+from compressor.physics._jit import fused, inlined, jit, square_root
 from compressor.physics.elementary import direction
 
 SMALL = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
@@ -44,7 +44,7 @@ def ideal_at(cos_theta, sin_theta, p):
     """Ideal `Motion` at a crank angle given by its cosine and sine."""
     ratio = p.crank_ratio
     sin_phi = ratio * sin_theta
-    cos_phi = math.sqrt((1.0 - sin_phi) * (1.0 + sin_phi))
+    cos_phi = square_root((1.0 - sin_phi) * (1.0 + sin_phi))
     per_cos = 1.0 / cos_phi
     rate = ratio * p.omega * cos_theta * per_cos
     spin_up = sin_phi * (rate * rate - p.omega * p.omega) * per_cos

@@ -5,7 +5,7 @@ A lane whose next step is no plain one calls for `march` itself.
 
 import math
 
-from compressor.physics._jit import borrowed, inlined, jit
+from compressor.physics._jit import borrowed, inlined, jit, square_root
 from compressor.physics.elementary import direction, exponential, logarithm
 from compressor.physics.kinematics import SMALL
 from compressor.physics.lane_rows import (
@@ -85,7 +85,7 @@ def stiffness(scene, W, j):
         above = added_rate(W, 7, j, added_rate(W, 6, j, above))
         below = added_late(W, 5, j, added_late(W, 4, j, below))
         below = added_late(W, 7, j, added_late(W, 6, j, below))
-    rate = math.sqrt(above / below) if below > 0.0 else 0.0
+    rate = square_root(above / below) if below > 0.0 else 0.0
     return W[H + j] * rate / STABILITY_LIMIT
 
 

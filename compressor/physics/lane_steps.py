@@ -1,10 +1,8 @@
 """A step of several runs side by side: loops over lanes, which LLVM makes vector code of."""
 
-import math
-
 import numpy as np
 
-from compressor.physics._jit import borrowed, fused, inlined, jit
+from compressor.physics._jit import borrowed, fused, inlined, jit, square_root
 from compressor.physics.contact_laws import Law
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.lane_rows import (
@@ -203,7 +201,7 @@ def stage_rates(scene, W, k, fraction, w, s):
         p = record_of(scene, W, j)
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
         y = state_of(scene, W, j, w)
-        now = evaluate(motion, y, int(W[PHASE + j]), p)
+        now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
         put_rates(scene, W, j, y, deviating(now, p), powers(now, y, joint_forces(now, y, p), p))
     keep_stage(scene, W, k, s)
 
@@ -216,7 +214,7 @@ def look_at_node(scene, W, k, fraction, w, i):
         p = record_of(scene, W, j)
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
         y = state_of(scene, W, j, w)
-        now = evaluate(motion, y, int(W[PHASE + j]), p)
+        now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
         put_seen(W, j, glanced(now, joint_forces(now, y, p), p), energies(now, y, p))
     keep_seen(W, k, i)
 
@@ -245,7 +243,7 @@ def finish_step(scene, W, k, w):
         if len(scene) == 3:
             e = part_of_error(W, 5, j, part_of_error(W, 4, j, e))
             e = part_of_error(W, 7, j, part_of_error(W, 6, j, e))
-        W[ERROR + j] = W[H + j] * math.sqrt(e / n)
+        W[ERROR + j] = W[H + j] * square_root(e / n)
 
 
 @inlined

@@ -43,17 +43,14 @@ def design_force(phase, x, v, deviation, deviation_rate, p):
     x (m), v (m/s) of the crosshead and their deviations from the ideal motion. While the follower
     moves with the ideal piston the spring sees the deviation alone.
     """
-    if phase == 1:
-        shortening = deviation
+    late = phase >= COMPRESSION  # compared by size: LLVM makes no vector code of a `switch`
+    if phase & 1:  # the follower dwells
+        shortening = deviation + (p.spring_stroke if late else 0.0)
         rate = deviation_rate
-    elif phase == 3:
-        shortening = p.spring_stroke + deviation
-        rate = deviation_rate
-    elif phase == 0:
-        shortening = x - (p.rod_length + p.crank_radius - p.spring_stroke)
-        rate = v
     else:
-        shortening = x - (p.rod_length - p.crank_radius)
+        reach = p.rod_length - p.crank_radius
+        start = reach if late else p.rod_length + p.crank_radius - p.spring_stroke
+        shortening = x - start
         rate = v
     return p.preload + p.spring_stiffness * shortening + p.spring_damping * rate
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import borrowed, inlined, jit
+from compressor.physics._jit import borrowed, jit, merged
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
 from compressor.physics.observe import (
@@ -64,7 +64,7 @@ rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
 rosenbrock_extend = rosenbrock.extend
 
 
-@inlined
+@merged
 def attempt(w, base, h, z, work, atol, size, phase, p):
     """Take a step of length h by the walker's present method; returns its error norm."""
     if w.stiff:
@@ -80,7 +80,7 @@ def attempt(w, base, h, z, work, atol, size, phase, p):
     return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
 
 
-@inlined
+@merged
 def may_change(rows, p):
     """Whether contact may begin or end within a step, by the nearness at its ends and middle.
 
@@ -97,7 +97,7 @@ def may_change(rows, p):
     return False
 
 
-@inlined
+@merged
 def may_touch(rows, p):
     """Whether contact may begin within a step, by the nearness at its nodes.
 
@@ -115,7 +115,7 @@ def may_touch(rows, p):
     return False
 
 
-@inlined
+@merged
 def look_at_step(w, base, h, z, work, phase, p, tally):
     """Observe the step's interpolant at its nodes; returns every which one.
 
@@ -156,7 +156,7 @@ def look_at_step(w, base, h, z, work, phase, p, tally):
     return every
 
 
-@inlined
+@merged
 def onset_ahead(w, h, every, work, phase, p):
     """Whether contact begins within the step just taken; it is then to be taken again, to there.
 
@@ -175,7 +175,7 @@ def onset_ahead(w, h, every, work, phase, p):
     return found
 
 
-@inlined
+@merged
 def sample_grid(w, t_end, h, z, work, times, states):
     """Fill the output samples up to t_end.
 
@@ -191,7 +191,7 @@ def sample_grid(w, t_end, h, z, work, times, states):
         w.sample += 1
 
 
-@inlined
+@merged
 def measure_apart(w, h, every, work, phase, p):
     """Write the share of a step that each joint is without contact.
 
@@ -214,7 +214,7 @@ def measure_apart(w, h, every, work, phase, p):
         work.apart[joint] = apart
 
 
-@inlined
+@merged
 def take_in(w, h, every, work, phase, p, tally):
     """Tally an accepted step that has been looked at, and audit its energy."""
     last = NODES.size - 1
@@ -230,7 +230,7 @@ def take_in(w, h, every, work, phase, p, tally):
     tally_step(h, NODES, weights, work.rows, every, work.apart, measured, tally, p)
 
 
-@inlined
+@merged
 def land(w, h, work, phase, p, tally):
     """Note that a step of length h has ended on an onset; whether joints carry new speeds."""
     w.landing = 0.0
@@ -248,7 +248,7 @@ def finite(new):
     return math.isfinite(total)
 
 
-@inlined
+@merged
 def advance(w, z, work, reached, fresh, at_edge, segments):
     """Move the walker to the end of the step that was taken, and into the next segment.
 

@@ -144,19 +144,19 @@ def solve_both(motion, turn, load, big, small, p):
 @inlined
 def contact_big_end(y, motion, turn, p):
     """`joint_contact` of the big end in scene big_end."""
-    ex, ey, ex_rate, ey_rate = eccentricity_big_end(y, turn, p)
+    big = eccentricity_big_end(y, turn, p)
+    spins = p.omega, -motion.rate - y[3]
     kept = carried_by(AT_BIG_END, y, p)
-    spin = -motion.rate - y[3]
-    return joint_contact(AT_BIG_END, ex, ey, ex_rate, ey_rate, p.omega, spin, kept, p)
+    return joint_contact(big, spins, p.clearance[0], p.stiffness[0], kept, p)
 
 
 @inlined
 def contact_small_end(y, motion, turn, p):
     """`joint_contact` of the small end in scene small_end."""
-    ex, ey, ex_rate, ey_rate = eccentricity_small_end(y, turn, p)
+    small = eccentricity_small_end(y, turn, p)
+    spins = 0.0, -motion.rate - y[3]
     kept = carried_by(AT_SMALL_END, y, p)
-    spin = -motion.rate - y[3]
-    return joint_contact(AT_SMALL_END, ex, ey, ex_rate, ey_rate, 0.0, spin, kept, p)
+    return joint_contact(small, spins, p.clearance[1], p.stiffness[1], kept, p)
 
 
 @inlined
@@ -165,11 +165,9 @@ def contacts_both(y, motion, turn, p):
     big, small = eccentricities_both(y, turn, p)
     spin = -motion.rate - y[7]
     kept = carried_by(AT_BIG_END, y, p)
-    at_big = joint_contact(AT_BIG_END, big[0], big[1], big[2], big[3], p.omega, spin, kept, p)
+    at_big = joint_contact(big, (p.omega, spin), p.clearance[0], p.stiffness[0], kept, p)
     kept = carried_by(AT_SMALL_END, y, p)
-    at_small = joint_contact(
-        AT_SMALL_END, small[0], small[1], small[2], small[3], 0.0, spin, kept, p
-    )
+    at_small = joint_contact(small, (0.0, spin), p.clearance[1], p.stiffness[1], kept, p)
     return at_big, at_small
 
 

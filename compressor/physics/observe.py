@@ -7,7 +7,7 @@ The right-hand side records nothing. `observe` writes one row of quantities; the
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import inlined, jit, merged
+from compressor.physics._jit import inlined, jit, merged, square_root
 from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
@@ -188,8 +188,8 @@ def glanced(now, forces, p):
     big, small = now.big, now.small
     return (
         now.a, forces[0], forces[1], forces[2], forces[3],
-        math.sqrt(forces[0] * forces[0] + forces[1] * forces[1]),
-        math.sqrt(forces[2] * forces[2] + forces[3] * forces[3]),
+        square_root(forces[0] * forces[0] + forces[1] * forces[1]),
+        square_root(forces[2] * forces[2] + forces[3] * forces[3]),
         now.a - now.motion.a, big.penetration, small.penetration, big.normal, small.normal,
         nearness(big, p.stiffness[0], p), nearness(small, p.stiffness[1], p),
     )  # fmt: skip
@@ -228,14 +228,14 @@ def observe(t, y, phase, p, row):
     write_gauged(now, y, joint_forces(now, y, p), p, row)
 
 
-@inlined
+@merged
 def glance(motion, y, phase, p, row):
     """The columns from ACCELERATION to NEARNESS: what a step is tallied by between its ends."""
     now = evaluate(motion, y, phase, p)
     write_glanced(now, joint_forces(now, y, p), p, row)
 
 
-@inlined
+@merged
 def gauge(motion, y, phase, p, row):
     """The columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     now = evaluate(motion, y, phase, p)
@@ -255,7 +255,7 @@ def derivative_with_flows(t, z, phase, p, out):
     write_flowing_derivative(ideal(t, p), z, phase, p, out)
 
 
-@inlined
+@merged
 def write_flowing_derivative(motion, z, phase, p, out):
     """`derivative_with_flows` around an ideal motion that is known, written into its caller."""
     n = z.size - 4
@@ -265,7 +265,7 @@ def write_flowing_derivative(motion, z, phase, p, out):
     write_powers(now, y, joint_forces(now, y, p), p, out[n:])
 
 
-@inlined
+@merged
 def derivative_and_gauge(motion, z, phase, p, out, row):
     """`derivative_with_flows` and `gauge` from one evaluation."""
     n = z.size - 4

@@ -6,7 +6,7 @@ turns positive. Both are watched on the step's interpolant while F_N = 0. Where 
 step goes on; how much of it was without contact is told to the metrics.
 """
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import jit, merged
 from compressor.physics.contact import nearness
 from compressor.physics.kinematics import ideal
 from compressor.physics.motion import derivative, evaluate
@@ -23,13 +23,17 @@ NEVER = 2.0  # a fraction of the step beyond its end
 
 
 @jit
+def contact_at(joint, t, y, phase, p):
+    """A joint's `Contact` at a time and state."""
+    now = evaluate(ideal(t, p), y, phase, p)
+    return now.big if joint == 0 else now.small
+
+
+@jit
 def nearness_at(joint, s, t, h, dense, phase, p, y):
     """`nearness` of a joint at the fraction s of a step with interpolant `dense`; y: scratch."""
     interpolate(s, dense, y)
-    now = evaluate(ideal(t + s * h, p), y, phase, p)
-    if joint == 0:
-        return nearness(now.big, p.stiffness[0], p)
-    return nearness(now.small, p.stiffness[1], p)
+    return nearness(contact_at(joint, t + s * h, y, phase, p), p.stiffness[joint], p)
 
 
 @jit
@@ -149,15 +153,6 @@ def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
 
 
 @jit
-def gap(joint, t, y, phase, p):
-    """Penetration (m) and its rate (m/s) of a joint at a time and state."""
-    now = evaluate(ideal(t, p), y, phase, p)
-    if joint == 0:
-        return now.big.penetration, now.big.rate
-    return now.small.penetration, now.small.rate
-
-
-@jit
 def meeting(joint, t, y, phase, p, rates, before):
     """How near a joint's contact is to its begin, at a time and a state within a hair of it.
 
@@ -165,16 +160,15 @@ def meeting(joint, t, y, phase, p, rates, before):
     when it does: two motions that are a little apart meet a little apart in time. rates, before:
     scratch, (n,).
     """
-    depth, rate = gap(joint, t, y, phase, p)
-    since = depth / rate if rate > 0.0 else 0.0
+    now = contact_at(joint, t, y, phase, p)
+    since = now.penetration / now.rate if now.rate > 0.0 else 0.0
     derivative(t, y, phase, p, rates)
     for i in range(y.size):
         before[i] = y[i] - since * rates[i]
-    _, speed = gap(joint, t - since, before, phase, p)
-    return depth, speed
+    return now.penetration, contact_at(joint, t - since, before, phase, p).rate
 
 
-@inlined
+@merged
 def remember(w, t, work, phase, p, tally):
     """Have joints that meet again after a flight carry the speed at which they do.
 

@@ -5,11 +5,9 @@ differences; no iteration that could fail to converge. Coefficients: Hairer & Wa
 Ordinary Differential Equations II, IV.7 and IV.10, with their continuous extension of order 3.
 """
 
-import math
-
 import numpy as np
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import jit, square_root
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS
 
@@ -171,7 +169,7 @@ def spectral_radius(jacobian, size, v, w):
             after += (w[i] / size[i]) ** 2
         if not before > 0.0 or not after > 0.0:
             return growth
-        growth = math.sqrt(after / before)
+        growth = square_root(after / before)
         for i in range(n):
             v[i] = w[i] / growth
     return growth
@@ -184,7 +182,7 @@ def error_norm(z, new, u, rtol, atol):
     total = 0.0
     for i in range(n):
         total += (u[STIFF_STAGES - 1, i] / (atol[i] + rtol * max(abs(z[i]), abs(new[i])))) ** 2
-    return math.sqrt(total / n)
+    return square_root(total / n)
 
 
 @jit

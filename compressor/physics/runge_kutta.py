@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import fused, inlined
+from compressor.physics._jit import fused, merged, square_root
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.observe import derivative_and_gauge, write_flowing_derivative
 
@@ -100,7 +100,7 @@ P = np.array(
 )  # fmt: skip
 
 
-@inlined
+@merged
 def take_step(pair, base, h, z, k, phase, p, new, row):
     """Stages 1 to 6 of a step from z of length h into k, and the state at its end into new.
 
@@ -131,7 +131,7 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
             derivative_and_gauge(motion, new, phase, p, k[stage], row)
 
 
-@inlined
+@merged
 def error_norm(pair, h, z, new, k, rtol, atol):
     """Root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
@@ -149,10 +149,10 @@ def error_norm(pair, h, z, new, k, rtol, atol):
         c /= fused(rtol, max(abs(z[i + 2]), abs(new[i + 2])), atol[i + 2])
         d /= fused(rtol, max(abs(z[i + 3]), abs(new[i + 3])), atol[i + 3])
         total = fused(d, d, fused(c, c, fused(b, b, fused(a, a, total))))
-    return h * np.sqrt(total / n)
+    return h * square_root(total / n)
 
 
-@inlined
+@merged
 def weights_at(pair, s, weights):
     """Weights of the stages at the fraction s of a step into weights, (STAGES,)."""
     for stage in range(STAGES):
@@ -161,7 +161,7 @@ def weights_at(pair, s, weights):
         weights[stage] = s * fused(s, fused(s, fused(s, d, c), b), a)
 
 
-@inlined
+@merged
 def combine(weights, h, z, k, out):
     """The motion where the stages have these weights into out, (n,): no interpolant is laid."""
     for i in range(0, out.size, LANES):
@@ -178,7 +178,7 @@ def combine(weights, h, z, k, out):
         out[i + 3] = fused(h, d, z[i + 3])
 
 
-@inlined
+@merged
 def extend(pair, h, z, k, dense):
     """Coefficients of a step's interpolant into dense, (5, n): y(s) = sum_j dense[j] s^j."""
     for i in range(0, dense.shape[1], LANES):
@@ -198,7 +198,7 @@ def extend(pair, h, z, k, dense):
             dense[j + 1, i + 3] = h * d
 
 
-@inlined
+@merged
 def interpolate(s, dense, out):
     """The motion at the fraction s of a step into out, shape (n,)."""
     for i in range(0, out.size, LANES):

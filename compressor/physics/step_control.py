@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import jit, merged, square_root
 from compressor.physics.elementary import exponential, logarithm
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
@@ -63,7 +63,7 @@ def first_step(w, z, work, atol, phase, p, end):
         scale = atol[i] + w.rtol * abs(z[i])
         size += (z[i] / scale) ** 2
         rate += (rates[i] / scale) ** 2
-    size, rate = math.sqrt(size / n), math.sqrt(rate / n)
+    size, rate = square_root(size / n), square_root(rate / n)
     guess = 1e-6 if size < 1e-5 or rate < 1e-5 else 0.01 * size / rate
     guess = min(guess, end - w.t)
     for i in range(z.size):
@@ -74,13 +74,13 @@ def first_step(w, z, work, atol, phase, p, end):
     for i in range(n):
         scale = atol[i] + w.rtol * abs(z[i])
         change += ((trial[i] - rates[i]) / scale) ** 2
-    change = math.sqrt(change / n) / guess
+    change = square_root(change / n) / guess
     steepest = max(rate, change)
     bold = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** 0.2
     return min(100.0 * guess, bold, end - w.t)
 
 
-@inlined
+@merged
 def controlled(w, h, error):
     """The next step's length after an accepted step (PI control)."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
@@ -90,7 +90,7 @@ def controlled(w, h, error):
     return h * min(GROW, max(SHRINK, factor))
 
 
-@inlined
+@merged
 def refuse(w, h, error):
     """Shorten the step after a refused attempt; a step that makes no way ends the walk."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
@@ -120,10 +120,10 @@ def stiff_rate(w, h, z, work, size):
             change -= h * A[w.pair, STAGES - 2, j] * work.k[j, i]
         above += ((work.k[STAGES - 1, i] - work.k[STAGES - 2, i]) / size[i]) ** 2
         below += (change / size[i]) ** 2
-    return math.sqrt(above / below) if below > 0.0 else 0.0
+    return square_root(above / below) if below > 0.0 else 0.0
 
 
-@inlined
+@merged
 def choose_method(w, h, z, work, size):
     """Change to the stiff partner where stability holds the explicit steps, and back.
 

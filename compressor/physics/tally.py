@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import jit, merged
 from compressor.physics.contact_laws import in_contact
 from compressor.physics.observe import (
     ACCELERATION,
@@ -122,7 +122,7 @@ def deepest_of(nodes, rows, every, column, known):
     return max(top, known, vertex(left, right, before, here, after))
 
 
-@inlined
+@merged
 def tally_energy(row, flows, tally):
     """Keep the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
 
@@ -149,7 +149,7 @@ def add_flows(rows, weights, span, flows):
             flows[k] += span * weights[i] * rows[i, CRANK_POWER + k]
 
 
-@inlined
+@merged
 def near_record(rows, middle, tally):
     """Whether a peak may be beaten within a step, by the rows at its ends and in its middle."""
     last = rows.shape[0] - 1
@@ -166,7 +166,7 @@ def near_record(rows, middle, tally):
     return False
 
 
-@inlined
+@merged
 def share_apart(before, after):
     """Share of the way from one nearness to another that is without contact, by a straight line."""
     low, high = min(before, after), max(before, after)
@@ -196,7 +196,7 @@ def contact_within(rows, joint):
     return inside and not ends
 
 
-@inlined
+@merged
 def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
     """Add a step's contact loss, impacts, releases and penetration at one joint."""
     for i in range(0, nodes.size, every):
@@ -217,7 +217,7 @@ def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
         tally.loss_seconds[joint] += apart[joint] * span
 
 
-@inlined
+@merged
 def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
 

@@ -7,11 +7,9 @@ of the motion only at a tight tolerance: at a loose one the explicit pair's step
 stability now and then, where a difference grows by as much as rtol exceeds rounding.
 """
 
-import math
-
 import numpy as np
 
-from compressor.physics._jit import inlined, jit
+from compressor.physics._jit import jit, merged, square_root
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.march import attempt, march
@@ -44,13 +42,13 @@ def separation(t, y, other, p, rows):
         if p.clearance[joint] > 0.0:
             i = ECCENTRICITY + 2 * joint
             x, y_apart = rows[1, i] - rows[0, i], rows[1, i + 1] - rows[0, i + 1]
-            apart = math.sqrt(x * x + y_apart * y_apart) / p.clearance[joint]
+            apart = square_root(x * x + y_apart * y_apart) / p.clearance[joint]
             if not apart <= worst:  # keeps a nan
                 worst = apart
     return worst
 
 
-@inlined
+@merged
 def follow(w, fellow, twin, work, atol, size, phase, p):
     """Take the step that a walker took, from fellow.t on, in the twin's motion."""
     if fellow.fresh:
@@ -63,7 +61,7 @@ def follow(w, fellow, twin, work, atol, size, phase, p):
     fellow.fresh = w.fresh
 
 
-@inlined
+@merged
 def meet(w, z, twin, work, phase, p):
     """Have the twin's contacts carry the speeds at which they meet where the first motion's do."""
     n = work.y.size
