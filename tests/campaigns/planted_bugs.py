@@ -24,7 +24,7 @@ BUGS = [
     ("friction's moment at the small end turned", "physics/motion.py",
      "big.moment + small.moment", "big.moment - small.moment"),
     ("journal and bearing swapped at the small end", "physics/motion.py",
-     "ey_rate, 0.0, spin, kept, p)", "ey_rate, spin, 0.0, kept, p)"),
+     "spins = 0.0, -motion.rate - y[3]", "spins = -motion.rate - y[3], 0.0"),
     ("the rod's inertia about its mass centre", "physics/motion.py",
      "p.rod_inertia + p.rod_mass * b * b", "p.rod_inertia"),
     ("an offset the other way", "physics/motion.py",
