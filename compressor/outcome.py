@@ -19,6 +19,15 @@ from compressor.program import PROGRAM
 ROW = np.dtype(
     [(name, "f8", tuple(SIZES[dim] for dim in dims)) for name, (dims, _, _) in NUMBERS.items()]
 )
+NOTHING = np.full(1, math.nan, ROW).tobytes()
+
+
+def row(data: bytes = NOTHING) -> np.void:
+    """A job's numbers, to be written: from their bytes, or nan.
+
+    To copy so many named numbers takes twenty times as long.
+    """
+    return np.frombuffer(bytearray(data), ROW)[0]
 
 
 class Regime(StrEnum):
@@ -102,8 +111,7 @@ class Outcome:
 
 
 def _received(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:
-    # of bytes that may be written: to copy so many named numbers takes forty times as long
-    return Outcome(status, reason, np.frombuffer(bytearray(numbers), ROW)[0], *rest)
+    return Outcome(status, reason, row(numbers), *rest)
 
 
 def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more: Any) -> Outcome:
@@ -113,7 +121,7 @@ def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more:
     """
     program = PROGRAM
     said = {**attributes, "complete": 0, "program": program, "detail": detail} | more
-    return Outcome("failed", str(reason), np.full(1, math.nan, ROW)[0], said)
+    return Outcome("failed", str(reason), row(), said)
 
 
 class Variable(NamedTuple):

@@ -10,6 +10,7 @@ import reprlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
+from functools import lru_cache
 from inspect import cleandoc
 from typing import Any, TypeVar
 
@@ -96,6 +97,7 @@ def shown(value: Any) -> str:
     return SHORT.repr(value)
 
 
+@lru_cache(4096)  # the jobs of a study share most of their values
 def to_si(value: float, unit: str) -> float:
     """A case-file value in SI; powers of ten are divided, so that 0.1 mm is exactly 1e-4 m."""
     _, numerator, denominator = UNITS[unit]

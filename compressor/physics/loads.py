@@ -119,7 +119,7 @@ def cam_corners(crank_radius, rod_length, stroke):
 def load_corners(p, pressure_ratio, printed):
     """Corners (rad) of the record's load, (3,): Eq. 13's if `printed`, where it is the gas's."""
     if p["load"] == Load.NONE:
-        return p["corners"]
+        return 0.0, 0.0, 0.0
     if p["load"] == Load.DESIGN:
         return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
     return printed_corners() if printed else gas_corners(p, pressure_ratio)
@@ -137,15 +137,17 @@ def segments(p, duration):
     Returns edges, shape (n + 1,) in s, and phases, shape (n,). A corner closer than a
     billionth of a turn to the end opens no segment of its own.
     """
-    if p.load == Load.NONE:
+    if p["load"] == Load.NONE:
         return np.array([0.0, duration]), np.zeros(1, dtype=np.int64)
-    turn = 2.0 * math.pi / p.omega
+    turn = 2.0 * math.pi / p["omega"]
+    starts = np.zeros(4)
+    starts[1:] = p["corners"] / p["omega"]
     revolutions = np.arange(math.ceil(duration / turn * (1 + 1e-9)))
-    starts = np.concatenate(([0.0], np.asarray(p.corners) / p.omega))
-    edges = (revolutions[:, None] * turn + starts).ravel()
-    edges = edges[edges < duration - 1e-9 * turn]
-    phases = np.arange(edges.size, dtype=np.int64) % 4
-    return np.append(edges, duration), phases
+    starts = (revolutions[:, None] * turn + starts).ravel()
+    phases = np.arange(starts.searchsorted(duration - 1e-9 * turn)) % 4
+    edges = np.full(phases.size + 1, duration)
+    edges[:-1] = starts[: phases.size]
+    return edges, phases
 
 
 def sample_segments(times, edges):
@@ -155,4 +157,4 @@ def sample_segments(times, edges):
     """
     slack = 1e-9 * (edges[1:] - edges[:-1]).min()
     found = np.searchsorted(edges[:-1], times + slack, side="right") - 1
-    return np.clip(found, 0, edges.size - 2)
+    return np.maximum(np.minimum(found, edges.size - 2), 0)

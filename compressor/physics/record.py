@@ -108,9 +108,14 @@ RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
 CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (2,))], align=True)
 
 
+def zero(kind: np.dtype) -> np.record:
+    """A record of a kind, of zeros, that compiled functions may write."""
+    return np.zeros(1, np.dtype((np.record, kind)))[0]
+
+
 def new_record(chosen: bool = False) -> np.record:
     """A record of zeros, to be filled field by field; `chosen`: for laws but the default ones."""
-    return np.zeros(1, dtype=CHOSEN if chosen else RECORD).view(np.recarray)[0]
+    return zero(CHOSEN if chosen else RECORD)
 
 
 def state_names(p: np.record) -> tuple[str, ...]:

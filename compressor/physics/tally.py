@@ -20,6 +20,7 @@ from compressor.physics.observe import (
     PENETRATION,
     POTENTIAL,
 )
+from compressor.physics.record import zero
 
 NEAR = 0.98  # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
@@ -63,7 +64,7 @@ TALLY = np.dtype(
 
 def new_tally():
     """An empty tally; a joint counts as touching until it is seen apart."""
-    tally = np.zeros(1, dtype=TALLY).view(np.recarray)[0]
+    tally = zero(TALLY)
     tally["touching"] = 1
     tally["max_penetration"] = -math.inf
     tally["deepest"] = -math.inf

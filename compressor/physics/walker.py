@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics.observe import COLUMNS
+from compressor.physics.record import zero
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, P, Pair
 from compressor.physics.step_control import LEAST_ERROR, REST, Mode
 from compressor.physics.tally import lobatto
@@ -84,7 +85,7 @@ class Work(NamedTuple):
 
 def new_walker(mode):
     """A walker at the start of its first segment."""
-    walker = np.zeros(1, dtype=WALKER).view(np.recarray)[0]
+    walker = zero(WALKER)
     walker["fresh"] = 1
     walker["error"] = LEAST_ERROR
     walker["mode"] = mode

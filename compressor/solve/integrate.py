@@ -30,7 +30,8 @@ def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndar
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)
     result = Trajectory(request.times, states, phases[owner], new_tally())
-    z = np.append(request.start, np.zeros(FLOWS))
+    z = np.zeros(request.start.size + FLOWS)
+    z[:-FLOWS] = request.start
     row = np.empty(COLUMNS)
     observe(0.0, request.start, int(phases[0]), request.p, row)
     tally_energy(row, z[-FLOWS:], result.tally)

@@ -1,9 +1,11 @@
 """Case -> the SI record of parameters that compiled functions read.
 
-Fields are set as items: as attributes each would take some ten times as long, for every job.
+Gathered in a dict, for which the record is filled once: to read a field back would take ten times
+as long, for every job.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +30,7 @@ def scene(case: Case) -> Scene:
 
 def record(case: Case) -> np.record:
     """The record of a case, every number in SI."""
-    p = new_record(case.chooses_laws)
+    p: dict[str, Any] = {}  # what is not set stays zero
     p["scene"] = scene(case)
     p["load"] = Load[case.load.upper()]
     _machine(case, p)
@@ -37,7 +39,10 @@ def record(case: Case) -> np.record:
     _spring(case, p)
     ratio = case.gas.discharge_MPa / case.gas.suction_MPa
     complete(p, ratio, printed=case.gas.switching == "paper")
-    return p
+    filled = new_record(case.chooses_laws)
+    for name, value in p.items():
+        filled[name] = value
+    return filled
 
 
 def offsets(case: Case) -> np.ndarray:
@@ -57,7 +62,7 @@ def stiffness_of(case: Case, joint: str) -> float:
     return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
 
 
-def _machine(case: Case, p: np.record) -> None:
+def _machine(case: Case, p: dict[str, Any]) -> None:
     machine = case.machine
     p["omega"] = case.omega
     p["crank_radius"] = to_si(machine.crank_radius_mm, "mm")
@@ -70,7 +75,7 @@ def _machine(case: Case, p: np.record) -> None:
     p["pin_radius"] = to_si(machine.pin_radius_mm, "mm")
 
 
-def _contact(case: Case, p: np.record) -> None:
+def _contact(case: Case, p: dict[str, Any]) -> None:
     contact, friction = case.contact, case.friction
     p["exponent"] = contact.exponent
     p["damping"] = to_si(contact.damping_N_s_per_mm, "N s/mm")
@@ -78,9 +83,8 @@ def _contact(case: Case, p: np.record) -> None:
     p["least_approach"] = to_si(contact.least_approach_mm_per_s or NO_APPROACH, "mm/s")
     law = (friction.law or "adams") if friction else "none"
     choose_laws(p, contact.law, contact.restitution or 1.0, law)
-    for i, joint in enumerate(JOINTS):
-        p["clearance"][i] = to_si(getattr(case.clearance_mm, joint), "mm")
-        p["stiffness"][i] = stiffness_of(case, joint)
+    p["clearance"] = [to_si(getattr(case.clearance_mm, joint), "mm") for joint in JOINTS]
+    p["stiffness"] = [stiffness_of(case, joint) for joint in JOINTS]
     if friction:
         p["static"], p["dynamic"] = friction.static, friction.dynamic
         p["stiction_velocity"] = to_si(friction.stiction_velocity_mm_per_s, "mm/s")
@@ -90,7 +94,7 @@ def _contact(case: Case, p: np.record) -> None:
         p["viscous"] = to_si(friction.viscous_s_per_mm or 0.0, "s/mm")
 
 
-def _gas(case: Case, p: np.record) -> None:
+def _gas(case: Case, p: dict[str, Any]) -> None:
     gas = case.gas
     area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
     p["suction_force"] = to_si(gas.suction_MPa, "MPa") * area
@@ -100,7 +104,7 @@ def _gas(case: Case, p: np.record) -> None:
     p["gas_exponent"] = gas.exponent
 
 
-def _spring(case: Case, p: np.record) -> None:
+def _spring(case: Case, p: dict[str, Any]) -> None:
     spring = case.spring
     p["spring_stiffness"] = to_si(spring.stiffness_N_per_mm, "N/mm")
     p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")

@@ -1,6 +1,5 @@
 """Case -> Dataset: the only place where numbers get names, units and attributes."""
 
-import math
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from compressor.cases import MODEL_VERSION, Case
 from compressor.metrics import SERIES
-from compressor.outcome import ROW, Outcome, Table, without_run
+from compressor.outcome import Outcome, Table, row, without_run
 from compressor.physics import FLOWS, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
@@ -111,7 +110,7 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
 
 def outcome(case: Case, solution: Solution) -> Outcome:
     """What is kept of a solution without its series."""
-    numbers = np.full(1, math.nan, dtype=ROW)[0]
+    numbers = row()
     known = solution.metrics | solution.reversal | ledger(solution.trajectory)
     errors = solution.bars | solution.series_errors | solution.reversal_bars
     known |= {f"{name}_error": error for name, error in errors.items()}

@@ -13,12 +13,13 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
     The length is the smaller of the clearance and the penetration under the forces at hand, but
     not below a thousandth of the latter; the speed is that length at the contact's frequency.
     """
-    force = p["reciprocating_mass"] * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
-    faulty = p["clearance"] > 0
-    contact = elastic_form(p["stiffness"][faulty].max(), p)
+    moving = p["reciprocating_mass"]
+    force = moving * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
+    joints = [j for j in zip(p["clearance"].tolist(), p["stiffness"], strict=True) if j[0] > 0.0]
+    contact = elastic_form(max(stiffness for _, stiffness in joints), p)
     depth = contact.static_depth(force)
-    length = max(min(p["clearance"][faulty].min(), depth), 1e-3 * depth)
-    mass = min(p["rod_mass"], p["reciprocating_mass"])
+    length = max(min(min(clearance for clearance, _ in joints), depth), 1e-3 * depth)
+    mass = min(p["rod_mass"], moving)
     return length, length * math.sqrt(contact.tangent(depth) / mass)
 
 
@@ -28,9 +29,10 @@ def natural_sizes(p: np.record) -> np.ndarray:
     With chosen laws also of what contacts carry (`state_names`): speeds, bristles as they slide.
     """
     length, speed = length_and_speed(p)
-    per_unit = np.ones(p["freedoms"])
-    per_unit[-1] = 1.0 / p["rod_length"]  # the last freedom is an angle
-    sizes = np.concatenate((length * per_unit, speed * per_unit))
+    n = int(p["freedoms"])
+    sizes = np.full(2 * n, length)
+    sizes[n:] = speed
+    sizes[n - 1 :: n] *= 1.0 / p["rod_length"]  # the last freedom is an angle
     more = len(state_names(p)) - sizes.size
     if not more:
         return sizes

@@ -78,4 +78,5 @@ def with_edge(
     i = int(np.searchsorted(edges, time))
     if i == edges.size:
         return edges, phases, time
-    return np.insert(edges, i, time), np.insert(phases, i, phases[i - 1]), time
+    edges = np.concatenate((edges[:i], (time,), edges[i:]))
+    return edges, np.concatenate((phases[:i], phases[i - 1 : i], phases[i:])), time
