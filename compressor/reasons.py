@@ -34,7 +34,7 @@ class Reason(StrEnum):
     PENETRATION_IMPLAUSIBLE = (
         "penetration_implausible",
         "a journal sank deeper into its bearing than a tenth of its radius, for which no contact "
-        "law is meant",
+        "law is meant, or with johnson than half the clearance",
         "the contact is too soft for the forces: check contact.stiffness, masses and speed, and "
         "their units",
     )

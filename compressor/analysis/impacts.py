@@ -85,7 +85,8 @@ def impacts_of(run: xr.Dataset, joint: str) -> list[Impact]:
     """The impacts at one joint over the whole run, start-up included."""
     series = contact_series(run, joint)
     p = record_of(run)
-    contact = elastic_form(float(p["stiffness"][JOINTS.index(joint)]), p)
+    number = JOINTS.index(joint)
+    contact = elastic_form(float(p["stiffness"][number]), float(p["clearance"][number]), p)
     mass = float(p["rod_mass"] + p["reciprocating_mass"])
     found = []
     for span in contact_spans(series):
@@ -94,9 +95,8 @@ def impacts_of(run: xr.Dataset, joint: str) -> list[Impact]:
         begin, speed = touch(series, span)
         longest = contact.impact_time(contact.impact_depth(mass, speed), speed)
         one = impact(series, span, (begin, speed), longest)
-        if not one.released:  # the elastic energy K delta^(p+1) / (p+1) is not lost
-            order = contact.exponent + 1.0
-            stored = contact.stiffness * float(series.depth[-1]) ** order / order
+        if not one.released:  # what is stored elastically is not lost
+            stored = contact.energy(float(series.depth[-1]))
             one = replace(one, lost_energy=one.lost_energy - stored)
         found.append(one)
     return found

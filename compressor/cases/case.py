@@ -12,7 +12,7 @@ from typing import Any
 from compressor.cases.accuracy import ACCURACY, Targets, first_rung
 from compressor.cases.checked import checked_part, keys_given
 from compressor.cases.conflicts import conflicts
-from compressor.cases.laws import CONTACT_LAWS, with_law
+from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, with_law
 from compressor.cases.parameter import CaseError, Problem, shown
 from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
 from compressor.cases.swept import FORMS
@@ -110,7 +110,7 @@ class Case(Settings):
             solve = replace(solve, duration_rev=None)
         if solve.output_step_s is not None:
             solve = replace(solve, output_step_deg=None)
-        if contact.materials is not None:
+        if contact.materials is not None or contact.law in CYLINDRICAL:
             contact = replace(contact, stiffness_N_per_mm15=None)
         if contact.geometry == "external":  # as without the key
             contact = replace(contact, geometry=None)

@@ -5,10 +5,13 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, cast
 
-from compressor.cases.groups import COMPILED
-from compressor.cases.laws import READ_BY, RESTITUTING, law_of
+from compressor.cases.law_conflicts import (
+    contact_conflicts,
+    friction_conflicts,
+    law_conflicts,
+)
 from compressor.cases.one_way import back_action, moving_mass
-from compressor.cases.parameter import IMPLAUSIBLE, Problem, listed
+from compressor.cases.parameter import IMPLAUSIBLE, Problem
 from compressor.cases.table import GROUPS, Settings, table
 from compressor.metrics import AXES, JOINTS
 
@@ -18,6 +21,7 @@ IN_PLACE_OF = (
     ("solve.output_step_s", "solve.output_step_deg"),
     ("solve.rtol", "solve.accuracy"),
     ("contact.materials", "contact.stiffness_N_per_mm15"),
+    ("contact.materials", "contact.modulus_GPa"),
 )
 HEAVIEST = 0.1  # the moving parts' share of a body's mass
 MOST_BACK = 0.3  # of a force that a body's motion may change at the speed's first two orders
@@ -81,57 +85,6 @@ class _Known:
 def _output_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     if case.output.signals and case.output.keep != "series":
         yield Problem("output.signals", "are time series: they need output.keep: series")
-
-
-def _contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    contact = case.contact
-    if contact.geometry is not None and contact.materials is None:
-        yield Problem(
-            "contact.geometry",
-            "is that of the stiffness that contact.materials give: add materials: [steel, steel]",
-        )
-    if contact.materials is not None and contact.exponent != 1.5:
-        yield Problem(
-            "contact.exponent",
-            f"is {contact.exponent:g}, but Eq. 15's stiffness from materials needs exponent 1.5: "
-            "leave it out, or give stiffness_N_per_mm15 in place of materials",
-        )
-
-
-def _friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    friction = case.friction
-    if not friction or law_of(friction) not in READ_BY["friction"]["friction_velocity_mm_per_s"]:
-        return
-    if friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
-        yield Problem(
-            "friction.friction_velocity_mm_per_s",
-            f"{friction.friction_velocity_mm_per_s:g} mm/s must exceed the "
-            f"stiction_velocity_mm_per_s, {friction.stiction_velocity_mm_per_s:g} mm/s",
-        )
-
-
-def _law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Keys of a law that was not named, and what a law cannot do without."""
-    for name, keys in READ_BY.items():
-        group = getattr(case, name)
-        if not group or f"{name}.law" in given:
-            continue
-        for key, readers in keys.items():
-            if f"{name}.{key}" in given and law_of(group) not in readers:
-                message = f"is read with {name}.law: {listed(readers)}: add the law"
-                yield Problem(f"{name}.{key}", message)
-    law = case.contact.law
-    if law not in RESTITUTING:
-        return
-    if case.contact.restitution is None:
-        message = f"is needed with contact.law: {law}; give it, such as 0.9"
-        yield Problem("contact.restitution", message)
-    if case.solve.method not in COMPILED:
-        message = (
-            f"{case.solve.method} does not stop where journal and bore meet, as contact.law: {law} "
-            f"needs: choose one of {', '.join(COMPILED)}"
-        )
-        yield Problem("solve.method", message)
 
 
 def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
@@ -335,5 +288,5 @@ RULES: tuple[Rule, ...] = (
     *(partial(rule, joint=joint) for joint in JOINTS
       for rule in (_missing_clearance, _clearance_conflicts)),
     _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts, _output_conflicts,
-    _law_conflicts, _contact_conflicts, _friction_conflicts,
+    law_conflicts, contact_conflicts, friction_conflicts,
 )  # fmt: skip

@@ -195,6 +195,12 @@ class Contact:
         "speed of meeting below which such a law damps as at this one; 10 by default",
         above=True, optional=True,
     )  # fmt: skip
+    length_mm: float | None = parameter(
+        None, "mm", (0, 1e4), "ours", "joint length (johnson, liu)", above=True, optional=True
+    )
+    modulus_GPa: float | None = parameter(
+        None, "GPa", (0, 1e6), "ours", "composite modulus (johnson, liu)", above=True, optional=True
+    )
 
 
 @documented

@@ -4,15 +4,20 @@ from dataclasses import fields, replace
 from typing import Any
 
 RESTITUTING = ("hunt_crossley", "lankarani_nikravesh", "flores", "gonthier", "hu_guo")
-CONTACT_LAWS = ("impact", "hertz", *RESTITUTING)
+CYLINDRICAL = ("johnson", "liu")  # of a pin in its bore; with a restitution if one is given
+CONTACT_LAWS = ("impact", "hertz", *RESTITUTING, *CYLINDRICAL)
 FRICTION_LAWS = ("adams", "coulomb_tanh", "threlfall", "ambrosio", "lugre")
 # keys that some laws alone read, and those laws
 READ_BY = {
     "contact": {
         "damping_N_s_per_mm": ("impact",),
         "full_damping_mm": ("impact",),
-        "restitution": RESTITUTING,
-        "least_approach_mm_per_s": RESTITUTING,
+        "restitution": RESTITUTING + CYLINDRICAL,
+        "least_approach_mm_per_s": RESTITUTING + CYLINDRICAL,
+        "exponent": tuple(law for law in CONTACT_LAWS if law not in CYLINDRICAL),
+        "geometry": tuple(law for law in CONTACT_LAWS if law not in CYLINDRICAL),
+        "length_mm": CYLINDRICAL,
+        "modulus_GPa": CYLINDRICAL,
     },
     "friction": {
         "static": ("adams", "lugre"),

@@ -1,6 +1,13 @@
 """Materials of the paper, and the contact stiffness that follows from them; needs no compiler."""
 
 import math
+from typing import TYPE_CHECKING
+
+from compressor.cases.laws import CYLINDRICAL
+from compressor.cases.parameter import to_si
+
+if TYPE_CHECKING:
+    from compressor.cases.groups import Contact
 
 # Table 2 of the paper: density (kg/m^3), Young's modulus (Pa), Poisson's ratio
 MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326)}
@@ -22,3 +29,35 @@ def contact_stiffness(first, second, journal_radius, bearing_radius, internal=Fa
     sign = -1.0 if internal else 1.0
     radius = journal_radius * bearing_radius / (bearing_radius + sign * journal_radius)
     return 4.0 / (3.0 * math.pi * compliance) * math.sqrt(radius)
+
+
+def composite_modulus(first, second):
+    """E* (Pa) of two materials by name: 1 / E* is the sum of (1 - nu^2) / E.
+
+    Raises KeyError for a material that is not in Table 2.
+    """
+    compliance = 0.0
+    for name in (first, second):
+        _, modulus, poisson = MATERIALS[name]
+        compliance += (1.0 - poisson**2) / modulus
+    return 1.0 / compliance
+
+
+def joint_stiffness(contact: "Contact", pin_radius_mm: float, clearance_mm: float) -> float:
+    """What a joint's contact law is scaled by: K (N/m^p), or pi E* L (N/m) with johnson.
+
+    With liu K (N/m^1.5) at small penetrations, which depends on the clearance; 0 without any.
+    """
+    pin, clearance = to_si(pin_radius_mm, "mm"), to_si(clearance_mm, "mm")
+    if contact.law in CYLINDRICAL:
+        modulus = to_si(contact.modulus_GPa or 0.0, "GPa")
+        if contact.materials:
+            modulus = composite_modulus(*contact.materials)
+        line = math.pi * modulus * to_si(contact.length_mm or 0.0, "mm")
+        if contact.law == "johnson":
+            return line
+        return line / (2.0 * math.sqrt(2.0 * clearance)) if clearance > 0.0 else 0.0
+    if contact.materials:
+        internal = contact.geometry == "internal" and clearance > 0.0  # an ideal joint has none
+        return contact_stiffness(*contact.materials, pin, pin + clearance, internal)
+    return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent

@@ -32,6 +32,7 @@ UNITS = {
     "m/s2": ("m/s2", 1, 1),
     "rpm": ("rad/s", math.pi, 30),
     "MPa": ("Pa", 1_000_000, 1),
+    "GPa": ("Pa", 1_000_000_000, 1),
     "N": ("N", 1, 1),
     "N/mm": ("N/m", 1000, 1),
     "N/mm^p": ("N/m^p", 1, 1),  # times 1000^exponent: see compressor.solve.si_record

@@ -172,10 +172,16 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     active["clearance"] = ", ".join(widths)
     stiffness = contact.stiffness_N_per_mm15
     material = f"K = {stiffness:g} N/mm^p" if stiffness else " on ".join(contact.materials or ())
+    if contact.modulus_GPa is not None:
+        material = f"E* = {contact.modulus_GPa:g} GPa"
+    shape = f"p = {contact.exponent:g}"
+    if contact.length_mm is not None:
+        shape = f"{contact.length_mm:g} mm long"
     damped = f"C_max = {contact.damping_N_s_per_mm:g} N s/mm"
     if contact.law != "impact":
-        damped = "undamped" if contact.law == "hertz" else f"restitution {contact.restitution:g}"
-    active["contact"] = f"{contact.law}, {material}, p = {contact.exponent:g}, {damped}"
+        restitution = contact.restitution
+        damped = "undamped" if restitution is None else f"restitution {restitution:g}"
+    active["contact"] = f"{contact.law}, {material}, {shape}, {damped}"
     return active, absent
 
 

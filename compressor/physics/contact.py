@@ -77,7 +77,7 @@ def joint_contact(eccentricity, spins, clearance, stiffness, carried, p):
     turning = fused(journal_spin, arm, -(rod_spin * bore))
     slip = fused(ey_rate, nx, fused(-ex_rate, ny, turning))
     approach, bristle = carried
-    normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, p)
+    normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, clearance, p)
     friction = 0.0
     if p.friction and in_contact(normal):
         friction = -friction_coefficient(slip, bristle, p) * normal
@@ -88,7 +88,7 @@ def joint_contact(eccentricity, spins, clearance, stiffness, carried, p):
 
 
 @merged
-def nearness(contact, stiffness, p):
+def nearness(contact, stiffness, clearance, p):
     """Positive in contact; otherwise how far from it: the gap (m), or the clamped force as one.
 
     A clamped force is turned into a length by the contact's stiffness at the penetration of full
@@ -97,4 +97,4 @@ def nearness(contact, stiffness, p):
     if contact.penetration <= 0.0:
         return contact.penetration
     full = p.full_damping
-    return contact.unclamped * full / elastic_force(full, stiffness, p)
+    return contact.unclamped * full / elastic_force(full, stiffness, clearance, p)

@@ -1,10 +1,11 @@
 """Contact laws: the force, damping and elastic energy of each, its depths, and the choice of one.
 
 A law is a member of `Law`, named by `contact.law` in small letters (physics/README.md, Contact). If
-it damps by chi times the elastic force over the approach speed, it is a line in `HYSTERESIS`. If
-not, it needs functions like `impact_elastic` and `impact`, and a branch in each of `normal_force`,
-`elastic_force`, `elastic_energy` and `elastic_form`. Nothing else knows of a law but the choices of
-`contact.law` in the table of parameters (`cases.laws`).
+it damps by chi times the elastic force over the approach speed, it is a line in `HYSTERESIS`; if
+not, it needs a function like `impact`, and a branch in `normal_force`. If its elastic force is not
+K delta^p, that has a branch in each of `elastic_force`, `elastic_energy` and `elastic_form`.
+Nothing else knows of a law but the choices of `contact.law` in the table of parameters
+(`cases.laws`).
 
 For the default law nothing is compared: that took 3 to 10 % off the speed of the march. Whether a
 record's laws are chosen ones is its type (`record.CHOSEN`).
@@ -16,6 +17,15 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from compressor.physics._jit import fused, inlined, jit, merged, plain, square_root
+from compressor.physics.cylinder_laws import (
+    Conformal,
+    johnson,
+    johnson_energy,
+    johnson_form,
+    liu,
+    liu_energy,
+    liu_form,
+)
 
 
 class Law(IntEnum):
@@ -28,10 +38,12 @@ class Law(IntEnum):
     FLORES = 4
     GONTHIER = 5
     HU_GUO = 6
+    JOHNSON = 7  # of a pin in its bore; these two: cylinder_laws
+    LIU = 8
 
 
-# chi by the coefficient of restitution e, where F = K delta^p (1 + chi delta' / delta'_0) with the
-# speed delta'_0 at which the bodies met
+# chi by the coefficient of restitution e, where F = F_e (1 + chi delta' / delta'_0): the elastic
+# force F_e, and the speed delta'_0 at which the bodies met
 HYSTERESIS: dict[Law, Callable[[float], float]] = {
     Law.HERTZ: lambda e: 0.0,
     Law.HUNT_CROSSLEY: lambda e: 1.5 * (1.0 - e),  # J. Appl. Mech. 42 (1975)
@@ -39,8 +51,11 @@ HYSTERESIS: dict[Law, Callable[[float], float]] = {
     Law.FLORES: lambda e: 1.6 * (1.0 - e) / e,  # Multibody Syst. Dyn. 25 (2011)
     Law.GONTHIER: lambda e: (1.0 - e**2) / e,  # Multibody Syst. Dyn. 11 (2004)
     Law.HU_GUO: lambda e: 1.5 * (1.0 - e) / e,  # J. Sound Vib. 340 (2015)
+    Law.JOHNSON: lambda e: 0.75 * (1.0 - e**2),  # by Lankarani and Nikravesh
+    Law.LIU: lambda e: 0.75 * (1.0 - e**2),
 }
-IMPACT = int(Law.IMPACT)  # numba wants plain integers
+# numba wants plain integers
+IMPACT, JOHNSON, LIU = int(Law.IMPACT), int(Law.JOHNSON), int(Law.LIU)
 
 
 @merged
@@ -84,36 +99,47 @@ def impact(penetration, rate, stiffness, p):
 
 
 @merged
-def elastic_force(penetration, stiffness, p):
-    """Elastic force (N) of the record's law at a positive penetration (m)."""
+def elastic_force(penetration, stiffness, clearance, p):
+    """Elastic force (N) of the record's law at a positive penetration (m).
+
+    stiffness and clearance (m): the joint's.
+    """
+    if has_chosen_laws(p) and p.law == JOHNSON:
+        return johnson(penetration, stiffness, clearance)
+    if has_chosen_laws(p) and p.law == LIU:
+        return liu(penetration, stiffness, clearance)
     return impact_elastic(penetration, stiffness, p)
 
 
 @merged
-def elastic_energy(elastic, penetration, p):
+def elastic_energy(elastic, penetration, stiffness, clearance, p):
     """Energy (J) that is stored where the elastic force (N) has reached a penetration (m)."""
+    if has_chosen_laws(p) and elastic > 0.0 and p.law == JOHNSON:
+        return johnson_energy(elastic, penetration, stiffness, clearance)
+    if has_chosen_laws(p) and elastic > 0.0 and p.law == LIU:
+        return liu_energy(penetration, stiffness, clearance)
     return elastic * penetration / (p.exponent + 1.0)
 
 
 @jit
-def hysteretic(penetration, rate, approach, stiffness, p):
-    """`normal_force` by a law of HYSTERESIS: K delta^p (1 + chi delta' / delta'_0)."""
+def hysteretic(penetration, rate, approach, stiffness, clearance, p):
+    """`normal_force` by a law of HYSTERESIS: F_e (1 + chi delta' / delta'_0)."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
-    elastic = impact_elastic(penetration, stiffness, p)
+    elastic = elastic_force(penetration, stiffness, clearance, p)
     unclamped = fused(elastic * p.hysteresis / approach, rate, elastic)
     return max(0.0, unclamped), elastic, unclamped
 
 
 @merged
-def normal_force(penetration, rate, approach, stiffness, p):
+def normal_force(penetration, rate, approach, stiffness, clearance, p):
     """F_N, its elastic part, and F_N before its lower bound (N), by the record's law.
 
     At a penetration (m), its rate and the speed at which the bodies met (m/s): the elastic force
     with damping times rate added, but never pulling. All are 0 unless the penetration is positive.
     """
     if has_chosen_laws(p) and p.law != IMPACT:
-        return hysteretic(penetration, rate, approach, stiffness, p)
+        return hysteretic(penetration, rate, approach, stiffness, clearance, p)
     return impact(penetration, rate, stiffness, p)
 
 
@@ -133,6 +159,7 @@ class Power:
     exponent: float
     full_damping: float = 0.0  # N s/m
     per_full_damping: float = 0.0  # 1/m: over the penetration at which damping is full
+    deepest: float = math.inf  # m: beyond which the law has no force
 
     def static_depth(self, force: float) -> float:
         """Penetration (m) at rest under a force (N): (F / K)^(1/p)."""
@@ -145,6 +172,10 @@ class Power:
     def damping(self, depth: float) -> float:
         """Damping coefficient (N s/m) at a penetration (m)."""
         return self.full_damping * plain(rise)(depth * self.per_full_damping)
+
+    def energy(self, depth: float) -> float:
+        """Energy (J) that is stored at a penetration (m)."""
+        return self.stiffness * depth ** (self.exponent + 1.0) / (self.exponent + 1.0)
 
     def impact_depth(self, mass: float, speed: float) -> float:
         """Greatest penetration (m) of an impact: m v^2 / 2 = K delta^(p+1) / (p+1)."""
@@ -160,10 +191,14 @@ class Power:
         return 2.0 * beta * depth / speed if speed > 0 else math.inf
 
 
-def elastic_form(stiffness: float, p) -> Power:
-    """The record's law in closed form with a joint's stiffness, for scales before a run."""
+def elastic_form(stiffness: float, clearance: float, p) -> Power | Conformal:
+    """The record's law with a joint's stiffness and clearance (m), for scales before a run."""
     if p["law"] == Law.IMPACT:
         return Power(stiffness, p["exponent"], p["damping"], p["per_full_damping"])
+    if p["law"] == Law.JOHNSON:
+        return johnson_form(stiffness, clearance)
+    if p["law"] == Law.LIU:
+        return liu_form(stiffness, clearance)
     if p["law"] in HYSTERESIS:  # whose damping depends on how fast the bodies will meet
         return Power(stiffness, p["exponent"])
     raise ValueError(f"no contact law has the number {p['law']}")

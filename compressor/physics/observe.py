@@ -177,8 +177,8 @@ def energies(now, y, p):
     vx, vy, height = centre_velocity(now, y, p)
     kinetic += p.rod_mass * (vx * vx + vy * vy)
     big, small = now.big, now.small
-    potential = elastic_energy(big.elastic, big.penetration, p)
-    potential += elastic_energy(small.elastic, small.penetration, p)
+    potential = elastic_energy(big.elastic, big.penetration, p.stiffness[0], p.clearance[0], p)
+    potential += elastic_energy(small.elastic, small.penetration, p.stiffness[1], p.clearance[1], p)
     return 0.5 * kinetic, potential + p.rod_mass * p.gravity * height
 
 
@@ -191,7 +191,8 @@ def glanced(now, forces, p):
         square_root(forces[0] * forces[0] + forces[1] * forces[1]),
         square_root(forces[2] * forces[2] + forces[3] * forces[3]),
         now.a - now.motion.a, big.penetration, small.penetration, big.normal, small.normal,
-        nearness(big, p.stiffness[0], p), nearness(small, p.stiffness[1], p),
+        nearness(big, p.stiffness[0], p.clearance[0], p),
+        nearness(small, p.stiffness[1], p.clearance[1], p),
     )  # fmt: skip
 
 

@@ -33,7 +33,8 @@ def contact_at(joint, t, y, phase, p):
 def nearness_at(joint, s, t, h, dense, phase, p, y):
     """`nearness` of a joint at the fraction s of a step with interpolant `dense`; y: scratch."""
     interpolate(s, dense, y)
-    return nearness(contact_at(joint, t + s * h, y, phase, p), p.stiffness[joint], p)
+    contact = contact_at(joint, t + s * h, y, phase, p)
+    return nearness(contact, p.stiffness[joint], p.clearance[joint], p)
 
 
 @jit

@@ -9,8 +9,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from compressor.cases import IMPLAUSIBLE, Case, Study
+from compressor.cases import Case, Study
+from compressor.solve.request import greatest_depth
 from compressor.solve.scales import JointScales, contact_scales, expected_cost
+from compressor.solve.si_record import record
 from compressor.solve.unit_slips import slips
 
 SHALLOW = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
@@ -62,15 +64,17 @@ def _inertias(case: Case) -> Iterator[Remark]:
 
 def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
     """Penetrations for which the contact law is not meant."""
-    pin, depth = case.machine.pin_radius_mm, 1000 * joint.penetration
-    if depth > IMPLAUSIBLE * pin:
+    depth, clearance = 1000 * joint.penetration, 1000 * joint.clearance
+    most, limit = greatest_depth(record(case))
+    if joint.penetration > most:
         text = (
-            f"forces of about {joint.force:.3g} N press {depth:.3g} mm deep, more than a tenth of "
-            "the pin radius, at which a run stops: check stiffness, masses, speed and their units"
+            f"forces of about {joint.force:.3g} N press {depth:.3g} mm deep, more than {limit}, at "
+            "which a run stops: check stiffness, masses, speed and their units"
         )
-        yield Remark("contact.stiffness_N_per_mm15", text, "deep")
+        cylinder = case.contact.length_mm is not None
+        key = "contact.length_mm" if cylinder else "contact.stiffness_N_per_mm15"
+        yield Remark(key, text, "deep")
         return
-    clearance = 1000 * joint.clearance
     if depth > SHALLOW * clearance:
         text = f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm"
         yield Remark(

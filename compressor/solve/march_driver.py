@@ -53,7 +53,7 @@ def check_march(request: Request, walker: np.record, deepest: float, deadline: f
     """Raise Stop where a march has stopped, or may go no further."""
     status = Status(int(walker.status))
     if status == Status.PENETRATION_IMPLAUSIBLE:
-        raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest))
+        raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest, request.p))
     if status == Status.NON_FINITE:
         raise Stop(Reason.NON_FINITE, "the state or its rates are no longer finite")
     if status == Status.STEP_UNDERFLOW:

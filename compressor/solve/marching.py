@@ -5,9 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.cases import IMPLAUSIBLE
 from compressor.physics import FLOWS, Mode, Pair, Work, march, new_tally, new_walker, new_work
-from compressor.solve.request import Request
+from compressor.solve.request import Request, greatest_depth
 
 COMPILED = {
     "auto": (Mode.AUTO, Pair.TSIT5),
@@ -109,5 +108,5 @@ def ready_walker(request: Request, size: np.ndarray) -> np.record:
     walker = new_walker(mode)
     walker["pair"], walker["rtol"] = pair, request.rtol
     walker["watch"], walker["contact_step"] = 1, CONTACT_STEP * size[0] / size[size.size // 2]
-    walker["deepest"] = IMPLAUSIBLE * request.p["pin_radius"]
+    walker["deepest"] = greatest_depth(request.p)[0]
     return walker

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from compressor.cases import IMPLAUSIBLE
+from compressor.physics import elastic_form
 from compressor.solve.turns import Cuts
 
 LAST = 16  # attempts that a history keeps
@@ -87,6 +89,16 @@ def overdue(timeout: float) -> str:
     return f"more than {timeout:g} s of wall time"
 
 
-def too_deep(deepest: float) -> str:
+def greatest_depth(p: np.record) -> tuple[float, str]:
+    """Penetration (m) beyond which a run stops, and what that is in words."""
+    tenth = IMPLAUSIBLE * float(p["pin_radius"])
+    joints = [j for j in zip(p["stiffness"], p["clearance"].tolist(), strict=True) if j[1] > 0.0]
+    most = min((elastic_form(*joint, p).deepest for joint in joints), default=math.inf)
+    if most < tenth:
+        return most, "half the clearance, up to which contact.law: johnson holds"
+    return tenth, "a tenth of the pin radius"
+
+
+def too_deep(depth: float, p: np.record) -> str:
     """What is wrong with a penetration (m)."""
-    return f"{deepest * 1e3:.3g} mm, more than a tenth of the pin radius"
+    return f"{depth * 1e3:.3g} mm, more than {greatest_depth(p)[1]}"

@@ -65,7 +65,8 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
     """
     number = JOINTS.index(joint)
     clearance, stiffness = p["clearance"][number].item(), p["stiffness"][number].item()
-    contact, mass = elastic_form(stiffness, p), min(p["rod_mass"], p["reciprocating_mass"]).item()
+    contact = elastic_form(stiffness, clearance, p)
+    mass = min(p["rod_mass"], p["reciprocating_mass"]).item()
     depth = float(contact.static_depth(force))
     natural = math.sqrt(contact.tangent(depth) / mass)
     friction = 0.0

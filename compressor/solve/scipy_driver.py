@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import IMPLAUSIBLE
 from compressor.physics import (
     COLUMNS,
     FLOWS,
@@ -27,7 +26,7 @@ from compressor.physics import (
     tally_step,
 )
 from compressor.reasons import Reason
-from compressor.solve.request import Request, Stop, Trajectory, overdue, too_deep
+from compressor.solve.request import Request, Stop, Trajectory, greatest_depth, overdue, too_deep
 from compressor.solve.sizes import absolute_tolerances, length_and_speed
 from compressor.solve.turns import with_cuts
 
@@ -197,7 +196,7 @@ class Segment:
 
     def check(self) -> None:
         """Raise Stop when a journal sinks in implausibly deep."""
-        deepest, limit = self.result.tally.deepest, IMPLAUSIBLE * self.request.p.pin_radius
-        if not deepest <= limit:
-            raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest))
+        depth, p = float(self.result.tally.deepest), self.request.p
+        if not depth <= greatest_depth(p)[0]:
+            raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(depth, p))
         self.right_hand_side.check_budget()

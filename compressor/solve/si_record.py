@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, contact_stiffness, to_si
+from compressor.cases import Case, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     Load,
@@ -53,13 +53,9 @@ def offsets(case: Case) -> np.ndarray:
 
 
 def stiffness_of(case: Case, joint: str) -> float:
-    """The contact stiffness of a joint, N/m^p."""
-    contact, pin = case.contact, to_si(case.machine.pin_radius_mm, "mm")
-    if contact.materials:
-        clearance = to_si(getattr(case.clearance_mm, joint), "mm")
-        internal = contact.geometry == "internal" and clearance > 0.0  # an ideal joint has none
-        return contact_stiffness(*contact.materials, pin, pin + clearance, internal)
-    return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
+    """The contact stiffness of a joint, as of `joint_stiffness`."""
+    clearance = getattr(case.clearance_mm, joint)
+    return joint_stiffness(case.contact, case.machine.pin_radius_mm, clearance)
 
 
 def _machine(case: Case, p: dict[str, Any]) -> None:

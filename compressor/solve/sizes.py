@@ -16,9 +16,10 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
     moving = p["reciprocating_mass"]
     force = moving * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
     joints = [j for j in zip(p["clearance"].tolist(), p["stiffness"], strict=True) if j[0] > 0.0]
-    contact = elastic_form(max(stiffness for _, stiffness in joints), p)
+    clearance = min(clearance for clearance, _ in joints)
+    contact = elastic_form(max(stiffness for _, stiffness in joints), clearance, p)
     depth = contact.static_depth(force)
-    length = max(min(min(clearance for clearance, _ in joints), depth), 1e-3 * depth)
+    length = max(min(clearance, depth), 1e-3 * depth)
     mass = min(p["rod_mass"], moving)
     return length, length * math.sqrt(contact.tangent(depth) / mass)
 

@@ -168,8 +168,15 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
          "friction.friction_velocity_mm_per_s", "must exceed"),
         ({"friction": {"bristle_stiffness_per_mm": 10}},
          "friction.bristle_stiffness_per_mm", "is read with friction.law: lugre: add the law"),
-        ({"contact": {"restitution": 0.9}}, "contact.restitution", "gonthier or hu_guo: add the"),
+        ({"contact": {"restitution": 0.9}}, "contact.restitution", "johnson or liu: add the law"),
         ({"contact": {"law": "flores"}}, "contact.restitution", "is needed with contact.law: flor"),
+        ({"contact": {"law": "liu", "modulus_GPa": 110}}, "contact.length_mm", "such as 20"),
+        ({"contact": {"law": "johnson", "length_mm": 20}}, "contact.materials", "or give modulus"),
+        ({"contact": {"length_mm": 20}}, "contact.length_mm", "johnson or liu: add the law"),
+        ({"contact": {"law": "johnson", "length_mm": 20, "modulus_GPa": 110,
+                      "materials": ["steel", "steel"]}}, "contact.materials", "give one of the"),
+        ({"contact": {"law": "liu", "length_mm": 20, "modulus_GPa": 110, "restitution": 0.9},
+          "solve": {"method": "BDF"}}, "solve.method", "as contact.law: liu"),
         ({"contact": {"law": "flores", "restitution": 0.9}, "solve": {"method": "BDF"}},
          "solve.method", "choose one of auto, DOPRI5, TSIT5, RODAS"),
         ({"spring": {"stroke_mm": 240}}, "spring.stroke_mm", "less than the piston's stroke"),
@@ -304,7 +311,17 @@ def test_the_paper_s_geometry_is_the_default():
     [
         ("contact", {"law": "hertz"}, {"damping_N_s_per_mm": 5, "restitution": 0.5}),
         ("contact", {"law": "flores", "restitution": 0.5}, {"full_damping_mm": 0.2}),
-        ("contact", {"law": "impact"}, {"restitution": 0.5}),
+        ("contact", {"law": "impact"}, {"restitution": 0.5, "length_mm": 20, "modulus_GPa": 110}),
+        (
+            "contact",
+            {"law": "johnson", "length_mm": 20, "modulus_GPa": 110},
+            {"damping_N_s_per_mm": 5, "exponent": 1.2, "stiffness_N_per_mm15": 1e5},
+        ),
+        (
+            "contact",
+            {"law": "liu", "length_mm": 20, "materials": ["steel", "copper"]},
+            {"geometry": "internal"},
+        ),
         ("friction", {"law": "coulomb_tanh"}, {"static": 0.5, "friction_velocity_mm_per_s": 70}),
         ("friction", {"law": "adams"}, {"bristle_damping_s_per_mm": 1}),
     ],
@@ -375,7 +392,8 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "sensor.seed": 2,
 }
 CLEARANCES = {"big_end": 0.1, "small_end": 0.1}
-OF_LAWS = {*USUAL, "restitution"}  # keys that the default laws do not read
+OF_PINS = {"length_mm": 20, "modulus_GPa": 110}
+OF_LAWS = {*USUAL, "restitution", *OF_PINS}  # keys that the default laws do not read
 
 
 def other_value(key):
@@ -397,6 +415,7 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"body": True, "sensor": True}
     if name in OF_LAWS:
         law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}
+        law = {"law": "johnson", **OF_PINS} if name in OF_PINS else law
         base |= {group: law}
     there = base.get(group, {})
     there = {} if there is True else there

@@ -550,12 +550,17 @@ def group(name: str, *left_out: str):
 
 
 # keys that need the name of a law beside them; the law itself
-OF_LAWS = ["law", "restitution", *USUAL]
+OF_LAWS = ["law", "restitution", "length_mm", "modulus_GPa", *USUAL]
 
 
 def as_hertz(values):
     """With a law that any method takes."""
     return values | {"law": "hertz"}
+
+
+def as_pin(values):
+    """With a law of a pin in its bore."""
+    return {"length_mm": 20, "modulus_GPa": 110} | values | {"law": "johnson"}
 
 
 TIMES = [
@@ -577,6 +582,7 @@ CASES = st.fixed_dictionaries(
         "contact": group("contact", "materials", "exponent", "geometry", *OF_LAWS)
         | group("contact", "materials", "geometry", "restitution").map(as_hertz)
         | st.just({"materials": ["steel", "copper"]})
+        | group("contact", "materials", "geometry", "restitution").map(as_pin)
         | st.just({"materials": ["steel", "steel"], "geometry": "internal"}),
         "friction": st.just(False)
         | group("friction", *OF_LAWS)

@@ -16,6 +16,7 @@ from compressor.physics.friction_laws import friction_coefficient
 from compressor.solve.si_record import record
 
 K = 3.36e5 * 1000**1.5
+C = 2e-4  # m
 NOTHING = (0.0, 0.0)  # that the contact carries
 finite = st.floats(-1e3, 1e3)
 
@@ -64,20 +65,20 @@ def test_friction_values(slip, mu):
 @pytest.mark.parametrize(("force", "depth_mm"), [(825, 0.018), (3087, 0.044)])
 def test_static_penetration(force, depth_mm):
     assert (force / K) ** (2 / 3) * 1e3 == pytest.approx(depth_mm, abs=5e-4)
-    assert normal_force((force / K) ** (2 / 3), 0.0, 1.0, K, law())[0] == pytest.approx(force)
+    assert normal_force((force / K) ** (2 / 3), 0.0, 1.0, K, C, law())[0] == pytest.approx(force)
 
 
 def test_the_clamp_never_pulls():
-    assert normal_force(1e-5, -100.0, 1.0, K, law())[0] == 0.0
-    assert normal_force(0.0, 5.0, 1.0, K, law())[0] == 0.0
-    assert normal_force(-1e-9, 5.0, 1.0, K, law())[0] == 0.0
+    assert normal_force(1e-5, -100.0, 1.0, K, C, law())[0] == 0.0
+    assert normal_force(0.0, 5.0, 1.0, K, C, law())[0] == 0.0
+    assert normal_force(-1e-9, 5.0, 1.0, K, C, law())[0] == 0.0
 
 
 def bounce(speed, p, mass=5.0):
     """Contact time, exit speed and depth of a mass that strikes the contact at `speed`."""
 
     def derivative(_, y):
-        return [y[1], -normal_force(y[0], y[1], 1.0, K, p)[0] / mass]
+        return [y[1], -normal_force(y[0], y[1], 1.0, K, C, p)[0] / mass]
 
     def leaves(_, y):
         return y[0]

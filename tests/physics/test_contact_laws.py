@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from compressor.cases.case import Case
+from compressor.cases.laws import CYLINDRICAL
 from compressor.cases.table import table
 from compressor.physics.contact_laws import (
     HYSTERESIS,
@@ -19,6 +20,7 @@ from compressor.solve.si_record import record
 
 DEPTH = 3e-5  # m
 APPROACH = 0.2  # m/s
+CLEARANCE = 2e-4  # m
 RESTITUTION = 0.8
 laws = pytest.mark.parametrize("law", [law.name.lower() for law in Law])
 exponents = pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
@@ -32,7 +34,11 @@ def restitutes(law):
 def contact(law, exponent=1.5, **more):
     """A record with a law, and the stiffness of its joint."""
     values = {"law": law, "exponent": exponent, "restitution": RESTITUTION, **more}
-    p = record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "contact": values}))
+    if law in CYLINDRICAL:
+        values |= {"length_mm": 20, "modulus_GPa": 110}
+    p = record(
+        Case.from_values({"joint": "big_end", "clearance_mm": 1000 * CLEARANCE, "contact": values})
+    )
     return p, float(p["stiffness"][0])
 
 
@@ -45,48 +51,49 @@ def test_every_choice_of_a_case_file_is_compiled(key, names):
 @exponents
 def test_the_energy_is_the_work_of_the_elastic_force(law, exponent):
     p, stiffness = contact(law, exponent)
-    work, _ = quad(lambda depth: elastic_force(depth, stiffness, p), 0.0, DEPTH)
-    elastic = elastic_force(DEPTH, stiffness, p)
-    assert elastic_energy(elastic, DEPTH, p) == pytest.approx(work, rel=1e-7)
+    work, _ = quad(lambda depth: elastic_force(depth, stiffness, CLEARANCE, p), 0.0, DEPTH)
+    elastic = elastic_force(DEPTH, stiffness, CLEARANCE, p)
+    assert elastic_energy(elastic, DEPTH, stiffness, CLEARANCE, p) == pytest.approx(work, rel=1e-7)
 
 
 @laws
 @exponents
 def test_the_closed_form_is_of_the_elastic_force(law, exponent):
     p, stiffness = contact(law, exponent)
-    form = elastic_form(stiffness, p)
-    elastic = elastic_force(DEPTH, stiffness, p)
+    form = elastic_form(stiffness, CLEARANCE, p)
+    elastic = elastic_force(DEPTH, stiffness, CLEARANCE, p)
     assert form.static_depth(elastic) == pytest.approx(DEPTH, rel=1e-12)
-    near = [elastic_force(DEPTH * (1 + side), stiffness, p) for side in (-1e-5, 1e-5)]
+    near = [elastic_force(DEPTH * (1 + side), stiffness, CLEARANCE, p) for side in (-1e-5, 1e-5)]
     for depth in (DEPTH, 1e-3 * DEPTH, 1e3 * DEPTH):  # damping rises, and is full
-        _, elastic_part, unclamped = normal_force(depth, 1.0, 1.0, stiffness, p)
+        _, elastic_part, unclamped = normal_force(depth, 1.0, 1.0, stiffness, CLEARANCE, p)
         known = 0.0 if restitutes(law) else unclamped - elastic_part  # before bodies meet
         assert form.damping(depth) == pytest.approx(known, rel=1e-9)
     assert form.tangent(DEPTH) == pytest.approx((near[1] - near[0]) / (2e-5 * DEPTH), rel=1e-8)
-    speed = np.sqrt(2.0 * elastic_energy(elastic, DEPTH, p) / 3.0)
+    speed = np.sqrt(2.0 * elastic_energy(elastic, DEPTH, stiffness, CLEARANCE, p) / 3.0)
     assert form.impact_depth(3.0, speed) == pytest.approx(DEPTH, rel=1e-12)
+    assert form.energy(DEPTH) == pytest.approx(1.5 * speed**2, rel=1e-12)
 
 
 @laws
 def test_the_force_is_elastic_and_damped_and_never_pulls(law):
     p, stiffness = contact(law)
-    elastic = elastic_force(DEPTH, stiffness, p)
-    damping = elastic_form(stiffness, p).damping(DEPTH)
+    elastic = elastic_force(DEPTH, stiffness, CLEARANCE, p)
+    damping = elastic_form(stiffness, CLEARANCE, p).damping(DEPTH)
     if restitutes(law):
         damping = elastic * HYSTERESIS[Law[law.upper()]](RESTITUTION) / APPROACH
     assert damping > 0.0 or law == "hertz"
     for rate in (0.01, 0.0, -1e-4):
         expected = elastic + damping * rate
-        assert normal_force(DEPTH, rate, APPROACH, stiffness, p) == pytest.approx(
+        assert normal_force(DEPTH, rate, APPROACH, stiffness, CLEARANCE, p) == pytest.approx(
             (expected, elastic, expected)
         )
-    force, _, unclamped = normal_force(DEPTH, -100.0, APPROACH, stiffness, p)
+    force, _, unclamped = normal_force(DEPTH, -100.0, APPROACH, stiffness, CLEARANCE, p)
     assert force == 0.0 > unclamped or law == "hertz"
-    assert normal_force(0.0, 1.0, 1.0, stiffness, p) == (0.0, 0.0, 0.0)
+    assert normal_force(0.0, 1.0, 1.0, stiffness, CLEARANCE, p) == (0.0, 0.0, 0.0)
 
 
 def test_a_number_without_a_law_is_refused():
     p, stiffness = contact("impact")
     p["law"] = 99
     with pytest.raises(ValueError, match="99"):
-        elastic_form(stiffness, p)
+        elastic_form(stiffness, CLEARANCE, p)

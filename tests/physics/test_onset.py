@@ -210,9 +210,11 @@ def test_an_ideal_joint_never_touches():
 @pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
 def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     p = parameters()
-    normal, elastic, unclamped = normal_force(penetration, rate, 1.0, p.stiffness[1], p)
+    normal, elastic, unclamped = normal_force(
+        penetration, rate, 1.0, p.stiffness[1], p.clearance[1], p
+    )
     contact = Contact(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
-    assert (nearness(contact, p.stiffness[1], p) > 0) == (normal > 0)
+    assert (nearness(contact, p.stiffness[1], p.clearance[1], p) > 0) == (normal > 0)
 
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0])
@@ -223,7 +225,9 @@ def test_a_clamped_force_counts_as_a_length(exponent):
     pull = p.stiffness[1] * p.full_damping**exponent
     for share in (1.0, 0.01):
         contact = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 1e-6, -1.0, 0.0, 0.0, -share * pull)
-        assert nearness(contact, p.stiffness[1], p) == pytest.approx(-share * p.full_damping)
+        assert nearness(contact, p.stiffness[1], p.clearance[1], p) == pytest.approx(
+            -share * p.full_damping
+        )
 
 
 # ---- constructed re-engagements: a free flight drawn backwards from its contact
@@ -293,7 +297,7 @@ def release(rng, length, joint, t, y, phase, p):
     stiffness = p.stiffness[joint]
 
     def force(speed):
-        return normal_force(speed * length, -speed, 1.0, stiffness, p)[2]
+        return normal_force(speed * length, -speed, 1.0, stiffness, p.clearance[joint], p)[2]
 
     speed = brentq(force, 1e-3, 0.5 * p.full_damping / length)
     y = with_radial_rate(joint, t, y, phase, p, -speed)

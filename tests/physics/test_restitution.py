@@ -97,6 +97,15 @@ def test_it_depends_on_neither_speed_nor_mass_nor_exponent(law, speed, mass, exp
     assert given_back(rows) == pytest.approx(dict(GIVEN)[law][1], abs=1e-3)
 
 
+@pytest.mark.parametrize(("restitution", "given"), [(0.7, 0.7960), (0.3, 0.6842), (None, 1.0)])
+@pytest.mark.parametrize("law", ["johnson", "liu"])
+def test_pins_in_bores_give_back_what_their_damping_does(law, restitution, given):
+    """That of Lankarani and Nikravesh: the closed form holds of any elastic force."""
+    more = {"restitution": restitution} if restitution else {}
+    _, rows = drop("small_end", 0.3, rtol=1e-7, law=law, length_mm=20, modulus_GPa=110, **more)
+    assert given_back(rows) == pytest.approx(given, abs=1e-3)
+
+
 def test_hertz_gives_all_back():
     _, rows = drop("small_end", 0.3, law="hertz")
     assert given_back(rows) == pytest.approx(1.0, abs=1e-5)

@@ -15,6 +15,7 @@ from compressor.cases.materials import contact_stiffness
 from compressor.measure.explain import terms, unknowns
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
+from compressor.solve.cautions import remarks
 from compressor.solve.horizon import CLOSE, FAR, followed, predictability_horizon
 from compressor.solve.integrate import integrate
 from compressor.solve.request import Request
@@ -136,6 +137,40 @@ def test_explicit_and_stiff_steps_agree(law, joint):
     assert np.linalg.norm(a - b) < 1e-4 * np.linalg.norm(a)
 
 
+@pytest.mark.parametrize("law", ["johnson", "liu"])
+def test_pins_in_bores_by_three_integrators(law):
+    """Undamped but for friction: explicit, stiff, and SciPy's DOP853, which lands on no onset."""
+    contact = {"law": law, "length_mm": 20, "materials": ["steel", "copper"]}
+    values = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
+    solve = {"duration_rev": 0.1, "settle_rev": 0, "error_bars": False, "rtol": 1e-10}
+    runs = [
+        simulate(Case.from_values({**values, "solve": {**solve, "method": method}}))
+        for method in ("TSIT5", "RODAS", "DOP853")
+    ]
+    first = runs[0]["acceleration"].values
+    assert runs[0]["impact_count"].sum() > 4
+    for run in runs:
+        assert run["status"].item() == "ok"
+        assert run["energy_residual"] < 1e-7
+        assert np.linalg.norm(run["acceleration"].values - first) < 1e-3 * np.linalg.norm(first)
+
+
+def test_a_pin_that_is_pressed_deeper_than_johnson_knows_is_told_of():
+    """Of a joint that is far too short for its forces."""
+    values = {
+        "joint": "big_end",
+        "clearance_mm": 0.1,
+        "contact": {"law": "johnson", "length_mm": 0.05, "materials": ["steel", "copper"]},
+    }
+    run = simulate(Case.from_values(values))
+    assert run["status"].item() == "failed"
+    assert run["reason"].item() == "penetration_implausible"
+    assert "half the clearance" in run.attrs["detail"]
+    deep = [one for one in remarks(Case.from_values(values)) if one.kind == "deep"]
+    assert [one.key for one in deep] == ["contact.length_mm"]
+    assert "half the clearance" in deep[0].message
+
+
 @pytest.mark.parametrize("law", ["gonthier", "flores"])
 def test_error_bars_hold_with_laws(law):
     """Of the default promise, by a far tighter run."""
@@ -158,6 +193,9 @@ def test_explain_names_laws_and_bristles():
     assert active["contact"].startswith("flores")
     assert active["contact"].endswith("restitution 0.8")
     assert active["friction"].startswith("lugre, static 0.23")
+    pin = {"law": "johnson", "length_mm": 20, "modulus_GPa": 110}
+    active, _ = terms(Case.from_values({**values, "contact": pin}))
+    assert active["contact"] == "johnson, E* = 110 GPa, 20 mm long, undamped"
     assert unknowns(case)[-2:] == ("bristles at the big end, m", "bristles at the small end, m")
     one = Case.from_values({**values, "joint": "big_end"})
     assert unknowns(one)[2:] == ("bristles at the big end, m",)

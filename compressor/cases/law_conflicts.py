@@ -1,0 +1,71 @@
+"""What does not fit together in the laws of contact and friction of a case."""
+
+from collections.abc import Iterator
+
+from compressor.cases.groups import COMPILED
+from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
+from compressor.cases.parameter import Problem, listed
+from compressor.cases.table import Settings
+
+
+def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Keys of a law that was not named, and what a law cannot do without."""
+    for name, keys in READ_BY.items():
+        group = getattr(case, name)
+        if not group or f"{name}.law" in given:
+            continue
+        for key, readers in keys.items():
+            if f"{name}.{key}" in given and law_of(group) not in readers:
+                message = f"is read with {name}.law: {listed(readers)}: add the law"
+                yield Problem(f"{name}.{key}", message)
+    law, restitution = case.contact.law, case.contact.restitution
+    if law in CYLINDRICAL:
+        yield from cylinder_conflicts(case)
+    if law not in RESTITUTING and (law not in CYLINDRICAL or restitution is None):
+        return
+    if restitution is None:
+        needed = f"is needed with contact.law: {law}; give it, such as 0.9"
+        yield Problem("contact.restitution", needed)
+    if case.solve.method not in COMPILED:
+        message = (
+            f"{case.solve.method} does not stop where journal and bore meet, as contact.law: {law} "
+            f"needs: choose one of {', '.join(COMPILED)}"
+        )
+        yield Problem("solve.method", message)
+
+
+def contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    contact = case.contact
+    if contact.geometry is not None and contact.materials is None:
+        yield Problem(
+            "contact.geometry",
+            "is that of the stiffness that contact.materials give: add materials: [steel, steel]",
+        )
+    if contact.materials is not None and contact.exponent != 1.5:
+        yield Problem(
+            "contact.exponent",
+            f"is {contact.exponent:g}, but Eq. 15's stiffness from materials needs exponent 1.5: "
+            "leave it out, or give stiffness_N_per_mm15 in place of materials",
+        )
+
+
+def friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    friction = case.friction
+    if not friction or law_of(friction) not in READ_BY["friction"]["friction_velocity_mm_per_s"]:
+        return
+    if friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
+        yield Problem(
+            "friction.friction_velocity_mm_per_s",
+            f"{friction.friction_velocity_mm_per_s:g} mm/s must exceed the "
+            f"stiction_velocity_mm_per_s, {friction.stiction_velocity_mm_per_s:g} mm/s",
+        )
+
+
+def cylinder_conflicts(case: Settings) -> Iterator[Problem]:
+    """A pin in a bore is known by its length and by what both are made of."""
+    contact = case.contact
+    needed = f"is needed with contact.law: {contact.law}; give it, such as"
+    if contact.length_mm is None:
+        yield Problem("contact.length_mm", f"{needed} 20")
+    if contact.materials is None and contact.modulus_GPa is None:
+        yield Problem("contact.materials", f"{needed} [steel, copper], or give modulus_GPa")

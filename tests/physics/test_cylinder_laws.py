@@ -1,0 +1,126 @@
+"""Johnson's and Liu's laws of a pin in its bore: by Lambert's function, limits and quadrature."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.special import lambertw
+
+from compressor.cases.case import Case
+from compressor.cases.materials import composite_modulus
+from compressor.physics.cylinder_laws import (
+    FLATTEST,
+    JOHNSON_DEEPEST,
+    johnson,
+    johnson_energy,
+    johnson_form,
+    liu,
+    liu_energy,
+    liu_form,
+    solved,
+)
+from compressor.solve.request import greatest_depth
+from compressor.solve.si_record import record
+
+ROOT = Path(__file__).parents[2]
+CLEARANCE = 1e-4  # m
+LINE = math.pi * 1.1e11 * 0.02  # pi E* L, N/m
+SOFT = LINE / (2.0 * math.sqrt(2.0 * CLEARANCE))
+EDGE = 4.0 * CLEARANCE * FLATTEST * math.exp(-1.0 - FLATTEST)  # m, where Johnson's law is left
+depths = pytest.mark.parametrize("depth", [1e-15, 1e-10, 1e-7, 2e-6, 2.1e-6, 1e-5, 4e-5, 5e-5])
+
+
+@depths
+def test_johnson_s_force_solves_his_equation(depth):
+    force = johnson(depth, LINE, CLEARANCE)
+    penetration = force / LINE * (math.log(4.0 * LINE * CLEARANCE / force) - 1.0)
+    assert penetration == pytest.approx(depth, rel=1e-13)
+    share = -lambertw(-math.e * depth / (4.0 * CLEARANCE), -1).real
+    assert force == pytest.approx(LINE * depth / share, rel=1e-13)
+
+
+def test_johnson_s_law_goes_on_along_its_tangent():
+    """No depth in use gets there: the equation has no solution beyond 0.541 of the clearance."""
+    assert JOHNSON_DEEPEST * CLEARANCE < EDGE < 4.0 * CLEARANCE * math.exp(-2.0)
+    before, at, after = (johnson(EDGE * (1.0 + s), LINE, CLEARANCE) for s in (-1e-6, 0.0, 1e-6))
+    slope = johnson_form(LINE, CLEARANCE).tangent(EDGE)
+    assert (after - at) / (1e-6 * EDGE) == pytest.approx(slope, rel=1e-5)
+    assert (at - before) / (1e-6 * EDGE) == pytest.approx(slope, rel=1e-4)
+
+
+@depths
+def test_liu_s_force_is_his_formula(depth):
+    """Of a pressure over an arc whose half angle has the cosine c / (c + delta)."""
+    half = 0.5 * math.acos(CLEARANCE / (CLEARANCE + depth)) if depth > 1e-10 else None
+    expected = math.sqrt(depth / (2.0 * (CLEARANCE + depth)))
+    if half:
+        assert math.sin(half) == pytest.approx(expected, rel=1e-4)
+    assert liu(depth, SOFT, CLEARANCE) == pytest.approx(0.5 * LINE * depth * expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("depth", [1e-12, 1e-6, 1.99e-6, 2.01e-6, 1e-5, EDGE, 6e-5, 1e-4])
+def test_energies_are_the_work_of_the_forces(depth):
+    """Also beside the switches between two formulas; by the root of the depth, which is smooth."""
+
+    def work(force):
+        return quad(lambda s: 2.0 * s * force(s * s), 0.0, math.sqrt(depth), epsabs=0)[0]
+
+    elastic = johnson(depth, LINE, CLEARANCE)
+    assert johnson_energy(elastic, depth, LINE, CLEARANCE) == pytest.approx(
+        work(lambda x: johnson(x, LINE, CLEARANCE) if x else 0.0), rel=1e-8
+    )
+    assert liu_energy(depth, SOFT, CLEARANCE) == pytest.approx(
+        work(lambda x: liu(x, SOFT, CLEARANCE)), rel=1e-10
+    )
+
+
+@pytest.mark.parametrize("form", [johnson_form(LINE, CLEARANCE), liu_form(SOFT, CLEARANCE)])
+def test_an_impact_takes_as_long_as_its_motion(form):
+    """A free mass against the force: by SciPy's integrator, until it comes back."""
+    mass, speed = 5.0, 0.3
+    depth = form.impact_depth(mass, speed)
+    assert form.energy(depth) == pytest.approx(0.5 * mass * speed**2, rel=1e-12)
+
+    def back(t, y):
+        return y[0]
+
+    back.terminal, back.direction = True, -1
+    run = solve_ivp(
+        lambda t, y: (y[1], -form.force(y[0]) / mass if y[0] > 0.0 else 0.0),
+        (0.0, 1e-2), (1e-14, speed), method="DOP853", rtol=1e-9, atol=1e-15, events=back,
+    )  # fmt: skip
+    assert run.t_events[0][0] == pytest.approx(form.impact_time(depth, speed), rel=1e-5)
+    assert run.y[0].max() <= depth * (1.0 + 1e-6)
+    assert form.impact_time(0.0, 0.0) == math.inf
+
+
+def test_the_page_has_the_forces_of_the_laws():
+    """kN of the paper's materials in a joint of 20 mm, with a clearance of 0.1 mm."""
+    line = math.pi * composite_modulus("steel", "copper") * 0.02
+    soft = line / (2.0 * math.sqrt(2.0 * CLEARANCE))
+    page = (ROOT / "compressor/physics/README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"\| (\d+) µm \| (.*) kN \| (.*) kN \| (.*) kN \|", page)
+    assert len(rows) == 3
+    for depth, *forces in rows:
+        depth = 1e-6 * float(depth)
+        known = (
+            johnson(depth, line, CLEARANCE), liu(depth, soft, CLEARANCE), 1.0625e10 * depth**1.5,
+        )  # fmt: skip
+        assert [float(one) for one in forces] == pytest.approx([f / 1e3 for f in known], abs=0.051)
+
+
+def test_what_rises_is_solved_to_rounding():
+    for length in np.logspace(-12, -2, 6):
+        assert solved(lambda x: x**2.5, length**2.5) == pytest.approx(length, rel=1e-14)
+    assert solved(lambda x: x, 0.0) == 0.0
+
+
+@pytest.mark.parametrize(("law", "share"), [("johnson", 0.5e-4), ("liu", 1e-3)])
+def test_johnson_s_law_holds_up_to_half_the_smaller_clearance(law, share):
+    clearance = {"big_end": 0.1, "small_end": 0.3}
+    contact = {"law": law, "length_mm": 20, "materials": ["steel", "copper"]}
+    p = record(Case.from_values({"joint": "both", "clearance_mm": clearance, "contact": contact}))
+    assert greatest_depth(p)[0] == pytest.approx(share, rel=1e-12)
