@@ -41,7 +41,7 @@ BUGS = [
     ("the follower's lift is the spring's stroke", "analysis/cam.py",
      "lift = 2 * p.crank_radius - p.spring_stroke", "lift = p.spring_stroke"),
     # record
-    ("K as the paper prints it, per mm", "solve/si_record.py",
+    ("K as the paper prints it, per mm", "cases/materials.py",
      "1000.0**contact.exponent", "1000.0"),
     ("friction's velocity in mm/s", "solve/si_record.py",
      'to_si(friction.friction_velocity_mm_per_s, "mm/s")', "friction.friction_velocity_mm_per_s"),
