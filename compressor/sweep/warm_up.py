@@ -46,7 +46,8 @@ class Needs(NamedTuple):
     def parts(self) -> list[str]:
         """The parts of the equations that are needed, by name."""
         lanes = [f"lanes-{of}" for of in self.lanes]
-        return [*self.methods, *["horizon"] * self.horizon, *lanes, *["laws"] * self.laws]
+        laws = ["laws", *["laws-horizon"] * self.horizon] if self.laws else []
+        return [*self.methods, *["horizon"] * self.horizon, *lanes, *laws]
 
     def with_lanes(self, cases: Sequence[Case]) -> "Needs":
         """With the scenes of which there are jobs enough to march side by side.
@@ -80,10 +81,9 @@ def load(needs: Needs) -> None:
         cases = [Case.from_values({"joint": joint, **short}) for joint in LANES.values()]
         side_by_side(cases, needs.lanes)
     values = {"joint": "both", "clearance_mm": 0.1}
-    for how in hows:
-        measure(Case.from_values({**values, "solve": solve | how}))
-    if needs.laws:
-        measure(Case.from_values({**values, "contact": {"law": "hertz"}, "solve": solve}))
+    for contact in [{}, {"law": "hertz"}] if needs.laws else [{}]:
+        for how in hows:
+            measure(Case.from_values({**values, "contact": contact, "solve": solve | how}))
 
 
 def load_telling(needs: Needs, remark: Callable[[str], None]) -> None:
