@@ -47,6 +47,7 @@ TOGETHER = {
     "tests/physics/test_friction_laws.py": "laws",
     "tests/physics/test_restitution.py": "laws",
     "tests/solve/test_chosen_laws.py": "laws",
+    "tests/measure/test_stress_laws.py": "laws",
     "tests/campaigns/test_chaotic.py": "twins",
     "tests/measure/test_stress.py": "twins",
     "tests/solve/test_horizon.py": "twins",

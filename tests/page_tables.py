@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from pathlib import Path
 
 from compressor.cases.parameter import parameter_table
@@ -633,16 +634,24 @@ def stress_table():
         + f". Of the ok ones, {found['unforeseeable']} go on beyond their horizon. Slowest ok run: "
         f"{slow['seconds']:.2g} s (`{slow['command']}`); longest scene with all judges: "
         f"{found['slowest_judging_s']:.0f} s; peak memory of a worker: "
-        f"{found['peak_memory_MiB']} MiB.\n" + fresh_scenes(found["fresh"])
+        f"{found['peak_memory_MiB']} MiB.\n"
+        + fresh_scenes("fresh scenes", by_laws(found["fresh"], False))
+        + fresh_scenes("fresh scenes with laws drawn", by_laws(found["fresh"], True), True)
     )
 
 
-def fresh_scenes(found):
-    """What became of scenes of other seeds, which chose nothing."""
+def by_laws(found, drawn):
+    """The fresh scenes with laws drawn, or those with the default ones."""
+    return [one for one in found if one.get("laws", False) is drawn]
+
+
+def fresh_scenes(what, found, ends=False):
+    """What became of scenes of other seeds, which chose nothing; `ends`: how they all did."""
     if not found:
         return ""
     scenes, wrong = sum(one["scenes"] for one in found), silent(found)
     seeds = " and ".join(str(one["seed"]) for one in found)
+    plural = "s" if len(found) > 1 else ""
     commands = ", ".join(
         f"`{row['command']}` ({row['worst_metric']} off by {row['error']:.1e}, "
         f"bar {row['bar']:.1e})"
@@ -650,9 +659,23 @@ def fresh_scenes(found):
         for row in one["silent_wrong"]
     )
     return (
-        f"\n**Of {scenes:,} fresh scenes**, of the seeds {seeds}, {wrong or 'none'} "
-        f"{'was' if wrong == 1 else 'were'} wrong in silence{f': {commands}' if wrong else ''}.\n"
+        f"\n**Of {scenes:,} {what}**, of the seed{plural} {seeds}, {wrong or 'none'} "
+        f"{'was' if wrong == 1 else 'were'} wrong in silence{f': {commands}' if wrong else ''}."
+        + (f" {all_ends(found)}" if ends else "")
+        + "\n"
     )
+
+
+def all_ends(found):
+    """How scenes ended, in the supported range and in the whole."""
+    told = []
+    for kind in ("supported", "whole"):
+        ends = Counter()
+        for one in found:
+            ends.update(one["ends"][kind])
+        named = ", ".join(f"`{name}` {count}" for name, count in ends.most_common())
+        told.append(f"{kind} range: {named}")
+    return f"{'; '.join(told)}.".capitalize()
 
 
 def silent(found):
@@ -725,7 +748,7 @@ def numbers_list():
     plane, search = (kept("claims.json")[name] for name in ("map", "search"))
     word, bars = accuracy["words"]["standard"], accuracy["bars"]["standard"].values()
     within = sum(bar["within"] * bar["of"] for bar in bars) / sum(bar["of"] for bar in bars)
-    range_ = stress["ends"]["supported"]
+    range_, fresh = stress["ends"]["supported"], by_laws(stress["fresh"], False)
     unjudged = sum(ends.get("unjudged", 0) for ends in stress["ends"].values())
     link = "compressor/solve/README.md#supported-range-and-stress"
     lines = [
@@ -746,8 +769,8 @@ def numbers_list():
         f"**Extremes.** Of {stress['scenes']:,} extreme cases, half of them inside the supported "
         f"range, {range_['ok'] / sum(range_.values()):.1%} of that half ran to a result. The "
         f"others failed with a named reason. Silently wrong ([meaning]({link})): "
-        f"{stress['silent_wrong'] or 'none'}; of {sum(one['scenes'] for one in stress['fresh']):,} "
-        f"others, drawn afterwards, {silent(stress['fresh']) or 'none'}. Not judged: {unjudged}.",
+        f"{stress['silent_wrong'] or 'none'}; of {sum(one['scenes'] for one in fresh):,} "
+        f"others, drawn afterwards, {silent(fresh) or 'none'}. Not judged: {unjudged}.",
         f"**Kills.** Of {kills['trials']} sweeps killed at random and resumed, "
         f"{kills['failed'] or 'none'} had lost or changed a result. A sweep of {sweep['jobs']:,} "
         f"jobs, killed {len(sweep['kills'])} times and resumed, equals the undisturbed one "

@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -28,6 +28,11 @@ if TYPE_CHECKING:
               help="How many scenes are drawn.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
               help="Of the draws.")  # fmt: skip
+@click.option(
+    "--laws",
+    is_flag=True,
+    help="Draw laws of contact and friction as well, each as often as any other.",
+)
 @jobs_option("Worker processes.")
 @click.option("-o", "--output", default="stress", show_default=True,
               help="Folder of the campaign.")  # fmt: skip
@@ -35,8 +40,9 @@ if TYPE_CHECKING:
               help="Repeat this scene of the seed alone, and store nothing.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress.")
 def stress(
-    scenes: int, seed: int, jobs: int | None, output: str, scene: int | None, quiet: bool
-) -> int:
+    scenes: int, seed: int, laws: bool, jobs: int | None, output: str, scene: int | None,
+    quiet: bool,
+) -> int:  # fmt: skip
     """Test numerical stability at the extremes: draw scenes, run each, and judge what it says.
 
     Half of the scenes lie in the range that is documented as supported, half go far beyond. A scene
@@ -51,16 +57,16 @@ def stress(
     from compressor.sweep import cores
 
     if scene is not None:
-        click.echo("\n".join(repeated(scene, seed)))
+        click.echo("\n".join(repeated(scene, seed, laws)))
         return DONE
-    from compressor.measure import campaign
+    from compressor.measure import Budget, campaign
     from compressor.report import draw_outcomes, render
     from compressor.store import publish, writable_folder
 
     writable_folder(output)
     screen = Screen(quiet, "scenes")
     try:
-        study = campaign(output, scenes, seed, jobs or cores(), screen)
+        study = campaign(output, scenes, seed, jobs or cores(), screen, Budget(laws))
     finally:
         screen.end()
     drawing = draw_outcomes(study)
@@ -75,11 +81,11 @@ def stress(
     return SOME_FAILED if doubtful else DONE
 
 
-def repeated(number: int, seed: int) -> Iterator[str]:
+def repeated(number: int, seed: int, laws: bool) -> Iterator[str]:
     """A scene as a case file, and below it, as comments, how it ends."""
     from compressor.measure import repeat
 
-    drawn, row = repeat(number, seed)
+    drawn, row = repeat(number, seed, laws)
     yield from (f"{key}: {json.dumps(value)}" for key, value in drawn.items())
     for key, value in row.items():
         if key not in ("load", "joint") and value != "":
@@ -105,17 +111,18 @@ def summary(study: "xr.Dataset") -> Iterator[str]:
         )
         yield (
             f"{row['verdict'].item():<13} {far:>7.2g} {beyond:>7.2g} {error:>8.1e} {size:>8.1e}  "
-            f"{command(row, study.attrs['seed'])}"
+            f"{command(row, study.attrs)}"
         )
     longest = slowest(study)
     if longest is not None:
         yield (
             f"slowest ok scene: {duration(longest['seconds'].item())}, "
-            f"{command(longest, study.attrs['seed'])}"
+            f"{command(longest, study.attrs)}"
         )
     yield f"peak memory of a worker: {study['peak_memory'].max().item() / 2**20:.0f} MiB"
 
 
-def command(row: "xr.Dataset", seed: int) -> str:
-    """What repeats a scene."""
-    return f"compsim stress --scene {row['scene'].item()} --seed {seed}"
+def command(row: "xr.Dataset", attrs: dict[str, Any]) -> str:
+    """What repeats a scene of a campaign."""
+    laws = " --laws" if attrs.get("laws") else ""
+    return f"compsim stress --scene {row['scene'].item()} --seed {attrs['seed']}{laws}"

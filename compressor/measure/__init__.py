@@ -1,6 +1,7 @@
 """The trade of speed for accuracy, and the extremes."""
 
 from compressor.measure.explain import Explanation, explain
+from compressor.measure.extremes import Budget
 from compressor.measure.features import SERIES, trade
 from compressor.measure.find import Answer, find
 from compressor.measure.question import Question

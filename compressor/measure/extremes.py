@@ -5,17 +5,20 @@ is documented as supported, odd ones in the whole range; each kind has a scrambl
 its own, over the numbers of `SPANS` and over load, scene, friction's ratio and the start. A span of
 None is the same for both kinds. Contact stiffness is drawn in N/m^1.5; with another exponent it is
 the one whose force at 0.1 mm, the law's full damping, is the same.
+
+With laws, the same scenes have laws of contact and friction that are drawn as well, each as often
+as any other, with the numbers that they read.
 """
 
 import math
+import random
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from compressor.cases import Case, design
+from compressor.cases import Case, design, table
 from compressor.metrics import JOINTS
-from compressor.physics import Power
 
 # name: (unit, whole range, supported range, log-uniform)
 SPANS: dict[str, tuple[str, tuple[float, float], tuple[float, float] | None, bool]] = {
@@ -43,12 +46,27 @@ DEEPEST_START = 0.03  # of the pin radius
 FORCES = {"none": 0.0, "typical": 3087.0, "design": 3347.0}  # N, greatest of each load
 CRANK = 0.12  # m
 SAMPLES = 720  # of the output grid
+# (whole range, supported range) of what chosen laws read, drawn evenly in the logarithm
+OF_LAWS = {
+    "contact.restitution": ((0.05, 1.0), (0.3, 0.95)),
+    "contact.least_approach_mm_per_s": ((0.1, 1000.0), (1.0, 100.0)),
+    "contact.length_mm": ((1.0, 1000.0), (10.0, 100.0)),
+    "contact.modulus_GPa": ((0.1, 1000.0), (10.0, 250.0)),
+    "friction.bristle_stiffness_per_mm": ((1.0, 1e5), (10.0, 1e4)),
+    "friction.bristle_damping_s_per_mm": ((1e-4, 0.3), (1e-3, 0.1)),
+    "friction.viscous_s_per_mm": ((1e-6, 1e-2), (1e-5, 1e-3)),
+}
+ELASTIC = ("johnson", "liu")  # which need no restitution: half of them have none
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How far scenes run, and what each run may cost; `seconds` are more than steps ever need."""
+    """How far scenes run, and what each run may cost; `seconds` are more than steps ever need.
 
+    laws: whether they have laws other than the default ones.
+    """
+
+    laws: bool = False
     revolutions: float = 0.25
     max_steps: int = 500_000
     seconds: float = 30.0
@@ -67,7 +85,7 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
     exponent = found["exponent"]
     stiffness = found["stiffness"] * FULL_DAMPING ** (1.5 - exponent)
     force = found["reciprocating_mass"] * CRANK * (found["speed"] * math.pi / 30) ** 2
-    depth = Power(stiffness, exponent).static_depth(force + FORCES[load])
+    depth = ((force + FORCES[load]) / stiffness) ** (1 / exponent)  # at rest
     worn = [one for one in JOINTS if joint in (one, "both")]
     offset: dict[str, float] = {}
     for one in JOINTS:
@@ -76,7 +94,7 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
             deepest = min(depth, DEEPEST_START * found["pin_radius"])
             offset |= _start(one, drawn, found[f"clearance_{one}"], deepest)
     stiction = 1e3 * found["stiction_velocity"]
-    made = {
+    made: dict[str, Any] = {
         "name": f"stress-{seed}-{number}",
         "load": load,
         "joint": joint,
@@ -100,6 +118,10 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
             "friction_velocity_mm_per_s": 10.0 * stiction,
         },
     }
+    if budget.laws:
+        draw = random.Random(f"{seed} {number}")
+        for group in ("contact", "friction"):
+            made[group] |= chosen(group, draw, supported(number))
     return _rounded(made) | {
         "output": {"keep": "series"},
         "solve": {
@@ -112,6 +134,19 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
             "timeout_s": budget.seconds,
         },
     }
+
+
+def chosen(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
+    """A law of contact or friction, and all that any law reads beside the default one's numbers."""
+    found: dict[str, Any] = {"law": draw.choice(table()[f"{group}.law"].choices)}
+    for key, (whole, narrow) in OF_LAWS.items():
+        low, high = narrow if inside else whole
+        value = low * (high / low) ** draw.random()
+        if key.startswith(group):
+            found[key.partition(".")[2]] = value
+    if found["law"] in ELASTIC and draw.random() < 0.5:
+        del found["restitution"]
+    return found
 
 
 def place(case: Case) -> dict[str, float]:

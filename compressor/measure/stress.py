@@ -27,7 +27,6 @@ from compressor.sweep import Done, Lost, Needs, Progress, run_here
 
 FILE = "stress.nc"
 FULL = Budget()
-NEEDS = Needs(("auto",), horizon=True)
 TIMEOUT = 300.0  # s that a scene may take with all of its judges
 FLUSH = 30.0  # s between two writings of what is finished
 VERDICTS = ("ok", "failed", "silent_wrong", "unjudged")
@@ -107,9 +106,10 @@ def run_scene(task: tuple[int, int, Budget]) -> Row:
     }  # fmt: skip
 
 
-def repeat(number: int, seed: int) -> tuple[dict[str, Any], Row]:
+def repeat(number: int, seed: int, laws: bool = False) -> tuple[dict[str, Any], Row]:
     """The values of a scene's case, by key, and its row, from another run."""
-    return extremes.values(number, seed), run_scene((number, seed, FULL))
+    budget = Budget(laws)
+    return extremes.values(number, seed, budget), run_scene((number, seed, budget))
 
 
 def campaign(
@@ -131,7 +131,8 @@ def campaign(
     progress(total - len(missing), total, "")
     tasks = [(number, (number, seed, budget), TIMEOUT) for number in missing]
     remark = partial(progress, total - len(missing), total)
-    running = run_here(run_scene, tasks, NEEDS, workers, remark)
+    needs = Needs(("auto",), horizon=True, laws=budget.laws)
+    running = run_here(run_scene, tasks, needs, workers, remark)
     try:
         for end in running:
             rows[end.id] = ended(end)
@@ -177,6 +178,7 @@ def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset
     attrs = {
         "title": "outcomes of extreme scenes",
         "seed": seed,
+        "laws": int(budget.laws),
         "settings": settings(budget),
         "program": PROGRAM,
     }
@@ -205,7 +207,7 @@ def settings(budget: Budget) -> str:
     """What scenes and verdicts depend on beside the seed."""
     return (
         f"model {MODEL_VERSION}; {budget.revolutions:g} revolutions, "
-        f"{budget.max_steps} steps or {budget.seconds:g} s"
+        f"{budget.max_steps} steps or {budget.seconds:g} s" + "; with laws drawn" * budget.laws
     )
 
 

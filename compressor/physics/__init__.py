@@ -1,7 +1,7 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
 from compressor.physics.contact import choose_laws
-from compressor.physics.contact_laws import Power, elastic_form
+from compressor.physics.contact_laws import elastic_form
 from compressor.physics.friction_laws import steepest
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.lane_runs import Run, march_side_by_side

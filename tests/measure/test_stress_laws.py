@@ -1,0 +1,61 @@
+"""Extreme scenes with laws drawn: which they are, who judges them, and a few of a campaign."""
+
+from collections import Counter
+
+import pytest
+from compsim.stress import summary
+
+from compressor.cases.case import Case
+from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
+from compressor.measure.extremes import ELASTIC, OF_LAWS, Budget, values
+from compressor.measure.judge import judges
+from compressor.measure.stress import campaign
+from compressor.solve.solution import solve
+from compressor.store.files import StoreError
+
+SMALL = Budget(True, revolutions=0.0625, max_steps=40_000, seconds=20.0)
+COUNT, SEED = 8, 1
+
+
+def test_scenes_have_every_law_and_else_the_numbers_of_old():
+    seen, elastic = Counter(), Counter()
+    for number in range(400):
+        made, plain = values(number, 3, SMALL), values(number, 3, Budget(False, 0.0625, 40_000, 20))
+        contact, friction = made.pop("contact"), made.pop("friction")
+        seen[contact["law"]] += 1
+        seen[friction["law"]] += 1
+        elastic[contact["law"]] += "restitution" not in contact
+        for group, found in (("contact", contact), ("friction", friction)):
+            before = plain.pop(group)
+            assert {key: found[key] for key in before} == before
+            for key, (whole, narrow) in OF_LAWS.items():
+                low, high = narrow if number % 2 == 0 else whole
+                value = found.get(key.partition(".")[2], low) if key.startswith(group) else low
+                assert 0.999 * low <= value <= 1.001 * high
+        assert made == plain
+        Case.from_values({**made, "contact": contact, "friction": friction})
+    assert {*seen} == {*CONTACT_LAWS, *FRICTION_LAWS}
+    assert min(seen.values()) > 20
+    assert {law for law, count in elastic.items() if count} == {*ELASTIC}
+
+
+@pytest.mark.compiled
+def test_only_those_who_land_judge_laws_that_remember_a_meeting():
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": {"duration_rev": 1}})
+    found = solve(case)
+    assert "DOP853" in judges(found)
+    assert judges(found, meets=True) == ("RODAS", "DOPRI5")
+    found.trajectory.evaluations = 20 * found.trajectory.steps  # as of the stiff partner
+    assert judges(found) == ("DOPRI5", "LSODA", "Radau")
+    assert judges(found, meets=True) == ("DOPRI5", "RODAS")
+
+
+@pytest.mark.compiled
+def test_none_of_a_few_scenes_is_wrong_in_silence(tmp_path):
+    study = campaign(tmp_path, COUNT, SEED, 1, budget=SMALL)
+    verdicts = Counter(study["verdict"].values.tolist())
+    assert verdicts["ok"] >= COUNT / 2, verdicts
+    assert not verdicts["silent_wrong"], "\n".join(summary(study))
+    assert f"--seed {SEED} --laws" in "\n".join(summary(study))
+    with pytest.raises(StoreError, match="with laws drawn"):
+        campaign(tmp_path, COUNT, SEED, 1)
