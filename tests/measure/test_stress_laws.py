@@ -41,7 +41,8 @@ def test_scenes_have_every_law_and_else_the_numbers_of_old():
 
 @pytest.mark.compiled
 def test_only_those_who_land_judge_laws_that_remember_a_meeting():
-    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": {"duration_rev": 1}})
+    solve_how = {"duration_rev": 1, "settle_rev": 0}
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": solve_how})
     found = solve(case)
     assert "DOP853" in judges(found)
     assert judges(found, meets=True) == ("RODAS", "DOPRI5")
