@@ -14,6 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from compressor.program import machine_code_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -74,6 +76,10 @@ def load_numba() -> None:
     def type_of(value: Deferred, _: object) -> Any:
         return cpu_target.typing_context.resolve_value_type(value.made)
 
+    @typeof_impl.register(ByKind)
+    def type_of_choice(value: ByKind, _: object) -> Any:
+        return numba.types.Dispatcher(value)
+
     # to be known before anything is compiled
     for intrinsic in (borrowed, fused, square_root):
         vars(intrinsic)["made"] = vars(intrinsic)["make"]()
@@ -114,6 +120,46 @@ def inlined(function: Function) -> Function:
     and makes no vector code of the loop.
     """
     return _compiled(function, inline="always")
+
+
+class ByKind:
+    """A function that is one of two others, by the kind of the record among its arguments.
+
+    Which one is settled when a caller is compiled, so that the other is no part of its machine
+    code, and is not compiled with it.
+    """
+
+    is_compiling = False  # numba asks: whether it calls itself
+
+    def __init__(self, least: int, special: Any, usual: Any):
+        self.least, self.special, self.usual = least, special, usual
+
+    def __call__(self, *arguments: Any) -> Any:
+        lengths = [one["laws"].size for one in arguments if isinstance(one, np.record)]
+        return (self.special if max(lengths, default=0) >= self.least else self.usual)(*arguments)
+
+    def of(self, arguments: Any) -> Any:
+        """The dispatcher for arguments of these types of numba's."""
+        for one in arguments:
+            members = getattr(one, "members", ())
+            for name, field in members:
+                if name == "laws" and field.shape[0] >= self.least:
+                    return self.special.made
+        return self.usual.made
+
+    def get_call_template(self, arguments: Any, keywords: Any) -> Any:
+        """What numba asks of a function that another calls: it compiles the one that is meant."""
+        return self.of(arguments).get_call_template(arguments, keywords)
+
+    def get_overload(self, arguments: Any) -> Any:
+        """What numba asks for when it writes the call."""
+        return self.of(arguments).get_overload(arguments)
+
+
+def by_kind(least: int, special: Function, usual: Function) -> Function:
+    """`special` for records whose `laws` are at least so many, `usual` for all others."""
+    chosen: Any = ByKind(least, special, usual)
+    return chosen
 
 
 def plain(function: Function) -> Function:

@@ -11,7 +11,8 @@ import pytest
 
 from compressor import program
 from compressor.physics import _jit
-from compressor.physics._jit import fused
+from compressor.physics._jit import by_kind, fused, jit, merged
+from compressor.physics.record import new_record
 
 PROBE = """
 import json
@@ -92,3 +93,31 @@ def test_a_fused_product_is_rounded_once():
         exact = float(Fraction(a) * Fraction(b) + Fraction(c))
         assert compiled(a, b, c) == exact
         assert fused(a, b, c) == a * b + c  # from Python
+
+
+@merged
+def product(x, p):
+    return x * p.omega
+
+
+@merged
+def of_no_field(x, p):
+    return x + p.no_such_field
+
+
+either = by_kind(2, of_no_field, product)
+
+
+@jit
+def one_more(x, p):
+    return either(x, p) + 1.0
+
+
+def test_a_function_by_kind_is_that_of_the_record():
+    """The other is not even compiled: it reads a field that no record has."""
+    p = new_record()
+    p["omega"] = 3.0
+    assert (either(2.0, p), one_more(2.0, p)) == (6.0, 7.0)
+    wrong = new_record(chosen=True)
+    with pytest.raises(Exception, match="no_such_field"):
+        one_more(2.0, wrong)
