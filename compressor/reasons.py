@@ -43,6 +43,11 @@ class Reason(StrEnum):
         "the integrator's step has become too short to move the time",
         "try another solve.method, such as Radau, or a looser rtol",
     )
+    CRANK_STALLED = (
+        "crank_stalled",
+        "the crank of a case with a drive has come to a stop, or would turn back",
+        "give the drive more torque_N_m, slope_N_m_s or flywheel_kg_m2",
+    )
     BUDGET_STEPS = (
         "budget_steps",
         "solve.max_steps were taken, refused ones included, before the end was reached",

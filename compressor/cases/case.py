@@ -13,6 +13,7 @@ from compressor.cases.accuracy import ACCURACY, Targets, first_rung
 from compressor.cases.checked import checked_part, keys_given
 from compressor.cases.conflicts import conflicts
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, with_law
+from compressor.cases.mechanism import filled_guide
 from compressor.cases.parameter import CaseError, Problem, shown
 from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
 from compressor.cases.swept import FORMS
@@ -35,8 +36,9 @@ class Case(Settings):
     `Case.from_values` makes a valid one. `name` (of the study), `load` (design, typical or none)
     and `joint` (none, big_end, small_end or both) are words. The groups are `clearance_mm`
     (PerJoint), `initial_offset_mm` (Offset), `machine`, `gas`, `spring`, `contact`, `friction`,
-    `body`, `sensor`, `solve` and `output`, each of the class of that name; friction, body and
-    sensor may be None. A case never changes; `dataclasses.replace` makes another:
+    `guide`, `drive`, `rod`, `body`, `sensor`, `solve` and `output`, each of the class of that name;
+    friction and the five after it may be None. A case never changes; `dataclasses.replace` makes
+    another:
 
     >>> from dataclasses import replace
     >>> import compressor
@@ -116,7 +118,11 @@ class Case(Settings):
             contact = replace(contact, geometry=None)
         friction = with_law("friction", self.friction) if self.friction else self.friction
         contact = with_law("contact", contact)
+        if friction and not friction.ideal_joints:  # as without the key
+            friction = replace(friction, ideal_joints=None)
+        guide = self.guide and filled_guide(self.guide, machine.reciprocating_mass_kg)
         resolved = {"machine": machine, "solve": solve, "contact": contact, "friction": friction}
+        resolved["guide"] = guide
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
             resolved["clearance_mm"] = replace(self.clearance_mm, **unused)
@@ -198,6 +204,17 @@ class Case(Settings):
     def chooses_laws(self) -> bool:
         """Whether contact or friction has another law than the default one."""
         return self.contact.law != CONTACT_LAWS[0] or bool(self.friction and self.friction.law)
+
+    @property
+    def has_features(self) -> bool:
+        """Whether more may move or rub than the paper's machine has: guide, drive, rod, joints."""
+        rubbing = self.friction and self.friction.ideal_joints
+        return bool(self.guide or self.drive or self.rod or rubbing)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it has neither laws of its own nor features: many such runs march in lanes."""
+        return not (self.chooses_laws or self.has_features)
 
     @cached_property
     def physics_key(self) -> str:

@@ -10,6 +10,7 @@ from compressor.cases.law_conflicts import (
     friction_conflicts,
     law_conflicts,
 )
+from compressor.cases.mechanism_conflicts import mechanism_conflicts
 from compressor.cases.one_way import back_action, moving_mass
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
 from compressor.cases.table import GROUPS, Settings, table
@@ -25,6 +26,7 @@ IN_PLACE_OF = (
 )
 HEAVIEST = 0.1  # the moving parts' share of a body's mass
 MOST_BACK = 0.3  # of a force that a body's motion may change at the speed's first two orders
+MANY = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
@@ -106,7 +108,8 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     for axis in sorted({*body.freedoms[:2]} & {*AXES}):
         yield from _resonance_conflicts(case, axis)
     span = (case.duration - case.settle) / case.turn
-    if body.start == "steady" and (case.settles_itself or abs(span - round(span)) > 1e-9):
+    whole = abs(span) < MANY and abs(span - round(span)) <= 1e-9
+    if body.start == "steady" and (case.settles_itself or not whole):
         yield Problem(
             "body.start",
             "steady repeats whole settled revolutions: give duration_rev and settle_rev as whole "
@@ -288,5 +291,5 @@ RULES: tuple[Rule, ...] = (
     *(partial(rule, joint=joint) for joint in JOINTS
       for rule in (_missing_clearance, _clearance_conflicts)),
     _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts, _output_conflicts,
-    law_conflicts, contact_conflicts, friction_conflicts,
+    law_conflicts, contact_conflicts, friction_conflicts, mechanism_conflicts,
 )  # fmt: skip

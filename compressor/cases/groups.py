@@ -244,6 +244,10 @@ class Friction:
         None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_2 over the normal force; 0 by default",
         optional=True,
     )  # fmt: skip
+    ideal_joints: bool | None = choice(
+        None, (), "ours", "whether joints without clearance rub as well", kind="boolean",
+        optional=True,
+    )  # fmt: skip
 
 
 @documented
@@ -309,14 +313,9 @@ class Solve:
         5_000_000, "", (1, 10**12), "ours", "budget of integration steps", kind="integer"
     )
     timeout_s: float = parameter(
-        600.0,
-        "s",
-        (0, 1e7),
-        "ours",
-        "budget of wall time; not part of a job's identity",
-        above=True,
-        identity=False,
-    )
+        600.0, "s", (0, 1e7), "ours", "budget of wall time; not part of a job's identity",
+        above=True, identity=False,
+    )  # fmt: skip
 
 
 @documented

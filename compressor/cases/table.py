@@ -21,6 +21,7 @@ from compressor.cases.groups import (
     Solve,
     Spring,
 )
+from compressor.cases.mechanism import Drive, Guide, Rod
 from compressor.cases.parameter import Parameter, choice
 from compressor.cases.vibration import Body, Sensor
 
@@ -34,13 +35,18 @@ GROUPS: dict[str, type] = {
     "spring": Spring,
     "contact": Contact,
     "friction": Friction,
+    "guide": Guide,
+    "drive": Drive,
+    "rod": Rod,
     "body": Body,
     "sensor": Sensor,
     "solve": Solve,
     "output": Output,
 }
 # groups that a word may stand for: `false` leaves one out, `true` is one with its defaults
-WORDS = {"friction": False, "body": True, "sensor": True}
+WORDS = {
+    "friction": False, "guide": True, "drive": True, "rod": True, "body": True, "sensor": True,
+}  # fmt: skip
 # groups that no joint reads with `joint: none`
 OF_JOINTS = ("clearance_mm",)
 
@@ -66,6 +72,9 @@ class Settings:
     spring: Spring = Spring()
     contact: Contact = Contact()
     friction: Friction | None = Friction()
+    guide: Guide | None = None
+    drive: Drive | None = None
+    rod: Rod | None = None
     body: Body | None = None
     sensor: Sensor | None = None
     solve: Solve = Solve()

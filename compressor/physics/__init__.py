@@ -14,17 +14,25 @@ from compressor.physics.loads import (
     static_load,
 )
 from compressor.physics.march import march
-from compressor.physics.motion import start
 from compressor.physics.observe import (
     COLUMNS,
     Column,
-    derivative_with_flows,
-    observe,
-    observe_all,
 )
-from compressor.physics.record import Load, Scene, new_record, state_names
+from compressor.physics.record import (
+    Coordinate,
+    Load,
+    Scene,
+    is_featured,
+    new_record,
+    state_names,
+)
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
+from compressor.physics.systems import (
+    derivative_with_flows,
+    observe_all,
+    start,
+)
 from compressor.physics.tally import (
     add_flows,
     contact_within,
@@ -34,5 +42,5 @@ from compressor.physics.tally import (
     tally_energy,
     tally_step,
 )
-from compressor.physics.twin import march_twins, new_rows
+from compressor.physics.twin import march_twins
 from compressor.physics.walker import Status, Work, new_walker, new_work

@@ -53,6 +53,9 @@ class Contact(NamedTuple):
     unclamped: float  # normal force before the clamp at zero
 
 
+NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 @inlined
 def joint_contact(eccentricity, spins, clearance, stiffness, carried, p):
     """Contact between a joint's journal and the rod's bore.

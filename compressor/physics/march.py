@@ -17,9 +17,6 @@ from compressor.physics.observe import (
     ACCELERATION,
     COLUMNS,
     NEARNESS,
-    derivative_with_flows,
-    gauge,
-    glance,
 )
 from compressor.physics.onset import LANDED, change, first_onset, remember
 from compressor.physics.runge_kutta import (
@@ -38,6 +35,7 @@ from compressor.physics.step_control import (
     first_step,
     refuse,
 )
+from compressor.physics.systems import derivative_with_flows, gauge, glance
 from compressor.physics.tally import (
     near_record,
     share_apart,

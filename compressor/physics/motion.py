@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from compressor.physics._jit import fused, inlined, jit, merged
-from compressor.physics.contact import Contact, carried_by, joint_contact
+from compressor.physics.contact import NO_CONTACT, Contact, carried_by, joint_contact
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.friction_laws import LUGRE, bristle_rate
 from compressor.physics.kinematics import Motion, ideal, small_angle
@@ -26,7 +26,6 @@ from compressor.physics.record import Scene
 BIG_END = int(Scene.BIG_END)
 SMALL_END = int(Scene.SMALL_END)
 BOTH = int(Scene.BOTH)
-NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Turn(NamedTuple):
@@ -273,6 +272,13 @@ def derivative(t, y, phase, p, out):
     load's phase, 0 to 3.
     """
     write_derivative(evaluate(ideal(t, p), y, phase, p), y, p, out)
+
+
+@jit
+def contact_at(joint, t, y, phase, p):
+    """A joint's `Contact` at a time and state."""
+    now = evaluate(ideal(t, p), y, phase, p)
+    return now.big if joint == 0 else now.small
 
 
 @jit

@@ -16,6 +16,7 @@ from compressor.physics.motion import (
     eccentricity_big_end,
     eccentricity_small_end,
     evaluate,
+    turned,
     write_derivative,
 )
 from compressor.physics.record import Scene
@@ -47,9 +48,15 @@ class Column(IntEnum):
     FRICTION_POWER = 25  # lost to friction
     KINETIC = 26
     POTENTIAL = 27  # contacts' springs and gravity
+    GUIDE_FORCE = 28  # on the guide, upwards; from here on: of a mechanism with features alone
+    GUIDE_MOMENT = 29  # of this and its lever, about the crank's centre, counter-clockwise
+    GUIDE_FRICTION = 30  # on the guide, along x
+    GUIDE_GAP = 31  # least gap of the crosshead's corners, negative where one presses
+    CRANK_SPEED = 32  # rad/s
 
 
-COLUMNS = 28
+COLUMNS = 28  # that a march reads, and that scenes have
+WIDE = int(Column.CRANK_SPEED) + 1  # that a mechanism with features has
 # numba wants plain integers
 DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, int(Column.ACCELERATION)
 ROD_ANGLE, PISTON_FORCE = int(Column.ROD_ANGLE), int(Column.PISTON_FORCE)
@@ -75,6 +82,13 @@ def eccentricity_row(y, turn, p, row):
         big, small = eccentricities_both(y, turn, p)
         row[ECCENTRICITY], row[ECCENTRICITY + 1] = big[0], big[1]
         row[ECCENTRICITY + 2], row[ECCENTRICITY + 3] = small[0], small[1]
+
+
+@jit
+def write_eccentricities(t, y, p, row):
+    """Write both eccentricities (m) at a time (s) and state into the row."""
+    n = p.freedoms
+    eccentricity_row(y, turned(ideal(t, p), y[n - 1], y[2 * n - 1], p), p, row)
 
 
 @inlined

@@ -8,10 +8,9 @@ step goes on; how much of it was without contact is told to the metrics.
 
 from compressor.physics._jit import jit, merged
 from compressor.physics.contact import nearness
-from compressor.physics.kinematics import ideal
-from compressor.physics.motion import derivative, evaluate
 from compressor.physics.observe import PENETRATION
 from compressor.physics.runge_kutta import interpolate
+from compressor.physics.systems import contact_at, derivative
 
 SAMPLES = 12  # intervals of a step that are looked at
 EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
@@ -20,13 +19,6 @@ HALVINGS = 40
 PLACED = 1e-5  # of a step: as well as a change of contact is placed for the metrics
 LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NEVER = 2.0  # a fraction of the step beyond its end
-
-
-@jit
-def contact_at(joint, t, y, phase, p):
-    """A joint's `Contact` at a time and state."""
-    now = evaluate(ideal(t, p), y, phase, p)
-    return now.big if joint == 0 else now.small
 
 
 @jit

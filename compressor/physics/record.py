@@ -48,6 +48,42 @@ CARRIED = (
     "bristles at the big end, m", "bristles at the small end, m",
 )  # fmt: skip
 
+
+class Coordinate(IntEnum):
+    """Coordinates of the general mechanism; a feature that a case does not name leaves out its own.
+
+    An ideal joint has no eccentricity, an ideal guide neither height nor tilt, a rigid rod no
+    deflection, a steady crank no angle of its own.
+    """
+
+    CRANK = 0
+    BIG_X = 1  # eccentricities: journal centre less bore centre, m
+    BIG_Y = 2
+    SMALL_X = 3
+    SMALL_Y = 4
+    GUIDE = 5  # height of the crosshead's pin, m
+    TILT = 6  # of the crosshead, counter-clockwise, rad
+    BEND_1 = 7  # the rod's bending modes: half a wave, a whole one, m
+    BEND_2 = 8
+    STRETCH_MIDDLE = 9  # along the rod, of its middle and of its small end, m
+    STRETCH = 10
+
+
+COORDINATE_NAMES = {
+    Coordinate.BIG_X: ("big end eccentricity x, m", "its rate, m/s"),
+    Coordinate.BIG_Y: ("big end eccentricity y, m", "its rate, m/s"),
+    Coordinate.SMALL_X: ("small end eccentricity x, m", "its rate, m/s"),
+    Coordinate.SMALL_Y: ("small end eccentricity y, m", "its rate, m/s"),
+    Coordinate.GUIDE: ("height in the guide, m", "its rate, m/s"),
+    Coordinate.TILT: ("tilt in the guide, rad", "its rate, rad/s"),
+    Coordinate.BEND_1: ("rod's first bending mode, m", "its rate, m/s"),
+    Coordinate.BEND_2: ("rod's second bending mode, m", "its rate, m/s"),
+    Coordinate.STRETCH_MIDDLE: ("rod's stretch to its middle, m", "its rate, m/s"),
+    Coordinate.STRETCH: ("rod's stretch, m", "its rate, m/s"),
+}
+# of a crank whose speed gives way: behind a steady one's time, and speed over the steady one's
+CRANK = ("crank's lag, s", "crank's slip")
+
 FIELDS: list[tuple] = [
     ("scene", "i8"),
     ("load", "i8"),
@@ -102,10 +138,34 @@ FIELDS: list[tuple] = [
     ("bristle_damping", "f8"),  # sigma_1, s/m
     ("viscous", "f8"),  # sigma_2, s/m
 ]
-# The last field's length tells compiled functions, by its type alone, whether laws were chosen:
-# those for the default laws hold nothing of the others.
+# of a mechanism with more freedom than ideal guides, a steady crank and a rigid rod leave it
+FEATURES: list[tuple] = [
+    ("rubbing", "i8"),  # whether ideal joints have friction
+    ("driven", "i8"),  # whether the crank's speed gives way
+    ("tilting", "i8"),  # whether the crosshead has clearance in its guide
+    ("elastic", "i8"),  # whether the rod is
+    ("at", "i8", (len(Coordinate),)),  # place of each coordinate in a state; -1 of none
+    ("crank_inertia", "f8"),  # about the crank's axis, with the flywheel, kg m^2
+    ("unbalance", "f8"),  # of the crank: mass times its centre's distance, kg m
+    ("torque", "f8"),  # of the motor at the speed omega, N m
+    ("torque_slope", "f8"),  # by which it grows as the speed falls, N m s
+    ("guide_clearance", "f8"),  # of each side, m
+    ("guide_length", "f8"),  # half the crosshead's, m
+    ("guide_height", "f8"),  # half the crosshead's, m
+    ("guide_stiffness", "f8"),  # of a corner on the guide, N/m^p
+    ("guide_friction", "f8"),  # coefficient
+    ("guide_stiction", "f8"),  # m/s
+    ("crosshead_inertia", "f8"),  # about the pin, kg m^2
+    ("axial_stiffness", "f8"),  # of the rod: E A / L, N/m
+    ("bending_stiffness", "f8"),  # E I / L^3, N/m
+    ("rod_damping", "f8"),  # of the rod's material, over its stiffness, s
+]
+# The last field's length tells compiled functions, by its type alone, which kind a record is of:
+# those for the default one hold nothing of the others (`_jit.by_kind`).
+CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
-CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (2,))], align=True)
+CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (CHOICE,))], align=True)
+FEATURED = np.dtype([*FIELDS, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
 
 
 def zero(kind: np.dtype) -> np.record:
@@ -113,20 +173,65 @@ def zero(kind: np.dtype) -> np.record:
     return np.zeros(1, np.dtype((np.record, kind)))[0]
 
 
-def new_record(chosen: bool = False) -> np.record:
-    """A record of zeros, to be filled field by field; `chosen`: for laws but the default ones."""
-    return zero(CHOSEN if chosen else RECORD)
+def new_record(chosen: bool = False, featured: bool = False) -> np.record:
+    """A record of zeros, to be filled field by field.
+
+    chosen: for laws but the default ones; featured: for a mechanism with `FEATURES` and any laws.
+    """
+    return zero(FEATURED if featured else CHOSEN if chosen else RECORD)
+
+
+def is_featured(p: np.record) -> bool:
+    """Whether a record is that of a mechanism with features."""
+    return bool(p["laws"].size == MECHANISM)
+
+
+def present(p: np.record) -> list[Coordinate]:
+    """The coordinates that a mechanism's features and clearances give it, the crank's left out."""
+    found = []
+    if p["clearance"][BIG_END] > 0.0:
+        found += [Coordinate.BIG_X, Coordinate.BIG_Y]
+    if p["clearance"][SMALL_END] > 0.0:
+        found += [Coordinate.SMALL_X, Coordinate.SMALL_Y]
+    if p["tilting"]:
+        found += [Coordinate.GUIDE, Coordinate.TILT]
+    if p["elastic"]:
+        found += [Coordinate.BEND_1, Coordinate.BEND_2, Coordinate.STRETCH_MIDDLE]
+        found += [Coordinate.STRETCH]
+    return found
+
+
+def place_coordinates(p: np.record) -> None:
+    """Give each coordinate of a mechanism its place in a state; the crank's is its speed's."""
+    found = present(p)
+    at = [found.index(one) if one in found else -1 for one in Coordinate]
+    if p["driven"]:
+        at[Coordinate.CRANK] = 2 * len(found) + len(CARRIED) + 1
+    p["at"], p["freedoms"] = at, len(found)
 
 
 def state_names(p: np.record) -> tuple[str, ...]:
-    """Names of the numbers of a record's state: deviations, their rates, what contacts carry."""
-    names = STATE_NAMES[Scene(int(p["scene"]))]
-    return names + CARRIED if names and p["laws"].size > 1 else names
+    """Names of the numbers of a record's state: deviations, their rates, what contacts carry.
+
+    Of a mechanism: its coordinates and their rates in place of deviations, and the crank's lag and
+    slip at the end; numbers that are not used fill the state up to whole fours.
+    """
+    if not is_featured(p):
+        names = STATE_NAMES[Scene(int(p["scene"]))]
+        return names + CARRIED if names and p["laws"].size > 1 else names
+    found = present(p)
+    names = tuple(COORDINATE_NAMES[one][0] for one in found)
+    names += tuple(COORDINATE_NAMES[one][1] for one in found) + CARRIED
+    names += CRANK if p["driven"] else ()
+    return names + ("unused",) * (-len(names) % 4) if found or p["driven"] else ()
 
 
 def derive(p: np.record) -> None:
     """Fill the fields of a record that follow from its others."""
     p["freedoms"], p["wide"] = FREEDOMS[Scene(int(p["scene"]))] or 2, 1
+    fields = p if isinstance(p, dict) else p.dtype.names or ()
+    if "driven" in fields:
+        place_coordinates(p)
     p["crank_ratio"] = p["crank_radius"] / p["rod_length"]
     for name in ("rod_mass", "rod_inertia", "reciprocating_mass", "full_damping"):
         p[f"per_{name}"] = 1.0 / p[name]

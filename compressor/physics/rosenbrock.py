@@ -8,8 +8,9 @@ Ordinary Differential Equations II, IV.7 and IV.10, with their continuous extens
 import numpy as np
 
 from compressor.physics._jit import jit, square_root
-from compressor.physics.observe import derivative_with_flows
+from compressor.physics.linear import factorize, substitute
 from compressor.physics.runge_kutta import FLOWS
+from compressor.physics.systems import derivative_with_flows
 
 STIFF_STAGES = 6
 GAMMA = 0.25
@@ -68,43 +69,6 @@ def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, tim
     derivative_with_flows(earlier, scratch, phase, p, column)
     for i in range(z.size):
         time_rate[i] = (time_rate[i] - column[i]) / (later - earlier)
-
-
-@jit
-def factorize(matrix, pivots):
-    """LU of a small square matrix in place, with partial pivoting; False if it is singular."""
-    n = pivots.size
-    for j in range(n):
-        best = j
-        for i in range(j + 1, n):
-            if abs(matrix[i, j]) > abs(matrix[best, j]):
-                best = i
-        pivots[j] = best
-        if not abs(matrix[best, j]) > 0.0:
-            return False
-        if best != j:
-            for m in range(n):
-                matrix[j, m], matrix[best, m] = matrix[best, m], matrix[j, m]
-        for i in range(j + 1, n):
-            matrix[i, j] /= matrix[j, j]
-            for m in range(j + 1, n):
-                matrix[i, m] -= matrix[i, j] * matrix[j, m]
-    return True
-
-
-@jit
-def substitute(matrix, pivots, b):
-    """Solve with the factors of `factorize`, b (n,) being overwritten by the solution."""
-    n = pivots.size
-    for j in range(n):
-        b[j], b[pivots[j]] = b[pivots[j]], b[j]
-    for i in range(n):
-        for m in range(i):
-            b[i] -= matrix[i, m] * b[m]
-    for i in range(n - 1, -1, -1):
-        for m in range(i + 1, n):
-            b[i] -= matrix[i, m] * b[m]
-        b[i] /= matrix[i, i]
 
 
 @jit

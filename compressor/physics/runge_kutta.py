@@ -12,7 +12,7 @@ import numpy as np
 
 from compressor.physics._jit import fused, merged, square_root
 from compressor.physics.kinematics import ideal_after
-from compressor.physics.observe import derivative_and_gauge, write_flowing_derivative
+from compressor.physics.systems import derivative_and_gauge, write_flowing_derivative
 
 STAGES = 7
 FLOWS = 4

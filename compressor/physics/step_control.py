@@ -12,8 +12,8 @@ import numpy as np
 from compressor.physics import rosenbrock
 from compressor.physics._jit import jit, merged, square_root
 from compressor.physics.elementary import exponential, logarithm
-from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
+from compressor.physics.systems import derivative_with_flows
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)

@@ -11,32 +11,20 @@ import numpy as np
 
 from compressor.physics._jit import jit, merged, square_root
 from compressor.physics.contact_laws import has_chosen_laws
-from compressor.physics.kinematics import crank_direction, ideal
+from compressor.physics.kinematics import crank_direction
 from compressor.physics.march import attempt, march
-from compressor.physics.motion import turned
-from compressor.physics.observe import (
-    COLUMNS,
-    ECCENTRICITY,
-    derivative_with_flows,
-    eccentricity_row,
-)
+from compressor.physics.observe import ECCENTRICITY
 from compressor.physics.onset import meeting
 from compressor.physics.runge_kutta import STAGES
+from compressor.physics.systems import derivative_with_flows, write_eccentricities
 from compressor.physics.walker import DONE, RUNNING
-
-
-def new_rows():
-    """Two observed rows, in which eccentricities are compared."""
-    return np.zeros((2, COLUMNS))
 
 
 @jit
 def separation(t, y, other, p, rows):
     """Greatest distance of two states' eccentricities, over the joint's clearance."""
-    motion = ideal(t, p)
-    n = p.freedoms
-    eccentricity_row(y, turned(motion, y[n - 1], y[2 * n - 1], p), p, rows[0])
-    eccentricity_row(other, turned(motion, other[n - 1], other[2 * n - 1], p), p, rows[1])
+    write_eccentricities(t, y, p, rows[0])
+    write_eccentricities(t, other, p, rows[1])
     worst = 0.0
     for joint in range(2):
         if p.clearance[joint] > 0.0:
@@ -82,7 +70,7 @@ def march_twins(
     """`march` with a twin in step, until they are `far` apart; fellow.status is then DONE.
 
     fellow: the twin's walker, of the same pair; twin: its motion and flows, (n + 4,); far: as
-    share of the clearance; rows: of `new_rows`. The rest as for `march`.
+    share of the clearance; rows: scratch, (2, COLUMNS). The rest as for `march`.
     """
     n = size.size
     for _ in range(limit):

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import TIGHTEST, Case
-from compressor.physics import COLUMNS, Scene, start, state_names
+from compressor.physics import COLUMNS, state_names
 from compressor.solve.energy_audit import energy_residual
 from compressor.solve.error_bars import Companion, Metrics, bars, series_errors
 from compressor.solve.ideal_scene import closed_form
+from compressor.solve.initial import initial_state
 from compressor.solve.integrate import integrate
 from compressor.solve.request import Request, Trajectory
 from compressor.solve.rod_load import reversal, reversal_bars, reversal_times
@@ -22,7 +23,7 @@ from compressor.solve.series import (
     journal_distance,
     take_samples,
 )
-from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.si_record import is_ideal, record
 from compressor.solve.tallied import metrics
 from compressor.solve.turns import Cuts, Turns, merged
 
@@ -89,7 +90,7 @@ def attempt(
     top dead centre (`physics.state_names`), in place of the case's own; no ideal scene has one.
     """
     p, times = record(case), times_of(case, sampled)
-    if scene(case) == Scene.IDEAL:
+    if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER)
         return concluded(rtol, p, times, closed_form(p, times.all, case.settle, pieces, timeout))
     asked = request(case, rtol, p, times, state)
@@ -131,10 +132,10 @@ def request(
 ) -> Request:
     """What `attempt` asks to be integrated, without a limit in wall time."""
     how = case.solve
-    y = np.zeros(len(state_names(p)))
     if state is None:
-        start(offsets(case), y, p)
+        y = initial_state(case, p)
     else:
+        y = np.zeros(len(state_names(p)))
         y[:] = state
     return Request(p, y, times.all, times.settle, rtol, how.method, how.max_steps)
 

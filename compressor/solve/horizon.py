@@ -17,21 +17,21 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.physics import (
+    COLUMNS,
     FLOWS,
-    Scene,
+    Coordinate,
     Status,
+    is_featured,
     march_twins,
-    new_rows,
     new_tally,
     new_work,
     segments,
-    start,
-    state_names,
 )
+from compressor.solve.initial import initial_state
 from compressor.solve.march_driver import CHUNK, check_march
 from compressor.solve.marching import ready_walker
 from compressor.solve.request import Request, Stop
-from compressor.solve.si_record import offsets, record, scene
+from compressor.solve.si_record import is_ideal, record
 from compressor.solve.sizes import natural_sizes
 
 CLOSE = 1e-9  # of the clearance: how far from the motion its twin starts
@@ -71,12 +71,13 @@ def part(case: Case, span: float, rtol: float, close: float, timeout: float) -> 
 
     As `predictability_horizon`, which tells more.
     """
-    if scene(case) == Scene.IDEAL:
+    if is_ideal(case):
         return Parting(span, False, True)
     p = record(case)
-    moved, shifted = (np.zeros(len(state_names(p))) for _ in range(2))
-    start(offsets(case), moved, p)
-    start(offsets(case) + close * p["clearance"][:, None] / math.sqrt(2.0), shifted, p)
+    moved = initial_state(case, p)
+    shifted = initial_state(case, p, close * p["clearance"][:, None] / math.sqrt(2.0))
+    if is_featured(p) and p["tilting"]:
+        shifted[p["at"][Coordinate.GUIDE]] += close * p["guide_clearance"]
     ends = np.array([0.0, span])
     request = Request(p, moved, ends, 0.0, rtol, "auto", case.solve.max_steps, timeout)
     return followed(request, shifted)
@@ -93,7 +94,7 @@ def followed(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting
     size = natural_sizes(p)
     walker, fellow = ready_walker(request, size), ready_walker(request, size)
     z, twin = (np.append(y, np.zeros(FLOWS)) for y in (request.start, shifted))
-    work, twin_work, rows = new_work(size.size), new_work(size.size), new_rows()
+    work, twin_work, rows = new_work(size.size), new_work(size.size), np.zeros((2, COLUMNS))
     states = np.empty((request.times.size, size.size))
     try:
         while walker.status == Status.RUNNING and fellow.status == Status.RUNNING:

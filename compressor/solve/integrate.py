@@ -13,7 +13,7 @@ from compressor.physics import (
     COLUMNS,
     FLOWS,
     new_tally,
-    observe,
+    observe_all,
     sample_segments,
     segments,
     tally_energy,
@@ -32,9 +32,9 @@ def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndar
     result = Trajectory(request.times, states, phases[owner], new_tally())
     z = np.zeros(request.start.size + FLOWS)
     z[:-FLOWS] = request.start
-    row = np.empty(COLUMNS)
-    observe(0.0, request.start, int(phases[0]), request.p, row)
-    tally_energy(row, z[-FLOWS:], result.tally)
+    rows = np.empty((1, COLUMNS))
+    observe_all(np.zeros(1), request.start[np.newaxis], phases[:1], request.p, rows)
+    tally_energy(rows[0], z[-FLOWS:], result.tally)
     return result, edges, phases, z
 
 

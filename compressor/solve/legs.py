@@ -16,7 +16,7 @@ import numpy as np
 from compressor.cases import TIGHTEST, Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Table
-from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe
+from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe_all
 from compressor.reasons import Reason
 from compressor.solve.attempts import Solution, attempt
 from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
@@ -182,9 +182,9 @@ def eccentricities(p: np.record, at: float, state: np.ndarray) -> np.ndarray:
     rates = np.empty_like(z)
     derivative_with_flows(at, z, 0, p, rates)
     span = SHIFT * 2.0 * math.pi / float(p["omega"])
-    row, places = np.empty(COLUMNS), []
-    for shift in (0.0, -span, span):
-        observe(at + shift, state + shift * rates[:-FLOWS], 0, p, row)
-        places.append(row[Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2).copy())
+    shifts, rows = np.array([0.0, -span, span]), np.empty((3, COLUMNS))
+    states = state + shifts[:, np.newaxis] * rates[:-FLOWS]
+    observe_all(at + shifts, states, np.zeros(3, dtype=np.int64), p, rows)
+    places = rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(3, 2, 2)
     here, before, after = places
     return np.concatenate((here, (after - before) / (2.0 * span)), axis=1)

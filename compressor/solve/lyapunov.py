@@ -19,11 +19,10 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.physics import (
+    COLUMNS,
     FLOWS,
-    Scene,
     Status,
     march_twins,
-    new_rows,
     new_tally,
     new_work,
     segments,
@@ -32,7 +31,7 @@ from compressor.reasons import Reason
 from compressor.solve.march_driver import CHUNK, check_march
 from compressor.solve.marching import ready_walker
 from compressor.solve.request import Request, Stop
-from compressor.solve.si_record import record, scene
+from compressor.solve.si_record import is_ideal, record
 from compressor.solve.sizes import natural_sizes
 from compressor.solve.statistics import parts, standard_error, sure
 from compressor.solve.turns import Cuts, with_cuts
@@ -73,7 +72,7 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
     numbers to the bit, unless the time is up. Raises ValueError where all joints are
     ideal: there is no motion of theirs.
     """
-    if scene(case) == Scene.IDEAL:
+    if is_ideal(case):
         raise ValueError("all joints are ideal: the crank alone moves the machine")
     if revolutions < 1:
         raise ValueError(f"{revolutions} revolutions: an exponent needs one at least")
@@ -141,7 +140,7 @@ class _Twins:
         self.walker, self.fellow = (ready_walker(self.request, self.size) for _ in range(2))
         self.z, self.twin = (np.append(state, np.zeros(FLOWS)) for _ in range(2))
         self.work, self.twin_work = (new_work(self.size.size) for _ in range(2))
-        self.rows, self.tally = new_rows(), new_tally()
+        self.rows, self.tally = np.zeros((2, COLUMNS)), new_tally()
         self.states = np.empty((ends.size, self.size.size))
 
     def follow(self, difference: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from compressor.physics import FLOWS, Status, new_work
 from compressor.reasons import Reason
 from compressor.solve.last_steps import retrace
 from compressor.solve.marching import March, Snapshot, Standing, ready_walker
-from compressor.solve.request import LAST, Request, Stop, Trajectory, overdue, too_deep
+from compressor.solve.request import LAST, Request, Stop, Trajectory, check_speed, overdue, too_deep
 from compressor.solve.sizes import natural_sizes
 from compressor.solve.turns import with_cuts, with_edge
 
@@ -41,6 +41,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
         if walker.status == Status.DONE:
             return
         try:
+            check_speed(request.p, z)
             check_march(request, walker, float(result.tally.deepest), deadline)
         except Stop:
             result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()

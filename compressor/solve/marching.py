@@ -5,8 +5,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics import FLOWS, Mode, Pair, Work, march, new_tally, new_walker, new_work
+from compressor.physics import (
+    FLOWS,
+    Mode,
+    Pair,
+    Work,
+    march,
+    new_tally,
+    new_walker,
+    new_work,
+)
 from compressor.solve.request import Request, greatest_depth
+from compressor.solve.sizes import contact_sizes
 
 COMPILED = {
     "auto": (Mode.AUTO, Pair.TSIT5),
@@ -107,6 +117,7 @@ def ready_walker(request: Request, size: np.ndarray) -> np.record:
     mode, pair = COMPILED[request.method]
     walker = new_walker(mode)
     walker["pair"], walker["rtol"] = pair, request.rtol
-    walker["watch"], walker["contact_step"] = 1, CONTACT_STEP * size[0] / size[size.size // 2]
+    length, speed = contact_sizes(request.p, size)
+    walker["watch"], walker["contact_step"] = 1, CONTACT_STEP * length / speed
     walker["deepest"] = greatest_depth(request.p)[0]
     return walker

@@ -6,11 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compressor.cases import IMPLAUSIBLE
-from compressor.physics import elastic_form
+from compressor.physics import Coordinate, elastic_form, is_featured
+from compressor.reasons import Reason
 from compressor.solve.turns import Cuts
 
 LAST = 16  # attempts that a history keeps
 NONE = -1  # in place of a number of the state
+STALLED = 0.01  # of the steady speed: a crank that is slower has all but stopped
 
 
 @dataclass
@@ -87,6 +89,18 @@ class Stop(Exception):
 def overdue(timeout: float) -> str:
     """What is wrong with a run that takes longer (s)."""
     return f"more than {timeout:g} s of wall time"
+
+
+def check_speed(p: np.record, state: np.ndarray) -> None:
+    """Raise Stop where a crank whose speed gives way has all but come to a stop."""
+    if is_featured(p) and p["driven"] and state[p["at"][Coordinate.CRANK]] <= STALLED - 1.0:
+        least = STALLED * p["omega"] * 30.0 / math.pi
+        detail = (
+            f"slower than {least:.3g} rpm: the motor gives {p['torque']:g} N m at full speed and "
+            f"{p['torque_slope']:g} N m for each rad/s less, the flywheel has "
+            f"{p['crank_inertia']:g} kg m2"
+        )
+        raise Stop(Reason.CRANK_STALLED, detail)
 
 
 def greatest_depth(p: np.record) -> tuple[float, str]:

@@ -18,7 +18,6 @@ from compressor.physics import (
     contact_within,
     derivative_with_flows,
     lobatto,
-    observe,
     observe_all,
     sample_segments,
     shares_apart,
@@ -26,7 +25,15 @@ from compressor.physics import (
     tally_step,
 )
 from compressor.reasons import Reason
-from compressor.solve.request import Request, Stop, Trajectory, greatest_depth, overdue, too_deep
+from compressor.solve.request import (
+    Request,
+    Stop,
+    Trajectory,
+    check_speed,
+    greatest_depth,
+    overdue,
+    too_deep,
+)
 from compressor.solve.sizes import absolute_tolerances, length_and_speed
 from compressor.solve.turns import with_cuts
 
@@ -46,7 +53,7 @@ class Derivative:
     def __init__(self, request: Request):
         self.p = request.p
         self.z = np.zeros(request.start.size + FLOWS)
-        self.row = np.empty(COLUMNS)
+        self.rows = np.empty((1, COLUMNS))
         self.phase = 0
         self.evaluations = 0
         self.bad = 0
@@ -140,6 +147,7 @@ class Segment:
             result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
             taken = solver.t - solver.t_old
             result.history.add(solver.t_old, taken, math.nan, f"{request.method} taken")
+            check_speed(request.p, solver.y)
             self.check()
         if self.end == request.times[-1]:
             result.stop_time = math.nan
@@ -190,9 +198,9 @@ class Segment:
     def audit(self, solver) -> None:
         """Compare the energy at the step's end with the flows up to there."""
         state, flows = solver.y[:-FLOWS].copy(), solver.y[-FLOWS:].copy()
-        row = self.right_hand_side.row
-        observe(solver.t, state, self.right_hand_side.phase, self.request.p, row)
-        tally_energy(row, flows, self.result.tally)
+        hand, now = self.right_hand_side, np.array([solver.t])
+        observe_all(now, state[np.newaxis], np.array([hand.phase]), self.request.p, hand.rows)
+        tally_energy(hand.rows[0], flows, self.result.tally)
 
     def check(self) -> None:
         """Raise Stop when a journal sinks in implausibly deep."""

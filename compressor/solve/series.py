@@ -12,7 +12,7 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import SERIES, SIZES
-from compressor.physics import COLUMNS, Column, observe_all
+from compressor.physics import COLUMNS, Column, is_featured, observe_all
 from compressor.solve.request import Trajectory
 
 COLUMN = {
@@ -25,14 +25,18 @@ COLUMN = {
     "eccentricity": Column.ECCENTRICITY,
     "penetration": Column.PENETRATION,
 }
+WIDE = Column.CRANK_SPEED + 1  # columns of a mechanism with features
 A_TURN = 150  # times a revolution at which two runs are compared
 OF_A_PERIOD = 24  # samples of the forces in one of the body's fastest motion
 FEWEST, MOST = 64, 20_000  # of these times over a settled part
 
 
 def rows_of(p: np.record, run: Trajectory) -> np.ndarray:
-    """Observed rows of a run at its times, shape (m, COLUMNS); nan from where it stopped."""
-    rows = np.empty((run.times.size, COLUMNS))
+    """Observed rows of a run at its times, (m, COLUMNS); nan from where it stopped.
+
+    Of a mechanism with features (m, WIDE), with what its guide bears.
+    """
+    rows = np.empty((run.times.size, WIDE if is_featured(p) else COLUMNS))
     observe_all(run.times, run.states, run.phases, p, rows)
     rows[np.isnan(run.states).any(axis=1)] = math.nan
     return rows

@@ -12,11 +12,10 @@ import numpy as np
 
 from compressor.cases import ACCURACY, Case
 from compressor.metrics import METRICS
-from compressor.physics import Scene
 from compressor.solve.attempts import attempt
 from compressor.solve.error_bars import Metrics
 from compressor.solve.regime import Search
-from compressor.solve.si_record import record, scene
+from compressor.solve.si_record import is_ideal, record
 from compressor.solve.tallied import metrics
 from compressor.solve.turns import Cuts, Turns, revolutions
 
@@ -41,7 +40,7 @@ def with_span(case: Case, search: Search) -> Settling:
     """Give numbers to `settle_rev: auto` and `duration_rev: auto`, within the case's wall time."""
     if case.solve.settle_rev != "auto":
         return Settling(spanned(case, float(case.solve.settle_rev), 1))
-    if scene(case) == Scene.IDEAL:
+    if is_ideal(case):
         return Settling(spanned(case, 0.0, 1), 0.0)
     most = int(case.duration / case.turn * (1 + 1e-12))
     p, within = record(case), least_promise(case)

@@ -28,6 +28,12 @@ def scene(case: Case) -> Scene:
     return Scene(int(big) * Scene.BIG_END + int(small) * Scene.SMALL_END)
 
 
+def is_ideal(case: Case) -> bool:
+    """Whether nothing is integrated: ideal joints, and nothing else that may move."""
+    play = case.guide is not None and case.guide.clearance_mm > 0
+    return scene(case) == Scene.IDEAL and not (play or case.drive or case.rod)
+
+
 def record(case: Case) -> np.record:
     """The record of a case, every number in SI."""
     p: dict[str, Any] = {}  # what is not set stays zero
@@ -38,8 +44,10 @@ def record(case: Case) -> np.record:
     _gas(case, p)
     _spring(case, p)
     ratio = case.gas.discharge_MPa / case.gas.suction_MPa
+    if case.has_features:
+        _features(case, p)
     complete(p, ratio, printed=case.gas.switching == "paper")
-    filled = new_record(case.chooses_laws)
+    filled = new_record(case.chooses_laws, case.has_features)
     for name, value in p.items():
         filled[name] = value
     return filled
@@ -106,3 +114,32 @@ def _spring(case: Case, p: dict[str, Any]) -> None:
     p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")
     p["preload"] = spring.preload_N
     p["spring_stroke"] = to_si(spring.stroke_mm, "mm")
+
+
+def _features(case: Case, p: dict[str, Any]) -> None:
+    """What frees more than the joints: guide, drive, rod, friction of ideal joints."""
+    p["rubbing"] = int(bool(case.friction and case.friction.ideal_joints))
+    p["driven"], p["elastic"] = int(case.drive is not None), int(case.rod is not None)
+    p["tilting"] = int(case.guide is not None and case.guide.clearance_mm > 0)
+    guide, drive, rod = case.guide, case.drive, case.rod
+    p["guide_stiction"] = p["crosshead_inertia"] = 1.0  # where nothing reads them
+    if guide:
+        p["guide_clearance"] = to_si(guide.clearance_mm, "mm")
+        p["guide_length"] = to_si(guide.crosshead_length_mm, "mm") / 2
+        p["guide_height"] = to_si(guide.crosshead_height_mm, "mm") / 2
+        p["guide_stiffness"] = guide.stiffness_N_per_mm15 * 1000.0**case.contact.exponent
+        p["guide_friction"] = guide.friction
+        p["guide_stiction"] = to_si(guide.stiction_velocity_mm_per_s, "mm/s")
+        p["crosshead_inertia"] = guide.crosshead_inertia_kg_m2 or 0.0
+    if drive:
+        p["crank_inertia"] = drive.flywheel_kg_m2
+        p["unbalance"] = to_si(drive.unbalance_kg_mm, "kg mm")
+        p["torque"] = drive.torque_N_m
+        p["torque_slope"] = drive.slope_N_m_s
+    if rod:
+        modulus, length = to_si(rod.youngs_modulus_GPa, "GPa"), p["rod_length"]
+        depth, width = to_si(rod.depth_mm, "mm"), to_si(rod.width_mm, "mm")
+        p["axial_stiffness"] = modulus * depth * width / length
+        p["bending_stiffness"] = modulus * width * depth**3 / 12 / length**3
+        slowest = math.pi**2 * math.sqrt(p["bending_stiffness"] / p["rod_mass"])  # rad/s
+        p["rod_damping"] = 2.0 * rod.damping_ratio / slowest

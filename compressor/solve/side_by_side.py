@@ -69,7 +69,8 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
 def suits(case: Case) -> bool:
     """Whether a case may be simulated in lanes, by what it says of its solution."""
     how = case.solve
-    ready = not case.problems and how.method in LANE_METHODS and how.settle_rev != "auto"
+    ready = case.is_plain and not case.problems and how.method in LANE_METHODS
+    ready = ready and how.settle_rev != "auto"
     return ready and how.timeout_s >= LEAST_TIME and how.max_steps >= MOST_ATTEMPTS
 
 

@@ -13,7 +13,7 @@ positive towards the crank, and g gravity against y:
 
 import numpy as np
 
-from compressor.physics import Column
+from compressor.physics import Column, Coordinate, is_featured
 from compressor.solve.series import block
 
 # over time and these dimensions: (dimensions, unit, long name)
@@ -26,12 +26,51 @@ SIGNALS = {
     "rod_load": ((), "N", "force of the crosshead pin on the rod along x, positive in tension"),
 }
 
+# of a mechanism that has the coordinate: the same, and how they come of it
+FEATURES: dict[str, tuple[Coordinate, str, str]] = {
+    "guide_height": (Coordinate.GUIDE, "m", "height of the crosshead's pin in its guide"),
+    "guide_tilt": (Coordinate.TILT, "rad", "tilt of the crosshead, counter-clockwise"),
+    "rod_bend": (Coordinate.BEND_1, "m", "deflection of the rod across it, of its first mode"),
+    "rod_stretch": (Coordinate.STRETCH, "m", "by which the rod is longer"),
+}
+
+
+def features(
+    p: np.record, states: np.ndarray, rows: np.ndarray
+) -> dict[str, tuple[np.ndarray, str, str]]:
+    """The series that a mechanism's features add, by name: values (m,), unit, long name.
+
+    states: (m, n); rows: observed there, (m, WIDE).
+    """
+    found = {}
+    for name, (coordinate, unit, phrase) in FEATURES.items():
+        if p["at"][coordinate] >= 0:
+            found[name] = states[:, p["at"][coordinate]].copy(), unit, phrase
+    if p["tilting"]:
+        gap = rows[:, Column.GUIDE_GAP].copy()
+        found["guide_gap"] = gap, "m", "least gap of the crosshead's corners, negative in contact"
+    if p["driven"]:
+        found["crank_speed"] = rows[:, Column.CRANK_SPEED].copy(), "rad/s", "speed of the crank"
+    return found
+
+
+def passed(p: np.record, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Time (s) that has passed when the crank is where a steady one were at these times."""
+    driven = is_featured(p) and p["driven"]
+    return times + states[:, p["at"][Coordinate.CRANK] - 1] if driven else times
+
 
 def signals(p: np.record, rows: np.ndarray) -> dict[str, np.ndarray]:
     """The `SIGNALS` by name from observed rows, (m, COLUMNS); SI."""
     series = (block(name, rows) for name in ("contact_force", "piston_force", "displacement"))
     found = forces_on_frame(p, *series)
     found["crank_torque"] = rows[:, Column.CRANK_POWER] / p["omega"]
+    if is_featured(p):
+        guide = rows[:, Column.GUIDE_FORCE]
+        found["shaking_force"][:, 0] += rows[:, Column.GUIDE_FRICTION]
+        found["shaking_force"][:, 1] += guide - found["guide_force"]
+        found["guide_force"], found["guide_moment"] = guide, rows[:, Column.GUIDE_MOMENT]
+        found["crank_torque"] = rows[:, Column.CRANK_POWER] / rows[:, Column.CRANK_SPEED]
     return {name: found[name] for name in SIGNALS}
 
 

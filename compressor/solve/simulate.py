@@ -8,7 +8,7 @@ import numpy as np
 from compressor.cases import MODEL_VERSION, Case
 from compressor.metrics import SERIES
 from compressor.outcome import Outcome, Table, row, without_run
-from compressor.physics import FLOWS, state_names
+from compressor.physics import FLOWS, is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
 from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
@@ -16,7 +16,7 @@ from compressor.solve.foundation import foundation
 from compressor.solve.request import NONE, Trajectory
 from compressor.solve.series import block, finer, rows_of
 from compressor.solve.si_record import record
-from compressor.solve.signals import SIGNALS, signals
+from compressor.solve.signals import SIGNALS, features, passed, signals
 from compressor.solve.solution import solve
 from compressor.solve.tallied import ledger
 
@@ -122,9 +122,10 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     p, every = solution.p, finer(case)
     whole = rows_of(p, solution.trajectory)
     rows, times = whole[::every], solution.trajectory.times[::every]
+    states = solution.trajectory.states[::every]
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
     variables: dict[str, tuple] = {
-        "time": (("time",), times, {"units": "s", "long_name": "time"}),
+        "time": (("time",), passed(p, times, states), {"units": "s", "long_name": "time"}),
         "crank_angle": (("time",), p.omega * times, angle),
     }
     for name, (dims, unit, phrase) in SERIES.items():
@@ -133,6 +134,9 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     for name, values in (signals(p, rows) if case.output.signals else {}).items():
         dims, unit, phrase = SIGNALS[name]
         variables[name] = (("time", *dims), values, {"units": unit, "long_name": phrase})
+    if is_featured(p):
+        for name, (values, unit, phrase) in features(p, states, rows).items():
+            variables[name] = (("time",), values, {"units": unit, "long_name": phrase})
     return variables | (foundation(case, solution, whole) if case.body else {})
 
 

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from compressor.physics import FLOWS, elastic_form, state_names, static_load
+from compressor.physics import FLOWS, elastic_form, is_featured, state_names, static_load
+from compressor.solve.mechanism_sizes import mechanism_sizes
 
 
 def length_and_speed(p: np.record) -> tuple[float, float]:
@@ -29,6 +30,9 @@ def natural_sizes(p: np.record) -> np.ndarray:
 
     With chosen laws also of what contacts carry (`state_names`): speeds, bristles as they slide.
     """
+    if is_featured(p):
+        joints = length_and_speed(p) if p["clearance"].any() else (1.0, 1.0)
+        return mechanism_sizes(p, joints, bristle_size(p, joints[0]))
     length, speed = length_and_speed(p)
     n = int(p["freedoms"])
     sizes = np.full(2 * n, length)
@@ -37,9 +41,24 @@ def natural_sizes(p: np.record) -> np.ndarray:
     more = len(state_names(p)) - sizes.size
     if not more:
         return sizes
-    stiffness = float(p["bristle_stiffness"])
-    bent = float(p["dynamic"]) / stiffness if stiffness and p["dynamic"] else length
+    bent = bristle_size(p, length)
     return np.concatenate((sizes, np.full(2, speed), np.full(2, bent)))
+
+
+def bristle_size(p: np.record, length: float) -> float:
+    """Deflection (m) of bristles that slide; a length where there are none."""
+    stiffness = float(p["bristle_stiffness"])
+    return float(p["dynamic"]) / stiffness if stiffness and p["dynamic"] else length
+
+
+def contact_sizes(p: np.record, sizes: np.ndarray) -> tuple[float, float]:
+    """Length (m) and speed (m/s) of the journals in their bores, of sizes by `natural_sizes`.
+
+    Of a mechanism with ideal joints no step need be as short as theirs.
+    """
+    if not is_featured(p):
+        return sizes[0], sizes[sizes.size // 2]
+    return length_and_speed(p) if p["clearance"].any() else (math.inf, 1.0)
 
 
 def absolute_tolerances(p: np.record, rtol: float) -> np.ndarray:

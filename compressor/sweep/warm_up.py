@@ -25,29 +25,33 @@ LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
 class Needs(NamedTuple):
     """What some cases need of the equations: methods, twins for a horizon, scenes in lanes, laws
-    other than the default ones.
+    other than the default ones, a mechanism with features.
     """
 
     methods: tuple[str, ...] = ()
     horizon: bool = False
     lanes: tuple[int, ...] = ()
     laws: bool = False
+    features: bool = False
 
     @classmethod
     def of(cls, cases: Iterable[Case]) -> "Needs":
-        methods, twins, laws = {"auto"}, False, False
+        methods, twins, laws, features = {"auto"}, False, False, False
         for case in cases:  # which may be made one by one
             methods.add(case.solve.method)
             twins = twins or case.solve.horizon is True
-            laws = laws or case.chooses_laws
-        return cls(tuple(sorted(methods)), twins, laws=laws)
+            features = features or case.has_features
+            laws = laws or (case.chooses_laws and not case.has_features)
+        return cls(tuple(sorted(methods)), twins, laws=laws, features=features)
 
     @property
     def parts(self) -> list[str]:
         """The parts of the equations that are needed, by name."""
         lanes = [f"lanes-{of}" for of in self.lanes]
-        laws = ["laws", *["laws-horizon"] * self.horizon] if self.laws else []
-        return [*self.methods, *["horizon"] * self.horizon, *lanes, *laws]
+        twins = ["", *["-horizon"] * self.horizon]
+        kinds = [*["laws"] * self.laws, *["features"] * self.features]
+        more = [kind + twin for kind in kinds for twin in twins]
+        return [*self.methods, *["horizon"] * self.horizon, *lanes, *more]
 
     def with_lanes(self, cases: Sequence[Case]) -> "Needs":
         """With the scenes of which there are jobs enough to march side by side.
@@ -59,7 +63,7 @@ class Needs(NamedTuple):
 
         step = max(1, len(cases) // SEEN)
         looked = (cases[i] for i in range(0, len(cases), step))
-        seen = Counter(int(scene(case)) for case in looked if not case.chooses_laws)
+        seen = Counter(int(scene(case)) for case in looked if case.is_plain)
         least = {of: FEWEST if marker(f"lanes-{of}").exists() else MANY for of in LANES}
         return self._replace(lanes=tuple(of for of in LANES if seen[of] * step >= least[of]))
 
@@ -80,10 +84,15 @@ def load(needs: Needs) -> None:
         short = {"clearance_mm": 0.1, "solve": solve}
         cases = [Case.from_values({"joint": joint, **short}) for joint in LANES.values()]
         side_by_side(cases, needs.lanes)
-    values = {"joint": "both", "clearance_mm": 0.1}
-    for contact in [{}, {"law": "hertz"}] if needs.laws else [{}]:
+    values: dict[str, object] = {"joint": "both", "clearance_mm": 0.1}
+    kinds: list[dict[str, object]] = [{}]
+    if needs.laws:
+        kinds.append({"contact": {"law": "hertz"}})
+    if needs.features:
+        kinds.append({"guide": True})
+    for kind in kinds:
         for how in hows:
-            measure(Case.from_values({**values, "contact": contact, "solve": solve | how}))
+            measure(Case.from_values({**values, **kind, "solve": solve | how}))
 
 
 def load_telling(needs: Needs, remark: Callable[[str], None]) -> None:

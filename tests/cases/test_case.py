@@ -190,6 +190,12 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
         ({"solve": {"output_step_s": 1}}, "solve.output_step_s", "longer than the duration"),
         ({"solve": {"output_step_s": 5e-324}}, "solve.output_step_s", "makes inf samples"),
         ({"solve": {"settle_rev": 4}}, "solve.settle_rev", "leave nothing of a run of 4"),
+        ({"body": True, "drive": True}, "body", "leave out body or drive"),
+        ({"rod": True, "machine": {"rod_centre_mm": 200}}, "machine.rod_centre_mm", "uniform bar"),
+        ({"rod": True, "machine": {"rod_inertia_kg_m2": 0.1}}, "machine.rod_inertia_kg_m2",
+         "0.141 kg m2 at least"),
+        ({"friction": {"law": "lugre", "ideal_joints": True}}, "friction.ideal_joints", "bristles"),
+        ({"guide": {"friction": 0}}, "guide.friction", "leaves an ideal guide"),
     ],
 )  # fmt: skip
 def test_values_that_do_not_fit_each_other(values, key, message):
@@ -413,6 +419,8 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"contact": {"materials": ["steel", "steel"]}}
     if group == "sensor":
         base |= {"body": True, "sensor": True}
+    if group in ("guide", "drive", "rod"):
+        base |= {group: True}
     if name in OF_LAWS:
         law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}
         law = {"law": "johnson", **OF_PINS} if name in OF_PINS else law

@@ -586,7 +586,9 @@ CASES = st.fixed_dictionaries(
         | st.just({"materials": ["steel", "steel"], "geometry": "internal"}),
         "friction": st.just(False)
         | group("friction", *OF_LAWS)
-        | group("friction").map(lambda values: {"law": "lugre"} | values),
+        | group("friction", "ideal_joints").map(lambda values: {"law": "lugre"} | values),
+        "guide": st.just(True) | group("guide"),
+        "drive": st.just(True) | group("drive"),
         "solve": st.sampled_from([a | b for a in TIMES for b in SOLVES]),
         "output": group("output", "signals") | st.just({"keep": "series", "signals": True}),
     },

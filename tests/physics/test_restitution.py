@@ -9,64 +9,16 @@ import math
 
 import numpy as np
 import pytest
+from published import ASKED, GIVEN, drop, given_back
 from scipy.optimize import brentq
 
 from compressor.cases.case import Case
 from compressor.physics.contact_laws import HYSTERESIS, Law
-from compressor.physics.observe import COLUMNS, Column, observe
-from compressor.physics.record import CARRIED, state_names
+from compressor.physics.record import CARRIED
 from compressor.solve.attempts import attempt
-from compressor.solve.si_record import record
 
-# by law: what comes back with 0.9, 0.7, 0.5 and 0.3 asked for, from the closed form
-GIVEN = {
-    "lankarani_nikravesh": (0.9132, 0.7960, 0.7252, 0.6842),
-    "hunt_crossley": (0.9090, 0.7680, 0.6630, 0.5813),
-    "flores": (0.8939, 0.6832, 0.4704, 0.2562),
-    "gonthier": (0.8764, 0.6696, 0.4877, 0.3042),
-    "hu_guo": (0.8999, 0.6973, 0.4877, 0.2707),
-}
-ASKED = (0.9, 0.7, 0.5, 0.3)
 EACH = [(law, e, out) for law, many in GIVEN.items() for e, out in zip(ASKED, many, strict=True)]
-CLEARANCE = 2e-4  # m
 pytestmark = pytest.mark.compiled
-
-
-def drop(joint, speed, method="auto", mass=5.0, rtol=1e-8, **contact):
-    """The crosshead flying at a speed (m/s) against the rod's end, along the rod, at almost no
-    crank speed: the rows observed at 400 times until it has come and gone.
-    """
-    depth = (1.25 * mass * speed**2 / (3.36e5 * 1000**1.5)) ** 0.4
-    span = 2.0 * CLEARANCE / speed + 2.0 * 2.9432 * depth / speed  # there and back; Hertz's contact
-    values = {
-        "joint": joint,
-        "clearance_mm": 1000 * CLEARANCE,
-        "load": "none",
-        "friction": False,
-        "contact": contact,
-        "machine": {"speed_rpm": 1e-3, "reciprocating_mass_kg": mass},
-        "solve": {"duration_s": span, "settle_rev": 0, "rtol": rtol, "method": method,
-                  "output_step_s": span / 400, "error_bars": False},
-    }  # fmt: skip
-    case = Case.from_values(values)
-    p = record(case)
-    state = np.zeros(len(state_names(p)))
-    state[p["freedoms"]] = speed if joint == "small_end" else -speed
-    if state.size > 2 * p["freedoms"]:
-        state[2 * p["freedoms"] :][:2] = p["least_approach"]
-    run = attempt(case, case.rtol, 60.0, True, state=state)
-    assert run.reason == ""
-    rows = np.empty((run.trajectory.times.size, COLUMNS))
-    for i, (t, y) in enumerate(zip(run.trajectory.times, run.trajectory.states, strict=True)):
-        observe(t, y, int(run.trajectory.phases[i]), p, rows[i])
-    return run, rows
-
-
-def given_back(rows):
-    """Share of the speed after the first contact in that before it."""
-    touching = rows[:, Column.NORMAL + 1] > 0.0
-    after = np.flatnonzero(touching[:-1] & ~touching[1:])[0] + 1
-    return -rows[after, Column.VELOCITY] / rows[0, Column.VELOCITY]
 
 
 @pytest.mark.parametrize(("law", "asked", "given"), EACH)

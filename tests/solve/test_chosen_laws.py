@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 import pytest
+from published import DRY, MACHINE, STIFFNESS
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
@@ -24,22 +25,6 @@ from compressor.solve.simulate import simulate
 from compressor.solve.sizes import natural_sizes
 
 pytestmark = pytest.mark.compiled
-
-MACHINE = {
-    "crank_radius_mm": 50, "rod_length_mm": 120, "rod_mass_kg": 0.21, "rod_inertia_kg_m2": 2.5e-4,
-    "reciprocating_mass_kg": 0.14, "speed_rpm": 5000, "pin_radius_mm": 9.5,
-}  # fmt: skip
-STIFFNESS = 6.61e10  # N/m^1.5
-DRY = {
-    "joint": "small_end",
-    "clearance_mm": 0.5,
-    "load": "none",
-    "machine": MACHINE,
-    "contact": {"law": "lankarani_nikravesh", "restitution": 0.9,
-                "stiffness_N_per_mm15": STIFFNESS / 1000**1.5},
-    "friction": {"law": "ambrosio", "dynamic": 0.03, "stiction_velocity_mm_per_s": 0.1,
-                 "friction_velocity_mm_per_s": 1.0},
-}  # fmt: skip
 
 
 def dry(**solve):

@@ -9,7 +9,8 @@ from conftest import keep
 from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case, CaseError
-from compressor.physics import COLUMNS, derivative_with_flows, observe
+from compressor.physics import COLUMNS, derivative_with_flows
+from compressor.physics.observe import observe
 from compressor.solve.foundation import BODY
 from compressor.solve.si_record import record
 from compressor.solve.simulate import measure, simulate

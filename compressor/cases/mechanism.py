@@ -1,0 +1,109 @@
+"""The groups of a case file that free what the paper's machine holds: guide, drive and rod."""
+
+from dataclasses import dataclass, replace
+
+from compressor.cases.parameter import documented, parameter
+
+OURS = "ours"
+
+
+@documented
+@dataclass(frozen=True)
+class Guide:
+    """The crosshead's guide; a case's `guide`, None unless a case asks: ideal, without friction.
+
+    With a clearance the crosshead moves across and tilts, and its four corners meet the guide by
+    ADAMS's IMPACT. `True` stands for the defaults, an ideal guide with friction:
+
+    >>> import compressor
+    >>> case = compressor.Case.from_values({"guide": {"clearance_mm": 0.1}})
+    >>> round(case.guide.crosshead_inertia_kg_m2, 4)  # 14 kg (0.12^2 + 0.08^2) / 12
+    0.0243
+    """
+
+    clearance_mm: float = parameter(
+        0.0, "mm", (0, 100), OURS, "between crosshead and guide, on each side"
+    )
+    friction: float = parameter(0.05, "", (0, 10), OURS, "coefficient of friction, oiled")
+    stiction_velocity_mm_per_s: float = parameter(
+        10.0, "mm/s", (0, 1e6), "Table 3, of the joints", "speed at which friction is three "
+        "quarters of its greatest", above=True,
+    )  # fmt: skip
+    crosshead_length_mm: float = parameter(
+        120.0, "mm", (0, 1e4), OURS, "the crosshead's length", above=True
+    )
+    crosshead_height_mm: float = parameter(
+        80.0, "mm", (0, 1e4), OURS, "the crosshead's height", above=True
+    )
+    crosshead_inertia_kg_m2: float | None = parameter(
+        None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
+        "the crosshead's inertia about its pin", above=True, optional=True,
+    )  # fmt: skip
+    stiffness_N_per_mm15: float = parameter(
+        3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
+        "contact stiffness of a corner, in N/mm^exponent", above=True,
+    )  # fmt: skip
+
+
+@documented
+@dataclass(frozen=True)
+class Drive:
+    """A motor whose speed gives way; a case's `drive`, None unless a case asks: steady speed.
+
+    The motor's torque is a line by the speed: `torque_N_m` at `machine.speed_rpm`, and more by
+    `slope_N_m_s` for each rad/s that the crank is slower. `True` stands for the defaults; a
+    crank that runs free has neither torque nor slope:
+
+    >>> import compressor
+    >>> free = {"slope_N_m_s": 0, "flywheel_kg_m2": 0.5}
+    >>> compressor.Case.from_values({"drive": free}).drive.torque_N_m
+    0.0
+    """
+
+    flywheel_kg_m2: float = parameter(
+        5.0, "kg m2", (0, 1e9), OURS, "inertia of crank, flywheel and motor", above=True
+    )
+    torque_N_m: float = parameter(0.0, "N m", (-1e9, 1e9), OURS, "torque at machine.speed_rpm")
+    slope_N_m_s: float = parameter(
+        100.0, "N m s", (0, 1e9), OURS, "by which the torque grows for each rad/s that speed falls"
+    )
+    unbalance_kg_mm: float = parameter(
+        0.0, "kg mm", (0, 1e9), OURS,
+        "the crank's mass times its centre's distance from the axis, on which gravity acts",
+    )  # fmt: skip
+
+
+@documented
+@dataclass(frozen=True)
+class Rod:
+    """An elastic rod; a case's `rod`, None unless a case asks: rigid.
+
+    A bar of rectangular section: two bending modes, and two shapes of stretch. `True` stands for
+    the defaults:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"rod": True}).rod.depth_mm
+    40.0
+    """
+
+    youngs_modulus_GPa: float = parameter(
+        207.0, "GPa", (0, 1e6), "Table 2, steel", "modulus of elasticity", above=True
+    )
+    depth_mm: float = parameter(
+        40.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar", "section, in the plane of motion",
+        above=True,
+    )  # fmt: skip
+    width_mm: float = parameter(
+        25.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar", "section, across it", above=True
+    )
+    damping_ratio: float = parameter(
+        0.005, "", (0, 1), OURS, "of the first bending mode, in proportion to stiffness"
+    )
+
+
+def filled_guide(guide: Guide, mass: float) -> Guide:
+    """A guide with its crosshead's inertia, by the mass (kg) that reciprocates."""
+    if guide.crosshead_inertia_kg_m2 is not None:
+        return guide
+    square = (guide.crosshead_length_mm / 1000) ** 2 + (guide.crosshead_height_mm / 1000) ** 2
+    return replace(guide, crosshead_inertia_kg_m2=mass * square / 12)

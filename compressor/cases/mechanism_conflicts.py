@@ -1,0 +1,41 @@
+"""What does not fit together in guide, drive, rod and the friction of ideal joints."""
+
+from collections.abc import Iterator
+
+from compressor.cases.parameter import Problem
+from compressor.cases.table import Settings
+
+SLIM = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
+
+
+def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """What does not fit together in guide, drive, rod and the friction of ideal joints."""
+    machine, friction = case.machine, case.friction
+    if case.drive and case.body:
+        yield Problem(
+            "body", "moves in equal steps of time, which a drive whose speed gives way has not: "
+            "leave out body or drive",
+        )  # fmt: skip
+    if case.rod:
+        if machine.rod_centre_mm != machine.rod_length_mm / 2:
+            yield Problem(
+                "machine.rod_centre_mm", "an elastic rod is a uniform bar: leave the key out"
+            )
+        least = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2 / 12
+        if (machine.rod_inertia_kg_m2 or 0.0) < SLIM * least:
+            yield Problem(
+                "machine.rod_inertia_kg_m2",
+                f"an elastic rod is a uniform bar, which has {least:.4g} kg m2 at least: leave "
+                "the key out",
+            )
+    if friction and friction.ideal_joints and friction.law == "lugre":
+        yield Problem(
+            "friction.ideal_joints", "have no bristles, as friction.law: lugre needs: choose "
+            "another law, or leave the key out",
+        )  # fmt: skip
+    rubs = case.guide and case.guide.clearance_mm == 0 and not case.guide.friction
+    if rubs and any(key.startswith("guide.") for key in given):
+        yield Problem(
+            "guide.friction", "is 0 and so is clearance_mm, which leaves an ideal guide: leave "
+            "the group out, or give one of the two",
+        )  # fmt: skip

@@ -1,0 +1,40 @@
+"""Small systems of linear equations: LU factors in place, with partial pivoting."""
+
+from compressor.physics._jit import jit
+
+
+@jit
+def factorize(matrix, pivots):
+    """LU of a small square matrix in place, with partial pivoting; False if it is singular."""
+    n = pivots.size
+    for j in range(n):
+        best = j
+        for i in range(j + 1, n):
+            if abs(matrix[i, j]) > abs(matrix[best, j]):
+                best = i
+        pivots[j] = best
+        if not abs(matrix[best, j]) > 0.0:
+            return False
+        if best != j:
+            for m in range(n):
+                matrix[j, m], matrix[best, m] = matrix[best, m], matrix[j, m]
+        for i in range(j + 1, n):
+            matrix[i, j] /= matrix[j, j]
+            for m in range(j + 1, n):
+                matrix[i, m] -= matrix[i, j] * matrix[j, m]
+    return True
+
+
+@jit
+def substitute(matrix, pivots, b):
+    """Solve with the factors of `factorize`, b (n,) being overwritten by the solution."""
+    n = pivots.size
+    for j in range(n):
+        b[j], b[pivots[j]] = b[pivots[j]], b[j]
+    for i in range(n):
+        for m in range(i):
+            b[i] -= matrix[i, m] * b[m]
+    for i in range(n - 1, -1, -1):
+        for m in range(i + 1, n):
+            b[i] -= matrix[i, m] * b[m]
+        b[i] /= matrix[i, i]

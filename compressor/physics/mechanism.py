@@ -1,0 +1,205 @@
+"""The general slider-crank: any joint and the guide with or without clearance, the rod elastic or
+rigid, the crank's speed steady or not. physics/README.md, The general mechanism.
+
+One system for all combinations. The bodies' velocities (`Row`) are linear in the rates of the
+coordinates (`record.Coordinate`), with a matrix of eleven columns; what a case does not name is a
+column less. The equations of motion are the bodies' own, projected on the columns that are left
+(Jourdain's principle), so that the forces of ideal joints drop out; these follow afterwards.
+
+The position x of the crosshead is no coordinate: it follows from the rod's length. Angles of the
+crank, not times, are what integrators step through: with a speed that gives way, `t` is the crank's
+angle over the steady speed, and what passes in time passes the slower the faster the crank turns.
+So corners of the load and revolutions stay where they are.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+from compressor.physics._jit import jit, square_root
+from compressor.physics.contact import NO_CONTACT, Contact, carried_by, joint_contact
+from compressor.physics.elastic_rod import BIG_SLOPE, MODES, SMALL_SLOPE, summed
+from compressor.physics.guide import UNGUIDED, Guided, corners
+from compressor.physics.loads import piston_force
+from compressor.physics.record import BIG_END, SMALL_END, Coordinate
+
+
+class Row(IntEnum):
+    """Velocities of the bodies, by which their inertia and forces are written."""
+
+    CRANK = 0  # rad/s
+    ROD_X = 1  # of the big end's bore, m/s
+    ROD_Y = 2
+    ROD_SPIN = 3  # of the rod's frame, counter-clockwise, rad/s
+    MODES = 4  # four of them, m/s
+    CROSSHEAD_X = 8
+    CROSSHEAD_Y = 9
+    CROSSHEAD_SPIN = 10
+
+
+ROWS, COORDINATES = len(Row) + MODES - 1, len(Coordinate)
+FIRST_MODE = int(Coordinate.BEND_1)
+STRETCH = int(Coordinate.STRETCH)
+
+
+class Pose(NamedTuple):
+    """Where the bodies are and how they move: SI, angles of the crank and the rod."""
+
+    cos_theta: float
+    sin_theta: float
+    sin_phi: float
+    cos_phi: float
+    length: float  # of the rod, between the bores
+    x: float
+    height: float  # of the crosshead's pin
+    tilt: float
+    speed: float  # of the crank, rad/s
+    spin: float  # of the rod, counter-clockwise
+
+
+class Joints(NamedTuple):
+    """Contacts, guide and load, and the bores' spins: all forces that need no acceleration."""
+
+    big: Contact
+    small: Contact
+    guide: Guided
+    load: float
+    big_spin: float  # rad/s, of the rod's bore
+    small_spin: float
+    pin_spin: float  # of the crosshead
+
+
+@jit
+def speed_of(y, p):
+    """The crank's speed (rad/s)."""
+    return p.omega * (1.0 + y[p.at[0]]) if p.driven else p.omega
+
+
+@jit
+def unpack(y, p, w, rates):
+    """Write the coordinates and their rates into w and rates, (11,); 0 of what is left out."""
+    n = p.freedoms
+    for i in range(1, COORDINATES):
+        place = p.at[i]
+        w[i], rates[i] = (y[place], y[n + place]) if place >= 0 else (0.0, 0.0)
+    rates[0] = speed_of(y, p)
+
+
+@jit
+def pose_of(motion, w, rates, p):
+    """The `Pose` at a crank angle, whose ideal `Motion` is given."""
+    c, s = motion.cos_theta, motion.sin_theta
+    length = p.rod_length + w[STRETCH]
+    fall = p.crank_radius * s - w[2] + w[4] - w[5]  # from the big end's bore to the small end's
+    sin_phi = fall / length
+    cos_phi = square_root((1.0 - sin_phi) * (1.0 + sin_phi))
+    x = p.crank_radius * c - w[1] + w[3] + length * cos_phi
+    falling = p.crank_radius * c * rates[0] - rates[2] + rates[4] - rates[5]
+    phi_rate = (falling - sin_phi * rates[STRETCH]) / (length * cos_phi)
+    return Pose(c, s, sin_phi, cos_phi, length, x, w[5], w[6], rates[0], -phi_rate)
+
+
+@jit
+def fill_jacobian(pose, p, jacobian):
+    """Write the bodies' velocities by the rates of the coordinates, (11, 11), zeros before."""
+    c, s, sin_phi, cos_phi, length = (
+        pose.cos_theta, pose.sin_theta, pose.sin_phi, pose.cos_phi, pose.length,
+    )  # fmt: skip
+    reach = length * cos_phi
+    crank = p.crank_radius
+    jacobian[0, 0] = 1.0
+    jacobian[1, 0], jacobian[2, 0] = -crank * s, crank * c
+    jacobian[1, 1], jacobian[2, 2] = -1.0, -1.0
+    jacobian[3, 0] = -crank * c / reach
+    jacobian[3, 2], jacobian[3, 4], jacobian[3, 5] = 1.0 / reach, -1.0 / reach, 1.0 / reach
+    jacobian[3, STRETCH] = sin_phi / reach
+    for i in range(MODES):
+        jacobian[4 + i, FIRST_MODE + i] = 1.0
+    jacobian[8, 3] = 1.0
+    jacobian[8, STRETCH] = cos_phi
+    for j in range(COORDINATES):
+        jacobian[8, j] += jacobian[1, j] + length * sin_phi * jacobian[3, j]
+    jacobian[9, 5], jacobian[10, 6] = 1.0, 1.0
+
+
+@jit
+def fill_bias(pose, rates, p, bias):
+    """Write the bodies' accelerations, (11,), where the coordinates' own are zero."""
+    inward = p.crank_radius * pose.speed * pose.speed
+    twice = 2.0 * rates[STRETCH] * pose.spin  # of Coriolis, across the rod
+    bias[1], bias[2] = -inward * pose.cos_theta, -inward * pose.sin_theta
+    lowering = bias[2] + pose.length * pose.sin_phi * pose.spin * pose.spin
+    bias[3] = -(lowering + twice * pose.cos_phi) / (pose.length * pose.cos_phi)
+    centripetal = pose.length * pose.cos_phi * pose.spin * pose.spin
+    bias[8] = bias[1] + twice * pose.sin_phi - centripetal
+    bias[8] += pose.length * pose.sin_phi * bias[3]
+
+
+@jit
+def joints_of(phase, y, motion, pose, velocity, p):
+    """The `Joints` at a state; velocity: of the bodies, (11,)."""
+    n, modes = p.freedoms, velocity[4:8]
+    big_spin = pose.spin + summed(BIG_SLOPE, 0, MODES, modes) / p.rod_length
+    small_spin = pose.spin + summed(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
+    pin_spin = velocity[10]
+    big, small = NO_CONTACT, NO_CONTACT
+    if p.clearance[0] > 0.0:
+        place = p.at[1]
+        off = y[place], y[place + 1], y[n + place], y[n + place + 1]
+        kept = carried_by(BIG_END, y, p)
+        spins = pose.speed, big_spin
+        big = joint_contact(off, spins, p.clearance[0], p.stiffness[0], kept, p)
+    if p.clearance[1] > 0.0:
+        place = p.at[3]
+        off = y[place], y[place + 1], y[n + place], y[n + place + 1]
+        kept = carried_by(SMALL_END, y, p)
+        spins = pin_spin, small_spin
+        small = joint_contact(off, spins, p.clearance[1], p.stiffness[1], kept, p)
+    guide = UNGUIDED
+    if p.tilting:
+        rates = velocity[8], velocity[9], velocity[10]
+        guide = corners(pose.height, pose.tilt, rates, p)
+    ideal_v = motion.v * pose.speed / p.omega
+    load = piston_force(phase, pose.x, velocity[8], pose.x - motion.x, velocity[8] - ideal_v, p)
+    return Joints(big, small, guide, load, big_spin, small_spin, pin_spin)
+
+
+@jit
+def add_forces(pose, joints, p, force):
+    """Add to the bodies' forces, (11,), those of contacts, guide, load, weight and motor."""
+    big, small, guide = joints.big, joints.small, joints.guide
+    c, s = pose.cos_theta, pose.sin_theta
+    force[0] -= p.crank_radius * (c * big.fy - s * big.fx)
+    force[0] += (p.pin_radius - big.penetration) * big.friction
+    force[0] -= p.unbalance * p.gravity * c
+    if p.driven:
+        force[0] += motor_torque(pose, p)
+    add_on_rod(pose, (big.fx, big.fy, big.moment), (small.fx, small.fy, small.moment), p, force)
+    force[8] += guide.fx - joints.load - small.fx
+    force[9] += guide.fy - p.reciprocating_mass * p.gravity - small.fy
+    force[10] += guide.moment + (p.pin_radius - small.penetration) * small.friction
+
+
+@jit
+def add_on_rod(pose, big, small, p, force):
+    """Add a force (N) and a moment (N m) on the rod at either end: each (x, y, moment)."""
+    force[1] += big[0] + small[0]
+    force[2] += big[1] + small[1]
+    lever = pose.sin_phi * small[0] + pose.cos_phi * small[1]
+    force[3] += big[2] + small[2] + pose.length * lever
+    for i in range(MODES):
+        force[4 + i] += (BIG_SLOPE[i] * big[2] + SMALL_SLOPE[i] * small[2]) / p.rod_length
+    force[7] += pose.cos_phi * small[0] - pose.sin_phi * small[1]  # the stretch moves the small end
+
+
+@jit
+def motor_torque(pose, p):
+    """Torque (N m) of the motor at the crank's speed: a line."""
+    return p.torque + p.torque_slope * (p.omega - pose.speed)
+
+
+@jit
+def add_bodies(p, mass):
+    """Write the mass matrix of crank and crosshead."""
+    mass[0, 0] = p.crank_inertia
+    mass[8, 8], mass[9, 9] = p.reciprocating_mass, p.reciprocating_mass
+    mass[10, 10] = p.crosshead_inertia

@@ -1,0 +1,236 @@
+"""What integrators call and what is observed of the general mechanism.
+
+The same calls as `motion` and `observe` have for the scenes; `systems` chooses between them.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import jit, square_root
+from compressor.physics.contact import nearness
+from compressor.physics.contact_laws import elastic_energy
+from compressor.physics.elastic_rod import ACROSS, FIRST, MODES, material_work, summed
+from compressor.physics.friction_laws import LUGRE, bristle_rate
+from compressor.physics.kinematics import ideal
+from compressor.physics.mechanism import COORDINATES, ROWS, motor_torque
+from compressor.physics.mechanism_motion import solve
+from compressor.physics.observe import (
+    ACCELERATION,
+    COLUMNS,
+    CRANK_POWER,
+    DAMPING_POWER,
+    DEVIATION,
+    DISPLACEMENT,
+    ECCENTRICITY,
+    FORCE,
+    FORCE_SIZE,
+    FRICTION_POWER,
+    KINETIC,
+    LOAD_POWER,
+    NEARNESS,
+    NORMAL,
+    PENETRATION,
+    PISTON_FORCE,
+    POTENTIAL,
+    ROD_ANGLE,
+    VELOCITY,
+    WIDE,
+    Column,
+    damping_power,
+)
+
+GUIDE_FORCE, GUIDE_MOMENT = int(Column.GUIDE_FORCE), int(Column.GUIDE_MOMENT)
+GUIDE_FRICTION, GUIDE_GAP = int(Column.GUIDE_FRICTION), int(Column.GUIDE_GAP)
+CRANK_SPEED = int(Column.CRANK_SPEED)
+
+
+@jit
+def pace_of(now, p):
+    """Time that passes while a steady crank would turn as far, over the steady one's."""
+    return p.omega / now.pose.speed
+
+
+@jit
+def write_rates(now, y, p, out):
+    """Write dy/dt, of a steady crank's t, into out."""
+    n, pace = p.freedoms, pace_of(now, p)
+    for i in range(y.size):
+        out[i] = 0.0
+    for i in range(1, COORDINATES):
+        place = p.at[i]
+        if place >= 0:
+            out[place] = now.rates[i] * pace
+            out[n + place] = now.accelerations[i] * pace
+    place = 2 * n
+    if p.friction == LUGRE and p.clearance[0] > 0.0:
+        out[place + 2] = bristle_rate(now.joints.big.slip, y[place + 2], p) * pace
+    if p.friction == LUGRE and p.clearance[1] > 0.0:
+        out[place + 3] = bristle_rate(now.joints.small.slip, y[place + 3], p) * pace
+    if p.driven:
+        out[p.at[0] - 1] = pace - 1.0
+        out[p.at[0]] = now.accelerations[0] / p.omega * pace
+
+
+@jit
+def crank_torque(now, p):
+    """Torque (N m) that the motor gives the crank, or that keeps its speed."""
+    if p.driven:
+        return motor_torque(now.pose, p)
+    pose, forces, big = now.pose, now.reactions, now.joints.big
+    torque = p.crank_radius * (pose.cos_theta * forces.big_y - pose.sin_theta * forces.big_x)
+    torque += forces.big_torque + p.unbalance * p.gravity * pose.cos_theta
+    return torque - (p.pin_radius - big.penetration) * big.friction
+
+
+@jit
+def write_powers(now, p, row):
+    """Write the four powers (W) into the row: of crank and load, lost to damping and friction."""
+    big, small, guide, pose = now.joints.big, now.joints.small, now.joints.guide, now.pose
+    forces, modes = now.reactions, now.rates[7:11]
+    row[CRANK_POWER] = crank_torque(now, p) * pose.speed
+    row[LOAD_POWER] = -now.joints.load * now.velocity[8]
+    damped = damping_power(big) + damping_power(small) + guide.damped
+    row[DAMPING_POWER] = damped + p.rod_damping * material_work(modes, modes, p)
+    rubbed = guide.rubbed - big.friction * big.slip - small.friction * small.slip
+    rubbed += forces.big_torque * (pose.speed - now.joints.big_spin)
+    rubbed += forces.small_torque * (now.joints.pin_spin - now.joints.small_spin)
+    row[FRICTION_POWER] = rubbed - forces.rubbing * now.velocity[8]
+
+
+@jit
+def write_energies(now, p, row):
+    """Write kinetic and potential energy (J) into the row."""
+    pose, joints, modes = now.pose, now.joints, now.w[7:11]
+    kinetic = 0.0
+    for i in range(ROWS):
+        kinetic += 0.5 * now.velocity[i] * summed(now.mass[i], 0, ROWS, now.velocity)
+    row[KINETIC] = kinetic
+    stored = joints.guide.stored + 0.5 * material_work(modes, modes, p)
+    big, small = joints.big, joints.small
+    stored += elastic_energy(big.elastic, big.penetration, p.stiffness[0], p.clearance[0], p)
+    stored += elastic_energy(small.elastic, small.penetration, p.stiffness[1], p.clearance[1], p)
+    along = p.rod_centre + summed(FIRST, ACROSS, MODES, modes)
+    height = p.crank_radius * pose.sin_theta - now.w[2] - along * pose.sin_phi
+    height += summed(FIRST, 0, ACROSS, modes) * pose.cos_phi
+    weight = p.rod_mass * height + p.reciprocating_mass * pose.height
+    row[POTENTIAL] = stored + p.gravity * (weight + p.unbalance * pose.sin_theta)
+
+
+@jit
+def write_glanced(now, p, row):
+    """Write the columns from ACCELERATION to NEARNESS."""
+    forces = now.reactions
+    row[ACCELERATION] = now.body[8]
+    row[FORCE], row[FORCE + 1] = forces.big_x, forces.big_y
+    row[FORCE + 2], row[FORCE + 3] = forces.small_x, forces.small_y
+    row[FORCE_SIZE] = square_root(forces.big_x**2 + forces.big_y**2)
+    row[FORCE_SIZE + 1] = square_root(forces.small_x**2 + forces.small_y**2)
+    row[DEVIATION] = now.body[8] - now.motion.a
+    big, small = now.joints.big, now.joints.small
+    row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration
+    row[NORMAL], row[NORMAL + 1] = big.normal, small.normal
+    row[NEARNESS] = nearness(big, p.stiffness[0], p.clearance[0], p)
+    row[NEARNESS + 1] = nearness(small, p.stiffness[1], p.clearance[1], p)
+
+
+@jit
+def write_row(now, p, row):
+    """Write the columns from ACCELERATION on."""
+    write_glanced(now, p, row)
+    write_powers(now, p, row)
+    write_energies(now, p, row)
+
+
+@jit
+def derivative(t, y, phase, p, out):
+    """`motion.derivative` of the mechanism."""
+    write_rates(solve(ideal(t, p), y, phase, p), y, p, out)
+
+
+@jit
+def write_flowing_derivative(motion, z, phase, p, out):
+    """`observe.write_flowing_derivative` of the mechanism."""
+    derivative_and_gauge(motion, z, phase, p, out, np.empty(COLUMNS))
+
+
+@jit
+def derivative_with_flows(t, z, phase, p, out):
+    """`observe.derivative_with_flows` of the mechanism."""
+    write_flowing_derivative(ideal(t, p), z, phase, p, out)
+
+
+@jit
+def derivative_and_gauge(motion, z, phase, p, out, row):
+    """`observe.derivative_and_gauge` of the mechanism."""
+    n = z.size - 4
+    now = solve(motion, z[:n], phase, p)
+    write_rates(now, z[:n], p, out[:n])
+    write_row(now, p, row)
+    for i in range(4):
+        out[n + i] = row[CRANK_POWER + i] * pace_of(now, p)
+
+
+@jit
+def glance(motion, y, phase, p, row):
+    """`observe.glance` of the mechanism."""
+    write_glanced(solve(motion, y, phase, p), p, row)
+
+
+@jit
+def gauge(motion, y, phase, p, row):
+    """`observe.gauge` of the mechanism."""
+    write_row(solve(motion, y, phase, p), p, row)
+
+
+@jit
+def observe(t, y, phase, p, row):
+    """`observe.observe` of the mechanism; row: (COLUMNS,), or (WIDE,) for the guide's as well."""
+    now = solve(ideal(t, p), y, phase, p)
+    pose, guide, forces = now.pose, now.joints.guide, now.reactions
+    row[DISPLACEMENT], row[VELOCITY] = pose.x, now.velocity[8]
+    row[ROD_ANGLE] = math.atan2(pose.sin_phi, pose.cos_phi)
+    row[PISTON_FORCE] = now.joints.load
+    for i in range(4):
+        row[ECCENTRICITY + i] = now.w[1 + i]
+    write_row(now, p, row)
+    if row.size == WIDE:
+        row[GUIDE_FORCE] = -forces.guide
+        along = guide.fx + forces.rubbing
+        row[GUIDE_MOMENT] = -(pose.x * forces.guide + guide.moment - pose.height * along)
+        row[GUIDE_FRICTION], row[CRANK_SPEED] = -along, pose.speed
+        row[GUIDE_GAP] = -guide.deepest
+
+
+@jit
+def observe_all(times, states, phases, p, rows):
+    """`observe` at each of m times: states (m, k), phases (m,) integers, rows (m, ...)."""
+    for i in range(times.size):
+        observe(times[i], states[i], phases[i], p, rows[i])
+
+
+@jit
+def contact_at(joint, t, y, phase, p):
+    """A joint's `Contact` at a time and state."""
+    now = solve(ideal(t, p), y, phase, p)
+    return now.joints.big if joint == 0 else now.joints.small
+
+
+@jit
+def write_eccentricities(t, y, p, row):
+    """Write both eccentricities (m) into the row; an ideal joint has none."""
+    for i in range(4):
+        place = p.at[1 + i]
+        row[ECCENTRICITY + i] = y[place] if place >= 0 else 0.0
+
+
+@jit
+def start(offset, y, p):
+    """`motion.start` of the mechanism: concentric but for the offsets, an undeflected rod."""
+    for i in range(y.size):
+        y[i] = 0.0
+    for joint in range(2):
+        y[2 * p.freedoms + joint] = p.least_approach
+        place = p.at[1 + 2 * joint]
+        if place >= 0:
+            y[place], y[place + 1] = offset[joint, 0], offset[joint, 1]

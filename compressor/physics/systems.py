@@ -1,0 +1,36 @@
+"""What is integrated and observed, by the kind of a record: one of the scenes, or the mechanism.
+
+A scene is the mechanism with clearance at its joints and no other feature, written by hand for
+speed; that both agree is a test.
+"""
+
+from compressor.physics import mechanism_rows
+from compressor.physics._jit import by_kind
+from compressor.physics.motion import contact_at as scene_contact_at
+from compressor.physics.motion import derivative as scene_derivative
+from compressor.physics.motion import start as scene_start
+from compressor.physics.observe import derivative_and_gauge as scene_derivative_and_gauge
+from compressor.physics.observe import derivative_with_flows as scene_derivative_with_flows
+from compressor.physics.observe import gauge as scene_gauge
+from compressor.physics.observe import glance as scene_glance
+from compressor.physics.observe import observe_all as scene_observe_all
+from compressor.physics.observe import write_eccentricities as scene_eccentricities
+from compressor.physics.observe import write_flowing_derivative as scene_flowing_derivative
+from compressor.physics.record import MECHANISM
+
+derivative = by_kind(MECHANISM, mechanism_rows.derivative, scene_derivative)
+derivative_with_flows = by_kind(
+    MECHANISM, mechanism_rows.derivative_with_flows, scene_derivative_with_flows
+)
+write_flowing_derivative = by_kind(
+    MECHANISM, mechanism_rows.write_flowing_derivative, scene_flowing_derivative
+)
+derivative_and_gauge = by_kind(
+    MECHANISM, mechanism_rows.derivative_and_gauge, scene_derivative_and_gauge
+)
+glance = by_kind(MECHANISM, mechanism_rows.glance, scene_glance)
+gauge = by_kind(MECHANISM, mechanism_rows.gauge, scene_gauge)
+observe_all = by_kind(MECHANISM, mechanism_rows.observe_all, scene_observe_all)
+contact_at = by_kind(MECHANISM, mechanism_rows.contact_at, scene_contact_at)
+write_eccentricities = by_kind(MECHANISM, mechanism_rows.write_eccentricities, scene_eccentricities)
+start = by_kind(MECHANISM, mechanism_rows.start, scene_start)

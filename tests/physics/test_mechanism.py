@@ -1,0 +1,233 @@
+"""The general mechanism: Lagrange's equations by SymPy for each combination, scenes, energy."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import sympy
+
+from compressor.cases.case import Case
+from compressor.metrics import JOINTS
+from compressor.physics import mechanism_rows
+from compressor.physics.kinematics import ideal
+from compressor.physics.mechanism_motion import solve
+from compressor.physics.motion import (
+    eccentricities_both,
+    eccentricity_big_end,
+    eccentricity_small_end,
+    turned,
+)
+from compressor.physics.observe import COLUMNS, Column
+from compressor.physics.observe import observe as scene_observe
+from compressor.physics.record import (
+    Coordinate,
+    new_record,
+    place_coordinates,
+    present,
+    state_names,
+)
+from compressor.solve.si_record import record
+
+SCENES = ("none", *JOINTS, "both")
+FEATURES = ("driven", "tilting", "elastic")
+COMBINATIONS = [
+    (joint, {name for name, on in zip(FEATURES, some, strict=True) if on})
+    for joint in SCENES
+    for some in itertools.product((False, True), repeat=len(FEATURES))
+]
+NUMBERS = {
+    "crank_inertia": 0.4, "unbalance": 0.3, "torque": 90.0, "torque_slope": 12.0,
+    "guide_clearance": 2e-4, "guide_length": 0.06, "guide_height": 0.04, "guide_stiffness": 1e10,
+    "guide_friction": 0.05, "guide_stiction": 0.01, "crosshead_inertia": 0.03,
+    "axial_stiffness": 3.4e8, "bending_stiffness": 1.3e5, "rod_damping": 1e-6,
+}  # fmt: skip
+# natural sizes of the coordinates and of their rates
+SIZES = np.array([1.0, 2.5e-4, 2.5e-4, 2.5e-4, 2.5e-4, 2.2e-4, 1e-3, 1e-3, 2e-4, 1e-4, 1e-4])
+RATES = np.array([50.0, 0.1, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 0.5, 0.2, 0.2])
+
+
+def featured(joint="none", features=(), values=None, **numbers):
+    """A record of a case with features, their numbers those of NUMBERS."""
+    clearance = {} if joint == "none" else {"joint": joint, "clearance_mm": 0.2}
+    usual = record(Case.from_values(clearance | (values or {})))
+    p = new_record(featured=True)
+    for name in usual.dtype.names:
+        if name != "laws":
+            p[name] = usual[name]
+    for name, value in {**NUMBERS, **dict.fromkeys(features, 1), **numbers}.items():
+        p[name] = value
+    place_coordinates(p)
+    return p
+
+
+def state_of(p, w, rates):
+    """The state of coordinates and their rates, (11,) each; the crank's speed is a rate."""
+    y, n = np.zeros(len(state_names(p))), int(p["freedoms"])
+    for place, coordinate in enumerate(present(p)):
+        y[place], y[n + place] = w[coordinate], rates[coordinate]
+    if p["driven"]:
+        y[p["at"][Coordinate.CRANK]] = rates[0] / p["omega"] - 1.0
+    y[2 * n : 2 * n + 2] = p["least_approach"]
+    return y
+
+
+def random_motion(p, rng):
+    """Coordinates and rates that a mechanism may have, zeros of what it does not."""
+    w, rates = np.zeros(11), np.zeros(11)
+    here = present(p)
+    w[here] = rng.normal(size=len(here)) * SIZES[here]
+    rates[here] = rng.normal(size=len(here)) * RATES[here]
+    w[0] = rng.uniform(0.0, 2.0 * math.pi)
+    rates[0] = p["omega"] * (1.0 + (0.1 * rng.normal() if p["driven"] else 0.0))
+    return w, rates
+
+
+@pytest.fixture(scope="module")
+def lagrange():
+    """Mass matrix and the other side of Lagrange's equations, from the two energies.
+
+    The kinetic one is W_ij r_i' r_j' / 2 over positions r of the coordinates w, with SymPy's exact
+    integrals over the rod in W. With J = dr/dw, two of Lagrange's terms are equal, second
+    derivatives being symmetric, so that J^T W (J w'' + d(J w')/dw w') = -dV/dw.
+    """
+    names = "R L m I mp Jc unbalance Jp g EA EI"
+    k = dict(zip(names.split(), sympy.symbols(names), strict=True))
+    w, v = sympy.symbols("w0:11"), sympy.symbols("v0:11")
+    s = sympy.Symbol("s")
+    bore = k["R"] * sympy.Matrix([sympy.cos(w[0]), sympy.sin(w[0])]) - sympy.Matrix(w[1:3])
+    length = k["L"] + w[10]
+    sin_phi = (bore[1] + w[4] - w[5]) / length
+    cos_phi = sympy.sqrt(1 - sin_phi**2)
+    along, across = sympy.Matrix([cos_phi, -sin_phi]), sympy.Matrix([sin_phi, cos_phi])
+    shapes = [sympy.Integer(1), s, sympy.sin(sympy.pi * s), sympy.sin(2 * sympy.pi * s),
+              4 * s * (1 - s), s * (2 * s - 1)]  # fmt: skip
+    places = [bore, k["L"] * along, w[7] * across, w[8] * across, w[9] * along, w[10] * along]
+    x = bore[0] + length * cos_phi + w[3]
+    positions = sympy.Matrix([*places, [x], [w[5]], [sympy.asin(sin_phi)], [w[6]], [w[0]]])
+    inertia = sympy.zeros(17)
+    for i, j in itertools.product(range(6), repeat=2):
+        mean = k["m"] * sympy.integrate(shapes[i] * shapes[j], (s, 0, 1))
+        inertia[2 * i, 2 * j] = inertia[2 * i + 1, 2 * j + 1] = mean
+    own = [k["mp"], k["mp"], k["I"] - k["m"] * k["L"] ** 2 / 12, k["Jp"], k["Jc"]]
+    for i, one in enumerate(own):
+        inertia[12 + i, 12 + i] = one
+    means = [sympy.integrate(one, (s, 0, 1)) for one in shapes]
+    height = sum((mean * place[1] for mean, place in zip(means, places, strict=True)), 0)
+    stored = k["g"] * (k["m"] * height + k["mp"] * w[5] + k["unbalance"] * sympy.sin(w[0]))
+    stretch = sympy.diff(w[9] * shapes[4] + w[10] * shapes[5], s)
+    bend = sympy.diff(w[7] * shapes[2] + w[8] * shapes[3], s, 2)
+    stored += k["EA"] / 2 * sympy.integrate(sympy.expand(stretch**2), (s, 0, 1))
+    stored += k["EI"] / 2 * sympy.integrate(sympy.expand(bend**2), (s, 0, 1))
+    jacobian, rates = positions.jacobian(w), sympy.Matrix(v)
+    bias = (jacobian * rates).jacobian(w) * rates
+    pushed = [-sympy.diff(stored, one) for one in w]
+    parts = jacobian.tolist(), list(bias), inertia.tolist(), pushed
+    evaluate = sympy.lambdify((w, v, tuple(k.values())), parts, modules="math", cse=True)
+
+    def equations(w, v, numbers):
+        jacobian, bias, inertia, pushed = (
+            np.array(part, float) for part in evaluate(w, v, numbers)
+        )
+        carried = jacobian.T @ inertia
+        return carried @ jacobian, pushed - carried @ bias
+
+    return equations
+
+
+@pytest.mark.parametrize(("joint", "features"), COMBINATIONS)
+def test_accelerations_are_lagranges(lagrange, joint, features):
+    """In free flight: between contacts, with weight, a motor's torque and an elastic rod."""
+    values = {"load": "none", "machine": {"gravity_m_per_s2": 9.81, "rod_inertia_kg_m2": 0.15}}
+    p = featured(joint, features, values, rod_damping=0.0, guide_friction=0.0)
+    if not any(p["at"] >= 0):
+        return
+    rng = np.random.default_rng(11)
+    far = {"clearance": [1.0 * (p["clearance"][i] > 0) for i in range(2)], "guide_clearance": 1.0}
+    for name, value in far.items():
+        p[name] = value
+    numbers = (
+        p["crank_radius"], p["rod_length"], p["rod_mass"], p["rod_inertia"],
+        p["reciprocating_mass"], p["crank_inertia"], p["unbalance"], p["crosshead_inertia"],
+        p["gravity"], p["axial_stiffness"], p["bending_stiffness"],
+    )  # fmt: skip
+    moving = [int(one) for one in Coordinate if p["at"][one] >= 0]
+    for _ in range(5):
+        w, rates = random_motion(p, rng)
+        t = w[0] / p["omega"]
+        mass, other = lagrange(w, rates, numbers)
+        torque = p["torque"] + p["torque_slope"] * (p["omega"] - rates[0])
+        force = other + np.eye(11)[0] * torque
+        expected = np.linalg.solve(mass[np.ix_(moving, moving)], force[moving])
+        y = state_of(p, w, rates)
+        found = solve(ideal(t, p), y, 1, p)
+        assert found.accelerations[moving] == pytest.approx(expected, rel=1e-9, abs=1e-7)
+        kinetic = 0.5 * rates @ mass @ rates
+        row = np.empty(COLUMNS)
+        mechanism_rows.observe(t, y, 1, p, row)
+        assert row[Column.KINETIC] == pytest.approx(kinetic, rel=1e-12)
+
+
+@pytest.mark.parametrize("gravity", [0, 9.81])
+@pytest.mark.parametrize("joint", SCENES)
+def test_a_scene_is_the_mechanism_without_features(joint, gravity):
+    """All that is observed, at random states: the hand-written equations are its special cases."""
+    values = {"machine": {"gravity_m_per_s2": gravity, "rod_centre_mm": 250}}
+    q = featured(joint, (), values, crank_inertia=0.0, unbalance=0.0, guide_friction=0.0)
+    clearance = {} if joint == "none" else {"joint": joint, "clearance_mm": 0.2}
+    p = record(Case.from_values(clearance | values))
+    rng = np.random.default_rng(1)
+    n, size = int(p["freedoms"]), 4 if joint == "both" else 2
+    for t in np.linspace(0.001, 0.11, 9):
+        y = rng.normal(size=2 * size) * np.repeat([2.5e-4, 0.12], size)
+        y[[size - 1, 2 * size - 1]] *= 2.0
+        if joint == "none":
+            y[:] = 0.0
+        off = scene_eccentricities(joint, t, y, n, p)
+        z, m = np.zeros(len(state_names(q))), int(q["freedoms"])
+        z[:m] = np.array([one[:2] for one in off]).ravel()
+        z[m : 2 * m] = np.array([one[2:] for one in off]).ravel()
+        expected, found = np.empty(COLUMNS), np.empty(COLUMNS)
+        scene_observe(t, y, 1, p, expected)
+        mechanism_rows.observe(t, z, 1, q, found)
+        floor = 1e-12 * np.abs(expected).max()
+        assert found == pytest.approx(expected, rel=1e-11, abs=floor)
+
+
+def scene_eccentricities(joint, t, y, n, p):
+    if joint == "none":
+        return []
+    turn = turned(ideal(t, p), y[n - 1], y[2 * n - 1], p)
+    if joint == "both":
+        return eccentricities_both(y, turn, p)
+    one = eccentricity_big_end if joint == "big_end" else eccentricity_small_end
+    return [one(y, turn, p)]
+
+
+@pytest.mark.parametrize(("joint", "features"), COMBINATIONS)
+def test_energy_changes_by_the_powers(joint, features):
+    """dE/dt along the equations of motion equals the powers, with contacts and all friction."""
+    values = {"machine": {"gravity_m_per_s2": 9.81}}
+    p = featured(joint, features, values, rubbing=1)
+    rng = np.random.default_rng(3)
+    y = np.zeros(len(state_names(p)) or 4)
+    for t in np.linspace(0.001, 0.11, 7):
+        if state_names(p):
+            w, rates = random_motion(p, rng)
+            y = state_of(p, w, rates)
+        rate, row = np.zeros_like(y), np.empty(COLUMNS)
+        mechanism_rows.derivative(t, y, 1, p, rate)
+        mechanism_rows.observe(t, y, 1, p, row)
+        h, energies = 1e-8, []
+        for s in (h, -h):
+            moved = np.empty(COLUMNS)
+            mechanism_rows.observe(t + s, y + s * rate, 1, p, moved)
+            energies.append(moved[Column.KINETIC] + moved[Column.POTENTIAL])
+        power = row[Column.CRANK_POWER] + row[Column.LOAD_POWER]
+        power -= row[Column.DAMPING_POWER] + row[Column.FRICTION_POWER]
+        pace = 1.0 / (1.0 + y[p["at"][0]]) if p["driven"] else 1.0
+        scale = np.abs(row[Column.CRANK_POWER : Column.KINETIC]).sum() + 1e-8 * sum(energies) / h
+        change = (energies[0] - energies[1]) / (2.0 * h)
+        assert change == pytest.approx(power * pace, abs=1e-4 * scale)
+        assert row[Column.FRICTION_POWER] >= 0.0
+        assert row[Column.DAMPING_POWER] >= 0.0

@@ -1,0 +1,141 @@
+"""Runs of the mechanism with features: integrators agree, energy closes, limits are kept."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.cases.case import Case
+from compressor.solve import measure, simulate
+from compressor.solve.horizon import predictability_horizon
+
+BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
+GUIDE, RUBBING = {"guide": {"clearance_mm": 0.1}}, {"friction": {"ideal_joints": True}}
+COMBINATIONS = {
+    "play": {**GUIDE, **RUBBING},
+    "speed": {**BIG_END, "drive": True, "load": "typical", **RUBBING},
+    "elastic": {"joint": "small_end", "clearance_mm": 0.2, "rod": {"damping_ratio": 0.05}},
+    "all": {
+        "joint": "both", "clearance_mm": 0.2, "drive": {"flywheel_kg_m2": 1}, **GUIDE,
+        "rod": {"damping_ratio": 0.05}, "machine": {"gravity_m_per_s2": 9.81},
+    },
+}  # fmt: skip
+
+
+def run(values, **solve):
+    how = {"duration_rev": 0.5, "settle_rev": 0, "error_bars": False, **solve}
+    found = simulate(Case.from_values({**values, "solve": how}))
+    assert found.status == "ok", found.attrs.get("detail")
+    return found
+
+
+def apart(one, other, name):
+    a, b = one[name].values, other[name].values
+    return float(np.linalg.norm(a - b) / np.linalg.norm(a))
+
+
+@pytest.mark.parametrize("name", COMBINATIONS)
+def test_three_integrators_agree(name):
+    """Explicit steps, stiff ones and SciPy's LSODA share the equations alone."""
+    runs = [run(COMBINATIONS[name], method=how, rtol=1e-8) for how in ("TSIT5", "RODAS", "LSODA")]
+    for one in runs:
+        assert float(one.energy_residual) < 1e-5
+    for other in runs[1:]:
+        assert apart(runs[0], other, "acceleration") < 2e-4
+        assert apart(runs[0], other, "contact_force") < 2e-4
+
+
+@pytest.mark.parametrize("name", COMBINATIONS)
+def test_an_accuracy_is_kept(name):
+    """What `standard` promises, against a tighter run."""
+    case = Case.from_values({**COMBINATIONS[name], "solve": {"duration_rev": 2}})
+    found = simulate(case)
+    assert found.attrs["promise"] == "kept"
+    exact = run(COMBINATIONS[name], duration_rev=2, settle_rev=1, rtol=1e-9)
+    settled = found.crank_angle > 2 * math.pi
+    a, b = (one.acceleration.values[settled] for one in (found, exact))
+    assert np.linalg.norm(a - b) / np.linalg.norm(b) < 5e-3
+
+
+def test_a_heavy_flywheel_turns_steadily():
+    """Towards the steady crank as 1 / J."""
+    steady = run(BIG_END, rtol=1e-8)
+    far = []
+    for inertia in (1e3, 1e4):
+        driven = run({**BIG_END, "drive": {"flywheel_kg_m2": inertia}}, rtol=1e-8)
+        far.append(apart(steady, driven, "acceleration"))
+        assert np.ptp(driven.crank_speed.values) > 0.0
+    assert far[0] / far[1] == pytest.approx(10.0, rel=0.2)
+    assert far[1] < 1e-3
+
+
+def test_a_hard_rod_is_rigid():
+    """The difference falls as 1 / E: the modes follow what moves them."""
+    rigid = run({"load": "none"}, rtol=1e-9)
+    far = []
+    for modulus in (2e3, 2e4):
+        hard = {"youngs_modulus_GPa": modulus, "damping_ratio": 0.2}
+        elastic = run({"load": "none", "rod": hard}, rtol=1e-9)
+        far.append(apart(rigid, elastic, "acceleration"))
+    assert far[0] / far[1] == pytest.approx(10.0, rel=0.3)
+
+
+def test_a_narrow_guide_bears_what_an_ideal_one_does():
+    """With play of a micrometre the crosshead rings on its guide; over 18 degrees it does not."""
+    signals = {"output": {"signals": True}}
+    ideal = run(signals, rtol=1e-7, duration_rev=1)
+    narrow = {"clearance_mm": 0.001, "friction": 0}
+    narrow = run({**signals, "guide": narrow}, rtol=1e-7, duration_rev=1)
+    a, b = (one.guide_force.values[1:].reshape(20, 60).mean(axis=1) for one in (ideal, narrow))
+    assert np.linalg.norm(a - b) / np.linalg.norm(a) < 0.02
+    assert float(abs(narrow.guide_height).max()) < 30e-6
+
+
+def test_friction_of_ideal_joints_takes_its_work_from_the_crank():
+    """Everything else equal: both ends ideal, no load, a turn of steady speed."""
+    values = {"load": "none", "solve": {"duration_rev": 1, "settle_rev": 0}}
+    without, rubbing = (measure(Case.from_values(values | more)) for more in ({}, RUBBING))
+    lost = rubbing.numbers["friction_loss"]
+    assert without.numbers["friction_loss"] == 0.0
+    assert lost > 1.0
+    assert rubbing.numbers["crank_work"] - without.numbers["crank_work"] == pytest.approx(lost)
+
+
+def test_the_time_of_a_speed_that_gives_way_is_its_own():
+    """A crank that is braked needs longer; its speed is the rate of its angle."""
+    values = {"load": "none", "friction": {"ideal_joints": True}}
+    free = {**values, "drive": {"flywheel_kg_m2": 1, "slope_N_m_s": 0}}
+    found = run(free, rtol=1e-9, duration_rev=2)
+    t, theta = found.time.values, found.crank_angle.values
+    assert t[-1] > Case.from_values(free).turn * 2
+    rate = np.gradient(theta, t, edge_order=2)
+    assert rate == pytest.approx(found.crank_speed.values, rel=1e-4)
+
+
+def test_a_crank_that_stops_ends_its_run_and_says_so():
+    values = {"load": "typical", "drive": {"flywheel_kg_m2": 0.1, "slope_N_m_s": 0}}
+    solve = {"duration_rev": 4, "settle_rev": 0}
+    found = simulate(Case.from_values({**values, "solve": solve}))
+    assert found.status == "failed"
+    assert found.reason == "crank_stalled"
+    assert "the flywheel has 0.1 kg m2" in found.attrs["detail"]
+
+
+def test_a_play_in_the_guide_may_be_chaotic_by_itself():
+    """Twins are shifted in the guide, and compared there."""
+    values = {**GUIDE, "load": "none", "machine": {"gravity_m_per_s2": 9.81}}
+    case = Case.from_values({**values, "solve": {"duration_rev": 1, "settle_rev": 0}})
+    assert predictability_horizon(case) > 0.0
+
+
+def test_what_is_not_named_is_absent():
+    """Same key, no further series."""
+    plain = Case.from_values(BIG_END)
+    for group in ("guide", "drive", "rod"):
+        assert group not in plain.values()
+    no_rubbing = Case.from_values({**BIG_END, "friction": {"ideal_joints": False}})
+    assert no_rubbing.key == plain.key
+    found = run(BIG_END)
+    assert {"guide_height", "crank_speed", "rod_bend"}.isdisjoint(found)
+    more = run({**BIG_END, **GUIDE, "drive": True, "rod": {"damping_ratio": 0.05}})
+    assert {"guide_height", "guide_tilt", "guide_gap", "crank_speed", "rod_bend"} <= {*more}
