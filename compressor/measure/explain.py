@@ -13,7 +13,8 @@ from typing import Any
 import xarray as xr
 
 from compressor.cases import ACCURACY, Case, Study, points
-from compressor.measure.features import FEATURES, Effect, Feature, compare
+from compressor.measure.feature_rows import FEATURES, Feature
+from compressor.measure.features import Effect, compare
 from compressor.measure.work_precision import SLOW, complete, faulty
 from compressor.metrics import JOINTS
 from compressor.physics import Scene, state_names
@@ -113,18 +114,19 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
         evaluations=int(run["evaluations"]),
         workers=workers,
         sweep_seconds=seconds * len(study.cases) / min(workers, len(study.cases)),
-        advice=tuple(advise(case, repeats)) if ended else (),
+        advice=tuple(advise(case, repeats)) if ended and run["steps"] > 0 else (),
     )
 
 
 def unknowns(case: Case) -> tuple[str, ...]:
-    """Names of what is integrated: a scene's freedoms, and bristles where friction has them."""
+    """Names of what is integrated: freedoms, bristles where friction has them, the crank's own."""
     p = record(case)
-    names = state_names(p)
-    bristles = names[-2:] if p["bristle_stiffness"] > 0.0 else ()
-    return names[: p["freedoms"]] + tuple(
+    names, n = state_names(p), int(p["freedoms"])
+    bristles = names[2 * n + 2 : 2 * n + 4] if p["bristle_stiffness"] > 0.0 else ()
+    found = names[:n] + tuple(
         name for name, joint in zip(bristles, JOINTS, strict=False) if joint in faulty(case)
     )
+    return found + tuple(name for name in names[2 * n + 4 :] if name.startswith("crank"))
 
 
 def timed(case: Case, repeats: int) -> tuple[xr.Dataset, float]:
@@ -160,7 +162,8 @@ def promise(case: Case) -> float:
 def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     """What a case computes, in words by term, and what it leaves out at no cost."""
     ideal = scene(case) == Scene.IDEAL
-    shown = [feature for feature in FEATURES if not feature.key.startswith("clearance")]
+    told = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
+    shown = [feature for feature in FEATURES if not feature.key.startswith(told)]
     used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
     active = {feature.name: spoken(case, feature) for feature in used}
     absent = tuple(feature.name for feature in shown if feature not in used)
@@ -192,6 +195,8 @@ def spoken(case: Case, feature: Feature) -> str:
         law = f"{case.friction.law}, " if case.friction.law else ""
         return f"{law}static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
     value = getattr(getattr(case, group), name) if dot else getattr(case, group)
+    if not dot and hasattr(value, "__dataclass_fields__"):
+        value = ", ".join(f"{key} {one:g}" for key, one in vars(value).items())
     return f"{feature.key} = {value}"
 
 
@@ -204,8 +209,6 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
 
 def advise(case: Case, repeats: int) -> Iterator[Advice]:
     """What each feature that a case pays for changes, and whether it could be left out."""
-    if scene(case) == Scene.IDEAL:
-        return
     allowed = promise(case)
     for feature in FEATURES:
         if feature.paid(case):

@@ -1,19 +1,19 @@
 """The modelling trade: what each feature of the model changes in the answer, and costs in time.
 
-A feature is one row of a table: whether a case pays for it, the case without it, and the case with
-it. `trade` quotes them all; `compressor.measure.explain` those that a case pays for.
+A feature is a row of `compressor.measure.feature_rows`. `trade` quotes them all;
+`compressor.measure.explain` those that a case pays for.
 """
 
 import math
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from compressor.cases import ACCURACY, Case, Output
+from compressor.measure.feature_rows import FEATURES
 from compressor.measure.work_precision import (
     Progress,
     complete,
@@ -27,27 +27,7 @@ from compressor.physics import exact_motion, series_motion
 from compressor.program import PROGRAM
 from compressor.solve import simulate
 
-GRAVITY = 9.81  # m/s2
-SMALL_CLEARANCE = 0.001  # mm, in the joint that was ideal
 EXACT = "fine"  # accuracy at which answers are compared
-
-
-@dataclass(frozen=True)
-class Feature:
-    """One feature of the model: the key that sets it, and cases with and without it.
-
-    `add` gives None where a case has no use for the feature, or cannot have it; `off` and `on`
-    name a case that is changed so, and `neutral` is how a case file leaves the feature out.
-    """
-
-    name: str
-    key: str
-    paid: Callable[[Case], bool]
-    remove: Callable[[Case], Case]
-    add: Callable[[Case], Case | None]
-    off: str
-    on: str
-    neutral: str
 
 
 @dataclass(frozen=True)
@@ -62,97 +42,6 @@ class Effect:
     change_acceleration: float = math.nan
     time_ratio: float = math.nan
     reason: str = ""
-
-
-def without_clearance(case: Case, joint: str) -> Case:
-    """A case of two faulty joints with one of them ideal, and concentric at the start."""
-    other = next(name for name in JOINTS if name != joint)
-    centred = {f"{joint}_x": 0.0, f"{joint}_y": 0.0}
-    return replace(case, joint=other, initial_offset_mm=replace(case.initial_offset_mm, **centred))
-
-
-def with_clearance(case: Case, joint: str) -> Case | None:
-    """A case of one faulty joint with a small clearance in the other, `joint`."""
-    if len(faulty(case)) != 1 or faulty(case) == [joint]:
-        return None
-    widths = replace(case.clearance_mm, **{joint: SMALL_CLEARANCE})
-    return replace(case, joint="both", clearance_mm=widths)
-
-
-def clearance_feature(joint: str) -> Feature:
-    """A second joint's clearance, which doubles the freedoms."""
-    return Feature(
-        f"clearance of the {joint.replace('_', ' ')}",
-        f"clearance_mm.{joint}",
-        lambda case: len(faulty(case)) == 2,
-        lambda case: without_clearance(case, joint),
-        lambda case: with_clearance(case, joint),
-        f"ideal {joint.replace('_', ' ')}",
-        f"{1000 * SMALL_CLEARANCE:g} µm in the ideal joint",
-        f"joint: {next(name for name in JOINTS if name != joint)}",
-    )
-
-
-def changed(case: Case, group: str, **values: Any) -> Case:
-    """A case with some values of a group replaced."""
-    return replace(case, **{group: replace(getattr(case, group), **values)})
-
-
-FEATURES = (
-    Feature(
-        "friction",
-        "friction",
-        lambda case: bool(case.friction and (case.friction.static or case.friction.dynamic)),
-        lambda case: replace(case, friction=None),
-        lambda case: replace(case, friction=Case().friction),
-        "no friction",
-        "friction",
-        "friction: false",
-    ),
-    Feature(
-        "spring damping",
-        "spring.damping_N_s_per_mm",
-        lambda case: case.load == "design" and case.spring.damping_N_s_per_mm > 0,
-        lambda case: changed(case, "spring", damping_N_s_per_mm=0.0),
-        lambda case: None if case.load != "design" else changed(
-            case, "spring", damping_N_s_per_mm=type(case.spring)().damping_N_s_per_mm
-        ),
-        "no spring damping",
-        "spring damping",
-        "spring.damping_N_s_per_mm: 0",
-    ),
-    Feature(
-        "gravity",
-        "machine.gravity_m_per_s2",
-        lambda case: case.machine.gravity_m_per_s2 > 0,
-        lambda case: changed(case, "machine", gravity_m_per_s2=0.0),
-        lambda case: changed(case, "machine", gravity_m_per_s2=GRAVITY),
-        "no gravity",
-        f"gravity {GRAVITY:g} m/s²",
-        "machine.gravity_m_per_s2: 0",
-    ),
-    Feature(
-        "back pressure",
-        "gas.back_pressure_MPa",
-        lambda case: case.load == "typical" and case.gas.back_pressure_MPa > 0,
-        lambda case: changed(case, "gas", back_pressure_MPa=0.0),
-        lambda case: None,
-        "no back pressure",
-        "back pressure",
-        "gas.back_pressure_MPa: 0",
-    ),
-    Feature(
-        "load",
-        "load",
-        lambda case: case.load != "none",
-        lambda case: replace(case, load="none"),
-        lambda case: None,
-        "no load",
-        "a load",
-        "load: none",
-    ),
-    *map(clearance_feature, JOINTS),
-)  # fmt: skip
 
 
 def comparable(case: Case) -> Case:
@@ -175,7 +64,8 @@ def compare(base: Case, other: Case, repeats: int) -> Effect:
     for run in runs:
         if not complete(run):
             return Effect(reason=run["reason"].item())
-    peak, force, apart = changes(*[stored_values(run, faulty(base)) for run in runs])
+    joints = faulty(base) or [*JOINTS]
+    peak, force, apart = changes(*[stored_values(run, joints) for run in runs])
     return Effect(peak, force, apart, statistics.median(ratios))
 
 
