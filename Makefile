@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-pure check format calibration accuracy claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-pure check format calibration accuracy validation claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -74,11 +74,15 @@ throughput: install  ## measure starting up, 10,000 jobs, and all beside an earl
 sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (ten minutes)
 	$(CAMPAIGN)/measure_sweep.py tests/results/sweep.json
 
+validation: install  ## compare with what others have published (a minute)
+	$(CAMPAIGN)/measure_validation.py tests/results/validation.json
+
 peers: install  ## time other tools and ours in turn on one problem (about three minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
 	  || echo "going on without numbalsoda: it needs a Fortran compiler"
 	$(CAMPAIGN)/measure_peers.py tests/results/peers.json
+	$(CAMPAIGN)/measure_validation.py tests/results/validation.json
 
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
 	$(CAMPAIGN)/measure_tradeoff.py tests/results/tradeoff.json
@@ -107,7 +111,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: calibration accuracy claims page tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
+measurements: calibration accuracy validation claims page tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py

@@ -161,6 +161,19 @@ def of_scenes(rows, key, digits):
     return " / ".join(numbers)
 
 
+def validation_table():
+    head = ["subject", "what", "unit", "expected", "found", "may differ by", "expected by"]
+    rows = []
+    for one in kept("validation.json")["rows"]:
+        digits = max(4, 2 + len(f"{abs(one['expected']) / one['within']:.0f}"))
+        expected, found = (f"{one[name]:.{digits}g}" for name in ("expected", "found"))
+        if one["expected"] == 0:
+            expected, found = "0", f"{one['found']:.1e}"
+        rows.append([one["subject"], one["what"], one["unit"], expected, found,
+                     f"{one['within']:.2g}", one["source"]])  # fmt: skip
+    return markdown(head, rows)
+
+
 def peers_table():
     kept_rows = kept("peers.json")["rows"]
     lines = [
@@ -831,6 +844,7 @@ PAGES = {
     "compressor/solve/README.md": {"reasons": reason_table},
     MEASURED: {
         "accuracy": accuracy_table,
+        "validation": validation_table,
         "bars": bars_table,
         "broken": broken_table,
         "calibration": calibration_table,

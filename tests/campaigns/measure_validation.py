@@ -1,0 +1,134 @@
+"""What others have published, and what comes out here: `make validation`.
+
+Each row has what was expected, what was found, and how far apart the two may be. Nothing here is
+fitted; the machines and equations are those of tests/published.py.
+"""
+
+import json
+import math
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from measure_accuracy import provenance
+from peers import guide
+from published import (
+    ACCELERATION,
+    ASKED,
+    DRY,
+    GIVEN,
+    MACHINE,
+    POSITION,
+    PUBLIC,
+    RATE,
+    STIFFNESS,
+    drop,
+    given_back,
+    guided,
+    rod_apart,
+    simeon,
+)
+
+from compressor.cases.case import Case
+from compressor.cases.materials import contact_stiffness
+from compressor.solve import predictability_horizon, simulate
+
+SICONOS = "Siconos, SliderCrankMoreauJeanDirectProjectionOSI.ref, steps of 0.1 ms"
+TIMES = (1e-3, 2e-3)  # s
+
+
+def row(subject, what, unit, expected, found, within, source):
+    """A row: numbers as they are, `within` in their unit."""
+    numbers = {"expected": float(expected), "found": float(found), "within": float(within)}
+    return {"subject": subject, "what": what, "unit": unit, **numbers, "source": source}
+
+
+def restitution():
+    """Drops through the whole solver."""
+    for law, given in GIVEN.items():
+        for asked, expected in zip(ASKED, given, strict=True):
+            _, rows = drop("small_end", 0.3, law=law, restitution=asked)
+            what = f"{law}, e = {asked:g}"
+            yield row("Restitution", what, "", expected, given_back(rows), 1e-3, "closed form")
+
+
+def dry_joint():
+    """The ideal machine of the dry joint, and its stiffness."""
+    source = "Flores and Koshy"
+    solve = {"duration_rev": 1, "settle_rev": 0, "output_step_deg": 0.25}
+    values = {"load": "none", "friction": False, "machine": MACHINE, "solve": solve}
+    run = simulate(Case.from_values({**values, "output": {"signals": True}}))
+    a, torque = run["acceleration"].values, run["crank_torque"].values
+    for what, unit, expected, found, within in (
+        ("least ideal acceleration", "m/s²", -19419, a.min(), 0.5),
+        ("greatest ideal acceleration", "m/s²", 9696, a.max(), 0.5),
+        ("greatest crank moment", "N m", 138.5, torque.max(), 0.05),
+    ):
+        yield row("Dry joint", what, unit, expected, found, within, source)
+    contact = {**DRY["contact"], "law": "hertz"}
+    case = Case.from_values({**DRY, "contact": contact, "solve": {"duration_rev": 3}})
+    parted = predictability_horizon(case) / case.turn
+    yield row("Dry joint", "undamped, twins part after", "rev", 1.6, parted, 0.1, source)
+    ours = contact_stiffness("steel", "steel", 0.0095, 0.0100, True)
+    ours *= (1 - 0.29**2) / (1 - 0.3**2)  # of their Poisson's ratio
+    yield row("Dry joint", "stiffness", "N/m^1.5", STIFFNESS, ours, 1e-3 * STIFFNESS, source)
+
+
+def play():
+    """The slider with play in its guide, before its first contact."""
+    subject, source = "Guide with play", "Flores, Leine and Glocker 2010"
+    run = guided(rtol=1e-11)
+    speed = CubicSpline(run.time, run.crank_speed)(TIMES)
+    height = CubicSpline(run.time, run.guide_height / guide.CLEARANCE)(TIMES)
+    for i, (one, other) in enumerate([(139.11588, 0.077487), (120.46388, 0.494396)]):
+        at = f"at {1e3 * TIMES[i]:g} ms"
+        yield row(subject, f"crank speed {at}", "rad/s", one, speed[i], 1e-5, source)
+        yield row(subject, f"height over clearance {at}", "", other, height[i], 1e-5, source)
+    first = CubicSpline(run.time, run.guide_gap).roots(extrapolate=False)[0]
+    yield row(subject, "first contact", "ms", 2.6925, 1e3 * first, 1e-4, source)
+    known = (("crank speed", "rad/s", 139.23030734, speed), ("height", "", 0.07712895696, height))
+    for what, unit, expected, found in known:
+        yield row(subject, f"{what} at 1 ms", unit, expected, found[0], 5e-3 * expected, SICONOS)
+    if find_spec("exudyn"):
+        import exudyn
+
+        for i, theirs in enumerate(guide.converged(TIMES)):
+            at, source = f"at {1e3 * TIMES[i]:g} ms", f"Exudyn {exudyn.__version__}"
+            yield row(subject, f"crank speed {at}", "rad/s", theirs[0], speed[i], 1e-6, source)
+            yield row(
+                subject, f"height over clearance {at}", "", theirs[1], height[i], 1e-7, source
+            )
+
+
+def elastic_rod():
+    """The published start of an elastic rod, by the equations that the program is held against."""
+    source = "IVP test set, crank (Simeon)"
+    found = simeon(0.0, POSITION, RATE, PUBLIC)
+    subject = "Elastic rod"
+    x = 0.45 + POSITION[5]
+    yield row(subject, "x₃ at the start", "m", 0.450016933, x, 1e-9, source)
+    spin = -0.15 * 150.0 / (0.30 + POSITION[5])
+    yield row(subject, "φ₂' at the start", "rad/s", -74.995767, spin, 1e-6, source)
+    yield row(subject, "x₃'' at the start", "m/s²", ACCELERATION[1], found[1], 1e-5, source)
+    source = "the same equations, by SciPy's DOP853"
+    for name, apart in rod_apart().items():
+        yield row(subject, f"{name}, relative difference over 8 ms", "", 0, apart, 1e-6, source)
+
+
+def main(target):
+    rows = [one for made in (restitution, dry_joint, play, elastic_rod) for one in made()]
+    kept = provenance("make validation") | {"rows": rows}
+    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    bad = [one for one in rows if not math.fabs(one["found"] - one["expected"]) <= one["within"]]
+    print(f"{len(rows)} numbers, {len(bad)} beyond what they may differ by", *bad, sep="\n")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    np.seterr(all="ignore")
+    sys.exit(main(sys.argv[1]))
