@@ -210,3 +210,12 @@ def rod_apart():
         name: float(np.abs(run[name].values - other[at]).max() / np.abs(other[at]).max())
         for name, at in rows.items()
     }
+
+
+# H. J. Butenschoen's tables (1976), as in DIN 31652: length over diameter, eccentricity, Sommerfeld
+# number and attitude (degrees; 0 where it was not at hand)
+BEARING = [
+    (1.0, 0.1, 0.1196, 79.41), (1.0, 0.5, 0.8903, 56.71), (1.0, 0.8, 3.5663, 36.24),
+    (1.0, 0.95, 18.79, 19.45), (0.5, 0.1, 0.0368, 0.0), (0.5, 0.5, 0.3124, 0.0),
+    (0.5, 0.8, 1.7339, 0.0), (0.5, 0.95, 13.31, 0.0),
+]  # fmt: skip

@@ -45,7 +45,7 @@ PACKAGES = (
 )  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
-    # designs, integrators, Student's t, splines, root finder and minimiser, spectra
+    # designs, sparse systems, integrators, Student's t, splines, root finder and minimiser, spectra
     "scipy": {
         "compressor.analysis.course",
         "compressor.analysis.effects",
@@ -56,6 +56,7 @@ LIBRARIES = {  # library -> the modules that may import it
         "compressor.diagnosis.strangeness",
         "compressor.machines.search",
         "compressor.measure.find",
+        "compressor.solve.bearing",
         "compressor.solve.scipy_driver",
         "compressor.solve.statistics",
         "compressor.vibration",

@@ -12,9 +12,9 @@ from compressor.reasons import Reason, reason_table, remedy
 
 PROGRAM = [name for name in SOURCES if name.startswith("compressor") and "reasons" not in name]
 STORED = {  # names that stores hold: never renamed
-    "invalid_input", "non_finite", "penetration_implausible", "step_underflow", "budget_steps",
-    "budget_seconds", "contact_underresolved", "energy_audit_failed", "accuracy_not_reached",
-    "not_settled", "worker_died", "out_of_memory", "internal_error",
+    "invalid_input", "non_finite", "penetration_implausible", "step_underflow", "crank_stalled",
+    "budget_steps", "budget_seconds", "contact_underresolved", "energy_audit_failed",
+    "accuracy_not_reached", "not_settled", "worker_died", "out_of_memory", "internal_error",
 }  # fmt: skip
 
 

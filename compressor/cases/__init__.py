@@ -18,6 +18,7 @@ from compressor.cases.groups import (
 )
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import load_cases, load_studies
+from compressor.cases.lubricant import Lubricant
 from compressor.cases.materials import joint_stiffness
 from compressor.cases.mechanism import Drive, Guide, Rod
 from compressor.cases.one_way import back_action

@@ -36,9 +36,9 @@ class Case(Settings):
     `Case.from_values` makes a valid one. `name` (of the study), `load` (design, typical or none)
     and `joint` (none, big_end, small_end or both) are words. The groups are `clearance_mm`
     (PerJoint), `initial_offset_mm` (Offset), `machine`, `gas`, `spring`, `contact`, `friction`,
-    `guide`, `drive`, `rod`, `body`, `sensor`, `solve` and `output`, each of the class of that name;
-    friction and the five after it may be None. A case never changes; `dataclasses.replace` makes
-    another:
+    `lubricant`, `guide`, `drive`, `rod`, `body`, `sensor`, `solve` and `output`, each of the class
+    of that name; friction and the six after it may be None. A case never changes;
+    `dataclasses.replace` makes another:
 
     >>> from dataclasses import replace
     >>> import compressor
@@ -207,9 +207,9 @@ class Case(Settings):
 
     @property
     def has_features(self) -> bool:
-        """Whether more may move or rub than the paper's machine has: guide, drive, rod, joints."""
+        """Whether it has more than the paper's machine: oil, guide, drive, rod, rubbing joints."""
         rubbing = self.friction and self.friction.ideal_joints
-        return bool(self.guide or self.drive or self.rod or rubbing)
+        return bool(self.lubricant or self.guide or self.drive or self.rod or rubbing)
 
     @property
     def is_plain(self) -> bool:

@@ -1,11 +1,28 @@
-"""What does not fit together in guide, drive, rod and the friction of ideal joints."""
+"""What does not fit together in lubricant, guide, drive, rod and the friction of ideal joints."""
 
 from collections.abc import Iterator
 
+from compressor.cases.lubricant import GREATEST_RATIO, LEAST_RATIO
 from compressor.cases.parameter import Problem
 from compressor.cases.table import Settings
 
 SLIM = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
+
+
+def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """A film needs a clearance, and a bearing for which its numbers hold."""
+    if not case.lubricant:
+        return
+    if case.joint == "none":
+        yield Problem("lubricant", "fills clearances, and joint: none has none: name a joint")
+    width = 2.0 * case.machine.pin_radius_mm
+    ratio = case.lubricant.bearing_length_mm / width
+    if not LEAST_RATIO <= ratio <= GREATEST_RATIO:
+        yield Problem(
+            "lubricant.bearing_length_mm",
+            f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers hold "
+            f"from {LEAST_RATIO:g} to {GREATEST_RATIO:g} times",
+        )
 
 
 def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:

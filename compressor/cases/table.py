@@ -21,6 +21,7 @@ from compressor.cases.groups import (
     Solve,
     Spring,
 )
+from compressor.cases.lubricant import Lubricant
 from compressor.cases.mechanism import Drive, Guide, Rod
 from compressor.cases.parameter import Parameter, choice
 from compressor.cases.vibration import Body, Sensor
@@ -35,6 +36,7 @@ GROUPS: dict[str, type] = {
     "spring": Spring,
     "contact": Contact,
     "friction": Friction,
+    "lubricant": Lubricant,
     "guide": Guide,
     "drive": Drive,
     "rod": Rod,
@@ -45,7 +47,8 @@ GROUPS: dict[str, type] = {
 }
 # groups that a word may stand for: `false` leaves one out, `true` is one with its defaults
 WORDS = {
-    "friction": False, "guide": True, "drive": True, "rod": True, "body": True, "sensor": True,
+    "friction": False, "lubricant": True, "guide": True, "drive": True, "rod": True, "body": True,
+    "sensor": True,
 }  # fmt: skip
 # groups that no joint reads with `joint: none`
 OF_JOINTS = ("clearance_mm",)
@@ -72,6 +75,7 @@ class Settings:
     spring: Spring = Spring()
     contact: Contact = Contact()
     friction: Friction | None = Friction()
+    lubricant: Lubricant | None = None
     guide: Guide | None = None
     drive: Drive | None = None
     rod: Rod | None = None

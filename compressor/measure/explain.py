@@ -17,21 +17,20 @@ from compressor.measure.feature_rows import FEATURES, Feature
 from compressor.measure.features import Effect, compare
 from compressor.measure.work_precision import SLOW, complete, faulty
 from compressor.metrics import JOINTS
-from compressor.physics import Scene, state_names
+from compressor.physics import state_names
 from compressor.solve import (
     JointScales,
     expected_cost,
     joint_scales,
     record,
-    scene,
     simulate,
 )
 
-SCENES = {
-    Scene.IDEAL: "ideal joints",
-    Scene.BIG_END: "clearance at the big end",
-    Scene.SMALL_END: "clearance at the small end",
-    Scene.BOTH: "clearance at both joints",
+SCENES = {  # by the joints with clearance
+    (): "ideal joints",
+    ("big_end",): "clearance at the big end",
+    ("small_end",): "clearance at the small end",
+    ("big_end", "small_end"): "clearance at both joints",
 }
 
 
@@ -96,7 +95,7 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
         path=study.path,
         jobs=len(study.cases),
         point=next(points(study)),
-        scene=SCENES[scene(case)],
+        scene=SCENES[tuple(faulty(case))],
         unknowns=unknowns(case),
         active=active,
         absent=absent,
@@ -161,7 +160,7 @@ def promise(case: Case) -> float:
 
 def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     """What a case computes, in words by term, and what it leaves out at no cost."""
-    ideal = scene(case) == Scene.IDEAL
+    ideal = not faulty(case)
     told = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
     shown = [feature for feature in FEATURES if not feature.key.startswith(told)]
     used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]

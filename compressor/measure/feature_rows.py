@@ -21,8 +21,9 @@ LAWS: dict[str, dict[str, Any]] = {
     "liu": STEEL,
 }
 FRICTION_LAWS = ("coulomb_tanh", "threlfall", "ambrosio", "lugre")
-# groups of the mechanism: name, key, the case without and with it
+# groups that a case may name: name, key, the case without and with it
 MECHANISM = (
+    ("oil film", "lubricant", "dry joints", "oil film"),
     ("friction of the guide", "guide", "ideal guide", "friction of the guide"),
     ("speed that gives way", "drive", "steady speed", "speed that gives way"),
     ("elastic rod", "rod", "rigid rod", "elastic rod"),
@@ -125,7 +126,8 @@ def with_friction(case: Case, law: str) -> Case | None:
 
 def named(key: str, value: Any) -> Any:
     """The group that a case file's value stands for."""
-    return getattr(Case.from_values({key: value}), key)
+    worn = {"joint": "both", "clearance_mm": 0.1}  # for a group that needs it
+    return getattr(Case.from_values({**worn, key: value}), key)
 
 
 def with_group(case: Case, key: str, group: Any) -> Case:

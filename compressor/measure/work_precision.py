@@ -16,10 +16,9 @@ import xarray as xr
 from compressor.analysis import FAULTS, label, paper_cases, settled
 from compressor.cases import ACCURACY, METHODS, Case, Output
 from compressor.metrics import JOINTS
-from compressor.physics import Scene
 from compressor.program import PROGRAM, CompsimError
 from compressor.reasons import Reason
-from compressor.solve import LOCAL, scene, simulate
+from compressor.solve import LOCAL, simulate
 
 MEASURED = tuple(method for method in METHODS if method != "TSIT5")  # which auto steps by
 # those behind the words of `accuracy`, and some between
@@ -139,7 +138,7 @@ def work_precision(
     clearance, or ValueError is raised; raises ReferenceFailed.
     """
     for name, case in cases.items():
-        if scene(case) == Scene.IDEAL:
+        if not faulty(case):
             raise ValueError(f"{name} has no joint with clearance: nothing is integrated")
     tolerances = sorted(tolerances, reverse=True)
     study = empty(list(cases), methods, tolerances)

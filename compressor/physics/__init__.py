@@ -2,6 +2,7 @@
 
 from compressor.physics.contact import choose_laws
 from compressor.physics.contact_laws import elastic_form
+from compressor.physics.film import film_constants
 from compressor.physics.friction_laws import steepest
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.lane_runs import Run, march_side_by_side

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from compressor.physics._jit import jit, square_root
 from compressor.physics.contact import NO_CONTACT, Contact, carried_by, joint_contact
 from compressor.physics.elastic_rod import BIG_SLOPE, MODES, SMALL_SLOPE, summed
+from compressor.physics.film import film
 from compressor.physics.guide import UNGUIDED, Guided, corners
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END, SMALL_END, Coordinate
@@ -56,11 +57,23 @@ class Pose(NamedTuple):
     spin: float  # of the rod, counter-clockwise
 
 
+class Film(NamedTuple):
+    """What a joint's oil film does beside its force on the rod, which is in the contact's."""
+
+    moment: float  # on the journal, N m
+    loss: float  # power that the film takes, W
+
+
+NO_FILM = Film(0.0, 0.0)
+
+
 class Joints(NamedTuple):
     """Contacts, guide and load, and the bores' spins: all forces that need no acceleration."""
 
-    big: Contact
+    big: Contact  # with the film's force and moment, where a joint has one
     small: Contact
+    big_film: Film
+    small_film: Film
     guide: Guided
     load: float
     big_spin: float  # rad/s, of the rod's bore
@@ -135,6 +148,19 @@ def fill_bias(pose, rates, p, bias):
 
 
 @jit
+def oiled(contact, eccentricity, spins, clearance, p):
+    """A joint's `Contact` with its film's force and moment on the rod, and the `Film`."""
+    if p.viscosity == 0.0:
+        return contact, NO_FILM
+    fx, fy, journal, bore, lost = film(eccentricity, spins, clearance, p)
+    found = Contact(
+        contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
+        contact.penetration, contact.rate, contact.slip, contact.elastic, contact.unclamped,
+    )  # fmt: skip
+    return found, Film(journal, lost)
+
+
+@jit
 def joints_of(phase, y, motion, pose, velocity, p):
     """The `Joints` at a state; velocity: of the bodies, (11,)."""
     n, modes = p.freedoms, velocity[4:8]
@@ -142,25 +168,30 @@ def joints_of(phase, y, motion, pose, velocity, p):
     small_spin = pose.spin + summed(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
     pin_spin = velocity[10]
     big, small = NO_CONTACT, NO_CONTACT
+    big_film, small_film = NO_FILM, NO_FILM
     if p.clearance[0] > 0.0:
         place = p.at[1]
         off = y[place], y[place + 1], y[n + place], y[n + place + 1]
         kept = carried_by(BIG_END, y, p)
         spins = pose.speed, big_spin
         big = joint_contact(off, spins, p.clearance[0], p.stiffness[0], kept, p)
+        big, big_film = oiled(big, off, spins, p.clearance[0], p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
         off = y[place], y[place + 1], y[n + place], y[n + place + 1]
         kept = carried_by(SMALL_END, y, p)
         spins = pin_spin, small_spin
         small = joint_contact(off, spins, p.clearance[1], p.stiffness[1], kept, p)
+        small, small_film = oiled(small, off, spins, p.clearance[1], p)
     guide = UNGUIDED
     if p.tilting:
         rates = velocity[8], velocity[9], velocity[10]
         guide = corners(pose.height, pose.tilt, rates, p)
     ideal_v = motion.v * pose.speed / p.omega
     load = piston_force(phase, pose.x, velocity[8], pose.x - motion.x, velocity[8] - ideal_v, p)
-    return Joints(big, small, guide, load, big_spin, small_spin, pin_spin)
+    return Joints(
+        big, small, big_film, small_film, guide, load, big_spin, small_spin, pin_spin
+    )  # fmt: skip
 
 
 @jit
@@ -169,14 +200,15 @@ def add_forces(pose, joints, p, force):
     big, small, guide = joints.big, joints.small, joints.guide
     c, s = pose.cos_theta, pose.sin_theta
     force[0] -= p.crank_radius * (c * big.fy - s * big.fx)
-    force[0] += (p.pin_radius - big.penetration) * big.friction
+    force[0] += (p.pin_radius - big.penetration) * big.friction + joints.big_film.moment
     force[0] -= p.unbalance * p.gravity * c
     if p.driven:
         force[0] += motor_torque(pose, p)
     add_on_rod(pose, (big.fx, big.fy, big.moment), (small.fx, small.fy, small.moment), p, force)
     force[8] += guide.fx - joints.load - small.fx
     force[9] += guide.fy - p.reciprocating_mass * p.gravity - small.fy
-    force[10] += guide.moment + (p.pin_radius - small.penetration) * small.friction
+    force[10] += guide.moment + joints.small_film.moment
+    force[10] += (p.pin_radius - small.penetration) * small.friction
 
 
 @jit

@@ -80,7 +80,7 @@ def crank_torque(now, p):
     pose, forces, big = now.pose, now.reactions, now.joints.big
     torque = p.crank_radius * (pose.cos_theta * forces.big_y - pose.sin_theta * forces.big_x)
     torque += forces.big_torque + p.unbalance * p.gravity * pose.cos_theta
-    return torque - (p.pin_radius - big.penetration) * big.friction
+    return torque - (p.pin_radius - big.penetration) * big.friction - now.joints.big_film.moment
 
 
 @jit
@@ -91,6 +91,7 @@ def write_powers(now, p, row):
     row[CRANK_POWER] = crank_torque(now, p) * pose.speed
     row[LOAD_POWER] = -now.joints.load * now.velocity[8]
     damped = damping_power(big) + damping_power(small) + guide.damped
+    damped += now.joints.big_film.loss + now.joints.small_film.loss
     row[DAMPING_POWER] = damped + p.rod_damping * material_work(modes, modes, p)
     rubbed = guide.rubbed - big.friction * big.slip - small.friction * small.slip
     rubbed += forces.big_torque * (pose.speed - now.joints.big_spin)

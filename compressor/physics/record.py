@@ -138,6 +138,13 @@ FIELDS: list[tuple] = [
     ("bristle_damping", "f8"),  # sigma_1, s/m
     ("viscous", "f8"),  # sigma_2, s/m
 ]
+# of a mechanism whose worn joints are lubricated
+FILM: list[tuple] = [
+    ("viscosity", "f8"),  # of the oil, Pa s; 0 of dry joints
+    ("film_length", "f8"),  # of the bearings, m
+    ("film_share", "f8"),  # of the clearance: the film's last, in which the contact takes over
+    ("film_constants", "f8", (51,)),  # `film.film_constants`
+]
 # of a mechanism with more freedom than ideal guides, a steady crank and a rigid rod leave it
 FEATURES: list[tuple] = [
     ("rubbing", "i8"),  # whether ideal joints have friction
@@ -165,7 +172,7 @@ FEATURES: list[tuple] = [
 CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
 CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (CHOICE,))], align=True)
-FEATURED = np.dtype([*FIELDS, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
+FEATURED = np.dtype([*FIELDS, *FILM, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
 
 
 def zero(kind: np.dtype) -> np.record:

@@ -9,7 +9,7 @@ from compressor.solve.lyapunov import largest_exponent
 from compressor.solve.marching import COMPILED
 from compressor.solve.scales import JointScales, expected_cost, joint_scales
 from compressor.solve.scipy_driver import LOCAL
-from compressor.solve.si_record import record, scene
+from compressor.solve.si_record import record
 from compressor.solve.side_by_side import side_by_side
 from compressor.solve.signals import forces_on_frame
 from compressor.solve.simulate import measure, observe, simulate

@@ -44,6 +44,7 @@ def record(case: Case) -> np.record:
     _gas(case, p)
     _spring(case, p)
     ratio = case.gas.discharge_MPa / case.gas.suction_MPa
+    _film(case, p)
     if case.has_features:
         _features(case, p)
     complete(p, ratio, printed=case.gas.switching == "paper")
@@ -114,6 +115,19 @@ def _spring(case: Case, p: dict[str, Any]) -> None:
     p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")
     p["preload"] = spring.preload_N
     p["spring_stroke"] = to_si(spring.stroke_mm, "mm")
+
+
+def _film(case: Case, p: dict[str, Any]) -> None:
+    """The oil film of the joints with clearance."""
+    lubricant = case.lubricant
+    if lubricant is None:
+        return
+    from compressor.solve.bearing import film_numbers
+
+    length = to_si(lubricant.bearing_length_mm, "mm")
+    p["viscosity"] = to_si(lubricant.viscosity_mPa_s, "mPa s")
+    p["film_length"], p["film_share"] = length, lubricant.last_share
+    p["film_constants"] = film_numbers(0.5 * length / p["pin_radius"], lubricant.last_share)
 
 
 def _features(case: Case, p: dict[str, Any]) -> None:

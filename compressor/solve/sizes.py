@@ -4,7 +4,13 @@ import math
 
 import numpy as np
 
-from compressor.physics import FLOWS, elastic_form, is_featured, state_names, static_load
+from compressor.physics import (
+    FLOWS,
+    elastic_form,
+    is_featured,
+    state_names,
+    static_load,
+)
 from compressor.solve.mechanism_sizes import mechanism_sizes
 
 
@@ -12,7 +18,8 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
     """Length (m) and speed (m/s) that absolute tolerances are relative to.
 
     The length is the smaller of the clearance and the penetration under the forces at hand, but
-    not below a thousandth of the latter; the speed is that length at the contact's frequency.
+    not below a thousandth of the latter; the speed is that length at the contact's frequency, or
+    that at which a film against the wall gives way to the forces, if that is less.
     """
     moving = p["reciprocating_mass"]
     force = moving * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
@@ -22,7 +29,18 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
     depth = contact.static_depth(force)
     length = max(min(clearance, depth), 1e-3 * depth)
     mass = min(p["rod_mass"], moving)
-    return length, length * math.sqrt(contact.tangent(depth) / mass)
+    speed = length * math.sqrt(contact.tangent(depth) / mass)
+    if (damping := film_damping(p, clearance)) > 0.0:
+        speed = min(speed, force / damping)
+    return length, speed
+
+
+def film_damping(p: np.record, clearance: float) -> float:
+    """Damping (N s/m) of a joint's film that is pressed against the wall; 0 of a dry joint."""
+    if not is_featured(p) or p["viscosity"] == 0.0:
+        return 0.0
+    size = 2.0 * p["film_length"] * p["viscosity"] * p["pin_radius"] ** 3 / clearance**2
+    return float(size * p["film_constants"][-1] / clearance)
 
 
 def natural_sizes(p: np.record) -> np.ndarray:

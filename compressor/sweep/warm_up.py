@@ -59,13 +59,12 @@ class Needs(NamedTuple):
         Results are the same to the bit without: where no lanes have been compiled yet, many more
         jobs are asked for than where they need but be loaded.
         """
-        from compressor.solve import scene
-
         step = max(1, len(cases) // SEEN)
         looked = (cases[i] for i in range(0, len(cases), step))
-        seen = Counter(int(scene(case)) for case in looked if case.is_plain)
+        seen = Counter(case.joint for case in looked if case.is_plain)
         least = {of: FEWEST if marker(f"lanes-{of}").exists() else MANY for of in LANES}
-        return self._replace(lanes=tuple(of for of in LANES if seen[of] * step >= least[of]))
+        many = (of for of, joint in LANES.items() if seen[joint] * step >= least[of])
+        return self._replace(lanes=tuple(many))
 
 
 def load(needs: Needs) -> None:

@@ -20,6 +20,7 @@ from peers import guide
 from published import (
     ACCELERATION,
     ASKED,
+    BEARING,
     DRY,
     GIVEN,
     MACHINE,
@@ -37,6 +38,7 @@ from published import (
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.solve import predictability_horizon, simulate
+from compressor.solve.bearing import reynolds
 
 SICONOS = "Siconos, SliderCrankMoreauJeanDirectProjectionOSI.ref, steps of 0.1 ms"
 TIMES = (1e-3, 2e-3)  # s
@@ -120,8 +122,21 @@ def elastic_rod():
         yield row(subject, f"{name}, relative difference over 8 ms", "", 0, apart, 1e-6, source)
 
 
+def bearing():
+    """Sommerfeld numbers and attitudes of the film, from Reynolds' equation."""
+    source = "Butenschön 1976, DIN 31652"
+    for ratio, eps, number, angle in BEARING:
+        at, found = f"B/D {ratio:g}, ε {eps:g}", reynolds(eps, ratio)
+        size = eps * math.hypot(*found)
+        yield row("Journal bearing", f"So at {at}", "", number, size, 4e-3 * number, source)
+        if angle:
+            turned = math.degrees(math.atan2(found.across, found.normal))
+            yield row("Journal bearing", f"attitude at {at}", "°", angle, turned, 0.1, source)
+
+
 def main(target):
-    rows = [one for made in (restitution, dry_joint, play, elastic_rod) for one in made()]
+    every = (restitution, dry_joint, play, bearing, elastic_rod)
+    rows = [one for made in every for one in made()]
     kept = provenance("make validation") | {"rows": rows}
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     bad = [one for one in rows if not math.fabs(one["found"] - one["expected"]) <= one["within"]]

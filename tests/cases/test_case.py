@@ -190,6 +190,9 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
         ({"solve": {"output_step_s": 1}}, "solve.output_step_s", "longer than the duration"),
         ({"solve": {"output_step_s": 5e-324}}, "solve.output_step_s", "makes inf samples"),
         ({"solve": {"settle_rev": 4}}, "solve.settle_rev", "leave nothing of a run of 4"),
+        ({"lubricant": True}, "lubricant", "joint: none has none: name a joint"),
+        ({**BIG_END, "lubricant": {"bearing_length_mm": 40}}, "lubricant.bearing_length_mm",
+         "2 times the diameter"),
         ({"body": True, "drive": True}, "body", "leave out body or drive"),
         ({"rod": True, "machine": {"rod_centre_mm": 200}}, "machine.rod_centre_mm", "uniform bar"),
         ({"rod": True, "machine": {"rod_inertia_kg_m2": 0.1}}, "machine.rod_inertia_kg_m2",
@@ -419,7 +422,7 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"contact": {"materials": ["steel", "steel"]}}
     if group == "sensor":
         base |= {"body": True, "sensor": True}
-    if group in ("guide", "drive", "rod"):
+    if group in ("lubricant", "guide", "drive", "rod"):
         base |= {group: True}
     if name in OF_LAWS:
         law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}

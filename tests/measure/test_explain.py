@@ -108,7 +108,7 @@ def test_freedoms_and_terms():
     assert active["load"] == "load = design"
     assert absent == (
         "gravity", "back pressure", "play of the guide", "friction of ideal joints",
-        "friction of the guide", "speed that gives way", "elastic rod",
+        "oil film", "friction of the guide", "speed that gives way", "elastic rod",
     )  # fmt: skip
     steel = Case.from_values(
         {"joint": "big_end", "clearance_mm": 0.1, "contact": {"materials": ["steel", "copper"]}}

@@ -1,0 +1,175 @@
+"""The oil film of a journal bearing under a load that moves: its forces, moments and loss.
+
+Holland's superposition: a part of the rotation and one of the squeeze, each by a Sommerfeld number
+of a bearing of finite length,
+
+    F_D = So_D(eps) B D eta |w| / psi^2     at the angle beta behind the line of centres
+    F_V = So_V(eps) B D eta eps' / psi^2    along it
+
+with the eccentricity eps over the clearance, w = w_J + w_B - 2 delta', delta the angle of the line
+of centres, B and D length and diameter, psi the clearance over the radius. The film that is pulled
+apart is the other half, as of -eps.
+
+The numbers are Butenschoen's approximations (Das hydrodynamische, zylindrische Gleitlager
+endlicher Breite unter instationaerer Belastung, Karlsruhe 1976), which are some per cent off his
+tables, times polynomials that make them those of Reynolds' equation (`solve.bearing`), which his
+tables are.
+
+Where both parts act, |w| and the sides of the squeeze change smoothly with the direction of the
+velocity; of a film that only turns, or is only squeezed, the numbers are exact.
+
+Below `CENTRED` the numbers go to those that make the centre smooth: a force against the velocity.
+In the film's last share the numbers stay what they are where it begins: the film bears no more,
+and the dry contact takes over.
+"""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import jit, plain
+from compressor.physics.contact_laws import rise
+
+CENTRED = 0.1
+SHAPES = {"rotation": 14, "attitude": 14, "squeeze": 22}  # numbers, and terms of each polynomial
+TERMS = sum(SHAPES.values())
+TURNED, SQUEEZED = 14, 28  # where the second and the third begin
+
+
+@jit
+def polynomial(constants, begin, end, x):
+    """Value of the polynomial whose constants, the lowest first, stand from begin to end."""
+    total = 0.0
+    for i in range(end - 1, begin - 1, -1):
+        total = total * x + constants[i]
+    return total
+
+
+@jit
+def ends(eps, b):
+    """How the open ends weaken a film, by the length over the diameter b: Butenschoen's a1, a2."""
+    a1 = 1.1642 + b * (-1.9456 + b * (7.1161 + b * (-10.1073 + b * 5.0141)))
+    a2 = 1.000026 + b * (0.023634 + b * (0.4215 + b * (0.038817 + b * 0.090551)))
+    return b * b * a1 * (1.0 - eps) / (a2 - eps)
+
+
+@jit
+def rotation_shape(eps, b):
+    """Sommerfeld number of the rotation over eps, which stays finite at the centre."""
+    room = 1.0 - eps * eps
+    size = math.sqrt(math.pi * math.pi * room + 16.0 * eps * eps)
+    return size / (2.0 * room * room) * ends(eps, b)
+
+
+@jit
+def squeeze_shape(eps, b):
+    """Sommerfeld number of the squeeze; eps negative: of a film that is pulled apart."""
+    room = 1.0 - eps * eps
+    half = (0.5 * math.pi - 0.5 * math.acos(eps)) * (1.0 + 2.0 * eps * eps)
+    shape = half + 1.5 * eps * math.sqrt(room)
+    return 4.0 * shape / (room * room * math.sqrt(room)) * ends(eps, b)
+
+
+@jit
+def attitude_shape(eps, b):
+    """The angle (rad) from the load to the line of centres, along the rotation."""
+    series = 6.6294 - 1.591732 * b
+    series = series * eps - 13.3415 + 3.424337 * b
+    series = series * eps + 8.73393 - 2.3291 * b
+    series = series * eps - 2.5905 + 0.798745 * b
+    series = series * eps + 1.152624 - 0.105465 * b
+    return math.atan2(math.pi * math.sqrt(1.0 - eps * eps), 2.0 * eps) * series
+
+
+def film_constants(ratio, share, number):
+    """Constants of the film's polynomials, `TERMS` of them, and the squeeze's number at the wall.
+
+    They lead from Butenschoen's approximations to other numbers at Chebyshev's points of the
+    eccentricities that a film with this last share may have. ratio: B / D; number: of a name in
+    `SHAPES`, an eccentricity and a ratio.
+    """
+    each = {"rotation": rotation_shape, "attitude": attitude_shape, "squeeze": squeeze_shape}
+    most, found = 1.0 - 0.5 * share, []
+    for name, count in SHAPES.items():
+        least = -most if name == "squeeze" else 0.0
+        nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        eps = least + (most - least) * (nodes + 1.0) / 2.0
+        quotient = [number(name, one, ratio) / each[name](one, ratio) for one in eps]
+        fit = np.polynomial.Chebyshev.fit(eps, quotient, count - 1)
+        found += fit.convert(kind=np.polynomial.Polynomial).coef.tolist()
+    wall = plain(kept)(1.0, share)
+    return (*found, plain(squeeze_number)(wall, ratio, np.array(found)))
+
+
+@jit
+def rotation_number(eps, b, constants):
+    """`rotation_shape` as Reynolds' equation has it; level at the centre."""
+    found = rotation_shape(eps, b) * polynomial(constants, 0, TURNED, eps)
+    centre = rotation_shape(0.0, b) * constants[0]
+    return centre + (found - centre) * rise(eps / CENTRED)
+
+
+@jit
+def attitude(eps, b, constants):
+    """`attitude_shape` as Reynolds' equation has it; a right angle at the centre."""
+    found = attitude_shape(eps, b) * polynomial(constants, TURNED, SQUEEZED, eps)
+    return 0.5 * math.pi + (found - 0.5 * math.pi) * rise(eps / CENTRED)
+
+
+@jit
+def squeeze_number(eps, b, constants):
+    """`squeeze_shape` as Reynolds' equation has it; at the centre the same in all directions."""
+    found = squeeze_shape(eps, b) * polynomial(constants, SQUEEZED, TERMS, eps)
+    centre = 2.0 * rotation_number(0.0, b, constants)
+    return centre + (found - centre) * rise(abs(eps) / CENTRED)
+
+
+@jit
+def kept(eps, share):
+    """eps up to the film's last share, and from there to the wall smoothly to its middle."""
+    begin = 1.0 - share
+    if eps <= begin:
+        return eps
+    s = min(1.0, (eps - begin) / share)
+    return begin + share * (s - 0.5 * s * s)
+
+
+@jit
+def film(eccentricity, spins, clearance, p):
+    """Force on the journal x, y (N), moments on journal and bore (N m), and the power lost (W).
+
+    eccentricity: journal centre less bore centre, x and y (m), and its rate (m/s); spins: of
+    journal and bore (rad/s); clearance (m). The moments balance: both have half of that of the
+    force pair, and the shear of the film (Petroff's over sqrt(1 - eps^2)) against their spin.
+    """
+    ex, ey, ex_rate, ey_rate = eccentricity
+    distance = math.sqrt(ex * ex + ey * ey)
+    nx, ny = (ex / distance, ey / distance) if distance > 0.0 else (1.0, 0.0)
+    radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
+    eps = kept(distance / clearance, p.film_share)
+    ratio = 0.5 * p.film_length / p.pin_radius
+    relative = clearance / p.pin_radius
+    size = 2.0 * p.film_length * p.pin_radius * p.viscosity / (relative * relative)
+    journal_spin, bore_spin = spins
+    per_distance = eps / distance if distance > 0.0 else 1.0 / clearance
+    wedge = eps * (journal_spin + bore_spin) - 2.0 * across * per_distance  # eps w
+    rotation = size * rotation_number(eps, ratio, p.film_constants)
+    beta = attitude(eps, ratio, p.film_constants)
+    # speeds along and across the line of centres, each smooth where the other one is not zero
+    closing = radial / clearance
+    speed = math.sqrt(wedge * wedge + closing * closing)
+    turning, pressing = 0.0, 0.0
+    if speed > 0.0:
+        turning, pressing = wedge * wedge / speed, closing * closing / speed
+    pressed = size * squeeze_number(eps, ratio, p.film_constants)
+    pulled = size * squeeze_number(-eps, ratio, p.film_constants)
+    normal = -rotation * turning * math.cos(beta)
+    normal -= 0.5 * (pressed + pulled) * closing + 0.5 * (pressed - pulled) * pressing
+    side = rotation * wedge * math.sin(beta)
+    fx, fy = normal * nx - side * ny, normal * ny + side * nx
+    shear = 2.0 * math.pi * p.viscosity * p.film_length * p.pin_radius**3
+    shear *= (journal_spin - bore_spin) / (clearance * math.sqrt(1.0 - eps * eps))
+    half = 0.5 * distance * side
+    lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)
+    lost -= normal * radial + side * across
+    return fx, fy, -shear - half, shear - half, lost

@@ -1,0 +1,104 @@
+"""Reynolds' equation of a journal bearing of finite length, and the film's numbers from it.
+
+    d/dtheta (h^3 dp/dtheta) + (D / B)^2 d/dz (h^3 dp/dz) = 6 dh/dtheta  or  12 eps' cos(theta)
+
+on theta around the bearing from the widest gap, h = 1 + eps cos(theta), and z from -1 to 1, with
+pressures that never pull (Reynolds' condition: p and its slope end together). A film that turns
+begins at its widest gap, as in Butenschoen's tables (1976; DIN 31652). Finite volumes, even in
+Sommerfeld's angle, 1 + eps cos(theta) = (1 - eps^2) / (1 - eps cos(xi)), fine where the film is
+thin; which cells bear is found by their pressures and flows, and two grids give a third
+(Richardson).
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from compressor.physics import film_constants
+
+GRID = (96, 12)  # cells around and along half the bearing
+MOST_LOOKS = 200  # in which the cells that bear are found
+
+
+class Reynolds(NamedTuple):
+    """Force over B D eta w / psi^2, that of a film that turns over eps as well.
+
+    Along the line of centres, away from the wall, and across it, along the rotation.
+    """
+
+    normal: float
+    across: float
+
+
+def reynolds(eps: float, ratio: float, squeeze: int = 0, grid: tuple[int, int] = GRID) -> Reynolds:
+    """Sommerfeld numbers of a film at an eccentricity, for B / D = ratio.
+
+    squeeze: 0 of a film that turns, 1 of one that is pressed, -1 of one that is pulled apart.
+    """
+    coarse = _forces(eps, ratio, squeeze, (grid[0] // 2, grid[1] // 2))
+    fine = _forces(eps, ratio, squeeze, grid)
+    return Reynolds(*((4.0 * fine - coarse) / 3.0))
+
+
+def _forces(eps: float, ratio: float, squeeze: int, grid: tuple[int, int]) -> np.ndarray:
+    """Both numbers on one grid, (2,)."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.linalg import spsolve
+
+    around, along = grid
+    finer = eps if squeeze >= 0 else 0.0  # a film that is pulled apart bears where it is wide
+    step, root = 2.0 * np.pi / around, np.sqrt(1.0 - finer * finer)
+    xi = step * np.arange(around)
+    wall = xi + 0.5 * step  # between a cell and the next
+    cosine, at_wall = ((np.cos(a) - finer) / (1.0 - finer * np.cos(a)) for a in (xi, wall))
+    width = root / (1.0 - finer * np.cos(xi)) * step  # of a cell in theta
+    sine = np.sin(xi) * width / step
+    conductance = (1.0 + eps * at_wall) ** 3 * (1.0 - finer * np.cos(wall)) / root / step
+    side = (1.0 + eps * cosine) ** 3 * width * (along / ratio) ** 2
+    source = 12.0 * squeeze * cosine * width
+    if not squeeze:  # over eps, which stays finite
+        source = 6.0 * (at_wall - np.roll(at_wall, 1))
+    i, j = (index.ravel() for index in np.mgrid[:around, :along])
+    cell = i * along + j
+    ahead, behind = conductance[i], np.roll(conductance, 1)[i]
+    out, inside = side[i] * (j < along - 1), side[i] * (j > 0)
+    diagonal = -(ahead + behind + out + inside + 2.0 * side[i] * (j == along - 1))
+    rows = np.tile(cell, 5)
+    columns = np.concatenate(
+        (cell, (i + 1) % around * along + j, (i - 1) % around * along + j,
+         np.minimum(cell + 1, cell.size - 1), np.maximum(cell - 1, 0))
+    )  # fmt: skip
+    values = np.concatenate((diagonal, ahead, behind, out, inside))
+    matrix = csr_matrix((values, (rows, columns)), shape=(cell.size, cell.size))
+    right = np.repeat(source, along)
+    open_end = np.zeros(cell.size, bool) if squeeze else i == 0
+    bears, pressure = ~open_end, np.zeros(cell.size)
+    for _ in range(MOST_LOOKS):
+        pressure[:] = 0.0
+        here = np.flatnonzero(bears)
+        pressure[here] = spsolve(matrix[here][:, here].tocsc(), right[here])
+        missing = matrix @ pressure - right > 1e-12 * np.abs(right).max()
+        now = np.where(bears, pressure > 0.0, missing) & ~open_end
+        if (now == bears).all():
+            break
+        bears = now
+    summed = pressure.reshape(grid).sum(axis=1) * width * 2.0 / along
+    return np.array([-(summed @ cosine), summed @ sine]) / 4.0
+
+
+@lru_cache(maxsize=64)
+def film_numbers(ratio: float, share: float) -> tuple[float, ...]:
+    """`film_constants` of a bearing's length over its diameter and a film's last share."""
+    return film_constants(ratio, share, _number)
+
+
+def _number(shape: str, eps: float, ratio: float) -> float:
+    """Reynolds' number in place of a shape's."""
+    if shape == "squeeze":
+        way = 1 if eps >= 0.0 else -1
+        return way * reynolds(abs(eps), ratio, way).normal
+    found = reynolds(eps, ratio)
+    if shape == "rotation":
+        return float(np.hypot(found.normal, found.across))
+    return float(np.arctan2(found.across, found.normal))

@@ -1,0 +1,156 @@
+"""The oil film: Reynolds' equation, Butenschoen's tables, limits, symmetry and smoothness."""
+
+import math
+
+import numpy as np
+import pytest
+from published import BEARING
+from scipy.integrate import solve_ivp
+
+from compressor.cases.case import Case
+from compressor.physics.film import attitude, film, rotation_number, squeeze_number
+from compressor.solve.bearing import film_numbers, reynolds
+from compressor.solve.si_record import record
+
+CLEARANCE = 5e-5  # m
+SPEED = 60.0  # rad/s
+
+
+def record_of(ratio=1.0, share=0.02):
+    lubricant = {"bearing_length_mm": 20 * ratio, "last_share": share}
+    values = {"joint": "big_end", "clearance_mm": 1000 * CLEARANCE, "lubricant": lubricant}
+    return record(Case.from_values(values))
+
+
+P = record_of()
+SIZE = P["viscosity"] * P["film_length"] * 2 * P["pin_radius"] * (P["pin_radius"] / CLEARANCE) ** 2
+
+
+def force(e, rate=(0.0, 0.0), spins=(SPEED, 0.0), p=P):
+    return np.array(film((*e, *rate), spins, CLEARANCE, p))
+
+
+@pytest.mark.parametrize(("ratio", "eps", "number", "angle"), BEARING)
+def test_numbers_are_those_of_the_tables(ratio, eps, number, angle):
+    """To 0.4 %, which is how far the tables are from finer grids; angles to a tenth of a degree."""
+    constants = np.array(film_numbers(ratio, 0.02))
+    found = reynolds(eps, ratio)
+    size = eps * math.hypot(*found)
+    assert size == pytest.approx(number, rel=4e-3)
+    assert eps * rotation_number(eps, ratio, constants) == pytest.approx(size, rel=1.5e-3)
+    if angle:
+        assert math.degrees(math.atan2(found.across, found.normal)) == pytest.approx(angle, abs=0.1)
+        turned = math.degrees(attitude(eps, ratio, constants))
+        assert turned == pytest.approx(angle, abs=0.1 if eps > 0.1 else 0.4)
+
+
+def test_grids_converge():
+    """With two grids extrapolated, the next one changes little more than a thousandth."""
+    for eps in (0.3, 0.9):
+        coarse, fine = (reynolds(eps, 1.0, grid=grid) for grid in ((96, 12), (192, 24)))
+        assert math.hypot(*coarse) == pytest.approx(math.hypot(*fine), rel=1e-3)
+
+
+@pytest.mark.parametrize("eps", [0.2, 0.5, 0.8])
+def test_a_short_bearing_is_ocvirk_s(eps):
+    """Half a film: b^2 eps sqrt(pi^2 (1 - eps^2) + 16 eps^2) / (2 (1 - eps^2)^2); its squeeze."""
+    b, room = 0.01, 1.0 - eps**2
+    found = reynolds(eps, b)
+    size = b**2 / (2 * room**2) * math.sqrt(math.pi**2 * room + 16 * eps**2)
+    assert math.hypot(*found) == pytest.approx(size, rel=0.01)
+    assert math.atan2(found.across, found.normal) == pytest.approx(
+        math.atan(math.pi * math.sqrt(room) / (4 * eps)), abs=0.01
+    )
+    half = (math.pi / 2 - math.acos(eps) / 2) * (1 + 2 * eps**2) + 1.5 * eps * math.sqrt(room)
+    assert reynolds(eps, b, 1).normal == pytest.approx(4 * b**2 * half / room**2.5, rel=0.01)
+
+
+def test_polynomials_keep_reynolds_numbers():
+    """Also where the film is pulled apart, and near the wall."""
+    constants = np.array(film_numbers(0.5, 0.02))
+    for eps in np.linspace(-0.98, 0.98, 15):
+        way = 1 if eps >= 0 else -1
+        exact = way * reynolds(abs(eps), 0.5, way).normal
+        if abs(eps) > 0.1:
+            assert squeeze_number(eps, 0.5, constants) == pytest.approx(exact, rel=3e-3)
+        if eps > 0.1:
+            exact = math.hypot(*reynolds(eps, 0.5))
+            assert rotation_number(eps, 0.5, constants) == pytest.approx(exact, rel=3e-3)
+
+
+def test_at_the_centre_the_film_resists_alike_in_all_directions():
+    for angle in np.linspace(0.0, 6.0, 9):
+        rate = 0.01 * np.array([math.cos(angle), math.sin(angle)])
+        fx, fy = force((1e-12, 0.0), rate, (0.0, 0.0))[:2]
+        straight = force((0.0, 0.0), rate, (0.0, 0.0))[:2]
+        assert np.array([fx, fy]) == pytest.approx(straight, rel=1e-6)
+        against = -math.hypot(fx, fy) / 0.01
+        assert np.array([fx, fy]) == pytest.approx(against * rate, rel=1e-6, abs=1e-9)
+
+
+def test_a_mirrored_bearing_has_mirrored_forces():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        e, rate = rng.normal(size=2) * 2e-5, rng.normal(size=2) * 0.01
+        spins = rng.normal(size=2) * 50
+        fx, fy, journal, bore, lost = force(e, rate, spins)
+        other = force((e[0], -e[1]), (rate[0], -rate[1]), -spins)
+        assert other == pytest.approx([fx, -fy, -journal, -bore, lost], rel=1e-9, abs=1e-9)
+
+
+def test_moments_balance_and_the_loss_is_what_is_put_in():
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        e, rate = rng.normal(size=2) * 2e-5, rng.normal(size=2) * 0.01
+        spins = rng.normal(size=2) * 50
+        fx, fy, journal, bore, lost = force(e, rate, spins)
+        assert journal + bore + e[0] * fy - e[1] * fx == pytest.approx(0.0, abs=1e-9)
+        put_in = fx * rate[0] + fy * rate[1] + journal * spins[0] + bore * spins[1]
+        assert lost == pytest.approx(-put_in, rel=1e-9, abs=1e-12)
+
+
+def test_a_turning_and_a_squeezed_film_lose_power():
+    for e in np.linspace(0.0, 1.2 * CLEARANCE, 13):
+        assert force((e, 0.0))[4] > 0.0
+        assert force((e, 0.0), (0.01, 0.0), (0.0, 0.0))[4] > 0.0
+        assert force((e, 0.0), (-0.01, 0.0), (0.0, 0.0))[4] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("begin", "end"),
+    [((0.9, 0.0), (1.1, 0.0)), ((-0.1, 0.0), (0.1, 0.0)), ((0.3, -0.3), (0.3, 0.3))],
+    ids=["hand-over", "centre", "beside"],
+)
+def test_forces_are_smooth_in_the_place(begin, end):
+    """Slopes on either side of each point differ as little as neighbours of a smooth curve do."""
+    steps, worst = 4000, 0.0
+    path = np.linspace(begin, end, steps + 1) * CLEARANCE
+    found = np.array([force(e, (0.002, -0.003))[:2] for e in path])
+    slopes = np.diff(found, axis=0)
+    worst = np.abs(np.diff(slopes, axis=0)).max()
+    assert worst < 0.02 * np.abs(slopes).max()
+
+
+def test_in_its_last_share_the_film_bears_no_more():
+    """Its force on the wall and beyond is that of the middle of the share."""
+    at_wall, beyond = force((CLEARANCE, 0.0)), force((1.5 * CLEARANCE, 0.0))
+    assert beyond[:2] == pytest.approx(at_wall[:2], rel=1e-9)
+    exact = SIZE * SPEED * 0.99 * math.hypot(*reynolds(0.99, 1.0))
+    assert math.hypot(*at_wall[:2]) == pytest.approx(exact, rel=5e-3)
+
+
+def test_a_journal_settles_where_its_sommerfeld_number_is_the_load_s():
+    """A light journal under a steady load: eccentricity and attitude of the table."""
+    eps = 0.8
+    load = SIZE * SPEED * eps * math.hypot(*reynolds(eps, 1.0))
+
+    def move(t, y):
+        fx, fy = film((y[0], y[1], y[2], y[3]), (SPEED, 0.0), CLEARANCE, P)[:2]
+        return [y[2], y[3], (load + fx) / 0.05, fy / 0.05]
+
+    start = [0.5 * CLEARANCE, 0.2 * CLEARANCE, 0.0, 0.0]
+    scale = [1e-9, 1e-9, 1e-6, 1e-6]
+    end = solve_ivp(move, (0.0, 3.0), start, "LSODA", rtol=1e-8, atol=scale).y[:, -1]
+    assert math.hypot(end[0], end[1]) / CLEARANCE == pytest.approx(eps, rel=2e-3)
+    assert math.degrees(math.atan2(end[1], end[0])) == pytest.approx(36.24, abs=0.2)
+    assert math.hypot(end[2], end[3]) < 1e-6
