@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--laws",
     is_flag=True,
-    help="Draw laws of contact and friction as well, each as often as any other.",
+    help="Draw laws of contact and friction as well, oil, guide, drive and rod.",
 )
 @jobs_option("Worker processes.")
 @click.option("-o", "--output", default="stress", show_default=True,

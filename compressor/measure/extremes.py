@@ -7,7 +7,8 @@ None is the same for both kinds. Contact stiffness is drawn in N/m^1.5; with ano
 the one whose force at 0.1 mm, the law's full damping, is the same.
 
 With laws, the same scenes have laws of contact and friction that are drawn as well, each as often
-as any other, with the numbers that they read.
+as any other, with the numbers that they read; and each of oil, guide, drive, rod and friction of
+ideal joints in three of ten (`extreme_features`).
 """
 
 import math
@@ -18,6 +19,7 @@ from functools import cache
 from typing import Any
 
 from compressor.cases import Case, design, table
+from compressor.measure.extreme_features import features
 from compressor.metrics import JOINTS
 
 # name: (unit, whole range, supported range, log-uniform)
@@ -63,7 +65,7 @@ ELASTIC = ("johnson", "liu")  # which need no restitution: half of them have non
 class Budget:
     """How far scenes run, and what each run may cost; `seconds` are more than steps ever need.
 
-    laws: whether they have laws other than the default ones.
+    laws: whether they have laws other than the default ones, and features.
     """
 
     laws: bool = False
@@ -122,6 +124,7 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
         draw = random.Random(f"{seed} {number}")
         for group in ("contact", "friction"):
             made[group] |= chosen(group, draw, supported(number))
+        made |= features(made, draw, supported(number))
     return _rounded(made) | {
         "output": {"keep": "series"},
         "solve": {

@@ -131,7 +131,7 @@ def campaign(
     progress(total - len(missing), total, "")
     tasks = [(number, (number, seed, budget), TIMEOUT) for number in missing]
     remark = partial(progress, total - len(missing), total)
-    needs = Needs(("auto",), horizon=True, laws=budget.laws)
+    needs = Needs(("auto",), horizon=True, laws=budget.laws, features=budget.laws)
     running = run_here(run_scene, tasks, needs, workers, remark)
     try:
         for end in running:
@@ -207,7 +207,9 @@ def settings(budget: Budget) -> str:
     """What scenes and verdicts depend on beside the seed."""
     return (
         f"model {MODEL_VERSION}; {budget.revolutions:g} revolutions, "
-        f"{budget.max_steps} steps or {budget.seconds:g} s" + "; with laws drawn" * budget.laws
+        f"{budget.max_steps} steps or {budget.seconds:g} s"
+        + "; with laws and features drawn"
+        * budget.laws
     )
 
 

@@ -7,6 +7,7 @@ from compsim.stress import summary
 
 from compressor.cases.case import Case
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
+from compressor.measure.extreme_features import RANGES
 from compressor.measure.extremes import ELASTIC, OF_LAWS, Budget, values
 from compressor.measure.judge import judges
 from compressor.measure.stress import campaign
@@ -32,9 +33,19 @@ def test_scenes_have_every_law_and_else_the_numbers_of_old():
                 low, high = narrow if number % 2 == 0 else whole
                 value = found.get(key.partition(".")[2], low) if key.startswith(group) else low
                 assert 0.999 * low <= value <= 1.001 * high
+        had = {name: made.pop(name) for name in RANGES if name in made}
+        seen.update([*had])
+        rubbing = friction.pop("ideal_joints", False)
+        seen["ideal_joints"] += rubbing
+        for group, found in had.items():
+            for key, spans in RANGES[group].items():
+                low, high = spans[number % 2 == 0]
+                value = found[key]
+                assert 0.999 * low <= value <= 1.001 * high or (group, value) == ("guide", 0.0)
         assert made == plain
-        Case.from_values({**made, "contact": contact, "friction": friction})
-    assert {*seen} == {*CONTACT_LAWS, *FRICTION_LAWS}
+        friction |= {"ideal_joints": True} if rubbing else {}
+        Case.from_values({**made, **had, "contact": contact, "friction": friction})
+    assert {*seen} == {*CONTACT_LAWS, *FRICTION_LAWS, *RANGES, "ideal_joints"}
     assert min(seen.values()) > 20
     assert {law for law, count in elastic.items() if count} == {*ELASTIC}
 
@@ -58,5 +69,5 @@ def test_none_of_a_few_scenes_is_wrong_in_silence(tmp_path):
     assert verdicts["ok"] >= COUNT / 2, verdicts
     assert not verdicts["silent_wrong"], "\n".join(summary(study))
     assert f"--seed {SEED} --laws" in "\n".join(summary(study))
-    with pytest.raises(StoreError, match="with laws drawn"):
+    with pytest.raises(StoreError, match="with laws and features drawn"):
         campaign(tmp_path, COUNT, SEED, 1)
