@@ -648,14 +648,19 @@ def stress_table():
         f"{slow['seconds']:.2g} s (`{slow['command']}`); longest scene with all judges: "
         f"{found['slowest_judging_s']:.0f} s; peak memory of a worker: "
         f"{found['peak_memory_MiB']} MiB.\n"
-        + fresh_scenes("fresh scenes", by_laws(found["fresh"], False))
-        + fresh_scenes("fresh scenes with laws drawn", by_laws(found["fresh"], True), True)
+        + fresh_scenes("fresh scenes", with_drawn(found["fresh"], ""))
+        + fresh_scenes("fresh scenes with laws drawn", with_drawn(found["fresh"], "laws"), True)
+        + fresh_scenes(
+            "fresh scenes with laws and features drawn",
+            with_drawn(found["fresh"], "features"),
+            True,
+        )
     )
 
 
-def by_laws(found, drawn):
-    """The fresh scenes with laws drawn, or those with the default ones."""
-    return [one for one in found if one.get("laws", False) is drawn]
+def with_drawn(found, drawn):
+    """The fresh scenes with nothing, laws, or laws and features drawn beside their numbers."""
+    return [one for one in found if one.get("drawn", "") == drawn]
 
 
 def fresh_scenes(what, found, ends=False):
@@ -761,7 +766,7 @@ def numbers_list():
     plane, search = (kept("claims.json")[name] for name in ("map", "search"))
     word, bars = accuracy["words"]["standard"], accuracy["bars"]["standard"].values()
     within = sum(bar["within"] * bar["of"] for bar in bars) / sum(bar["of"] for bar in bars)
-    range_, fresh = stress["ends"]["supported"], by_laws(stress["fresh"], False)
+    range_, fresh = stress["ends"]["supported"], with_drawn(stress["fresh"], "")
     unjudged = sum(ends.get("unjudged", 0) for ends in stress["ends"].values())
     link = "compressor/solve/README.md#supported-range-and-stress"
     lines = [

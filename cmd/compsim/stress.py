@@ -30,8 +30,15 @@ if TYPE_CHECKING:
               help="Of the draws.")  # fmt: skip
 @click.option(
     "--laws",
-    is_flag=True,
-    help="Draw laws of contact and friction as well, oil, guide, drive and rod.",
+    "drawn",
+    flag_value="laws",
+    help="Draw laws of contact and friction as well, each as often as any other.",
+)
+@click.option(
+    "--features",
+    "drawn",
+    flag_value="features",
+    help="Draw laws, oil, guide, drive and rod as well.",
 )
 @jobs_option("Worker processes.")
 @click.option("-o", "--output", default="stress", show_default=True,
@@ -40,7 +47,7 @@ if TYPE_CHECKING:
               help="Repeat this scene of the seed alone, and store nothing.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress.")
 def stress(
-    scenes: int, seed: int, laws: bool, jobs: int | None, output: str, scene: int | None,
+    scenes: int, seed: int, drawn: str | None, jobs: int | None, output: str, scene: int | None,
     quiet: bool,
 ) -> int:  # fmt: skip
     """Test numerical stability at the extremes: draw scenes, run each, and judge what it says.
@@ -57,7 +64,7 @@ def stress(
     from compressor.sweep import cores
 
     if scene is not None:
-        click.echo("\n".join(repeated(scene, seed, laws)))
+        click.echo("\n".join(repeated(scene, seed, drawn or "")))
         return DONE
     from compressor.measure import Budget, campaign
     from compressor.report import draw_outcomes, render
@@ -66,7 +73,7 @@ def stress(
     writable_folder(output)
     screen = Screen(quiet, "scenes")
     try:
-        study = campaign(output, scenes, seed, jobs or cores(), screen, Budget(laws))
+        study = campaign(output, scenes, seed, jobs or cores(), screen, Budget(drawn or ""))
     finally:
         screen.end()
     drawing = draw_outcomes(study)
@@ -81,12 +88,12 @@ def stress(
     return SOME_FAILED if doubtful else DONE
 
 
-def repeated(number: int, seed: int, laws: bool) -> Iterator[str]:
+def repeated(number: int, seed: int, drawn: str) -> Iterator[str]:
     """A scene as a case file, and below it, as comments, how it ends."""
     from compressor.measure import repeat
 
-    drawn, row = repeat(number, seed, laws)
-    yield from (f"{key}: {json.dumps(value)}" for key, value in drawn.items())
+    made, row = repeat(number, seed, drawn)
+    yield from (f"{key}: {json.dumps(value)}" for key, value in made.items())
     for key, value in row.items():
         if key not in ("load", "joint") and value != "":
             yield f"# {key}: {value:.3g}" if isinstance(value, float) else f"# {key}: {value}"
@@ -124,5 +131,5 @@ def summary(study: "xr.Dataset") -> Iterator[str]:
 
 def command(row: "xr.Dataset", attrs: dict[str, Any]) -> str:
     """What repeats a scene of a campaign."""
-    laws = " --laws" if attrs.get("laws") else ""
-    return f"compsim stress --scene {row['scene'].item()} --seed {attrs['seed']}{laws}"
+    drawn = f" --{attrs['drawn']}" if attrs.get("drawn") else ""
+    return f"compsim stress --scene {row['scene'].item()} --seed {attrs['seed']}{drawn}"

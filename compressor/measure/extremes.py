@@ -7,8 +7,8 @@ None is the same for both kinds. Contact stiffness is drawn in N/m^1.5; with ano
 the one whose force at 0.1 mm, the law's full damping, is the same.
 
 With laws, the same scenes have laws of contact and friction that are drawn as well, each as often
-as any other, with the numbers that they read; and each of oil, guide, drive, rod and friction of
-ideal joints in three of ten (`extreme_features`).
+as any other, with the numbers that they read; with features also each of oil, guide, drive, rod and
+friction of ideal joints in three of ten (`extreme_features`).
 """
 
 import math
@@ -58,6 +58,7 @@ OF_LAWS = {
     "friction.bristle_damping_s_per_mm": ((1e-4, 0.3), (1e-3, 0.1)),
     "friction.viscous_s_per_mm": ((1e-6, 1e-2), (1e-5, 1e-3)),
 }
+LAWS, FEATURES = "laws", "features"
 ELASTIC = ("johnson", "liu")  # which need no restitution: half of them have none
 
 
@@ -65,10 +66,10 @@ ELASTIC = ("johnson", "liu")  # which need no restitution: half of them have non
 class Budget:
     """How far scenes run, and what each run may cost; `seconds` are more than steps ever need.
 
-    laws: whether they have laws other than the default ones, and features.
+    drawn: what is drawn beside their numbers: nothing (""), "laws", or laws and "features".
     """
 
-    laws: bool = False
+    drawn: str = ""
     revolutions: float = 0.25
     max_steps: int = 500_000
     seconds: float = 30.0
@@ -120,11 +121,12 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
             "friction_velocity_mm_per_s": 10.0 * stiction,
         },
     }
-    if budget.laws:
+    if budget.drawn:
         draw = random.Random(f"{seed} {number}")
         for group in ("contact", "friction"):
             made[group] |= chosen(group, draw, supported(number))
-        made |= features(made, draw, supported(number))
+        if budget.drawn == FEATURES:
+            made |= features(made, draw, supported(number))
     return _rounded(made) | {
         "output": {"keep": "series"},
         "solve": {

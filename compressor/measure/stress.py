@@ -106,9 +106,16 @@ def run_scene(task: tuple[int, int, Budget]) -> Row:
     }  # fmt: skip
 
 
-def repeat(number: int, seed: int, laws: bool = False) -> tuple[dict[str, Any], Row]:
+DRAWN = {
+    "": "",
+    extremes.LAWS: "; with laws drawn",
+    extremes.FEATURES: "; with laws and features drawn",
+}
+
+
+def repeat(number: int, seed: int, drawn: str = "") -> tuple[dict[str, Any], Row]:
     """The values of a scene's case, by key, and its row, from another run."""
-    budget = Budget(laws)
+    budget = Budget(drawn)
     return extremes.values(number, seed, budget), run_scene((number, seed, budget))
 
 
@@ -131,7 +138,8 @@ def campaign(
     progress(total - len(missing), total, "")
     tasks = [(number, (number, seed, budget), TIMEOUT) for number in missing]
     remark = partial(progress, total - len(missing), total)
-    needs = Needs(("auto",), horizon=True, laws=budget.laws, features=budget.laws)
+    features = budget.drawn == extremes.FEATURES
+    needs = Needs(("auto",), horizon=True, laws=bool(budget.drawn), features=features)
     running = run_here(run_scene, tasks, needs, workers, remark)
     try:
         for end in running:
@@ -178,7 +186,7 @@ def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset
     attrs = {
         "title": "outcomes of extreme scenes",
         "seed": seed,
-        "laws": int(budget.laws),
+        "drawn": budget.drawn,
         "settings": settings(budget),
         "program": PROGRAM,
     }
@@ -207,9 +215,7 @@ def settings(budget: Budget) -> str:
     """What scenes and verdicts depend on beside the seed."""
     return (
         f"model {MODEL_VERSION}; {budget.revolutions:g} revolutions, "
-        f"{budget.max_steps} steps or {budget.seconds:g} s"
-        + "; with laws and features drawn"
-        * budget.laws
+        f"{budget.max_steps} steps or {budget.seconds:g} s{DRAWN[budget.drawn]}"
     )
 
 

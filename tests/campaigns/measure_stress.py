@@ -2,8 +2,8 @@
 
 Runs the command and writes a small JSON file and, beside it, the map of outcomes. A campaign that
 was interrupted goes on from its folder. With --fresh the outcomes of scenes of another seed, which
-chose nothing, are kept in the file beside those of the whole campaign; with --laws those of scenes
-with drawn laws.
+chose nothing, are kept in the file beside those of the whole campaign; with --drawn those of scenes
+with drawn laws, or laws and features.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def fresh(study):
     wrong = study.isel(scene=study["verdict"].values == "silent_wrong")
     return {
         "seed": int(study.attrs["seed"]),
-        "laws": bool(study.attrs["laws"]),
+        "drawn": study.attrs["drawn"],
         "scenes": study.sizes["scene"],
         "ends": counts(study),
         "silent_wrong": [
@@ -93,16 +93,16 @@ def beside(target, made):
     return kept | {"fresh": sorted([*others, made], key=lambda one: one["seed"])}
 
 
-def main(target, count, seed, jobs, folder, aside, laws):
+def main(target, count, seed, jobs, folder, aside, drawn):
     words = ["stress", "-n", str(count), "--seed", str(seed), "-j", str(jobs), "-o", folder]
-    words += ["--laws"] if laws else []
+    words += [f"--{drawn}"] if drawn else []
     code = cli.main(words)
     if code not in (DONE, SOME_FAILED):
         raise SystemExit(code)
     study = xr.load_dataset(Path(folder, FILE), engine="h5netcdf").isel(scene=slice(count))
     seconds = float(study["judging_seconds"].sum())  # of all runs of the command that it took
     target = Path(target)
-    if aside or laws:
+    if aside or drawn:
         kept = beside(target, provenance("make stress") | fresh(study))
     else:
         kept = {**provenance("make stress"), "workers": jobs, "work_s": plain(seconds)}
@@ -121,6 +121,7 @@ if __name__ == "__main__":
     parser.add_argument("-j", "--jobs", type=int, default=2, help="worker processes")
     parser.add_argument("-o", "--output", default="stress", help="folder of the campaign")
     parser.add_argument("--fresh", action="store_true", help="keep them beside the file's own")
-    parser.add_argument("--laws", action="store_true", help="with laws drawn; as --fresh")
+    parser.add_argument("--drawn", default="", choices=["", "laws", "features"],
+                        help="what is drawn beside numbers; as --fresh")  # fmt: skip
     asked = parser.parse_args()
-    main(asked.target, asked.scenes, asked.seed, asked.jobs, asked.output, asked.fresh, asked.laws)
+    main(asked.target, asked.scenes, asked.seed, asked.jobs, asked.output, asked.fresh, asked.drawn)

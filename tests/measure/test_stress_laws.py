@@ -8,20 +8,20 @@ from compsim.stress import summary
 from compressor.cases.case import Case
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.measure.extreme_features import RANGES
-from compressor.measure.extremes import ELASTIC, OF_LAWS, Budget, values
+from compressor.measure.extremes import ELASTIC, FEATURES, OF_LAWS, Budget, values
 from compressor.measure.judge import judges
 from compressor.measure.stress import campaign
 from compressor.solve.solution import solve
 from compressor.store.files import StoreError
 
-SMALL = Budget(True, revolutions=0.0625, max_steps=40_000, seconds=20.0)
-COUNT, SEED = 8, 1
+SMALL = Budget(FEATURES, revolutions=0.0625, max_steps=40_000, seconds=20.0)
+COUNT, SEED = 6, 1
 
 
 def test_scenes_have_every_law_and_else_the_numbers_of_old():
     seen, elastic = Counter(), Counter()
     for number in range(400):
-        made, plain = values(number, 3, SMALL), values(number, 3, Budget(False, 0.0625, 40_000, 20))
+        made, plain = values(number, 3, SMALL), values(number, 3, Budget("", 0.0625, 40_000, 20))
         contact, friction = made.pop("contact"), made.pop("friction")
         seen[contact["law"]] += 1
         seen[friction["law"]] += 1
@@ -68,6 +68,6 @@ def test_none_of_a_few_scenes_is_wrong_in_silence(tmp_path):
     verdicts = Counter(study["verdict"].values.tolist())
     assert verdicts["ok"] >= COUNT / 2, verdicts
     assert not verdicts["silent_wrong"], "\n".join(summary(study))
-    assert f"--seed {SEED} --laws" in "\n".join(summary(study))
+    assert f"--seed {SEED} --features" in "\n".join(summary(study))
     with pytest.raises(StoreError, match="with laws and features drawn"):
         campaign(tmp_path, COUNT, SEED, 1)
