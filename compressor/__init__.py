@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         Sensor,
         Solve,
         Spring,
+        Wear,
         load_cases,
     )
     from compressor.solve import simulate
@@ -72,6 +73,7 @@ __all__ = [
     "Spring",
     "StoreError",
     "StoreWarning",
+    "Wear",
     "__version__",
     "load_cases",
     "open_study",

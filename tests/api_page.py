@@ -15,7 +15,7 @@ SECTIONS = {
     "Cases": ("load_cases", "Case"),
     "Groups of a case": (
         "PerJoint", "Offset", "Machine", "Gas", "Spring", "Contact", "Friction", "Lubricant",
-        "Guide", "Drive", "Rod", "Body", "Sensor", "Solve", "Output",
+        "Guide", "Drive", "Rod", "Wear", "Body", "Sensor", "Solve", "Output",
     ),
     "Runs": ("simulate",),
     "Results": ("open_study", "read_job"),

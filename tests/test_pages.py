@@ -123,7 +123,7 @@ def test_case_files_have_the_jobs_that_they_say(tmp_path):
     assert [*jobs] == [
         "bearing-wear.yaml", "machines.yaml", "grid.yaml", "zipped.yaml", "random.yaml",
         "latin.yaml", "sampled.yaml", "sensitivity.yaml", "bounded.yaml", "blocks.yaml",
-        "regimes.yaml",
+        "regimes.yaml", "bearings.yaml",
     ]  # fmt: skip
     for name, count in jobs.items():
         (study,) = load_studies(tmp_path / name)

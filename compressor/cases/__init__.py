@@ -29,5 +29,6 @@ from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
 from compressor.cases.table import table
 from compressor.cases.vibration import Body, Sensor
+from compressor.cases.wear import Wear
 from compressor.cases.written import to_yaml
 from compressor.cases.yaml_reader import printable

@@ -19,6 +19,7 @@ from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
 from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
 from compressor.cases.unknown import SWEEP, meant
+from compressor.cases.wear import filled_wear
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "2"  # of the equations and the meaning of what is stored; part of a job's identity
@@ -36,8 +37,8 @@ class Case(Settings):
     `Case.from_values` makes a valid one. `name` (of the study), `load` (design, typical or none)
     and `joint` (none, big_end, small_end or both) are words. The groups are `clearance_mm`
     (PerJoint), `initial_offset_mm` (Offset), `machine`, `gas`, `spring`, `contact`, `friction`,
-    `lubricant`, `guide`, `drive`, `rod`, `body`, `sensor`, `solve` and `output`, each of the class
-    of that name; friction and the six after it may be None. A case never changes;
+    `lubricant`, `guide`, `drive`, `rod`, `wear`, `body`, `sensor`, `solve` and `output`, each of
+    the class of that name; friction and the seven after it may be None. A case never changes;
     `dataclasses.replace` makes another:
 
     >>> from dataclasses import replace
@@ -120,12 +121,16 @@ class Case(Settings):
         contact = with_law("contact", contact)
         if friction and not friction.ideal_joints:  # as without the key
             friction = replace(friction, ideal_joints=None)
-        guide = self.guide and filled_guide(self.guide, machine.reciprocating_mass_kg)
-        resolved = {"machine": machine, "solve": solve, "contact": contact, "friction": friction}
-        resolved["guide"] = guide
+        resolved: dict[str, Any] = {"machine": machine, "solve": solve, "contact": contact}
+        resolved["friction"] = friction
+        resolved["guide"] = self.guide and filled_guide(self.guide, machine.reciprocating_mass_kg)
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
             resolved["clearance_mm"] = replace(self.clearance_mm, **unused)
+        if self.wear:
+            resolved["wear"] = filled_wear(
+                self.wear, resolved.get("clearance_mm", self.clearance_mm)
+            )
         for name, value in resolved.items():
             object.__setattr__(self, name, value)
 
@@ -262,7 +267,7 @@ def identity(case: Case, with_solver: bool) -> dict[str, Any]:
     """What makes a case's results: nested values whose text a key is the hash of."""
     values, solve = case.values(), case.solve
     for unread in (*_groups_outside_identity(), "solve"):
-        del values[unread]
+        values.pop(unread, None)
     values["model"] = MODEL_VERSION
     # what is integrated and from where on it counts, however it is written
     duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"

@@ -10,7 +10,11 @@ from compressor.cases.law_conflicts import (
     friction_conflicts,
     law_conflicts,
 )
-from compressor.cases.mechanism_conflicts import lubricant_conflicts, mechanism_conflicts
+from compressor.cases.mechanism_conflicts import (
+    lubricant_conflicts,
+    mechanism_conflicts,
+    wear_conflicts,
+)
 from compressor.cases.one_way import back_action, moving_mass
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
 from compressor.cases.table import GROUPS, Settings, table
@@ -291,5 +295,6 @@ RULES: tuple[Rule, ...] = (
     *(partial(rule, joint=joint) for joint in JOINTS
       for rule in (_missing_clearance, _clearance_conflicts)),
     _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts, _output_conflicts,
-    law_conflicts, contact_conflicts, friction_conflicts, lubricant_conflicts, mechanism_conflicts,
+    law_conflicts, contact_conflicts, friction_conflicts, lubricant_conflicts, wear_conflicts,
+    mechanism_conflicts,
 )  # fmt: skip

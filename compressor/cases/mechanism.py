@@ -30,11 +30,9 @@ class Guide:
         "quarters of its greatest", above=True,
     )  # fmt: skip
     crosshead_length_mm: float = parameter(
-        120.0, "mm", (0, 1e4), OURS, "the crosshead's length", above=True
+        120.0, "mm", (0.001, 1e4), OURS, "the crosshead's length"
     )
-    crosshead_height_mm: float = parameter(
-        80.0, "mm", (0, 1e4), OURS, "the crosshead's height", above=True
-    )
+    crosshead_height_mm: float = parameter(80.0, "mm", (0.001, 1e4), OURS, "the crosshead's height")
     crosshead_inertia_kg_m2: float | None = parameter(
         None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
         "the crosshead's inertia about its pin", above=True, optional=True,

@@ -25,6 +25,25 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
         )
 
 
+def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Bores wear where journals touch them, and until a limit that is not yet reached."""
+    if not case.wear:
+        return
+    if case.joint == "none":
+        yield Problem("wear", "needs a clearance, and joint: none has none: name a joint")
+    if case.lubricant:
+        yield Problem(
+            "wear", "of a bore that runs dry is known, and the film's numbers are those of a round "
+            "one: leave out lubricant or wear",
+        )  # fmt: skip
+    most = max(case.clearance_mm.big_end, case.clearance_mm.small_end)
+    if case.wear.limit_mm is not None and case.wear.limit_mm <= most:
+        yield Problem(
+            "wear.limit_mm", f"{case.wear.limit_mm:g} mm must be more than the clearance, {most:g} "
+            "mm: it is what the clearance grows to",
+        )  # fmt: skip
+
+
 def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     """What does not fit together in guide, drive, rod and the friction of ideal joints."""
     machine, friction = case.machine, case.friction

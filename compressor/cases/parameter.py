@@ -38,6 +38,8 @@ UNITS = {
     "N m": ("N m", 1, 1),
     "N m s": ("N m s", 1, 1),
     "kg mm": ("kg m", 1, 1000),
+    "mm3/(N m)": ("m3/(N m)", 1, 1_000_000_000),
+    "h": ("s", 3600, 1),
     "N/mm": ("N/m", 1000, 1),
     "N/mm^p": ("N/m^p", 1, 1),  # times 1000^exponent: see compressor.solve.si_record
     "N s/mm": ("N s/m", 1000, 1),

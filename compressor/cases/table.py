@@ -25,6 +25,7 @@ from compressor.cases.lubricant import Lubricant
 from compressor.cases.mechanism import Drive, Guide, Rod
 from compressor.cases.parameter import Parameter, choice
 from compressor.cases.vibration import Body, Sensor
+from compressor.cases.wear import Wear
 
 MOST_REV = 50.0  # with `duration_rev: auto`
 
@@ -40,6 +41,7 @@ GROUPS: dict[str, type] = {
     "guide": Guide,
     "drive": Drive,
     "rod": Rod,
+    "wear": Wear,
     "body": Body,
     "sensor": Sensor,
     "solve": Solve,
@@ -47,8 +49,8 @@ GROUPS: dict[str, type] = {
 }
 # groups that a word may stand for: `false` leaves one out, `true` is one with its defaults
 WORDS = {
-    "friction": False, "lubricant": True, "guide": True, "drive": True, "rod": True, "body": True,
-    "sensor": True,
+    "friction": False, "lubricant": True, "guide": True, "drive": True, "rod": True, "wear": True,
+    "body": True, "sensor": True,
 }  # fmt: skip
 # groups that no joint reads with `joint: none`
 OF_JOINTS = ("clearance_mm",)
@@ -79,6 +81,7 @@ class Settings:
     guide: Guide | None = None
     drive: Drive | None = None
     rod: Rod | None = None
+    wear: Wear | None = None
     body: Body | None = None
     sensor: Sensor | None = None
     solve: Solve = Solve()

@@ -15,11 +15,13 @@ from compressor.physics.loads import (
     static_load,
 )
 from compressor.physics.march import march
+from compressor.physics.mechanism_rows import wear_all
 from compressor.physics.observe import (
     COLUMNS,
     Column,
 )
 from compressor.physics.record import (
+    MOST_SECTORS,
     Coordinate,
     Load,
     Scene,
@@ -45,3 +47,4 @@ from compressor.physics.tally import (
 )
 from compressor.physics.twin import march_twins
 from compressor.physics.walker import Status, Work, new_walker, new_work
+from compressor.physics.worn_bore import bore_fields

@@ -135,7 +135,8 @@ class ByKind:
         self.least, self.special, self.usual = least, special, usual
 
     def __call__(self, *arguments: Any) -> Any:
-        lengths = [one["laws"].size for one in arguments if isinstance(one, np.record)]
+        records = [one for one in arguments if isinstance(one, np.record)]
+        lengths = [one["laws"].size for one in records if "laws" in (one.dtype.names or ())]
         return (self.special if max(lengths, default=0) >= self.least else self.usual)(*arguments)
 
     def of(self, arguments: Any) -> Any:

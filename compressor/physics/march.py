@@ -54,6 +54,7 @@ from compressor.physics.walker import (
     WEIGHTS,
     Work,
 )
+from compressor.physics.wear_step import wear_step
 
 MIDDLE = NODES.size // 2
 INWARD = np.array([2, 1, 3])  # nodes between a step's ends, the middle first
@@ -314,6 +315,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h
         take_in(w, h, every, work, phase, p, tally)
+        wear_step(w, base, h, z, work, phase, p, tally)
         sample_grid(w, reached, h, z, work, times, states)
         w.taken = h
         was_stiff = w.stiff

@@ -12,6 +12,7 @@ angle over the steady speed, and what passes in time passes the slower the faste
 So corners of the load and revolutions stay where they are.
 """
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from compressor.physics.film import film
 from compressor.physics.guide import UNGUIDED, Guided, corners
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END, SMALL_END, Coordinate
+from compressor.physics.worn_bore import worn_contact
 
 
 class Row(IntEnum):
@@ -161,8 +163,24 @@ def oiled(contact, eccentricity, spins, clearance, p):
 
 
 @jit
-def joints_of(phase, y, motion, pose, velocity, p):
-    """The `Joints` at a state; velocity: of the bodies, (11,)."""
+def bore_axes(slope, modes, pose, p):
+    """Cosine and sine of a bore's angle, counter-clockwise, by the slope of the rod's end there."""
+    turned = summed(slope, 0, MODES, modes) / p.rod_length
+    c, s = math.cos(turned), math.sin(turned)
+    return pose.cos_phi * c + pose.sin_phi * s, pose.cos_phi * s - pose.sin_phi * c
+
+
+@jit
+def touching(joint, eccentricity, axes, spins, carried, p):
+    """A joint's `Contact`, with a round bore or a worn one."""
+    if p.sectors:
+        return worn_contact(joint, eccentricity, axes, spins, carried, p)
+    return joint_contact(eccentricity, spins, p.clearance[joint], p.stiffness[joint], carried, p)
+
+
+@jit
+def joints_of(phase, y, motion, pose, w, velocity, p):
+    """The `Joints` at a state; w: coordinates, (11,); velocity: of the bodies, (11,)."""
     n, modes = p.freedoms, velocity[4:8]
     big_spin = pose.spin + summed(BIG_SLOPE, 0, MODES, modes) / p.rod_length
     small_spin = pose.spin + summed(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
@@ -174,14 +192,16 @@ def joints_of(phase, y, motion, pose, velocity, p):
         off = y[place], y[place + 1], y[n + place], y[n + place + 1]
         kept = carried_by(BIG_END, y, p)
         spins = pose.speed, big_spin
-        big = joint_contact(off, spins, p.clearance[0], p.stiffness[0], kept, p)
+        axes = bore_axes(BIG_SLOPE, w[7:11], pose, p)
+        big = touching(BIG_END, off, axes, spins, kept, p)
         big, big_film = oiled(big, off, spins, p.clearance[0], p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
         off = y[place], y[place + 1], y[n + place], y[n + place + 1]
         kept = carried_by(SMALL_END, y, p)
         spins = pin_spin, small_spin
-        small = joint_contact(off, spins, p.clearance[1], p.stiffness[1], kept, p)
+        axes = bore_axes(SMALL_SLOPE, w[7:11], pose, p)
+        small = touching(SMALL_END, off, axes, spins, kept, p)
         small, small_film = oiled(small, off, spins, p.clearance[1], p)
     guide = UNGUIDED
     if p.tilting:

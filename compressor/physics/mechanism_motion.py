@@ -166,7 +166,7 @@ def solve(motion, y, phase, p):
     axes = pose.cos_phi, -pose.sin_phi, pose.sin_phi, pose.cos_phi
     add_rod(axes, pose.spin, w[7:11], rates[7:11], p, mass, own)
     add_bodies(p, mass)
-    joints = joints_of(phase, y, motion, pose, velocity, p)
+    joints = joints_of(phase, y, motion, pose, w, velocity, p)
     columns = np.zeros(COORDINATES, dtype=np.int64)
     columns = columns[: columns_of(p, columns)]
     count = columns.size

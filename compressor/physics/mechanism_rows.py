@@ -10,10 +10,18 @@ import numpy as np
 from compressor.physics._jit import jit, square_root
 from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import elastic_energy
-from compressor.physics.elastic_rod import ACROSS, FIRST, MODES, material_work, summed
+from compressor.physics.elastic_rod import (
+    ACROSS,
+    BIG_SLOPE,
+    FIRST,
+    MODES,
+    SMALL_SLOPE,
+    material_work,
+    summed,
+)
 from compressor.physics.friction_laws import LUGRE, bristle_rate
 from compressor.physics.kinematics import ideal
-from compressor.physics.mechanism import COORDINATES, ROWS, motor_torque
+from compressor.physics.mechanism import COORDINATES, ROWS, bore_axes, motor_torque
 from compressor.physics.mechanism_motion import solve
 from compressor.physics.observe import (
     ACCELERATION,
@@ -39,6 +47,7 @@ from compressor.physics.observe import (
     Column,
     damping_power,
 )
+from compressor.physics.worn_bore import at_the_wall, wear_off
 
 GUIDE_FORCE, GUIDE_MOMENT = int(Column.GUIDE_FORCE), int(Column.GUIDE_MOMENT)
 GUIDE_FRICTION, GUIDE_GAP = int(Column.GUIDE_FRICTION), int(Column.GUIDE_GAP)
@@ -211,10 +220,40 @@ def observe_all(times, states, phases, p, rows):
 
 
 @jit
+def at_joint(joint, now, p):
+    """A joint's `Contact`, eccentricity with its rate, the axes of its bore and the bore's spin."""
+    i = 1 + 2 * joint
+    off = now.w[i], now.w[i + 1], now.rates[i], now.rates[i + 1]
+    if joint == 0:
+        axes = bore_axes(BIG_SLOPE, now.w[7:11], now.pose, p)
+        return now.joints.big, off, axes, now.joints.big_spin
+    axes = bore_axes(SMALL_SLOPE, now.w[7:11], now.pose, p)
+    return now.joints.small, off, axes, now.joints.small_spin
+
+
+@jit
+def wear_at(motion, y, phase, weight, p, tally):
+    """Add to the tally what sliding wears off at a state that stands for `weight` (s) of t."""
+    now = solve(motion, y, phase, p)
+    weight *= pace_of(now, p)
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            contact, off, axes, _ = at_joint(joint, now, p)
+            wear_off(joint, contact, off, axes, weight, p, tally)
+
+
+@jit
+def wear_all(times, states, phases, weights, p, tally):
+    """`wear_at` for each of m states, (m, k), at times and with weights (s), (m,)."""
+    for i in range(times.size):
+        wear_at(ideal(times[i], p), states[i], phases[i], weights[i], p, tally)
+
+
+@jit
 def contact_at(joint, t, y, phase, p):
-    """A joint's `Contact` at a time and state."""
-    now = solve(ideal(t, p), y, phase, p)
-    return now.joints.big if joint == 0 else now.joints.small
+    """A joint's `Contact` at a time and state; on a worn bore as it meets the wall."""
+    contact, off, axes, spin = at_joint(joint, solve(ideal(t, p), y, phase, p), p)
+    return at_the_wall(joint, contact, off, axes, spin, p) if p.sectors else contact
 
 
 @jit

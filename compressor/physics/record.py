@@ -145,6 +145,14 @@ FILM: list[tuple] = [
     ("film_share", "f8"),  # of the clearance: the film's last, in which the contact takes over
     ("film_constants", "f8", (51,)),  # `film.film_constants`
 ]
+MOST_SECTORS = 180
+# of a mechanism whose bores wear
+WEAR: list[tuple] = [
+    ("sectors", "i8"),  # that a bore is divided into by angle; 0: round bores
+    ("sector", "f8"),  # width of one, rad
+    ("towards", "f8", (MOST_SECTORS, 2)),  # directions of the nodes between them, x and y
+    ("worn", "f8", (2, MOST_SECTORS)),  # per joint, m
+]
 # of a mechanism with more freedom than ideal guides, a steady crank and a rigid rod leave it
 FEATURES: list[tuple] = [
     ("rubbing", "i8"),  # whether ideal joints have friction
@@ -172,7 +180,7 @@ FEATURES: list[tuple] = [
 CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
 CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (CHOICE,))], align=True)
-FEATURED = np.dtype([*FIELDS, *FILM, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
+FEATURED = np.dtype([*FIELDS, *FILM, *WEAR, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
 
 
 def zero(kind: np.dtype) -> np.record:

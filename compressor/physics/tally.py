@@ -20,7 +20,7 @@ from compressor.physics.observe import (
     PENETRATION,
     POTENTIAL,
 )
-from compressor.physics.record import zero
+from compressor.physics.record import MOST_SECTORS, is_featured, zero
 
 NEAR = 0.98  # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
@@ -62,9 +62,23 @@ TALLY = np.dtype(
 )
 
 
-def new_tally():
-    """An empty tally; a joint counts as touching until it is seen apart."""
-    tally = zero(TALLY)
+WORN = np.dtype(
+    [
+        # first: to numba, a record with fields behind another's is one of those
+        ("slid", "f8", (2,)),  # integral of N |v| by joint, J: what wear is in proportion to
+        ("worn", "f8", (2, MOST_SECTORS)),  # its parts, by node of the bore
+        *[(name, TALLY[name]) for name in TALLY.names or ()],
+    ],
+    align=True,
+)  # fmt: skip
+
+
+def new_tally(p=None):
+    """An empty tally; a joint counts as touching until it is seen apart.
+
+    p: the run's record, where it may be that of a mechanism with features, whose bores may wear.
+    """
+    tally = zero(TALLY if p is None or not is_featured(p) else WORN)
     tally["touching"] = 1
     tally["max_penetration"] = -math.inf
     tally["deepest"] = -math.inf

@@ -15,3 +15,4 @@ from compressor.solve.signals import forces_on_frame
 from compressor.solve.simulate import measure, observe, simulate
 from compressor.solve.solution import solve
 from compressor.solve.statistics import mean_bar, sure
+from compressor.solve.wearing import Rubbed, rub

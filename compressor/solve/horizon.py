@@ -89,7 +89,7 @@ def followed(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting
     request: of a compiled method; shifted: the twin's initial state.
     """
     deadline = time.monotonic() + request.timeout
-    p, tally = request.p, new_tally()
+    p, tally = request.p, new_tally(request.p)
     edges, phases = segments(p, float(request.times[-1]))
     size = natural_sizes(p)
     walker, fellow = ready_walker(request, size), ready_walker(request, size)

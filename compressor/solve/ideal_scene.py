@@ -36,7 +36,7 @@ def closed_form(
     deadline = time.monotonic() + timeout
     edges, phases = segments(p, float(times[-1]))
     result = Trajectory(
-        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally()
+        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally(p)
     )
     began = time.perf_counter()
     grid = fine_grid(edges, pieces, 2.0 * math.pi / p.omega)

@@ -29,7 +29,7 @@ def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndar
     edges, phases = segments(request.p, float(request.times[-1]))
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)
-    result = Trajectory(request.times, states, phases[owner], new_tally())
+    result = Trajectory(request.times, states, phases[owner], new_tally(request.p))
     z = np.zeros(request.start.size + FLOWS)
     z[:-FLOWS] = request.start
     rows = np.empty((1, COLUMNS))

@@ -140,7 +140,7 @@ class _Twins:
         self.walker, self.fellow = (ready_walker(self.request, self.size) for _ in range(2))
         self.z, self.twin = (np.append(state, np.zeros(FLOWS)) for _ in range(2))
         self.work, self.twin_work = (new_work(self.size.size) for _ in range(2))
-        self.rows, self.tally = np.zeros((2, COLUMNS)), new_tally()
+        self.rows, self.tally = np.zeros((2, COLUMNS)), new_tally(p)
         self.states = np.empty((ends.size, self.size.size))
 
     def follow(self, difference: np.ndarray) -> np.ndarray:

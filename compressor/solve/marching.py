@@ -11,7 +11,6 @@ from compressor.physics import (
     Pair,
     Work,
     march,
-    new_tally,
     new_walker,
     new_work,
 )
@@ -59,6 +58,7 @@ class Snapshot(NamedTuple):
     rates: np.ndarray  # work.k[0]
     row: np.ndarray
     tally: bytes
+    kind: np.dtype  # of the tally
 
     @classmethod
     def of(cls, now: Standing) -> "Snapshot":
@@ -66,7 +66,7 @@ class Snapshot(NamedTuple):
         work = now.work
         return cls(
             now.walker.tobytes(), now.z.copy(), work.k[0].copy(), work.row.copy(),
-            now.tally.tobytes(),
+            now.tally.tobytes(), now.tally.dtype,
         )  # fmt: skip
 
     def standing(self) -> Standing:
@@ -74,16 +74,16 @@ class Snapshot(NamedTuple):
         work = new_work(self.z.size - FLOWS)
         work.k[0], work.row[:] = self.rates, self.row
         return Standing(
-            unpacked(self.walker, new_walker(0)),
+            unpacked(self.walker, new_walker(0).dtype),
             self.z.copy(),
             work,
-            unpacked(self.tally, new_tally()),
+            unpacked(self.tally, self.kind),
         )
 
 
-def unpacked(data: bytes, like: np.record) -> np.record:
-    """A record like another that compiled code may write, from its bytes."""
-    return np.frombuffer(bytearray(data), like.dtype).view(np.recarray)[0]
+def unpacked(data: bytes, kind: np.dtype) -> np.record:
+    """A record of a kind, that compiled code may write, from its bytes."""
+    return np.frombuffer(bytearray(data), kind).view(np.recarray)[0]
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,14 @@ from compressor.physics import (
     Column,
     contact_within,
     derivative_with_flows,
+    is_featured,
     lobatto,
     observe_all,
     sample_segments,
     shares_apart,
     tally_energy,
     tally_step,
+    wear_all,
 )
 from compressor.reasons import Reason
 from compressor.solve.request import (
@@ -180,6 +182,8 @@ class Segment:
         tally, p, apart = self.result.tally, self.request.p, np.empty(2)
         shares_apart(NODES, rows, apart)
         tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, measured, tally, p)
+        if measured and is_featured(p) and p["sectors"]:
+            wear_all(times, states, phases, (end - begin) * WEIGHTS, p, tally)
 
     def check_contact(self, begin: float, span: float, rows: np.ndarray) -> None:
         """Raise Stop where a whole contact lies within a step and its impulse is no small error."""

@@ -12,8 +12,10 @@ import numpy as np
 from compressor.cases import Case, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
+    MOST_SECTORS,
     Load,
     Scene,
+    bore_fields,
     choose_laws,
     complete,
     new_record,
@@ -34,8 +36,11 @@ def is_ideal(case: Case) -> bool:
     return scene(case) == Scene.IDEAL and not (play or case.drive or case.rod)
 
 
-def record(case: Case) -> np.record:
-    """The record of a case, every number in SI."""
+def record(case: Case, worn: np.ndarray | None = None) -> np.record:
+    """The record of a case, every number in SI.
+
+    worn: what was worn off both bores (m), (joint, sector); None: they are round.
+    """
     p: dict[str, Any] = {}  # what is not set stays zero
     p["scene"] = scene(case)
     p["load"] = Load[case.load.upper()]
@@ -45,10 +50,14 @@ def record(case: Case) -> np.record:
     _spring(case, p)
     ratio = case.gas.discharge_MPa / case.gas.suction_MPa
     _film(case, p)
-    if case.has_features:
+    featured = case.has_features or worn is not None
+    if featured:
         _features(case, p)
+    if worn is not None:
+        p |= bore_fields(worn.shape[1])
+        p["worn"] = np.pad(worn, ((0, 0), (0, MOST_SECTORS - worn.shape[1])))
     complete(p, ratio, printed=case.gas.switching == "paper")
-    filled = new_record(case.chooses_laws, case.has_features)
+    filled = new_record(case.chooses_laws, featured)
     for name, value in p.items():
         filled[name] = value
     return filled

@@ -12,6 +12,7 @@ SUMS = (
     "seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts", "releases",
 )  # fmt: skip
 GREATEST = ("peak", "max_penetration")  # the others go on from the start of the run
+WORN = ("slid", "worn")  # sums of a mechanism with features
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
 
@@ -39,6 +40,8 @@ class Cuts:
         fresh = new_tally()
         for name in SUMS + GREATEST:
             tally[name] = fresh[name]
+        for name in worn_sums(tally):
+            tally[name] = 0.0
         return not self.enough(self.turns)
 
 
@@ -47,10 +50,15 @@ def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
     return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
 
 
+def worn_sums(tally: np.record) -> tuple[str, ...]:
+    """The sums that a tally has beside `SUMS`."""
+    return WORN if "worn" in (tally.dtype.names or ()) else ()
+
+
 def merged(turns: Sequence[np.record]) -> np.record:
     """One tally of several revolutions in a row."""
     whole = turns[-1].copy()
-    for name in SUMS:
+    for name in (*SUMS, *worn_sums(whole)):
         whole[name] = sum(turn[name] for turn in turns)
     for name in GREATEST:
         whole[name] = np.max([turn[name] for turn in turns], axis=0)

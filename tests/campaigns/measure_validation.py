@@ -21,6 +21,7 @@ from published import (
     ACCELERATION,
     ASKED,
     BEARING,
+    COEFFICIENT,
     DRY,
     GIVEN,
     MACHINE,
@@ -33,12 +34,15 @@ from published import (
     guided,
     rod_apart,
     simeon,
+    uneven,
 )
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.solve import predictability_horizon, simulate
+from compressor.solve.attempts import request, times_of
 from compressor.solve.bearing import reynolds
+from compressor.solve.integrate import integrate
 
 SICONOS = "Siconos, SliderCrankMoreauJeanDirectProjectionOSI.ref, steps of 0.1 ms"
 TIMES = (1e-3, 2e-3)  # s
@@ -122,6 +126,17 @@ def elastic_rod():
         yield row(subject, f"{name}, relative difference over 8 ms", "", 0, apart, 1e-6, source)
 
 
+def wear():
+    """What slides on an uneven bore, by its sectors, against the energy that friction takes."""
+    source = "Archard's law; friction's energy over a constant coefficient"
+    for joint in ("big_end", "small_end"):
+        case, p = uneven(joint)
+        tally = integrate(request(case, case.rtol, p, times_of(case, False))).tally
+        asked, found = tally["friction_loss"] / COEFFICIENT, tally["worn"].sum()
+        what = f"∫ F |v| dt, {joint}, over sectors"
+        yield row("Wear", what, "J", asked, found, 1e-6 * asked, source)
+
+
 def bearing():
     """Sommerfeld numbers and attitudes of the film, from Reynolds' equation."""
     source = "Butenschön 1976, DIN 31652"
@@ -135,7 +150,7 @@ def bearing():
 
 
 def main(target):
-    every = (restitution, dry_joint, play, bearing, elastic_rod)
+    every = (restitution, dry_joint, play, bearing, elastic_rod, wear)
     rows = [one for made in every for one in made()]
     kept = provenance("make validation") | {"rows": rows}
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")

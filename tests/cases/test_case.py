@@ -193,6 +193,9 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
         ({"lubricant": True}, "lubricant", "joint: none has none: name a joint"),
         ({**BIG_END, "lubricant": {"bearing_length_mm": 40}}, "lubricant.bearing_length_mm",
          "2 times the diameter"),
+        ({"wear": True}, "wear", "joint: none has none: name a joint"),
+        ({**BIG_END, "wear": True, "lubricant": True}, "wear", "leave out lubricant or wear"),
+        ({**BIG_END, "wear": {"limit_mm": 0.1}}, "wear.limit_mm", "more than the clearance"),
         ({"body": True, "drive": True}, "body", "leave out body or drive"),
         ({"rod": True, "machine": {"rod_centre_mm": 200}}, "machine.rod_centre_mm", "uniform bar"),
         ({"rod": True, "machine": {"rod_inertia_kg_m2": 0.1}}, "machine.rod_inertia_kg_m2",
@@ -383,6 +386,8 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "contact.geometry": "internal",
     "contact.law": "hertz",
     "friction.law": "threlfall",
+    "wear.limit_mm": 0.9,
+    "wear.sectors": 36,
     "solve.accuracy": "fine",
     "solve.duration_rev": 5,
     "solve.duration_s": 0.6,
@@ -422,7 +427,7 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"contact": {"materials": ["steel", "steel"]}}
     if group == "sensor":
         base |= {"body": True, "sensor": True}
-    if group in ("lubricant", "guide", "drive", "rod"):
+    if group in ("lubricant", "guide", "drive", "rod", "wear"):
         base |= {group: True}
     if name in OF_LAWS:
         law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}
