@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-pure check format calibration accuracy validation claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-pure check format calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -77,6 +77,9 @@ sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (t
 validation: install  ## compare with what others have published (a minute)
 	$(CAMPAIGN)/measure_validation.py tests/results/validation.json
 
+wear: install  ## measure wear by steps and sectors, and on machines drawn at random (ten minutes)
+	$(CAMPAIGN)/measure_wear.py tests/results/wear.json
+
 peers: install  ## time other tools and ours in turn on one problem (about three minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
@@ -111,7 +114,7 @@ chaos: install  ## inject faults, thousands, and count what did not survive (an 
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: calibration accuracy validation claims page tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
+measurements: calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py

@@ -36,12 +36,13 @@ MAY_IMPORT = {
     "measure": {"analysis", "cases", "physics", "solve", "metrics", "reasons", "store", "sweep"},
     "regimes": {"analysis", "cases", "physics", "solve", "store", "sweep", "outcome", "metrics",
                 "reasons"},
+    "wear": {"cases", "solve", "store", "sweep", "metrics"},
     "compsim": {"analysis", "cases", "diagnosis", "digits", "machines", "measure", "metrics",
-                "reasons", "regimes", "report", "solve", "store", "sweep"},
+                "reasons", "regimes", "report", "solve", "store", "sweep", "wear"},
 }  # fmt: skip
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "measure",
-    "diagnosis", "machines", "regimes",
+    "diagnosis", "machines", "regimes", "wear",
 )  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},

@@ -38,6 +38,7 @@ from compsim import (
     stress,
     tradeoff,
     verify,
+    wear,
 )
 from compsim.screen import DONE, INTERNAL, say
 from compsim.usage import Commands, one_line
@@ -92,6 +93,7 @@ for verb in (
     explain.explain,
     tradeoff.tradeoff,
     stress.stress,
+    wear.wear,
     identify.identify,
     find.find,
     claims.claims,

@@ -7,7 +7,7 @@ from pathlib import Path
 from compressor.program import did_you_mean
 from compressor.store.files import Folder, WrongName
 
-PARTS = ("rows", "jobs", "studies", "shards", "regimes", "features")  # folders in a store
+PARTS = ("rows", "jobs", "studies", "shards", "regimes", "features", "wear")  # folders in a store
 MOST_LOOKED_AT = 1000  # entries of a folder in which results are sought
 MOST_NAMES = 5  # that are listed
 MAKE = "make one: compsim run CONFIG..."

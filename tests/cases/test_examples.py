@@ -44,7 +44,9 @@ def test_templates_come_first_and_say_what_they_answer():
     for one in found.values():
         assert one.question.count("?") == 1
         assert re.search(r"seconds|minutes|hour|\d s\b", one.jobs)
-        verb = "claims" if "claims" in one.path.read_text() and "run" not in one.next else "run"
+        verb = one.next.split()[1]
+        assert verb in ("run", "claims", "wear")
+        assert (verb == "wear") is ("\nwear:" in one.path.read_text())
         assert one.next.startswith(f"compsim {verb} {one.name}.yaml")
 
 

@@ -433,8 +433,17 @@ def test_explain_of_an_effect_that_failed():
 def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     import xarray as xr
 
+    from compressor.measure import features
     from compressor.measure.work_precision import work_precision
 
+    whole = features.variants
+
+    def plain(case):
+        """Without laws and mechanisms, which take a minute to compile: tests/measure has them."""
+        return {name: other for name, other in whole(case).items() if other.is_plain}
+
+    monkeypatch.setattr(features, "variants", plain)
+    monkeypatch.setattr(features.trade, "__defaults__", (1, *features.trade.__defaults__[1:]))
     few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
     defaults = (*few.values(), *work_precision.__defaults__[2:])
     monkeypatch.setattr(work_precision, "__defaults__", defaults)

@@ -1,0 +1,206 @@
+"""Stages of wear: a bore's profile, the motion on it, and the step to the next one.
+
+    RESULTS/wear/MACHINE.nc    the stages that are finished, in the order of operating hours
+
+MACHINE is a hash of all that decides the numbers. A stage's motion stands for all revolutions until
+the next one; it is taken from the profile midway, so that errors fall with the square of the step.
+The file is written anew after each stage and is whole or absent; what was interrupted goes on from
+the last stage in it, and ends in the same numbers to the bit.
+
+Wear is slow: how a motion wears depends on the profile alone, and every profile is reached after
+the fewer revolutions, the greater the coefficient is. So one machine tells of all coefficients.
+"""
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from compressor.cases import MODEL_VERSION, Case, Wear, to_si
+from compressor.metrics import JOINTS, METRICS
+from compressor.program import PROGRAM
+from compressor.solve import Rubbed, rub
+from compressor.store import Folder, StoreError, read_dataset, write_dataset
+
+FOLDER = "wear"
+REMEDY = "delete it: the same command makes it again"
+SCHEMA = 1  # of a stage's numbers: a change of what they mean makes them anew
+SHOWN = (
+    "rms_acceleration", "peak_acceleration", "peak_contact_force", "max_penetration",
+    "contact_loss_fraction", "impact_count",
+)  # fmt: skip
+# beside the stage: dims, unit, long name
+NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "hours": ((), "h", "operating hours"),
+    "worn_depth": (("joint", "angle"), "m", "what is worn off the bore"),
+    "rubbing_work": (("joint", "angle"), "J", "pressing times sliding in a revolution, by sector"),
+    "rubbing_spread": (("joint",), "J", "standard deviation of it over the revolutions"),
+    "turn": ((), "s", "time of a revolution"),
+    "end_state": (("number",), "1", "motion at the end, as the solver holds it, in SI"),
+    **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in SHOWN},
+}
+
+Stage = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Worn:
+    """One machine whose bores wear."""
+
+    case: Case
+
+    @property
+    def how(self) -> Wear:
+        """What its wear goes by."""
+        assert self.case.wear
+        return self.case.wear
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of what decides the numbers."""
+        what = [self.case.key, self.case.values()["wear"], MODEL_VERSION, SCHEMA]
+        return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:20]
+
+    @property
+    def clearances(self) -> np.ndarray:
+        """Of both joints, unworn (m)."""
+        given = self.case.clearance_mm
+        return np.array([to_si(getattr(given, joint), "mm") for joint in JOINTS])
+
+    @property
+    def limit(self) -> float:
+        """The clearance (m) of a joint that is worn out."""
+        return to_si(self.how.limit_mm or math.inf, "mm")
+
+    @property
+    def most_hours(self) -> float:
+        """Hours after which it ends: those that the greatest coefficient wears as much in."""
+        return self.how.hours * self.how.coefficient_factor
+
+    @property
+    def sector_area(self) -> np.ndarray:
+        """Of a bore, by joint (m^2)."""
+        radius = to_si(self.case.machine.pin_radius_mm, "mm") + self.clearances
+        width = 2.0 * math.pi / self.how.sectors * radius
+        return np.asarray(width * to_si(self.how.bore_length_mm, "mm"))
+
+    @property
+    def depth_per_work(self) -> np.ndarray:
+        """What each J wears off a sector (m), by joint: Archard's law."""
+        return to_si(self.how.coefficient_mm3_per_N_m, "mm3/(N m)") / self.sector_area
+
+    def path(self, folder: Folder) -> Path:
+        """Where it is stored."""
+        return Path(folder) / FOLDER / f"{self.key}.nc"
+
+    def over(self, stage: Stage) -> bool:
+        """Whether a stage is the last one: worn out, at the end of its hours, or failed."""
+        opened = self.clearances + stage["worn_depth"].max(axis=1)  # m
+        late = bool(stage["hours"] >= self.most_hours)
+        return bool(stage["reason"]) or late or bool((opened >= self.limit).any())
+
+
+def first(of: Worn) -> Stage:
+    """The stage of unworn bores."""
+    unworn = np.zeros((len(JOINTS), of.how.sectors))
+    return staged(0.0, unworn, rub(of.case, unworn, None))
+
+
+def staged(hours: float, worn: np.ndarray, motion: Rubbed) -> Stage:
+    """What is kept of a motion on bores that were worn in some hours."""
+    found = {name: motion.metrics.get(name, math.nan) for name in SHOWN}
+    shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
+    return {
+        "hours": hours, "worn_depth": worn, "rubbing_work": motion.work,
+        "rubbing_spread": motion.spread, "turn": motion.turn, "end_state": motion.state,
+        "reason": motion.reason, "detail": motion.detail,
+        **{name: np.broadcast_to(value, shapes[name]) for name, value in found.items()},
+    }  # fmt: skip
+
+
+def following(of: Worn, stage: Stage) -> Stage:
+    """The stage after one that is not the last; by the midpoint rule."""
+    rate = of.depth_per_work[:, np.newaxis] * stage["rubbing_work"]  # m a revolution
+    left = (of.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
+    fastest = float(rate.max())
+    step = to_si(of.how.step_mm, "mm")
+    span = min(step / fastest, left) if fastest > 0.0 else left  # revolutions
+    midway = rub(of.case, stage["worn_depth"] + 0.5 * span * rate, stage["end_state"])
+    if midway.reason:
+        return stage | {"reason": midway.reason, "detail": midway.detail}
+    hours = stage["hours"] + span * midway.turn / 3600.0
+    hours = of.most_hours if span == left else hours
+    worn = stage["worn_depth"] + span * of.depth_per_work[:, np.newaxis] * midway.work
+    return staged(hours, worn, rub(of.case, worn, midway.state))
+
+
+def dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
+    """The stages of a machine, with the dimension `stage`."""
+    found: dict[str, tuple] = {}
+    for name, phrase in (("reason", "why it ended early"), ("detail", "what is known of that")):
+        texts = np.array([stage[name] for stage in stages], object)
+        found[name] = ("stage",), texts, {"long_name": phrase}
+    for name, (dims, unit, phrase) in NUMBERS.items():
+        values = np.array([stage[name] for stage in stages], float)
+        found[name] = ("stage", *dims), values, {"units": unit, "long_name": phrase}
+    worn = found["worn_depth"][1]
+    deepest = of.clearances + worn.max(axis=2)
+    told = {"units": "m", "long_name": "clearance at the deepest place"}
+    found["clearance"] = ("stage", "joint"), np.where(of.clearances > 0.0, deepest, 0.0), told
+    told = {"units": "m3", "long_name": "volume that is worn off"}
+    found["worn_volume"] = ("stage", "joint"), worn.sum(axis=2) * of.sector_area, told
+    angles = 2.0 * math.pi / of.how.sectors * np.arange(of.how.sectors)
+    told = {"units": "rad", "long_name": "of a place on the bore from the rod's axis, towards the "
+            "small end, counter-clockwise"}  # fmt: skip
+    where = {
+        "angle": ("angle", angles, told),
+        "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
+    }
+    attrs = {"key": of.key, "program": PROGRAM, "model_version": MODEL_VERSION}
+    attrs["case"] = of.case.attributes()["case"]
+    return xr.Dataset(found, where, attrs)
+
+
+def kept(of: Worn, path: Path) -> list[Stage]:
+    """The stages of an earlier run, none where there is no file. Raises StoreError."""
+    if not path.exists():
+        return []
+    found = read_dataset(path, REMEDY)
+    names = {*NUMBERS, "reason", "detail"}
+    if found.attrs.get("key") != of.key or not names <= {*found.variables}:
+        raise StoreError(path, "does not hold the machine that its name says", REMEDY)
+    columns = {name: found[name].values for name in names}
+    stages = [
+        {name: column[n] for name, column in columns.items()} for n in range(found.sizes["stage"])
+    ]
+    for stage in stages:
+        stage["reason"], stage["detail"] = str(stage["reason"]), str(stage["detail"])
+    return stages
+
+
+def write(of: Worn, folder: Folder, stages: list[Stage]) -> None:
+    """Store the stages of a machine. Raises StoreError."""
+    write_dataset(of.path(folder), dataset(of, stages))
+
+
+def wear_file(folder: Folder, case: Case) -> Path:
+    """Where the stages of a case with wear are stored."""
+    return Worn(case).path(folder)
+
+
+def open_wear(folder: Folder, case: Case) -> xr.Dataset:
+    """How the bores of a case have worn, from a folder of results, as far as that was run.
+
+    Dims: `stage`, `joint`, `angle` of a place on the bore; `hours` and `worn_depth` (m) by stage,
+    with the metrics of the motion on such bores. Raises StoreError where there is nothing of it.
+    """
+    path = wear_file(folder, case)
+    if not path.exists():
+        raise StoreError(path, "is not there", "compsim wear the case file")
+    return read_dataset(path, REMEDY)
