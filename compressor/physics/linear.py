@@ -1,4 +1,6 @@
-"""Small systems of linear equations: LU factors in place, with partial pivoting."""
+"""Small systems of linear equations: LU factors with partial pivoting, or L D L' of what is
+symmetric and positive; in place.
+"""
 
 from compressor.physics._jit import jit
 
@@ -38,3 +40,35 @@ def substitute(matrix, pivots, b):
         for m in range(i + 1, n):
             b[i] -= matrix[i, m] * b[m]
         b[i] /= matrix[i, i]
+
+
+@jit
+def factorize_positive(matrix, n):
+    """L D L' in place, in the lower half, of n rows of a symmetric matrix; False if not positive.
+
+    Needs no pivots (Golub and Van Loan, Matrix Computations, 4.1.2 and 4.2).
+    """
+    for j in range(n):
+        for m in range(j):
+            scaled = matrix[j, m] * matrix[m, m]
+            matrix[j, j] -= scaled * matrix[j, m]
+            for i in range(j + 1, n):
+                matrix[i, j] -= matrix[i, m] * scaled
+        if not matrix[j, j] > 0.0:
+            return False
+        for i in range(j + 1, n):
+            matrix[i, j] /= matrix[j, j]
+    return True
+
+
+@jit
+def substitute_positive(matrix, b):
+    """Solve with the factors of `factorize_positive`, b (n,) being overwritten by the solution."""
+    n = b.size
+    for i in range(n):
+        for m in range(i):
+            b[i] -= matrix[i, m] * b[m]
+    for i in range(n - 1, -1, -1):
+        b[i] /= matrix[i, i]
+        for m in range(i + 1, n):
+            b[i] -= matrix[m, i] * b[m]

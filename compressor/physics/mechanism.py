@@ -114,26 +114,33 @@ def pose_of(motion, w, rates, p):
 
 
 @jit
-def fill_jacobian(pose, p, jacobian):
-    """Write the bodies' velocities by the rates of the coordinates, (11, 11), zeros before."""
-    c, s, sin_phi, cos_phi, length = (
-        pose.cos_theta, pose.sin_theta, pose.sin_phi, pose.cos_phi, pose.length,
-    )  # fmt: skip
-    reach = length * cos_phi
-    crank = p.crank_radius
-    jacobian[0, 0] = 1.0
-    jacobian[1, 0], jacobian[2, 0] = -crank * s, crank * c
-    jacobian[1, 1], jacobian[2, 2] = -1.0, -1.0
-    jacobian[3, 0] = -crank * c / reach
-    jacobian[3, 2], jacobian[3, 4], jacobian[3, 5] = 1.0 / reach, -1.0 / reach, 1.0 / reach
-    jacobian[3, STRETCH] = sin_phi / reach
+def carry(pose, rates, p, velocity):
+    """Write the bodies' velocities of the coordinates' rates, (11,) both: linear in these."""
+    crank, reach = p.crank_radius * rates[0], pose.length * pose.cos_phi
+    velocity[0] = rates[0]
+    velocity[1] = -pose.sin_theta * crank - rates[1]
+    velocity[2] = pose.cos_theta * crank - rates[2]
+    falling = velocity[2] + rates[4] - rates[5]
+    velocity[3] = (pose.sin_phi * rates[STRETCH] - falling) / reach
     for i in range(MODES):
-        jacobian[4 + i, FIRST_MODE + i] = 1.0
-    jacobian[8, 3] = 1.0
-    jacobian[8, STRETCH] = cos_phi
-    for j in range(COORDINATES):
-        jacobian[8, j] += jacobian[1, j] + length * sin_phi * jacobian[3, j]
-    jacobian[9, 5], jacobian[10, 6] = 1.0, 1.0
+        velocity[4 + i] = rates[FIRST_MODE + i]
+    along = velocity[1] + rates[3] + pose.cos_phi * rates[STRETCH]
+    velocity[8] = along + pose.length * pose.sin_phi * velocity[3]
+    velocity[9], velocity[10] = rates[5], rates[6]
+
+
+@jit
+def project(pose, force, p, pushed):
+    """Write what the bodies' forces are on the coordinates, (11,) both: `carry`, transposed."""
+    along, reach = force[1] + force[8], pose.length * pose.cos_phi
+    turning = (force[3] + pose.length * pose.sin_phi * force[8]) / reach
+    across = force[2] - turning
+    pushed[0] = force[0] + p.crank_radius * (pose.cos_theta * across - pose.sin_theta * along)
+    pushed[1], pushed[2], pushed[3] = -along, -across, force[8]
+    pushed[4], pushed[5], pushed[6] = -turning, force[9] + turning, force[10]
+    for i in range(MODES):
+        pushed[FIRST_MODE + i] = force[4 + i]
+    pushed[STRETCH] += pose.sin_phi * turning + pose.cos_phi * force[8]
 
 
 @jit

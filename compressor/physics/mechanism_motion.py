@@ -9,23 +9,23 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import jit, square_root
-from compressor.physics.elastic_rod import add_rod, summed
+from compressor.physics.elastic_rod import add_rod
 from compressor.physics.friction_laws import friction_coefficient
 from compressor.physics.guide import guide_coefficient
 from compressor.physics.kinematics import Motion
-from compressor.physics.linear import factorize, substitute
+from compressor.physics.linear import factorize_positive, substitute_positive
 from compressor.physics.mechanism import (
-    COORDINATES,
     ROWS,
     Joints,
     Pose,
     add_bodies,
     add_forces,
     add_on_rod,
+    carry,
     fill_bias,
-    fill_jacobian,
     joints_of,
     pose_of,
+    project,
     unpack,
 )
 
@@ -62,39 +62,36 @@ class Solved(NamedTuple):
 
 
 @jit
-def columns_of(p, columns):
-    """Write the coordinates that move, in their order; returns how many."""
-    count = 0
-    for i in range(COORDINATES):
-        if p.at[i] >= 0:
-            columns[count] = i
-            count += 1
-    return count
-
-
-@jit
-def times(matrix, vector, out):
-    """Write a matrix times a vector."""
-    for i in range(matrix.shape[0]):
-        total = 0.0
-        for j in range(vector.size):
-            total += matrix[i, j] * vector[j]
-        out[i] = total
-
-
-@jit
-def reduce(jacobian, mass, columns, matrix):
-    """Write the mass matrix of the coordinates that move; columns: their numbers."""
-    carried = np.zeros(ROWS)
-    for i in range(columns.size):
-        for row in range(ROWS):
-            carried[row] = 0.0
-            for other in range(ROWS):
-                carried[row] += jacobian[other, columns[i]] * mass[other, row]
-        for j in range(columns.size):
-            matrix[i, j] = 0.0
+def add_times(columns, vector, out):
+    """Add to out a matrix times a vector; columns: of the matrix. Most of the numbers are zeros."""
+    for i in range(ROWS):
+        if vector[i] != 0.0:
             for row in range(ROWS):
-                matrix[i, j] += carried[row] * jacobian[row, columns[j]]
+                out[row] += columns[i, row] * vector[i]
+
+
+@jit
+def reduce(pose, mass, p, room, matrix):
+    """Write the mass matrix of the coordinates that move; room: zeros, (4, 11)."""
+    unit, velocity, momentum, pushed = room[0], room[1], room[2], room[3]
+    for i in range(p.degrees):
+        unit[p.coordinates[i]] = 1.0
+        carry(pose, unit, p, velocity)
+        momentum[:] = 0.0
+        add_times(mass, velocity, momentum)
+        project(pose, momentum, p, pushed)
+        for j in range(p.degrees):
+            matrix[i, j] = pushed[p.coordinates[j]]
+        unit[p.coordinates[i]] = 0.0
+
+
+@jit
+def row_times(row, vector):
+    """Sum of a row's products with a vector, (11,) both."""
+    total = 0.0
+    for i in range(ROWS):
+        total += row[i] * vector[i]
+    return total
 
 
 @jit
@@ -151,56 +148,57 @@ def solve(motion, y, phase, p):
     Friction of ideal joints and of an ideal guide depends on their forces, and these on it: both
     are found in rounds, of which each leaves some hundredths of the last one's error.
     """
-    w, rates, velocity, bias = (
-        np.zeros(COORDINATES),
-        np.zeros(COORDINATES),
-        np.zeros(ROWS),
-        np.zeros(ROWS),
-    )
-    jacobian, mass, own = np.zeros((ROWS, COORDINATES)), np.zeros((ROWS, ROWS)), np.zeros(ROWS)
+    # one array of them all: to ask for memory takes longer than to use it
+    room = np.zeros((2 * ROWS + 13, ROWS))
+    mass, matrix, vectors = room[:ROWS], room[ROWS : 2 * ROWS], room[2 * ROWS :]
+    w, rates, velocity, bias, own = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     unpack(y, p, w, rates)
     pose = pose_of(motion, w, rates, p)
-    fill_jacobian(pose, p, jacobian)
-    times(jacobian, rates, velocity)
+    carry(pose, rates, p, velocity)
     fill_bias(pose, rates, p, bias)
     axes = pose.cos_phi, -pose.sin_phi, pose.sin_phi, pose.cos_phi
     add_rod(axes, pose.spin, w[7:11], rates[7:11], p, mass, own)
     add_bodies(p, mass)
     joints = joints_of(phase, y, motion, pose, w, velocity, p)
-    columns = np.zeros(COORDINATES, dtype=np.int64)
-    columns = columns[: columns_of(p, columns)]
-    count = columns.size
-    matrix, pivots = np.zeros((count, count)), np.zeros(count, dtype=np.int64)
-    reduce(jacobian, mass, columns, matrix)
-    regular = factorize(matrix, pivots)
-    steady, force, body = own.copy(), np.zeros(ROWS), np.zeros(ROWS)
+    reduce(pose, mass, p, vectors[5:9], matrix)
+    regular = factorize_positive(matrix, p.degrees)
+    accelerations, body, steady, force = vectors[9], vectors[10], vectors[11], vectors[12]
+    pushed, found = vectors[5], vectors[6, : p.degrees]
+    add_times(mass, bias, steady)
+    for row in range(ROWS):
+        steady[row] = own[row] - steady[row]
     add_forces(pose, joints, p, steady)
-    accelerations, pushed, needed = np.zeros(COORDINATES), np.zeros(count), np.zeros(4)
     reactions = Reactions(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(MOST_ROUNDS):
         force[:] = steady
         add_rubbing(pose, reactions, p, force)
-        times(mass, bias, body)
-        for i in range(count):
-            pushed[i] = 0.0
-            for row in range(ROWS):
-                pushed[i] += jacobian[row, columns[i]] * (force[row] - body[row])
-        substitute(matrix, pivots, pushed)
-        for i in range(count):
-            accelerations[columns[i]] = pushed[i] if regular else math.nan
-        times(jacobian, accelerations, body)
+        project(pose, force, p, pushed)
+        for i in range(p.degrees):
+            found[i] = pushed[p.coordinates[i]]
+        substitute_positive(matrix, found)
+        for i in range(p.degrees):
+            accelerations[p.coordinates[i]] = found[i] if regular else math.nan
+        carry(pose, accelerations, p, body)
         for row in range(ROWS):
             body[row] += bias[row]
-        for i in range(3):
-            needed[i] = summed(mass[1 + i], 0, ROWS, body) - own[1 + i]
-        needed[3] = p.reciprocating_mass * body[8]
         last = reactions
-        reactions = reactions_of(pose, joints, needed, velocity, last, p)
+        reactions = reactions_of(pose, joints, needed_of(mass, body, own, p), velocity, last, p)
         if not apart(last, reactions):
             break
     return Solved(
         motion, pose, joints, reactions, w, rates, accelerations, velocity, body, mass
     )  # fmt: skip
+
+
+@jit
+def needed_of(mass, body, own, p):
+    """What `reactions_of` asks for, by the bodies' accelerations and their own forces."""
+    return (
+        row_times(mass[1], body) - own[1],
+        row_times(mass[2], body) - own[2],
+        row_times(mass[3], body) - own[3],
+        p.reciprocating_mass * body[8],
+    )
 
 
 @jit

@@ -5,8 +5,6 @@ The same calls as `motion` and `observe` have for the scenes; `systems` chooses 
 
 import math
 
-import numpy as np
-
 from compressor.physics._jit import jit, square_root
 from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import elastic_energy
@@ -25,17 +23,13 @@ from compressor.physics.mechanism import COORDINATES, ROWS, bore_axes, motor_tor
 from compressor.physics.mechanism_motion import solve
 from compressor.physics.observe import (
     ACCELERATION,
-    COLUMNS,
     CRANK_POWER,
-    DAMPING_POWER,
     DEVIATION,
     DISPLACEMENT,
     ECCENTRICITY,
     FORCE,
     FORCE_SIZE,
-    FRICTION_POWER,
     KINETIC,
-    LOAD_POWER,
     NEARNESS,
     NORMAL,
     PENETRATION,
@@ -94,18 +88,18 @@ def crank_torque(now, p):
 
 @jit
 def write_powers(now, p, row):
-    """Write the four powers (W) into the row: of crank and load, lost to damping and friction."""
+    """Write four powers (W) into row, (4,): of crank and load, lost to damping and friction."""
     big, small, guide, pose = now.joints.big, now.joints.small, now.joints.guide, now.pose
     forces, modes = now.reactions, now.rates[7:11]
-    row[CRANK_POWER] = crank_torque(now, p) * pose.speed
-    row[LOAD_POWER] = -now.joints.load * now.velocity[8]
+    row[0] = crank_torque(now, p) * pose.speed
+    row[1] = -now.joints.load * now.velocity[8]
     damped = damping_power(big) + damping_power(small) + guide.damped
     damped += now.joints.big_film.loss + now.joints.small_film.loss
-    row[DAMPING_POWER] = damped + p.rod_damping * material_work(modes, modes, p)
+    row[2] = damped + p.rod_damping * material_work(modes, modes, p)
     rubbed = guide.rubbed - big.friction * big.slip - small.friction * small.slip
     rubbed += forces.big_torque * (pose.speed - now.joints.big_spin)
     rubbed += forces.small_torque * (now.joints.pin_spin - now.joints.small_spin)
-    row[FRICTION_POWER] = rubbed - forces.rubbing * now.velocity[8]
+    row[3] = rubbed - forces.rubbing * now.velocity[8]
 
 
 @jit
@@ -148,7 +142,7 @@ def write_glanced(now, p, row):
 def write_row(now, p, row):
     """Write the columns from ACCELERATION on."""
     write_glanced(now, p, row)
-    write_powers(now, p, row)
+    write_powers(now, p, row[CRANK_POWER:KINETIC])
     write_energies(now, p, row)
 
 
@@ -161,7 +155,12 @@ def derivative(t, y, phase, p, out):
 @jit
 def write_flowing_derivative(motion, z, phase, p, out):
     """`observe.write_flowing_derivative` of the mechanism."""
-    derivative_and_gauge(motion, z, phase, p, out, np.empty(COLUMNS))
+    n = z.size - 4
+    now = solve(motion, z[:n], phase, p)
+    write_rates(now, z[:n], p, out[:n])
+    write_powers(now, p, out[n:])
+    for i in range(n, z.size):
+        out[i] *= pace_of(now, p)
 
 
 @jit

@@ -160,6 +160,8 @@ FEATURES: list[tuple] = [
     ("tilting", "i8"),  # whether the crosshead has clearance in its guide
     ("elastic", "i8"),  # whether the rod is
     ("at", "i8", (len(Coordinate),)),  # place of each coordinate in a state; -1 of none
+    ("degrees", "i8"),  # of freedom: how many coordinates move
+    ("coordinates", "i8", (len(Coordinate),)),  # these
     ("crank_inertia", "f8"),  # about the crank's axis, with the flywheel, kg m^2
     ("unbalance", "f8"),  # of the crank: mass times its centre's distance, kg m
     ("torque", "f8"),  # of the motor at the speed omega, N m
@@ -223,6 +225,8 @@ def place_coordinates(p: np.record) -> None:
     if p["driven"]:
         at[Coordinate.CRANK] = 2 * len(found) + len(CARRIED) + 1
     p["at"], p["freedoms"] = at, len(found)
+    moving = [one for one in Coordinate if at[one] >= 0]
+    p["degrees"], p["coordinates"] = len(moving), moving + [-1] * (len(at) - len(moving))
 
 
 def state_names(p: np.record) -> tuple[str, ...]:

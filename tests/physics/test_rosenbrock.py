@@ -63,21 +63,6 @@ def test_dense_output_joins_the_ends_and_is_of_order_three():
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.35)
 
 
-@pytest.mark.parametrize("n", [4, 8])
-def test_factors_solve_the_system(n):
-    rng = np.random.default_rng(n)
-    for _ in range(20):
-        matrix, b = rng.normal(size=(n, n)), rng.normal(size=n)
-        factors, pivots, x = matrix.copy(), np.zeros(n, dtype=np.int64), b.copy()
-        assert rosenbrock.factorize(factors, pivots)
-        rosenbrock.substitute(factors, pivots, x)
-        assert matrix @ x == pytest.approx(b, abs=1e-10)
-
-
-def test_a_singular_system_is_told():
-    assert not rosenbrock.factorize(np.zeros((4, 4)), np.zeros(4, dtype=np.int64))
-
-
 STIFF = {
     "viscous contact": {"contact": {"damping_N_s_per_mm": 336e3}},
     "tiny stiction velocity": {"friction": {"stiction_velocity_mm_per_s": 0.001}},
