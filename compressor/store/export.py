@@ -23,7 +23,7 @@ from compressor.store.files import Folder, WrongName, publish, publishing
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.names import find_study, whole_key
 from compressor.store.reader import Stored, read_store
-from compressor.store.series_file import read_bytes, read_series, write_dataset
+from compressor.store.series_file import image_of, read_bytes, read_series
 from compressor.store.studies import StoredStudy, read_studies
 
 if TYPE_CHECKING:
@@ -190,7 +190,9 @@ def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
         is_grid = len(studies) == 1 and studies[0].is_grid
         layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
         table = outcomes(layout, stored.rows).assign_attrs(_attributes(studies))
-        size = write_dataset(task.path, _linked(table)).stat().st_size
+        data = image_of(_linked(table))
+        publish(task.path, data)
+        size = len(data)
     jobs = sum(study.jobs for study in studies)
     name = " ".join(study.name for study in studies)
     return Exported(os.fspath(task.path), "metrics", name, jobs, size)

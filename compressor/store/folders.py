@@ -8,16 +8,17 @@ from compressor.program import did_you_mean
 from compressor.store.files import Folder, WrongName
 
 PARTS = ("rows", "jobs", "studies", "shards", "regimes", "features", "wear")  # folders in a store
+HELD = ("studies/*.json", "regimes/*/*.json", "wear/*.nc")  # of which each is a result
 MOST_LOOKED_AT = 1000  # entries of a folder in which results are sought
 MOST_NAMES = 5  # that are listed
 MAKE = "make one: compsim run CONFIG..."
 
 
 def holds_results(folder: Folder) -> bool:
-    """Whether a folder holds a study, of jobs or of regimes."""
+    """Whether a folder holds a study, of jobs or of regimes, or a machine's wear."""
     place = Path(folder)
     try:
-        return any(place.glob("studies/*.json")) or any(place.glob("regimes/*/*.json"))
+        return any(any(place.glob(one)) for one in HELD)
     except OSError:
         return False
 
@@ -38,6 +39,9 @@ def no_results(folder: Folder) -> WrongName:
     if followed:
         problem = f"holds no study of jobs, only machines that were followed: {followed}"
         return WrongName(folder, problem, "compsim plot STUDY draws one")
+    if any(place.glob(HELD[-1])):
+        problem = "holds no study of jobs, only how machines have worn"
+        return WrongName(folder, problem, "compsim wear CONFIG... tells of them")
     return WrongName(folder, "holds no study", remedy_for(place))
 
 

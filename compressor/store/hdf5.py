@@ -36,6 +36,8 @@ BARE = "This is a netCDF dimension but not a netCDF variable."  # what netCDF ca
 # what h5py, numpy and who reads raise on a file that is none of ours
 FOREIGN = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError,
            ArithmeticError)  # fmt: skip
+SEAL = b"compsim digest "
+DIGITS = 20
 REMEDY = "run its study again, which replaces it"
 
 
@@ -44,8 +46,23 @@ class DamagedJob(StoreError):
 
 
 def digest(data: bytes) -> str:
-    """The checksum in the name of a stored file: 20 hexadecimal digits (BLAKE2b)."""
-    return hashlib.blake2b(data, digest_size=10).hexdigest()
+    """The checksum of a stored file: 20 hexadecimal digits (BLAKE2b)."""
+    return hashlib.blake2b(data, digest_size=DIGITS // 2).hexdigest()
+
+
+def sealed(data: bytes) -> bytes:
+    """A file's bytes with their digest behind them, which HDF5 does not look at."""
+    return data + SEAL + digest(data).encode()
+
+
+def unsealed(data: bytes, path: Folder, remedy: str = REMEDY) -> bytes:
+    """What `sealed` was given; files of former versions have no seal. Raises DamagedJob."""
+    at = data.rfind(SEAL, -len(SEAL) - DIGITS)
+    if at < 0:
+        return data
+    if data[at:] != SEAL + digest(data[:at]).encode():
+        raise DamagedJob(path, "is damaged: its bytes are not those that were written", remedy)
+    return data[:at]
 
 
 def image(
@@ -193,6 +210,8 @@ def variables(file: h5py.File) -> dict[str, tuple[tuple[str, ...], np.ndarray, d
     """All variables of a file, as `image` takes them."""
     found, dims = {}, _dimensions(file)
     for name, stored in file.items():
+        if "NAME" in stored.attrs and str(_attribute(stored, "NAME")).startswith(BARE):
+            continue
         is_text = h5py.check_string_dtype(stored.dtype) and stored.dtype.kind == "O"
         values = np.asarray(stored.asstr()[()] if is_text else stored[()])
         if is_text:

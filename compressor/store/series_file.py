@@ -20,7 +20,7 @@ from compressor.metrics import NUMBERS
 from compressor.outcome import SeriesFile, Table
 from compressor.store import hdf5
 from compressor.store.files import HEX20, KEY, StoreError, publish, system_error
-from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened
+from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened, sealed, unsealed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,16 +62,16 @@ def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:
 
 
 def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
-    """Store a Dataset that is no job as netCDF-4, durably."""
-    publish(path, image_of(dataset))
+    """Store a Dataset that is no job as netCDF-4, with the digest of its bytes, durably."""
+    publish(path, sealed(image_of(dataset)))
     return path
 
 
 def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
-    """What `write_dataset` stored. Raises StoreError where a file is no such thing."""
+    """What `write_dataset` stored. Raises StoreError where a file is no such thing, or damaged."""
     import xarray as xr
 
-    with opened(path.read_bytes(), path, remedy) as file:
+    with opened(unsealed(path.read_bytes(), path, remedy), path, remedy) as file:
         return xr.Dataset(hdf5.variables(file), attrs=hdf5.attributes(file))
 
 

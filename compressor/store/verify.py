@@ -11,9 +11,12 @@ from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import read_store
 from compressor.store.rows import Rows
 from compressor.store.segment import Cut
+from compressor.store.series_file import read_dataset
 from compressor.store.studies import Again, StoredStudy, owners, read_study, study_paths
 
 FORMER_REMEDY = "delete it: its jobs stay stored"
+FOLLOWED = ("regimes/*/*.nc", "wear/*.nc")  # machines over values and over hours
+FOLLOWED_REMEDY = "delete it: the command that made it makes it again"
 
 
 @dataclass(frozen=True)
@@ -42,15 +45,21 @@ class Damage:
 def verify(
     folder: Folder, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Damage]:
-    """All damage to a store: to segments, files of time series and studies.
+    """All damage to a store: to segments, files of time series, studies, chains and wear.
 
     `progress` is told how many files of time series were read, of how many. Raises StoreError for
     a folder that cannot be read.
     """
     stored = read_store(folder, DamagedJob)
-    if not (stored.segments or stored.damaged or study_paths(folder)):
+    followed = [path for pattern in FOLLOWED for path in sorted(Path(folder).glob(pattern))]
+    if not (stored.segments or stored.damaged or study_paths(folder) or followed):
         raise no_results(folder)
     found: list[Damage] = []
+    for path in followed:
+        try:
+            read_dataset(path, FOLLOWED_REMEDY)
+        except StoreError as error:
+            found.append(Damage(path, error.problem, (), error.remedy))
     studies: list[StoredStudy] = []
     for where, remedy in (("studies", "run its case file again"), ("former", FORMER_REMEDY)):
         for path in study_paths(folder, where):
