@@ -67,6 +67,15 @@ def anchors(page):
 
 
 @pytest.mark.parametrize("page", PAGES)
+def test_rows_of_a_table_have_as_many_cells_as_its_head(page):
+    text, cells = re.sub(r"```.*?```", "", PAGES[page], flags=re.DOTALL), 0
+    for line in text.splitlines():
+        found = len(re.findall(r"(?<!\\)\|", line)) if line.startswith("|") else 0
+        assert found == cells or not found or not cells, line
+        cells = found
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)\s]+)\)", PAGES[page]):
         path, _, anchor = target.partition("#")

@@ -133,7 +133,7 @@ def wear():
         case, p = uneven(joint)
         tally = integrate(request(case, case.rtol, p, times_of(case, False))).tally
         asked, found = tally["friction_loss"] / COEFFICIENT, tally["worn"].sum()
-        what = f"∫ F |v| dt, {joint}, over sectors"
+        what = f"∫ F ds, {joint}, over sectors"
         yield row("Wear", what, "J", asked, found, 1e-6 * asked, source)
 
 
