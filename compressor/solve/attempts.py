@@ -24,6 +24,7 @@ from compressor.solve.series import (
     take_samples,
 )
 from compressor.solve.si_record import is_ideal, record
+from compressor.solve.sizes import length_and_speed
 from compressor.solve.tallied import metrics
 from compressor.solve.turns import Cuts, Turns, merged
 
@@ -31,6 +32,7 @@ PIECES = 32  # of the ideal scene's quadrature
 FINER = 0.3  # power of the tolerance by which they become more
 TIGHTER = 2.5  # times: the run that errors are estimated by
 LOOSE = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
+BLUNT = 0.02  # the same, of the journals' speed, over the speed at which friction turns about
 STIFF_TIGHTER = 10.0  # the same at loose tolerances
 
 
@@ -155,9 +157,21 @@ def concluded(rtol: float, p: np.record, times: Times, trajectory: Trajectory) -
     return made
 
 
-def companion_rtol(rtol: float) -> float | None:
+def companion_rtol(p: np.record, rtol: float) -> float | None:
     """The tolerance of a run's `companion`, if that is by the run's own method and tighter."""
-    return rtol / TIGHTER if 0.99 * TIGHTER * TIGHTEST <= rtol <= LOOSE else None
+    fits = rtol >= 0.99 * TIGHTER * TIGHTEST and not overruns_friction(p, rtol)
+    return rtol / TIGHTER if fits else None
+
+
+def overruns_friction(p: np.record, rtol: float) -> bool:
+    """Whether explicit steps may run over friction's fast modes, or over the turn of its sign.
+
+    Then two explicit runs may agree on a force that friction never has.
+    """
+    if rtol > LOOSE:
+        return True
+    rubs = bool(p["friction"]) and bool(p["clearance"].any())
+    return rubs and rtol * length_and_speed(p)[1] > BLUNT * p["stiction_velocity"]
 
 
 def companion(
@@ -165,13 +179,13 @@ def companion(
 ) -> Solution:
     """The run that a run's errors are estimated by, where no looser one is there: a tighter one.
 
-    At the tightest tolerance, a looser one. Where the tolerance is so loose that explicit steps
-    may run over friction's fast modes, the stiff method is asked.
+    At the tightest tolerance, a looser one. Where explicit steps may run over friction, the stiff
+    method is asked.
     """
-    tighter = companion_rtol(solution.rtol)
+    tighter = companion_rtol(solution.p, solution.rtol)
     if tighter is not None:
         return ahead.get(tighter) or attempt(case, tighter, timeout, False)
-    if solution.rtol > LOOSE:
+    if overruns_friction(solution.p, solution.rtol):
         stiff = replace(case, solve=replace(case.solve, method="RODAS"))
         return attempt(stiff, solution.rtol / STIFF_TIGHTER, timeout, False)
     return attempt(case, 10.0 * solution.rtol, timeout, False)

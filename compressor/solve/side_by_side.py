@@ -79,7 +79,7 @@ def attempts_of(number: int, case: Case) -> list[Asked]:
     case = spanned(case, float(case.solve.settle_rev), 1)
     p, sampled = record(case), case.output.keep == "series"
     found = [asked(number, case, case.rtol, p, times_of(case, sampled))]
-    if case.wants_bars and (tighter := companion_rtol(case.rtol)):
+    if case.wants_bars and (tighter := companion_rtol(p, case.rtol)):
         if sampled:
             found.append(asked(number, case, tighter, p, times_of(case, False)))
         else:  # all but the tolerance is the same

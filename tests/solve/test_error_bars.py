@@ -5,7 +5,7 @@ import pytest
 from conftest import keep
 from random_cases import random_cases
 
-from compressor.cases.accuracy import ACCURACY, LOOSEST, first_rung
+from compressor.cases.accuracy import ACCURACY, first_rung
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.metrics import ERRORS, METRICS, SERIES, SERIES_ERRORS, Bar, Metric
@@ -21,6 +21,7 @@ from compressor.solve.error_bars import (
     ratio_of,
     series_errors,
 )
+from compressor.solve.si_record import record
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import solve
 from compressor.store.reader import job_status, open_study
@@ -185,21 +186,33 @@ LOOSE = {
 }  # fmt: skip
 
 
-def test_beyond_loose_tolerances_the_stiff_partner_estimates_the_error():
-    """Explicit steps run over friction's fast modes, at ten times this tolerance as well."""
+@pytest.mark.parametrize(("rtol", "other"), [(2.5e-4, 2.5e-3), (1.5e-4, 6e-5)])
+def test_where_explicit_steps_overrun_friction_the_stiff_partner_estimates_the_error(rtol, other):
+    """At another tolerance as well: two explicit runs agree on what neither has."""
     given = {"duration_rev": 0.03125, "settle_rev": 0, "output_step_deg": 0.0625}
     case, sure = (
         Case.from_values({**LOOSE, "solve": {**given, **how}})
-        for how in ({"rtol": 2.5e-4}, {"rtol": 1e-7, "method": "RODAS"})
+        for how in ({"rtol": rtol}, {"rtol": 1e-7, "method": "RODAS"})
     )
-    assert case.rtol > LOOSEST
     found, truth = solve(case), solve(sure)
-    again = attempts.attempt(case, case.rtol, 60.0, False)
-    attempts.estimate_errors(again, attempts.attempt(case, 10 * case.rtol, 60.0, False))
+    assert attempts.overruns_friction(found.p, rtol)
+    again = attempts.attempt(case, rtol, 60.0, False)
+    attempts.estimate_errors(again, attempts.attempt(case, other, 60.0, False))
     name = "rms_acceleration_deviation"
     error = abs(found.metrics[name] - truth.metrics[name])
     assert error > 10 * again.bars[name]
     assert error <= found.bars[name]
+
+
+def test_friction_is_overrun_by_a_tolerance_of_speeds_or_a_loose_one():
+    usual, slow = (
+        record(Case.from_values({**BOTH, "friction": {"stiction_velocity_mm_per_s": speed}}))
+        for speed in (10, 0.1)
+    )
+    free = record(Case.from_values({**BOTH, "friction": False}))
+    assert [attempts.overruns_friction(p, 1e-5) for p in (usual, slow, free)] == [0, 1, 0]
+    assert [attempts.overruns_friction(p, 1e-7) for p in (usual, slow, free)] == [0, 0, 0]
+    assert [attempts.overruns_friction(p, 3e-4) for p in (usual, slow, free)] == [1, 1, 1]
 
 
 def test_a_metric_added_to_the_table_has_error_bars(monkeypatch):
