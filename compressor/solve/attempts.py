@@ -10,7 +10,14 @@ import numpy as np
 from compressor.cases import TIGHTEST, Case
 from compressor.physics import COLUMNS, state_names
 from compressor.solve.energy_audit import energy_residual
-from compressor.solve.error_bars import Companion, Metrics, bars, series_errors
+from compressor.solve.error_bars import (
+    Companion,
+    Metrics,
+    bars,
+    enlarged,
+    longest,
+    series_errors,
+)
 from compressor.solve.ideal_scene import closed_form
 from compressor.solve.initial import initial_state
 from compressor.solve.integrate import integrate
@@ -34,6 +41,7 @@ TIGHTER = 2.5  # times: the run that errors are estimated by
 LOOSE = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
 BLUNT = 0.02  # the same, of the journals' speed, over the speed at which friction turns about
 STIFF_TIGHTER = 10.0  # the same at loose tolerances
+LOOSER = 3.0  # times: the run that is asked as well where a motion enlarges errors
 
 
 @dataclass
@@ -191,14 +199,31 @@ def companion(
     return attempt(case, 10.0 * solution.rtol, timeout, False)
 
 
-def estimate_errors(solution: Solution, other: Solution | None) -> None:
-    """Give a run its error bars and the errors of its time series; inf without another run."""
-    by = None
-    if other is not None and not other.reason:
-        apart = distances(solution.samples, other.samples)
-        by = Companion(other.metrics, other.rtol / solution.rtol, apart)
+def witness(case: Case, solution: Solution, other: Solution, timeout: float) -> Solution | None:
+    """A looser run, by which errors are estimated as well where the motion enlarges them.
+
+    other: its `companion`. None where there is no need, or the run does not reach its end.
+    """
+    if other.reason or not enlarged(solution.rtol, distances(solution.samples, other.samples)):
+        return None
+    found = attempt(case, LOOSER * solution.rtol, timeout, False)
+    return None if found.reason else found
+
+
+def estimate_errors(solution: Solution, *others: Solution) -> None:
+    """Give a run its error bars and the errors of its time series by other runs of its case.
+
+    The longest by any of them; inf without one that reached its end.
+    """
     residual = energy_residual(solution.trajectory.tally)
-    solution.bars = bars(solution.metrics, by, residual)
-    solution.series_errors = series_errors(by)
-    loads = solution.loads[:0] if other is None else other.loads
-    solution.reversal_bars = reversal_bars(solution.loads, by, loads)
+    known = [(by_run(solution, one), one.loads) for one in others if not one.reason]
+    by: list[tuple[Companion | None, np.ndarray]] = [*known] or [(None, solution.loads[:0])]
+    solution.bars = longest([bars(solution.metrics, one, residual) for one, _ in by])
+    solution.series_errors = longest([series_errors(one) for one, _ in by])
+    solution.reversal_bars = longest([reversal_bars(solution.loads, *one) for one in by])
+
+
+def by_run(solution: Solution, other: Solution) -> Companion:
+    """What another run that reached its end tells of a run."""
+    apart = distances(solution.samples, other.samples)
+    return Companion(other.metrics, other.rtol / solution.rtol, apart)

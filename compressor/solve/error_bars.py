@@ -3,7 +3,9 @@
 The difference from a tighter run is mostly the run's own error, and a little more than it bounds
 that; of the difference from a looser run, which is mostly the looser one's error, a share does
 (`closeness`). A metric's own difference may be small by chance: the distance of the time series
-that it is taken from stands beside it. The energy residual is a floor.
+that it is taken from stands beside it. The energy residual is a floor. Where a motion enlarges the
+errors of its steps (`enlarged`), two runs may agree by chance in all numbers; there a third one is
+asked, and the longest bars count.
 
 Shares stand in `compressor.metrics`; those and the ones below were chosen on random cases that
 judge nothing (tests/results/README.md, "Calibration").
@@ -21,6 +23,8 @@ Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes
 WHOLE = 3.0  # of the distance of a time series to a tighter run's
 LOOSER, TEN, FALL = 0.37, 10.0, 0.65  # share of a run TEN times looser, and how it falls beyond
 FLOOR = 0.1  # of the energy residual, relative to the metric
+ORDER = 0.8  # power of the tolerance with which errors fall
+ENLARGED = 30.0  # times rtol ** ORDER: a distance of accelerations ten times as great as most are
 
 
 class Companion(NamedTuple):
@@ -43,6 +47,16 @@ class Companion(NamedTuple):
 def closeness(ratio: float) -> float:
     """The share of the error of a run some ratio looser by which a run's own one is bounded."""
     return 1.0 if ratio < 1.0 else LOOSER * (ratio / TEN) ** -FALL
+
+
+def enlarged(rtol: float, apart: Mapping[str, Any]) -> bool:
+    """Whether a motion enlarges errors, by how far a run is apart from one at a like tolerance."""
+    return bool(apart["acceleration"] > ENLARGED * rtol**ORDER)
+
+
+def longest(found: Sequence[Metrics]) -> Metrics:
+    """Of several bars or errors of each name the greatest."""
+    return {name: np.maximum.reduce([one[name] for one in found]) for name in found[0]}
 
 
 def ratio_of(share: float) -> float:

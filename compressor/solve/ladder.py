@@ -2,9 +2,16 @@
 
 from compressor.cases import TIGHTEST, Case
 from compressor.reasons import Reason
-from compressor.solve.attempts import Ahead, Solution, attempt, companion, estimate_errors
+from compressor.solve.attempts import (
+    Ahead,
+    Solution,
+    attempt,
+    companion,
+    estimate_errors,
+    witness,
+)
 from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
-from compressor.solve.error_bars import beyond, closeness, ratio_of, unmet
+from compressor.solve.error_bars import ORDER, beyond, closeness, ratio_of, unmet
 from compressor.solve.regime import DOUBTFUL, Search
 
 OUT_OF_BUDGET = (
@@ -12,7 +19,6 @@ OUT_OF_BUDGET = (
     Reason.BUDGET_SECONDS,
     Reason.STEP_UNDERFLOW,
 )  # a tighter run may end so
-ORDER = 0.8  # power of the tolerance with which errors fall
 AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 LEAST, MOST = 10.0, 1000.0  # times tighter that the next run may be
 
@@ -20,7 +26,8 @@ LEAST, MOST = 10.0, 1000.0  # times tighter that the next run may be
 def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
     """The first run that balances and keeps its promise, or the last whole one as a failed job.
 
-    A first run is compared with one a little tighter. Each further one is as much tighter as its
+    A first run is compared with one a little tighter, and with a looser one, too, where the motion
+    enlarges errors. Each further one is as much tighter as its
     errors are expected to need, and is compared with the one before. Where errors are as large as
     the numbers, it is asked first whether the motion is chaotic; that ends the climb.
     """
@@ -48,7 +55,9 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
         else:
             other = before
         estimate_errors(now, other)
-        excess = over_promise(case, now)
+        excess, ratio = over_promise(case, now), other.rtol / rtol
+        if before is None and excess <= 1.0:
+            excess, ratio = attested(case, now, other, excess, search)
         if excess <= 1.0:
             now.promise = "kept" if promises(case) else "none"
             return now
@@ -58,7 +67,21 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
             return short_of(case, now, other.detail or "no run is tighter")
         tighter = other.rtol < rtol and balanced(case, other)
         before = other if tighter else now
-        rtol = max(short(before.rtol / further(excess, other.rtol / rtol)), TIGHTEST)
+        rtol = max(short(before.rtol / further(excess, ratio)), TIGHTEST)
+
+
+def attested(
+    case: Case, now: Solution, other: Solution, excess: float, search: Search
+) -> tuple[float, float]:
+    """The excess of a run that seems to keep its promise, and the ratio of the tolerances that tell
+    it, after a `witness` has been asked where there is need.
+    """
+    looser = witness(case, now, other, search.left)
+    if looser is not None:
+        estimate_errors(now, other, looser)
+        if (more := over_promise(case, now)) > excess:
+            return more, looser.rtol / now.rtol
+    return excess, other.rtol / now.rtol
 
 
 def promises(case: Case) -> bool:

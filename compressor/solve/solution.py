@@ -91,7 +91,7 @@ def chaotic(case: Case, solution: Solution, search: Search) -> Solution:
     if not balanced(case, now):
         return unbalanced(case, now, f"at rtol {now.rtol:.2g}")
     if case.wants_bars:
-        estimate_errors(now, None)
+        estimate_errors(now)
         if now.turns:
             now.statistics = statistics(now.p, now.turns)
             now.bars = chaotic_bars(now.statistics, now.metrics)

@@ -1,5 +1,7 @@
 """What accuracy promises is kept run by run, or the job says that it is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_cases import random_cases
@@ -7,10 +9,13 @@ from random_cases import random_cases
 from compressor.cases.accuracy import ACCURACY, TIGHTEST, first_rung
 from compressor.cases.case import Case
 from compressor.metrics import ERRORS, METRICS, SERIES_ERRORS
-from compressor.solve import attempts
-from compressor.solve.error_bars import closeness, unmet
-from compressor.solve.ladder import AIM, LEAST, MOST, ORDER, further
+from compressor.physics import Column
+from compressor.solve import attempts, ladder
+from compressor.solve.error_bars import ENLARGED, ORDER, closeness, enlarged, unmet
+from compressor.solve.ladder import AIM, LEAST, MOST, further
+from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
+from compressor.solve.solution import solve
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -85,13 +90,70 @@ def test_a_promise_that_cannot_be_kept_is_told_with_the_numbers():
     assert found.numbers["peak_acceleration"] > 0
 
 
-@pytest.mark.parametrize("solve", [{"rtol": 1e-5}, {"error_bars": False}])
-def test_nothing_is_promised_of_a_tolerance_or_without_bars(solve, asked):
+@pytest.mark.parametrize(("solve", "runs"), [({"rtol": 1e-5}, 3), ({"error_bars": False}, 1)])
+def test_nothing_is_promised_of_a_tolerance_or_without_bars(solve, runs, asked):
     found = measure(of(ILL, **solve))
     assert (found.status, found.attributes["promise"]) == ("ok", "none")
-    assert len(asked) == (1 if "error_bars" in solve else 2)
+    assert len(asked) == runs
     estimated = np.isfinite(found.numbers["acceleration_error"])
     assert estimated == ("rtol" in solve)
+
+
+def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
+    """Of both the longest bars count."""
+    rtol, case = 1e-5, of(ILL, rtol=1e-5)
+    found = solve(case)
+    expected = [rtol, rtol / attempts.TIGHTER, rtol * attempts.LOOSER]
+    assert asked == pytest.approx(expected)
+    again, *others = (attempts.attempt(case, one, 60.0, False) for one in expected)
+    assert enlarged(rtol, distances(again.samples, others[0].samples))
+    by_each = []
+    for other in others:
+        attempts.estimate_errors(again, other)
+        by_each.append(again.bars | again.series_errors)
+    for name, bar in (found.bars | found.series_errors).items():
+        np.testing.assert_array_equal(bar, np.maximum(*(one[name] for one in by_each)))
+
+
+def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
+    """Made to agree in all numbers, and nearly in their course; the looser run tells."""
+
+    def lucky(case, solution, timeout, ahead):
+        other = replace(solution, rtol=solution.rtol / attempts.TIGHTER)
+        much = 2.0 * ENLARGED * solution.rtol**ORDER
+        other.samples = solution.samples.copy()
+        other.samples[:, Column.ACCELERATION] *= 1.0 + much
+        return other
+
+    alone = of(ILL, accuracy="draft", max_steps=20_000)
+    monkeypatch.setattr(ladder, "companion", lucky)
+    found = solve(alone)
+    first = ACCURACY["draft"].rtol
+    assert asked[:2] == pytest.approx([first, first * attempts.LOOSER])
+    assert len(asked) > 2
+    assert min(asked) < 0.11 * first
+    assert found.promise == "kept"
+    monkeypatch.setattr(ladder, "witness", lambda *_: None)
+    assert solve(alone).rtol == first  # which is not enough
+
+
+def test_a_witness_that_fails_is_not_heard(monkeypatch):
+    case = of(ILL, rtol=1e-5)
+    two = attempts.attempt(case, 1e-5, 60.0, False), attempts.attempt(case, 4e-6, 60.0, False)
+    assert attempts.witness(case, *two, 60.0) is not None
+    original = attempts.attempt
+    monkeypatch.setattr(
+        attempts, "attempt", lambda *asked: replace(original(*asked), reason="step_underflow")
+    )
+    assert attempts.witness(case, *two, 60.0) is None
+    assert attempts.witness(case, two[0], replace(two[1], reason="non_finite"), 60.0) is None
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-10])
+def test_errors_are_enlarged_ten_times_as_far_apart_as_most(rtol):
+    least = ENLARGED * rtol**ORDER
+    assert not enlarged(rtol, {"acceleration": 0.99 * least})
+    assert enlarged(rtol, {"acceleration": 1.01 * least})
 
 
 def test_a_budget_that_ends_a_tighter_run_is_told():
