@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-from compressor.cases.groups import COMPILED
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.parameter import Problem, listed
 from compressor.cases.table import Settings
@@ -21,17 +20,9 @@ def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     law, restitution = case.contact.law, case.contact.restitution
     if law in CYLINDRICAL:
         yield from cylinder_conflicts(case)
-    if law not in RESTITUTING and (law not in CYLINDRICAL or restitution is None):
-        return
-    if restitution is None:
+    if law in RESTITUTING and restitution is None:
         needed = f"is needed with contact.law: {law}; give it, such as 0.9"
         yield Problem("contact.restitution", needed)
-    if case.solve.method not in COMPILED:
-        message = (
-            f"{case.solve.method} does not stop where journal and bore meet, as contact.law: {law} "
-            f"needs: choose one of {', '.join(COMPILED)}"
-        )
-        yield Problem("solve.method", message)
 
 
 def contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:

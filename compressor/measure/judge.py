@@ -151,7 +151,7 @@ def agreed_verdict(
     agreed: list[tuple[Excess, Solution]] = []
     dissent: list[tuple[Excess, Solution]] = []
     statistics = measured is compare_statistics
-    for method in judges(found, statistics, claim.contact.restitution is not None):
+    for method in judges(found, statistics):
         rtol = tolerance(found.rtol, TENTH if statistics else TIGHTER)
         other = asked(claim, method, rtol, result)
         if other is None:
@@ -167,20 +167,11 @@ def agreed_verdict(
     return ("unjudged", *dissent[0]) if dissent else ("unjudged", NOTHING, None)
 
 
-def judges(found: Solution, statistics: bool = False, meets: bool = False) -> tuple[str, ...]:
+def judges(found: Solution, statistics: bool = False) -> tuple[str, ...]:
     """Methods to judge a run by, those that are least like its own first.
 
-    Compiled ones share our step loop, SciPy's only the equations; these do not stop where bodies
-    meet, as some laws need it (`meets`), of which the stiff partner takes their place.
+    Compiled ones share our step loop, SciPy's only the equations.
     """
-    names = unlike(found, statistics)
-    if meets:
-        names = tuple(name if name in COMPILED else "RODAS" for name in names)
-    return tuple(dict.fromkeys(names))
-
-
-def unlike(found: Solution, statistics: bool) -> tuple[str, ...]:
-    """Methods that are not a run's own, the least alike first."""
     steps = found.trajectory.steps + found.trajectory.rejected
     stiff = found.trajectory.evaluations > STIFF * steps
     if stiff:

@@ -20,6 +20,7 @@ from compressor.physics.observe import (
     COLUMNS,
     Column,
 )
+from compressor.physics.onset import meeting
 from compressor.physics.record import (
     MOST_SECTORS,
     Coordinate,

@@ -36,6 +36,7 @@ from compressor.solve.request import (
     overdue,
     too_deep,
 )
+from compressor.solve.scipy_landing import Landings, needs_landings
 from compressor.solve.sizes import absolute_tolerances, length_and_speed
 from compressor.solve.turns import with_cuts
 
@@ -120,29 +121,45 @@ class Segment:
         self.begin, self.end = begin, end
         self.wanted = wanted  # indices of this segment's samples
         self.times = np.clip(request.times[wanted], begin, end)
+        p = request.p
+        self.landings = Landings(p, right_hand_side.phase) if needs_landings(p) else None
 
     def run(self, z: np.ndarray) -> np.ndarray:
         """Step to the segment's end and return state and flows there; raises Stop."""
+        result, t, bound = self.result, self.begin, self.end
+        result.stop_time, result.stop_state = t, z[:-FLOWS]
+        while t < self.end:
+            t, z, bound = self.go(t, z, bound)
+        if self.end == self.request.times[-1]:
+            result.stop_time = math.nan
+        return z
+
+    def go(self, t: float, z: np.ndarray, bound: float) -> tuple[float, np.ndarray, float]:
+        """Step from (t, z) to a bound by a fresh solver, or until bodies meet within a step.
+
+        Returns where it stands, and the next bound: that step is then to be taken again.
+        """
         request, result = self.request, self.result
-        result.stop_time, result.stop_state = self.begin, z[:-FLOWS]
         rtol = max(request.rtol * LOCAL.get(request.method, 1.0), LEAST_RTOL)
+        atol = absolute_tolerances(request.p, rtol)
         solver = scipy_method(request.method)(
-            self.right_hand_side,
-            self.begin,
-            z,
-            self.end,
-            rtol=rtol,
-            atol=absolute_tolerances(request.p, rtol),
+            self.right_hand_side, t, z, bound, rtol=rtol, atol=atol
         )
         while solver.status == "running":
-            if result.steps >= request.max_steps:
+            if result.steps + result.rejected >= request.max_steps:
                 raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
+            before = solver.y.copy()
             message = solver.step()
             if solver.status == "failed":
                 raise Stop(Reason.STEP_UNDERFLOW, str(message))
             if not np.isfinite(solver.y).all():
                 result.history.dominant = int(np.flatnonzero(~np.isfinite(solver.y))[0])
                 raise Stop(Reason.NON_FINITE, "the state is no longer finite")
+            if self.landings:
+                onset = self.landings.within(solver.t_old, solver.t, solver.dense_output())
+                if onset is not None:
+                    result.rejected += 1
+                    return solver.t_old, before, onset
             result.steps += 1
             self.take(solver)
             self.audit(solver)
@@ -151,9 +168,10 @@ class Segment:
             result.history.add(solver.t_old, taken, math.nan, f"{request.method} taken")
             check_speed(request.p, solver.y)
             self.check()
-        if self.end == request.times[-1]:
-            result.stop_time = math.nan
-        return solver.y.copy()
+        z = solver.y.copy()
+        if self.landings and bound < self.end:
+            self.landings.land(solver.t_old, solver.t, solver.dense_output(), z)
+        return solver.t, z, self.end
 
     def take(self, solver) -> None:
         """Tally the accepted step and sample the output grid within it."""

@@ -9,17 +9,19 @@ import math
 
 import numpy as np
 import pytest
-from published import DRY, MACHINE, STIFFNESS
+from published import DRY, MACHINE, STIFFNESS, drop, given_back
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.measure.explain import terms, unknowns
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
+from compressor.physics.record import CARRIED
 from compressor.solve.cautions import remarks
 from compressor.solve.horizon import CLOSE, FAR, followed, predictability_horizon
 from compressor.solve.integrate import integrate
 from compressor.solve.request import Request
+from compressor.solve.scipy_landing import needs_landings
 from compressor.solve.si_record import offsets, record
 from compressor.solve.simulate import simulate
 from compressor.solve.sizes import natural_sizes
@@ -120,6 +122,47 @@ def test_explicit_and_stiff_steps_agree(law, joint):
         assert run["energy_residual"] < 1e-6
     a, b = one["acceleration"].values, other["acceleration"].values
     assert np.linalg.norm(a - b) < 1e-4 * np.linalg.norm(a)
+
+
+@pytest.mark.parametrize(
+    ("law", "joint"), [("flores", "small_end"), ("lankarani_nikravesh", "both")]
+)
+@pytest.mark.parametrize("method", ["DOP853", "LSODA", "Radau"])
+def test_scipy_s_methods_meet_with_the_same_speeds(law, joint, method):
+    """They share the equations with the march, and neither its steps nor its search for onsets."""
+    values = {"joint": joint, "clearance_mm": 0.2, "contact": {"law": law, "restitution": 0.6}}
+    solve = {"duration_rev": 0.15, "settle_rev": 0, "error_bars": False, "rtol": 1e-9}
+    ours, theirs = (
+        simulate(Case.from_values({**values, "solve": {**solve, "method": one}}))
+        for one in ("TSIT5", method)
+    )
+    assert theirs["status"].item() == "ok"
+    assert theirs["energy_residual"] < 1e-7
+    assert 0 < theirs["rejected"] < 20  # steps that were taken again
+    assert (theirs["impact_count"] == ours["impact_count"]).all()
+    assert ours["impact_count"].sum() > 1
+    a, b = ours["acceleration"].values, theirs["acceleration"].values
+    assert np.linalg.norm(a - b) < 1e-6 * np.linalg.norm(a)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA"])
+@pytest.mark.parametrize(("law", "restitution", "given"), [("flores", 0.5, 0.4704),
+                                                          ("hu_guo", 0.3, 0.2707)])  # fmt: skip
+def test_a_drop_by_scipy_gives_back_what_the_closed_form_does(method, law, restitution, given):
+    run, rows = drop("small_end", 0.3, method, law=law, restitution=restitution)
+    assert given_back(rows) == pytest.approx(given, abs=1e-3)
+    approach = run.trajectory.states[-1, 4 + CARRIED.index("approach speed at the small end, m/s")]
+    assert approach == pytest.approx(0.3, rel=1e-5)
+
+
+def test_landings_are_for_laws_that_read_a_speed_alone():
+    def of(**contact):
+        case = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
+        return record(Case.from_values(case))
+
+    assert needs_landings(of(law="flores", restitution=0.6))
+    assert not needs_landings(of(law="hertz"))
+    assert not needs_landings(of())
 
 
 @pytest.mark.parametrize("law", ["johnson", "liu"])
