@@ -69,13 +69,10 @@ def lines(told: "Explanation") -> Iterator[str]:
     point = ", ".join(f"{key} = {value}" for key, value in told.point.items())
     yield f"{told.study}: {plural(told.jobs)}" + (f"; explained: {point}" if point else "")
     count = len(told.unknowns)
-    names = ", ".join(name.split()[0] for name in told.unknowns)
-    solved = (
-        f"{count} degrees of freedom, the deviations of {names}"
-        if count
-        else "closed form, nothing integrated"
-    )
+    solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
     yield heading("scene", f"{told.scene}: {solved}")
+    if count:
+        yield heading("", "; ".join(name.rpartition(",")[0] for name in told.unknowns))
     for number, (term, words) in enumerate(told.active.items()):
         yield heading("" if number else "active", f"{term}: {words}")
     if told.absent:

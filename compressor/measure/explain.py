@@ -62,7 +62,7 @@ class Explanation:
     active: dict[str, str]  # term -> in words
     absent: tuple[str, ...]  # terms left out, at no cost
     scales: tuple[JointScales, ...]
-    expected_steps: float  # by the scales alone, before the run
+    expected_steps: float  # by the scales alone, before the run; 0 where they tell too little
     expected_seconds: float
     accuracy: str  # the word, or "" where rtol is given
     rtol: float
@@ -89,7 +89,7 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
     ended = complete(run)
     active, absent = terms(case)
     joints = tuple(ideal_scales(case))
-    steps, expected = expected_cost(case, joints)
+    steps, expected = (0.0, 0.0) if case.has_features else expected_cost(case, joints)
     return Explanation(
         study=study.name,
         path=study.path,
@@ -125,7 +125,7 @@ def unknowns(case: Case) -> tuple[str, ...]:
     found = names[:n] + tuple(
         name for name, joint in zip(bristles, JOINTS, strict=False) if joint in faulty(case)
     )
-    return found + tuple(name for name in names[2 * n + 4 :] if name.startswith("crank"))
+    return found + tuple(name for name in names[2 * n + 4 :] if name.startswith("crank's lag"))
 
 
 def timed(case: Case, repeats: int) -> tuple[xr.Dataset, float]:
@@ -200,10 +200,22 @@ def spoken(case: Case, feature: Feature) -> str:
 
 
 def ideal_scales(case: Case) -> Iterator[JointScales]:
-    """The natural scales of each joint with clearance, under its greatest force when ideal."""
-    p, ideal = record(case), simulate(replace(case, joint="none"))
+    """The natural scales of each joint with clearance, under its greatest force when ideal.
+
+    The ideal machine has none of a case's features: its guide, drive and rod are ideal, too.
+    """
+    p, ideal = record(case), simulate(ideal_machine(case))
     for joint in faulty(case):
         yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
+
+
+def ideal_machine(case: Case) -> Case:
+    """The machine of a case without clearance and features."""
+    friction = case.friction and replace(case.friction, ideal_joints=False)
+    return replace(
+        case, joint="none", friction=friction, lubricant=None, guide=None, drive=None, rod=None,
+        wear=None,
+    )  # fmt: skip
 
 
 def advise(case: Case, repeats: int) -> Iterator[Advice]:

@@ -399,7 +399,8 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  scene       clearance at ")
     for word in ("active", "absent", "scales", "tolerance", "cost", "without"):
         assert re.search(rf"^  {word} ", out, re.MULTILINE), word
-    assert "2 degrees of freedom, the deviations of x, phi" in out
+    assert "2 degrees of freedom\n" in out
+    assert "x deviation; phi deviation\n" in out
     assert "for 2 jobs with 1 worker," in out
     assert "; less than 2 %: leave it out (machine.gravity_m_per_s2: 0)" in out
     assert re.search(r"friction: peak acceleration .* needed for peak acceleration", out)

@@ -8,7 +8,7 @@ import pytest
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.measure.explain import explain, ideal_scales, promise, terms
+from compressor.measure.explain import explain, ideal_scales, promise, terms, unknowns
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0}
 
@@ -99,6 +99,20 @@ def test_scales_follow_the_contact():
     # the contact's own rate goes as K^(1/2 + (p - 1)(-1/p) / 2) = K^(1/3) at a given force
     assert big.implicit_step / found.implicit_step == pytest.approx(100 ** (1 / 3), rel=1e-9)
     assert (big.damping_ratio > 1, found.damping_ratio) == (True, 0.0)
+
+
+def test_scales_are_those_of_the_machine_without_features():
+    values = {"joint": "both", "clearance_mm": 0.2}
+    more = {
+        "guide": {"clearance_mm": 0.1}, "drive": True, "rod": True, "lubricant": True,
+        "friction": {"ideal_joints": True},
+    }  # fmt: skip
+    plain, full = Case.from_values(values), Case.from_values(values | more)
+    assert [*ideal_scales(full)] == [*ideal_scales(plain)]
+    names = unknowns(full)
+    assert len(names) == 11
+    assert names[4:6] == ("height in the guide, m", "tilt in the guide, rad")
+    assert names[-1] == "crank's lag, s"
 
 
 def test_freedoms_and_terms():
