@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.screen import DONE, SOME_FAILED, caution, configs_argument, limit, plural, say, setting
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    caution,
+    configs_argument,
+    limit,
+    plural,
+    say,
+    setting,
+)
 
 if TYPE_CHECKING:
     from compressor.measure import Explanation
@@ -41,7 +51,11 @@ def explain(
     for study in studies:
         first = "the job" if study.jobs == 1 else f"the first of {plural(study.jobs)}"
         say(f"running {first} of {study.name}, with and without each of its features")
-        found.append(explained(study, jobs))
+        screen = Screen(False, "features", alike=False)
+        try:
+            found.append(explained(study, jobs, progress=screen))
+        finally:
+            screen.end()
         if not as_json:
             click.echo("\n".join(lines(found[-1])))
     if as_json:

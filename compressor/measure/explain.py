@@ -14,8 +14,8 @@ import xarray as xr
 
 from compressor.cases import ACCURACY, Case, Study, points
 from compressor.measure.feature_rows import FEATURES, Feature
-from compressor.measure.features import Effect, compare
-from compressor.measure.work_precision import SLOW, complete, faulty
+from compressor.measure.features import Effect, comparable, compare
+from compressor.measure.work_precision import SLOW, Progress, complete, faulty
 from compressor.metrics import JOINTS
 from compressor.physics import state_names
 from compressor.solve import (
@@ -78,10 +78,16 @@ class Explanation:
     advice: tuple[Advice, ...]
 
 
-def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
+def explain(
+    study: Study,
+    workers: int = 2,
+    repeats: int = 5,
+    progress: Progress = lambda done, total, remark: None,
+) -> Explanation:
     """Explain the first job of a study by running it, and it again without each of its features.
 
-    Times are medians of `repeats`; a job above `bench.SLOW` is timed once.
+    Times are medians of `repeats`; a job above `bench.SLOW` is timed once. progress: is told how
+    many features have been tried, of how many.
     """
     case = study.cases[0]
     run, seconds = timed(case, repeats)
@@ -113,7 +119,7 @@ def explain(study: Study, workers: int = 2, repeats: int = 5) -> Explanation:
         evaluations=int(run["evaluations"]),
         workers=workers,
         sweep_seconds=seconds * len(study.cases) / min(workers, len(study.cases)),
-        advice=tuple(advise(case, repeats)) if ended and run["steps"] > 0 else (),
+        advice=tuple(advise(case, repeats, progress)) if ended and run["steps"] > 0 else (),
     )
 
 
@@ -218,15 +224,16 @@ def ideal_machine(case: Case) -> Case:
     )  # fmt: skip
 
 
-def advise(case: Case, repeats: int) -> Iterator[Advice]:
+def advise(case: Case, repeats: int, progress: Progress) -> Iterator[Advice]:
     """What each feature that a case pays for changes, and whether it could be left out."""
-    allowed = promise(case)
-    for feature in FEATURES:
-        if feature.paid(case):
-            effect = compare(case, feature.remove(case), repeats)
-            needed = {
-                "peak acceleration": effect.change_peak_acceleration,
-                "contact force": effect.change_peak_contact_force,
-            }
-            kept = tuple(name for name, change in needed.items() if not abs(change) < allowed)
-            yield Advice(feature.key, feature.name, feature.neutral, effect, kept, not kept)
+    allowed, known = promise(case), simulate(comparable(case))
+    paid = [feature for feature in FEATURES if feature.paid(case)]
+    for done, feature in enumerate(paid):
+        progress(done, len(paid), "")
+        effect = compare(case, feature.remove(case), repeats, known)
+        needed = {
+            "peak acceleration": effect.change_peak_acceleration,
+            "contact force": effect.change_peak_contact_force,
+        }
+        kept = tuple(name for name, change in needed.items() if not abs(change) < allowed)
+        yield Advice(feature.key, feature.name, feature.neutral, effect, kept, not kept)
