@@ -693,8 +693,7 @@ def fresh_scenes(what, found, ends=False):
     seeds = " and ".join(str(one["seed"]) for one in found)
     plural = "s" if len(found) > 1 else ""
     commands = ", ".join(
-        f"`{row['command']}` ({row['worst_metric']} off by {row['error']:.1e}, "
-        f"bar {row['bar']:.1e})"
+        f"`{row['command']}` ({row['worst_metric']} {amiss(row)})"
         for one in found
         for row in one["silent_wrong"]
     )
@@ -704,6 +703,13 @@ def fresh_scenes(what, found, ends=False):
         + (f" {all_ends(found)}" if ends else "")
         + "\n"
     )
+
+
+def amiss(row):
+    """How far a number that is wrong in silence is off; beyond the horizon, of statistics."""
+    if row["error"] is None:
+        return f"beyond the horizon, {row['excess_beyond']:.2g} times as far off as is let pass"
+    return f"off by {row['error']:.1e}, bar {row['bar']:.1e}"
 
 
 def all_ends(found):
