@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -30,8 +31,8 @@ def blocks():
     return [re.sub(f"^{indent}", "", text, flags=re.MULTILINE) for indent, text in found]
 
 
-def indented(text, by=4):
-    return "".join(" " * by + line + "\n" if line else "\n" for line in text.splitlines())
+def indented(text):
+    return textwrap.indent(text.rstrip("\n") + "\n", "    ")
 
 
 def changed(copy, name, *edits):

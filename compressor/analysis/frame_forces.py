@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis.runs import case_of, record_of, settled
-from compressor.cases import Case
+from compressor.cases import Case, with_ideal_joints
 from compressor.metrics import JOINTS
 from compressor.solve import forces_on_frame, simulate
 
@@ -82,7 +82,7 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
 
 def healthy_twin(run: xr.Dataset) -> xr.Dataset:
     """The same machine with ideal joints, on the run's output grid, from closed forms."""
-    values = replace(case_of(run), joint="none", body=None, sensor=None).values()
+    values = replace(with_ideal_joints(case_of(run)), body=None, sensor=None).values()
     values["solve"]["error_bars"] = False
     values["output"] = {"keep": "series"}
     return simulate(Case.from_values(values))

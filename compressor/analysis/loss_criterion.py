@@ -24,14 +24,14 @@ a level of 1. That is an order of magnitude: along the rod, the mass is another 
 journal moved before does not count.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from compressor.analysis.contact_modes import FLIGHT, MODES, contact_modes, mode_map
 from compressor.analysis.runs import case_of
-from compressor.cases import Case
+from compressor.cases import Case, with_ideal_joints
 from compressor.metrics import JOINTS
 from compressor.solve import joint_scales, record, simulate
 
@@ -82,7 +82,7 @@ def loss_indices(case: Case) -> xr.Dataset:
 
 def ideal_revolution(case: Case) -> xr.Dataset:
     """A revolution of the case's machine with ideal joints, as a run with time series."""
-    values = replace(case, joint="none").values()
+    values = with_ideal_joints(case).values()
     values["solve"] = {"duration_rev": 1, "settle_rev": 0, "output_step_deg": STEP_DEG}
     values["output"] = {"keep": "series"}
     return simulate(Case.from_values(values))

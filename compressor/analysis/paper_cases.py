@@ -3,7 +3,7 @@
 import itertools
 from dataclasses import replace
 
-from compressor.cases import Case
+from compressor.cases import Case, with_ideal_joints
 from compressor.metrics import JOINTS
 
 CLEARANCES = (0.1, 0.2, 0.3)
@@ -32,7 +32,7 @@ def cases_of(machine: Case) -> dict[str, Case]:
     Its own load, joints and clearances are left aside. The typical load may not fit a machine of
     other lengths: such a case has `problems`, and no run of it is ok.
     """
-    ideal = replace(machine, joint="none")
+    ideal = with_ideal_joints(machine)
     cases = {load: replace(ideal, load=load) for load in ("typical", "design")}
     for fault, c in itertools.product(FAULTS, CLEARANCES):
         sizes = replace(machine.clearance_mm, big_end=c, small_end=c)

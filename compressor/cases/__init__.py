@@ -16,6 +16,7 @@ from compressor.cases.groups import (
     Solve,
     Spring,
 )
+from compressor.cases.ideal import with_ideal_joints
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.lubricant import Lubricant

@@ -12,7 +12,7 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.cases import ACCURACY, Case, Study, points
+from compressor.cases import ACCURACY, Case, Study, points, with_ideal_joints
 from compressor.measure.feature_rows import FEATURES, Feature
 from compressor.measure.features import Effect, comparable, compare
 from compressor.measure.work_precision import SLOW, Progress, complete, faulty
@@ -210,24 +210,19 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
 
     The ideal machine has none of a case's features: its guide, drive and rod are ideal, too.
     """
-    p, ideal = record(case), simulate(ideal_machine(case))
+    friction = case.friction and replace(case.friction, ideal_joints=False)
+    plain = replace(with_ideal_joints(case), friction=friction, guide=None, drive=None, rod=None)
+    p, ideal = record(case), simulate(plain)
     for joint in faulty(case):
         yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
 
 
-def ideal_machine(case: Case) -> Case:
-    """The machine of a case without clearance and features."""
-    friction = case.friction and replace(case.friction, ideal_joints=False)
-    return replace(
-        case, joint="none", friction=friction, lubricant=None, guide=None, drive=None, rod=None,
-        wear=None,
-    )  # fmt: skip
-
-
 def advise(case: Case, repeats: int, progress: Progress) -> Iterator[Advice]:
     """What each feature that a case pays for changes, and whether it could be left out."""
-    allowed, known = promise(case), simulate(comparable(case))
     paid = [feature for feature in FEATURES if feature.paid(case)]
+    if not paid:
+        return
+    allowed, known = promise(case), simulate(comparable(case))
     for done, feature in enumerate(paid):
         progress(done, len(paid), "")
         effect = compare(case, feature.remove(case), repeats, known)

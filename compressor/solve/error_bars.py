@@ -24,7 +24,7 @@ WHOLE = 3.0  # of the distance of a time series to a tighter run's
 LOOSER, TEN, FALL = 0.37, 10.0, 0.65  # share of a run TEN times looser, and how it falls beyond
 FLOOR = 0.1  # of the energy residual, relative to the metric
 ORDER = 0.8  # power of the tolerance with which errors fall
-ENLARGED = 30.0  # times rtol ** ORDER: a distance of accelerations ten times as great as most are
+ENLARGED = 50.0  # times rtol ** ORDER: a distance of accelerations beyond ten times the usual one
 
 
 class Companion(NamedTuple):

@@ -155,13 +155,14 @@ class Segment:
             if not np.isfinite(solver.y).all():
                 result.history.dominant = int(np.flatnonzero(~np.isfinite(solver.y))[0])
                 raise Stop(Reason.NON_FINITE, "the state is no longer finite")
+            dense = solver.dense_output()
             if self.landings:
-                onset = self.landings.within(solver.t_old, solver.t, solver.dense_output())
+                onset = self.landings.within(solver.t_old, solver.t, dense)
                 if onset is not None:
                     result.rejected += 1
                     return solver.t_old, before, onset
             result.steps += 1
-            self.take(solver)
+            self.take(solver, dense)
             self.audit(solver)
             result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
             taken = solver.t - solver.t_old
@@ -170,12 +171,11 @@ class Segment:
             self.check()
         z = solver.y.copy()
         if self.landings and bound < self.end:
-            self.landings.land(solver.t_old, solver.t, solver.dense_output(), z)
+            self.landings.land(solver.t_old, solver.t, dense, z)
         return solver.t, z, self.end
 
-    def take(self, solver) -> None:
+    def take(self, solver, dense) -> None:
         """Tally the accepted step and sample the output grid within it."""
-        dense = solver.dense_output()
         settle = self.request.settle
         if solver.t_old < settle < solver.t:
             self.tally(dense, solver.t_old, settle, False)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from compressor.analysis.frame_forces import (
     NoSeriesError,
@@ -49,3 +50,12 @@ def test_the_healthy_twin_has_ideal_joints_on_the_same_grid():
     assert np.array_equal(twin["time"].values, run["time"].values)
     assert not twin["eccentricity"].values.any()
     assert Case.from_attribute(twin.attrs["case"]).load == "typical"
+
+
+@pytest.mark.parametrize("more", [{"lubricant": True}, {"wear": True}])
+def test_the_healthy_twin_has_nothing_that_only_a_clearance_can_have(more):
+    worn = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **more, "solve": DRAFT})
+    plain = Case.from_values({"solve": DRAFT})
+    one, other = (healthy_twin(xr.Dataset(attrs=case.attributes())) for case in (worn, plain))
+    assert one["status"].item() == "ok"
+    np.testing.assert_array_equal(one["acceleration"].values, other["acceleration"].values)

@@ -33,7 +33,7 @@ from compressor.solve.horizon import predictability_horizon
 from compressor.solve.regime import CLOSE
 from compressor.solve.simulate import simulate
 
-SEEDS = (601, 602, 603)
+SEEDS = (701, 702, 703)
 RTOLS = [10.0**-k for k in range(3, 10)]
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
 TRUTH = 1e-12

@@ -41,5 +41,5 @@ def test_a_stranger_comes_out_again():
     few = [row for row in MEASURED["machines"] if row["values"]["joint"] != "both"]
     row = min(few, key=lambda row: row["values"]["clearance_mm"])  # which takes the fewest steps
     again = measure_wear.judged(row["values"])
-    assert again["hours"] == pytest.approx(row["hours"], rel=1e-3)  # other last bits: 3e-5
-    assert again["hours_error"] == pytest.approx(row["hours_error"], rel=0.05)
+    assert again["hours"] == pytest.approx(row["hours"], rel=1e-6)
+    assert again["hours_error"] == pytest.approx(row["hours_error"], abs=1e-5)

@@ -30,7 +30,7 @@ from compressor.solve.solution import solve
 from compressor.store.files import StoreError
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
-COUNT, SEED = 24, 1
+COUNT, SEED = 36, 1
 
 
 @pytest.fixture(scope="module")

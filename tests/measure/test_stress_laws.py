@@ -1,4 +1,4 @@
-"""Extreme scenes with laws drawn: which they are, and a few of a campaign."""
+"""Extreme scenes with laws drawn: which they are, who judges them, and a few of a campaign."""
 
 from collections import Counter
 
@@ -9,11 +9,13 @@ from compressor.cases.case import Case
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.measure.extreme_features import RANGES
 from compressor.measure.extremes import ELASTIC, FEATURES, OF_LAWS, Budget, values
+from compressor.measure.judge import judge, judges
 from compressor.measure.stress import campaign
+from compressor.solve.solution import solve
 from compressor.store.files import StoreError
 
 SMALL = Budget(FEATURES, revolutions=0.0625, max_steps=40_000, seconds=20.0)
-COUNT, SEED = 4, 1
+COUNT, SEED = 6, 1
 
 
 def test_scenes_have_every_law_and_else_the_numbers_of_old():
@@ -46,6 +48,19 @@ def test_scenes_have_every_law_and_else_the_numbers_of_old():
     assert {*seen} == {*CONTACT_LAWS, *FRICTION_LAWS, *RANGES, "ideal_joints"}
     assert min(seen.values()) > 20
     assert {law for law, count in elastic.items() if count} == {*ELASTIC}
+
+
+@pytest.mark.compiled
+def test_scipy_judges_laws_that_remember_a_meeting():
+    """It lands where bodies meet; a short run is judged by DOP853 first."""
+    how = {"duration_rev": 0.1, "settle_rev": 0, "rtol": 1e-6, "horizon": False}
+    law = {"law": "flores", "restitution": 0.6}
+    values = {"joint": "small_end", "clearance_mm": 0.2, "contact": law, "solve": how}
+    found = judge(Case.from_values(values))
+    assert (found.verdict, found.by[0]) == ("ok", "DOP853")
+    run = solve(Case.from_values(values))
+    run.trajectory.evaluations = 20 * run.trajectory.steps  # as of the stiff partner
+    assert judges(run) == ("DOPRI5", "LSODA", "Radau")
 
 
 @pytest.mark.compiled
