@@ -1,8 +1,11 @@
 """The program: its version, its errors, the libraries it runs with, where its machine code is."""
 
+import contextlib
 import hashlib
 import os
-from collections.abc import Iterable, Mapping
+import threading
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
@@ -42,6 +45,20 @@ class CompsimWarning(UserWarning):
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("error", compressor.CompsimWarning)
     """
+
+
+_FILTERS = threading.RLock()
+
+
+@contextlib.contextmanager
+def ignore_warnings(message: str = "") -> Iterator[None]:
+    """Ignore the warnings that begin with a message, all of them by default.
+
+    Filters belong to the process: threads take turns, or one would restore the other's.
+    """
+    with _FILTERS, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message)
+        yield
 
 
 def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | None = None) -> str:

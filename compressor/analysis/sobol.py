@@ -1,11 +1,12 @@
 """Sobol's indices of what was computed on a `saltelli` design, with bootstrap intervals."""
 
 import contextlib
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+
+from compressor.program import ignore_warnings
 
 RESAMPLES = 1000
 LEVEL = 0.95
@@ -40,8 +41,7 @@ class SaltelliDesign:
 
         a, b, mixed = values[self.a], values[self.b], values[self.mixed]
         table = {"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}
-        with warnings.catch_warnings(), seeded():
-            warnings.simplefilter("ignore")  # the bootstrap of what changes nothing
+        with ignore_warnings(), seeded():  # warnings: the bootstrap of what changes nothing
             found = sobol_indices(func=table, n=a.size, rng=np.random.default_rng(SEED))
             spread = found.bootstrap(confidence_level=LEVEL, n_resamples=resamples)
         idle = (mixed == a).all(axis=1)

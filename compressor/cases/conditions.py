@@ -12,7 +12,6 @@ import ast
 import itertools
 import operator
 import re
-import warnings
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -21,6 +20,7 @@ from compressor.cases.shorthands import row_of
 from compressor.cases.swept import is_number
 from compressor.cases.unknown import suggestion
 from compressor.cases.yaml_reader import resolved, shortened
+from compressor.program import ignore_warnings
 
 MAX_LENGTH = 1000  # characters
 MAX_DEPTH = 50  # of parentheses, and of `not`
@@ -84,8 +84,7 @@ class _Reader:
         if deep := [at for at, depth in enumerate(depths) if depth > MAX_DEPTH]:
             self.refuse(deep[0], f"is nested deeper than {MAX_DEPTH} levels")
         try:
-            with warnings.catch_warnings():  # of `1or`, which Python may refuse one day
-                warnings.simplefilter("ignore")
+            with ignore_warnings():  # of `1or`, which Python may refuse one day
                 tree = ast.parse(self.code, mode="eval").body
         except SyntaxError as error:
             self.refuse(*_misfit(self.code, error))

@@ -6,7 +6,6 @@ one job in whatever study.
 """
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -15,6 +14,7 @@ from fractions import Fraction
 from compressor.cases.parameter import Parameter
 from compressor.cases.shorthands import row_of
 from compressor.cases.yaml_reader import FileProblem, Node
+from compressor.program import ignore_warnings
 
 # designs of samples, which draw several keys together
 SAMPLED = ("random", "lhs", "sobol", "saltelli")
@@ -207,6 +207,5 @@ def design(kind: str, count: int, keys: int, seed: int) -> list[list[float]]:
     from scipy.stats import qmc  # takes half a second
 
     sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[kind](keys, seed=generator)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="The balance properties of Sobol")
+    with ignore_warnings("The balance properties of Sobol"):
         return sampler.random(count).tolist()

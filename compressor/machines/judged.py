@@ -2,7 +2,6 @@
 
 import json
 import math
-import warnings
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ import xarray as xr
 
 from compressor.analysis import cases_of, claim_margins
 from compressor.cases import Case
+from compressor.program import ignore_warnings
 
 CLAIMS = tuple(range(1, 9))
 SHARES = ("apart", "hit", "energy_angle", "active")  # by which claim 7 is measured
@@ -65,8 +65,7 @@ def simulated(case: Case) -> xr.Dataset:
     """A case's run; a solver's remarks are left aside."""
     from compressor.solve import simulate  # needs numba: only to simulate
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with ignore_warnings():
         return simulate(replace(case, output=replace(case.output, keep="series")))
 
 

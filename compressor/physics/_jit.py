@@ -10,6 +10,7 @@ import functools
 import math
 import os
 import shutil
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,6 +22,7 @@ from compressor.program import machine_code_folder
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 ENABLED = os.environ.get("COMPSIM_JIT", "1") != "0"
+MAKING = threading.RLock()  # or two threads would each make a function, of two types to numba
 
 
 def discard_other_code(folder: Path) -> None:
@@ -42,8 +44,14 @@ class Deferred:
 
     @functools.cached_property
     def made(self) -> Any:
-        load_numba()
-        return self.make()
+        with MAKING:
+            load_numba()
+            return vars(self).get("made") or self.make_here()
+
+    def make_here(self) -> Any:
+        """Make it, and hold it before another thread may look."""
+        vars(self)["made"] = self.make()
+        return vars(self)["made"]
 
     def __call__(self, *arguments: Any) -> Any:
         return self.made(*arguments)
@@ -82,7 +90,7 @@ def load_numba() -> None:
 
     # to be known before anything is compiled
     for intrinsic in (borrowed, fused, square_root):
-        vars(intrinsic)["made"] = vars(intrinsic)["make"]()
+        intrinsic.make_here()  # type: ignore[union-attr]
 
 
 def _compiled(function: Function, **options: Any) -> Function:

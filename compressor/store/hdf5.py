@@ -4,12 +4,18 @@ HDF5 can crash the process when a disk fills up while it writes, or when it foll
 file says; so that it never touches a disk here: `compressor.store.files` writes the bytes, and who
 reads them compares their digest first. A digest tells of damage, not of malice: what is opened is
 also checked before HDF5 follows it. Only this module imports h5py.
+
+HDF5 knows open files by their names, also those that are in memory: opening a name twice gives the
+first file again. So every file here has a name of its own, and threads take turns.
 """
 
 import contextlib
 import hashlib
 import math
+import os
 import struct
+import threading
+import uuid
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -39,6 +45,11 @@ FOREIGN = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeE
 SEAL = b"compsim digest "
 DIGITS = 20
 REMEDY = "run its study again, which replaces it"
+TURN = threading.RLock()  # one thread at a time; it may open a file while it has another open
+if hasattr(os, "register_at_fork"):  # or a child that is forked meanwhile would wait for ever
+    os.register_at_fork(
+        before=TURN.acquire, after_in_parent=TURN.release, after_in_child=TURN.release
+    )
 
 
 class DamagedJob(StoreError):
@@ -73,7 +84,8 @@ def image(
     A variable with the name of its one dimension is that dimension's coordinate. `deflated` ones
     are shuffled and compressed.
     """
-    with h5py.File("image", "w", driver="core", backing_store=False, track_order=True) as file:
+    new = {"mode": "w", "driver": "core", "backing_store": False, "track_order": True}
+    with TURN, h5py.File(uuid.uuid4().hex, **new) as file:
         for name, (dims, values, attrs) in variables.items():
             dtype = TEXT if values.dtype.kind in "OU" else values.dtype
             how = {"compression": GZIP_LEVEL, "shuffle": True} if name in deflated else {}
@@ -109,11 +121,11 @@ def storable(text: str) -> str:
 
 
 def _image(data: bytes) -> h5py.File:
-    """The HDF5 file that bytes are."""
+    """Open bytes as an HDF5 file."""
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(backing_store=False)
     access.set_file_image(data)
-    return h5py.File(h5f.open(b"image", h5f.ACC_RDONLY, access))
+    return h5py.File(h5f.open(uuid.uuid4().hex.encode(), h5f.ACC_RDONLY, access))
 
 
 @contextlib.contextmanager
@@ -125,7 +137,7 @@ def opened(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.Fil
     What goes wrong while the caller reads is a DamagedJob, too.
     """
     try:
-        with _image(data) as file:
+        with TURN, _image(data) as file:
             for name in file:
                 if problem := _objection(file, name, data):
                     raise DamagedJob(path, f"is refused: {name} {problem}", remedy)

@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -37,6 +38,8 @@ STALL = 60.0  # s without any result, while no job runs, after which all workers
 STARTING = 600.0  # s that workers may take to begin: what they prepare may have to be compiled
 UNSEEN = 3.0  # s that joblib may take to see that a worker died
 FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
+ELSEWHERE = "run these jobs in a process of their own"
+POOL = threading.Lock()
 BROKEN = (BrokenProcessPool, BrokenPipeError)  # the latter: loky's own helper was killed
 MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
 MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
@@ -60,9 +63,16 @@ def run_batches(
 
     Closing the iterator kills the workers. Whatever is raised here, a signal's exception too, comes
     after the results that had arrived (`rest` does the same for what the caller raises). Raises
-    WorkersFailed, and what `jobs` raises.
+    WorkersFailed, also where another call in this process has not ended, and what `jobs` raises.
     """
-    return Local(work, jobs, workers).ends(pulse)
+    if multiprocessing.current_process().daemon:
+        raise WorkersFailed(f"a daemonic process may start no workers: {ELSEWHERE}")
+    if not POOL.acquire(blocking=False):  # loky has one for the process: two would end each other's
+        raise WorkersFailed(f"other jobs run in this process: wait until they end, or {ELSEWHERE}")
+    try:
+        yield from Local(work, jobs, workers).ends(pulse)
+    finally:
+        POOL.release()
 
 
 def rest(ends: Generator[End, None, None], error: BaseException) -> Iterator[End]:

@@ -1,12 +1,12 @@
 """Run one job in a worker, which needs no more of the program than this."""
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from compressor.cases import Case
 from compressor.outcome import Outcome
+from compressor.program import ignore_warnings
 from compressor.reasons import Reason
 from compressor.store import StoreError, series_file, write_series
 
@@ -27,8 +27,7 @@ def run_job(place: Path | None, case: Case, ahead: Any = None) -> Outcome | Carr
     """
     from compressor.solve import measure, observe  # needs numba: only to simulate
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a solver's remarks; what matters is in the result
+    with ignore_warnings():  # a solver's remarks; what matters is in the result
         if case.output.keep == "metrics":
             return measure(case, ahead or {})
         found, dataset = observe(case, ahead or {})

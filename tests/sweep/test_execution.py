@@ -341,6 +341,30 @@ def test_no_room_for_workers_ends_the_call(monkeypatch):
         list(run_batches(work, named(range(100)), Workers()))
 
 
+def test_jobs_of_two_threads_do_not_mix():
+    first = run_batches(sleep, named([0.01 + n / 1e6 for n in range(40)]), Workers(1))
+    next(first)
+    second = []
+
+    def other():
+        with pytest.raises(WorkersFailed, match="other jobs run in this process: wait") as error:
+            list(run_batches(work, named(range(5)), Workers(1)))
+        second.append(str(error.value))
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    thread.join()
+    assert len(second) == 1
+    assert len(results(first)) == 39
+    assert len(results(run_batches(work, named(range(5)), Workers(1)))) == 5
+
+
+def test_a_daemonic_process_is_told_that_it_may_start_no_workers(monkeypatch):
+    monkeypatch.setitem(multiprocessing.current_process()._config, "daemon", True)
+    with pytest.raises(WorkersFailed, match="a daemonic process may start no workers"):
+        list(run_batches(work, named(range(5)), Workers(1)))
+
+
 # ---- ends ---------------------------------------------------------------------------------------
 
 
