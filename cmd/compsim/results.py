@@ -17,7 +17,7 @@ from click.shell_completion import CompletionItem
 MOST_BYTES = 5_000_000  # of the files of studies that are read for keys and axes
 HEXADECIMAL = re.compile("[0-9a-f]{2,20}")
 
-Items = list[CompletionItem[Any]]
+Items = list["CompletionItem[Any]"]  # a generic class from click 8.4.2 on
 Complete = Callable[[click.Context, click.Parameter, str], Items]
 
 

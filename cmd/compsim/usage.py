@@ -50,17 +50,18 @@ def one_line(error: click.ClickException, arguments: Sequence[str]) -> str:
     path = context.command_path if context else " ".join(["compsim", *arguments[:1]])
     text = " ".join(error.format_message().split())
     if isinstance(error, click.NoSuchOption) and context:
-        text = text.rstrip(".") + other_folder(error.option_name, context)
+        text = f"No such option {error.option_name!r}{other_option(error.option_name, context)}"
     if text.endswith("?") or "compsim " in text:  # what to do is said
         return f"{path}: {text}"
     return f"{path}: {text.rstrip('.')}; see {path} --help"
 
 
-def other_folder(option: str, context: click.Context) -> str:
-    """What to write for the folder of results where another command has this option for it."""
+def other_option(option: str, context: click.Context) -> str:
+    """Return what to write instead of an option that a command does not have; "" where unknown."""
     names = {parameter.name for parameter in context.command.params}
     if FOLDERS.get(option) == "output" and "folder" in names:
         return f": the folder of results is an argument, {context.command_path} FOLDER"
     if FOLDERS.get(option) == "folder" and "output" in names:
         return ": the folder of results is -o FOLDER here"
-    return ""
+    near = did_you_mean(option, [name for one in context.command.params for name in one.opts])
+    return near and f"; {near}"

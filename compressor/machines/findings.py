@@ -99,10 +99,10 @@ def region(found: xr.Dataset) -> Iterator[str]:
         if not count:
             continue
         ranges = []
-        for key, coordinate in found.coords.items():
+        for key, coordinate in found.variables.items():  # in the order in which they were swept
             if "case_key" not in coordinate.attrs or coordinate.dtype == object:
                 continue
-            inside = coordinate.where(there)
+            inside = found[key].where(there)
             unit = coordinate.attrs.get("units", "").removeprefix("1")
             low, high = float(inside.min()), float(inside.max())
             ranges.append(f"{spoken(str(key))} from {low:.3g} to {high:.3g} {unit}".rstrip())

@@ -71,7 +71,7 @@ MISTAKES = [
     ("run good.yaml --only 'clearance_mm < 0.2mm'", "write numbers without their unit"),
     ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
     ("run good.yaml --shard 3/2", "no I/N with 1 <= I <= N, such as 2/8"),
-    ("run good.yaml --quite", "No such option '--quite'", "'--quiet'"),
+    ("run good.yaml --quite", "No such option '--quite'", "did you mean --quiet"),
     ("run good.yaml -i results", "the folder of results is -o FOLDER here"),
     ("run good.yaml -o good.yaml", "good.yaml: is a file, where a folder is needed", "another"),
     # commands

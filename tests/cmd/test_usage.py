@@ -28,7 +28,7 @@ LAST = "see compsim --help"
             "compsim: 'folder' is a folder, and a command comes first: compsim status folder, or "
             "compsim report folder",
         ),
-        (["status", "--jsn"], "compsim status: No such option '--jsn'. Did you mean '--json'?"),
+        (["status", "--jsn"], "compsim status: No such option '--jsn'; did you mean --json?"),
         (
             ["verify", "-o", "results"],
             "compsim verify: No such option '-o': the folder of results is an argument, "
