@@ -1,8 +1,11 @@
 """The program: its version, its errors, the libraries it runs with, where its machine code is."""
 
+import atexit
 import contextlib
 import hashlib
 import os
+import shutil
+import tempfile
 import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,6 +16,7 @@ from pathlib import Path
 VERSION = "0.1.0"
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
 COMPILED = Path(__file__).parent / "physics"  # the sources that are compiled
+CODE_VARIABLE = "NUMBA_CACHE_DIR"
 MOST_MEANT = 3  # words that may have been meant
 LONGEST_WORD = 100  # characters of a word that others are compared with
 
@@ -92,12 +96,47 @@ def sources_hash(folder: Path) -> str:
 
 
 def machine_code_folder() -> Path:
-    """Where machine code is kept: beside the sources, or under the user's cache folder.
+    """Return the folder of machine code, named by a hash of the sources.
 
-    The folder is named by a hash of the sources: numba itself would go on using a caller's old code
-    after a change of what it calls in another file.
+    It is in NUMBA_CACHE_DIR, else beside the sources, else in the user's cache; where none of these
+    may be written, in a temporary folder of this process and its workers, with a CompsimWarning.
+    Numba itself would go on using a caller's old code after a change of what it calls in another
+    file.
     """
-    beside = COMPILED / "__pycache__"
-    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compsim"
-    base = beside if os.access(beside if beside.exists() else COMPILED, os.W_OK) else user
-    return base / f"numba-{sources_hash(COMPILED)}"
+    return _machine_code_base() / f"numba-{sources_hash(COMPILED)}"
+
+
+def _machine_code_base() -> Path:
+    named = os.environ.get(CODE_VARIABLE)
+    if named:
+        return Path(named) / "compsim"
+    for find in (lambda: COMPILED / "__pycache__", _user_cache):
+        with contextlib.suppress(RuntimeError):  # a user without a home
+            if _may_write(place := find()):
+                return place
+    place = Path(tempfile.mkdtemp(prefix="compsim-"))
+    os.environ[CODE_VARIABLE] = str(place)  # read by workers, too
+    atexit.register(_remove_own, place, os.getpid())
+    text = (
+        f"nothing may be written beside {COMPILED} or in the user's cache: the equations are "
+        f"compiled into {place}, and again next time; set {CODE_VARIABLE} to a folder that stays"
+    )
+    warnings.warn(text, CompsimWarning, stacklevel=2)
+    return place / "compsim"
+
+
+def _user_cache() -> Path:
+    """Return the user's cache folder for this program. Raises RuntimeError without a home."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compsim"
+
+
+def _may_write(folder: Path) -> bool:
+    """Whether files can be written to a folder, which need not be there yet."""
+    above = next((one for one in (folder, *folder.parents) if os.path.exists(one)), folder)
+    return os.path.isdir(above) and os.access(above, os.W_OK | os.X_OK)
+
+
+def _remove_own(folder: Path, process: int) -> None:
+    """Remove a folder, but not from a child that was forked."""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -76,9 +76,9 @@ def load_numba() -> None:
     from numba.core.registry import cpu_target
     from numba.extending import typeof_impl
 
-    if not numba.config.CACHE_DIR:  # type: ignore[attr-defined]
-        discard_other_code(machine_code_folder())
-        numba.config.CACHE_DIR = str(machine_code_folder())  # type: ignore[attr-defined]
+    folder = machine_code_folder()
+    discard_other_code(folder)
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
 
     @typeof_impl.register(Deferred)
     def type_of(value: Deferred, _: object) -> Any:

@@ -1,10 +1,13 @@
 """One source, compiled or not: the JIT switched off gives the same numbers."""
 
+import ctypes
 import json
 import os
+import shutil
 import subprocess
 import sys
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ from compressor.physics import _jit
 from compressor.physics._jit import by_kind, fused, jit, merged
 from compressor.physics.record import new_record
 
+COMPRESSOR = Path(program.__file__).parent
 PROBE = """
 import json
 import numpy as np
@@ -75,6 +79,65 @@ def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
     assert first.exists()
     _jit.discard_other_code(program.machine_code_folder())
     assert not first.exists()
+
+
+HOMELESS = """
+import os
+from compressor.physics import elementary
+from compressor.program import machine_code_folder
+
+folder = machine_code_folder()
+assert machine_code_folder() == folder
+elementary.direction(0.5)
+assert [*folder.rglob("*.nbi")], "nothing was kept"
+print(folder.parent.parent, folder.is_relative_to(os.environ["NUMBA_CACHE_DIR"]))
+"""
+
+
+def forbid_what_modes_forbid():
+    """Give up the right of root to write where nobody may: before a program starts."""
+    drop_from_bounding_set, dac_override = 24, 1  # linux/prctl.h, linux/capability.h
+    if os.getuid() == 0:
+        ctypes.CDLL(None).prctl(drop_from_bounding_set, dac_override, 0, 0, 0)
+
+
+@pytest.fixture
+def read_only(tmp_path):
+    """A copy of the package and a home in which nothing may be written; its environment."""
+    shutil.copytree(COMPRESSOR, tmp_path / "compressor", ignore=shutil.ignore_patterns("__pyc*"))
+    (tmp_path / "home").mkdir()
+    folders = [path for path in (tmp_path, *tmp_path.rglob("*")) if path.is_dir()]
+    for path in folders:
+        path.chmod(0o555)
+    kept = {name: os.environ[name] for name in ("PATH", "TMPDIR", "LANG") if name in os.environ}
+    yield {**kept, "PYTHONPATH": str(tmp_path), "HOME": str(tmp_path / "home")}
+    for path in folders:
+        path.chmod(0o755)
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(sys.platform != "linux", reason="capabilities are Linux's")
+def test_where_nothing_may_be_written_code_is_compiled_for_the_process(read_only):
+    words = [sys.executable, "-P", "-c", HOMELESS]
+    done = subprocess.run(
+        words, env=read_only, capture_output=True, text=True, preexec_fn=forbid_what_modes_forbid
+    )
+    assert done.returncode == 0, done.stderr
+    place, inside = done.stdout.split()
+    assert inside == "True"
+    assert not Path(place).exists()  # it ended with the process
+    assert done.stderr.count("CompsimWarning: nothing may be written beside") == 1
+    assert "set NUMBA_CACHE_DIR to a folder that stays" in done.stderr
+
+
+def test_a_user_without_a_home_may_name_a_folder(tmp_path, monkeypatch):
+    def nobody():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(program.Path, "home", nobody)
+    assert program.machine_code_folder().parent == program.COMPILED / "__pycache__"  # not looked at
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert program.machine_code_folder().parent == tmp_path / "compsim"
 
 
 @pytest.mark.compiled
