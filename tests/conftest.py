@@ -22,8 +22,9 @@ from compressor.cases.load import load_studies
 from compressor.metrics import NUMBERS
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
+from compressor.store.files import publish_pending
 from compressor.store.reader import finished_keys, read_store
-from compressor.store.series_file import write_series
+from compressor.store.series_file import series_path, write_series
 from compressor.store.studies import write_study
 from compressor.store.writer import Writer
 from compressor.sweep.run_job import run_job
@@ -125,6 +126,14 @@ def ncdump():
             ["ncdump", *map(str, words)], capture_output=True, text=True, check=True
         ).stdout
     )
+
+
+def write_named(place, dataset, output):
+    """Write a job's file and give it its name, without a row; returns its path."""
+    file = write_series(place, dataset, output)
+    path = series_path(place, dataset.attrs["key"], file.digest)
+    publish_pending([path])
+    return path
 
 
 def keep(folder, *datasets):

@@ -5,11 +5,12 @@ What the file system refuses is a StoreError, which says where and what to do ab
 
 import contextlib
 import errno
+import fcntl
 import os
 import re
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -22,6 +23,7 @@ KEY = re.compile(HEX20)
 
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
 
+LOCK_NAME = "writer.lock"
 FULL = "free some space there, then run the same command again"
 IS_FILE = "is a file, where a folder is needed"
 ELSEWHERE = "choose another folder"
@@ -126,6 +128,56 @@ def publishing(path: Path) -> Iterator[BinaryIO]:
         raise system_error(path, error) from error
 
 
+def pending_path(path: Path) -> Path:
+    """Return where a file waits until it gets its name."""
+    return path.with_name(f".{path.name}.tmp")
+
+
+def write_pending(path: Path, data: bytes) -> None:
+    """Write a whole file that `publish_pending` will give its name. Raises StoreError."""
+    make_folder(path.parent)
+    try:
+        try:
+            with open(pending_path(path), "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+        except BaseException:
+            with contextlib.suppress(OSError):
+                pending_path(path).unlink()
+            raise
+    except OSError as error:
+        raise system_error(path, error) from error
+
+
+def publish_pending(paths: Collection[Path]) -> None:
+    """Give files that wait their names, durably; one that has its name stays. Raises StoreError."""
+    for path in paths:
+        with refusals(path):
+            try:
+                os.replace(pending_path(path), path)
+            except FileNotFoundError:
+                if not path.exists():
+                    raise
+    for folder in {path.parent for path in paths}:
+        with refusals(folder):
+            _sync_folder(folder)
+
+
+def is_locked(place: Path) -> bool:
+    """Whether a `Writer` is at work in a place; what one that was killed left is no lock."""
+    try:
+        with open(place / LOCK_NAME, "rb") as file:
+            if not file.read(1):  # given back: nobody is disturbed by our look
+                return False
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return False
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+
+
 def make_folder(folder: Path) -> None:
     """Make a folder and those above it, durably; raises StoreError."""
     try:
@@ -170,11 +222,13 @@ def _sync_folder(folder: Path) -> None:
 def discard_leftovers(folder: Folder) -> None:
     """Remove the temporary files of writers that died long ago, from the folders in a folder.
 
-    Raises StoreError.
+    Not where a link leads: others may write there. Raises StoreError.
     """
     with refusals(folder):
         leftovers = [*Path(folder).glob("*/.*.tmp")]
     for path in leftovers:
+        if path.parent.is_symlink():
+            continue
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
                 path.unlink()

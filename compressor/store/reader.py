@@ -29,6 +29,7 @@ from compressor.store.hdf5 import DamagedJob
 from compressor.store.names import find_study
 from compressor.store.rows import Rows
 from compressor.store.segment import NAME, Cut, Segment, read_segment
+from compressor.store.series_file import NAME as SERIES_NAME
 from compressor.store.series_file import read_series, read_values
 from compressor.store.stale import stale
 from compressor.store.studies import read_studies
@@ -224,6 +225,20 @@ def _names(folder: Path) -> list[str]:
         return []
     except OSError as error:
         raise system_error(folder, error) from error
+
+
+def unowned_series(place: Path, rows: Rows) -> list[str]:
+    """Return the names of files of time series in a place whose jobs no row knows.
+
+    A run that ends leaves none: rows are gone, or have not been copied yet. Where `jobs` is a link,
+    others may store there.
+    """
+    if (place / "jobs").is_symlink():
+        return []
+    names = [name for name in _names(place / "jobs") if SERIES_NAME.fullmatch(name)]
+    keys = {name[:20] for name in names}
+    known = {key for key, at in zip(keys, rows.find([*keys]).tolist(), strict=True) if at >= 0}
+    return sorted(name for name in names if name[:20] not in known)
 
 
 def places(folder: Folder) -> list[Path]:

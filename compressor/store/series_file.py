@@ -4,7 +4,8 @@
 
 The digest of the file's bytes is in its name and in the job's row, and compared whenever the file
 is read. A job that is run again gets a new name, so that its old result stays whole until the new
-row is on disk.
+row is on disk. A new file waits under a temporary name until the `Writer` is about to store its
+row: a file with its name belongs to a row, and what a run that was killed leaves has no name.
 """
 
 import errno
@@ -19,7 +20,7 @@ from compressor.cases import Output
 from compressor.metrics import NUMBERS
 from compressor.outcome import SeriesFile, Table
 from compressor.store import hdf5
-from compressor.store.files import HEX20, KEY, StoreError, publish, system_error
+from compressor.store.files import HEX20, KEY, StoreError, publish, system_error, write_pending
 from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened, sealed, unsealed
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def series_path(place: Path, key: str, checksum: str) -> Path:
 
 
 def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> SeriesFile:
-    """Store a job's Dataset, or what it is made of, durably."""
+    """Write the file of a job's Dataset, or of what it is made of; a `Writer` gives it its name."""
     file, data = series_file(dataset, output)
     store_series(place, dataset.attrs["key"], file, data)
     return file
@@ -50,8 +51,8 @@ def series_file(dataset: "Table | xr.Dataset", output: Output) -> tuple[SeriesFi
 
 
 def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
-    """Put the bytes of a job's file in their place, durably."""
-    publish(series_path(place, key, file.digest), data)
+    """Write the bytes of a job's file; a `Writer` gives it its name."""
+    write_pending(series_path(place, key, file.digest), data)
 
 
 def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:

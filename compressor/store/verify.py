@@ -1,14 +1,19 @@
-"""Compare every file of a store with its digest, and name the jobs that damage costs."""
+"""Compare every file of a store with its digest, and name the jobs that damage costs.
 
-from collections.abc import Callable
+There is no index, so that a file that is gone is known by those that speak of it: rows of their
+files of time series and of their study, studies and files of time series of their rows.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from compressor.store.files import Folder, StoreError
+from compressor.store.files import Folder, StoreError, is_locked
 from compressor.store.folders import no_results
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.reader import read_store
+from compressor.store.reader import places, read_store, unowned_series
 from compressor.store.rows import Rows
 from compressor.store.segment import Cut
 from compressor.store.series_file import read_dataset
@@ -16,6 +21,8 @@ from compressor.store.studies import Again, StoredStudy, owners, read_study, stu
 
 FORMER_REMEDY = "delete it: its jobs stay stored"
 FOLLOWED = ("regimes/*/*.nc", "wear/*.nc")  # machines over values and over hours
+ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
+STUDY_REMEDY = "run its case file again, which computes nothing anew"
 FOLLOWED_REMEDY = "delete it: the command that made it makes it again"
 
 
@@ -29,7 +36,7 @@ class LostJob:
 
 @dataclass(frozen=True)
 class Damage:
-    """A file of a store that is not what was written, and the jobs that are lost with it.
+    """A file of a store that is gone or not what was written, and the jobs that are lost with it.
 
     A run of `again` computes the jobs anew; `remedy` is what else is to be done, or "".
     """
@@ -45,10 +52,11 @@ class Damage:
 def verify(
     folder: Folder, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Damage]:
-    """All damage to a store: to segments, files of time series, studies, chains and wear.
+    """Return all damage to a store: to segments, files of time series, studies, chains and wear.
 
-    `progress` is told how many files of time series were read, of how many. Raises StoreError for
-    a folder that cannot be read.
+    Jobs that a study has and no row knows are damage, too, unless a run is at work there: they have
+    not run, or their row is gone. `progress` is told how many files of time series were read, of
+    how many. Raises StoreError for a folder that cannot be read.
     """
     stored = read_store(folder, DamagedJob)
     followed = [path for pattern in FOLLOWED for path in sorted(Path(folder).glob(pattern))]
@@ -82,7 +90,39 @@ def verify(
             problem = "is damaged" if place.exists() else "is missing"
             found.append(Damage(place, problem, (key,)))
         progress(position + 1, len(rows))
+    found += _gone(folder, rows, studies, {key for damage in found for key in damage.keys})
     return _owned(found, studies)
+
+
+def _gone(
+    folder: Folder, rows: Rows, studies: list[StoredStudy], lost: set[str]
+) -> Iterator[Damage]:
+    """Yield what the files of a store show to be gone, but for jobs known to be lost."""
+    stored = {key.decode() for key in rows.columns["key"]}
+    busy = [place for place in places(folder) if is_locked(place)]
+    for place in (place for place in places(folder) if place not in busy):
+        series = unowned_series(place, rows)
+        if keys := {name[:20] for name in series} - lost:
+            problem = f"{len(series)} files belong to jobs that no row knows"
+            yield Damage(place / "jobs", problem, tuple(sorted(keys)), ROWS_REMEDY)
+            lost = lost | keys
+    for study in () if busy else studies:
+        absent = {*study.keys} - stored - lost
+        if absent and not study.former_of:
+            problem = f"no row knows {len(absent)} of its {study.jobs} jobs: not run yet, or gone"
+            path = Path(folder) / "studies" / f"{study.name}.json"
+            yield Damage(path, problem, tuple(sorted(absent)))
+    known = {key for study in studies for key in study.keys}
+    strays = [
+        at for at, key in enumerate(rows.columns["key"].tolist()) if key.decode() not in known
+    ]
+    names = Counter(str(rows.attributes(at).get("name", "")) for at in strays)
+    for name, count in sorted(names.items()):
+        path = Path(folder) / "studies" / f"{name}.json"
+        if name and not path.exists():
+            yield Damage(
+                path, f"is gone, and {count} stored jobs were run for it", (), STUDY_REMEDY
+            )
 
 
 def _owned(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:

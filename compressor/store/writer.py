@@ -12,24 +12,28 @@ import os
 import re
 import socket
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
+import numpy as np
+
 from compressor.outcome import Outcome
 from compressor.store.files import (
+    LOCK_NAME,
     Folder,
     StoreError,
     discard_leftovers,
     make_folder,
     publish,
+    publish_pending,
     refusals,
     system_error,
 )
-from compressor.store.reader import places, read_store, segment_paths
+from compressor.store.reader import places, read_store, segment_paths, unowned_series
 from compressor.store.rows import Rows, merge
-from compressor.store.segment import encode, of_outcomes, read_segment, segment_name
-from compressor.store.series_file import NAME as JOB_NAME
+from compressor.store.segment import Segment, encode, of_outcomes, read_segment, segment_name
+from compressor.store.series_file import series_path
 
 MOST_ROWS = 4096  # in a segment that is written at once; one with fewer is small
 MOST_AGE = 1.0  # s between two writings, if they are small
@@ -37,7 +41,6 @@ MOST_SMALL = 32  # small segments before they are merged
 FEW_SMALL = 8  # that may stay when the writer ends
 PATIENCE = 1.0  # s for which a lock's holder may leave its file empty
 SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}")
-LOCK_NAME = "writer.lock"
 
 
 class Writer:
@@ -45,7 +48,10 @@ class Writer:
 
     What is added is acknowledged by its key, from `add`, `flush_if_due` or `flush`, once it is on
     disk; leaving the context writes the rest, also when an exception ends it. `place` is where
-    files of time series belong, `found` what the store held at the start.
+    files of time series belong, `found` what the store held at the start, `unowned` how many
+    files of time series there are of jobs that no row knows; they are left as they are.
+
+    Of time series only those are removed that a better row of this store has replaced.
 
     Raises StoreError: at entry where another process writes there (unless `wait`), later where the
     disk refuses.
@@ -71,13 +77,13 @@ class Writer:
             self.number = max(map(_number, self._all_paths()), default=0)
             with refusals(self.place):
                 damaged = self._damaged(self.place)
-                if damaged:
-                    _set_aside(damaged)
-                else:
-                    self._discard_unheard_of()
+                _set_aside(damaged)
+                mine = [s for s in self.found.segments if s.place == self.place]
+                rows = Rows.of(mine)
+                self._discard_replaced(mine, rows)
+                self.unowned = 0 if damaged else len(unowned_series(self.place, rows))
                 if self.place == self.folder:
                     self._mend_idle_shards()
-            mine = (s for s in self.found.segments if s.place == self.place)
             self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
         except BaseException:
             _release(self.lock)
@@ -99,7 +105,7 @@ class Writer:
             _release(self.lock)
 
     def add(self, outcome: Outcome) -> list[str]:
-        """Take an outcome in, with a file of time series that is stored already."""
+        """Take an outcome in; `write_series` has written its time series, if it has any."""
         self.pending[outcome.key] = outcome
         return self.flush_if_due()
 
@@ -113,6 +119,8 @@ class Writer:
         if not self.pending:
             return []
         keys = list(self.pending)
+        series = [(one.key, one.series.digest) for one in self.pending.values() if one.series]
+        publish_pending([series_path(self.place, *names) for names in series])
         segment = of_outcomes(self.pending.values(), self.number + 1)
         path = self._publish(encode(segment))
         if len(segment) < MOST_ROWS:
@@ -142,8 +150,10 @@ class Writer:
         if len(paths) < 2:
             return
         with refusals(self.place):
-            segment = merge([read_segment(path) for path in paths])
+            parts = [read_segment(path) for path in paths]
+            segment = merge(parts)
             merged = self._publish(encode(segment))
+            self._discard_replaced(parts, segment)
             for path in paths:
                 path.unlink()
                 del self.small[path]
@@ -168,17 +178,25 @@ class Writer:
                     _set_aside(damaged)
                     os.close(lock)
 
-    def _discard_unheard_of(self) -> None:
-        """Remove time series that no row tells of: replaced, or never acknowledged."""
-        paths = [*(self.place / "jobs").glob("*.h5")]
-        if not paths:
+    def _discard_replaced(self, segments: Sequence[Segment], rows: Segment | Rows) -> None:
+        """Remove the time series of rows that better ones have replaced, where these have theirs.
+
+        Where `jobs` is a link, others may store there: nothing is removed.
+        """
+        if (self.place / "jobs").is_symlink() or sum(map(len, segments)) == len(rows):
             return
-        columns = Rows.of([s for s in self.found.segments if s.place == self.place]).columns
-        known = {*zip(columns["key"].tolist(), columns["digest"].tolist(), strict=True)}
-        for path in paths:
-            name = JOB_NAME.fullmatch(path.name)
-            if name and (name[1].encode(), name[2].encode()) not in known:
-                path.unlink()
+        chosen = _series_names(rows.columns)
+        better = dict(chosen)
+        for key, checksum in set().union(*(_series_names(s.columns) for s in segments)) - chosen:
+            if key in better and series_path(self.place, key, better[key]).exists():
+                series_path(self.place, key, checksum).unlink(missing_ok=True)
+
+
+def _series_names(columns: Mapping[str, np.ndarray]) -> set[tuple[str, str]]:
+    """Return key and digest of the rows that have time series."""
+    kept = columns["samples"] > 0
+    names = (columns[name][kept].tolist() for name in ("key", "digest"))
+    return {(key.decode(), checksum.decode()) for key, checksum in zip(*names, strict=True)}
 
 
 def _set_aside(paths: Iterable[Path]) -> None:

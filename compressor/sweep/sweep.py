@@ -132,6 +132,9 @@ def sweep(
         progress(0, jobs, f"preparing {jobs} jobs")
     cases = Wanted(studies)
     with Writer(folder, name, options.wait, options.command) as writer:
+        if writer.unowned:
+            progress(0, len(cases), f"{writer.place / 'jobs'}: {writer.unowned} files belong to "
+                     "jobs that no row knows, and stay; compsim verify tells more")  # fmt: skip
         ends = stored(writer.found, cases)
         if options.rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}

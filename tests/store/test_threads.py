@@ -79,12 +79,13 @@ def test_threads_export_the_same_as_one(folder, tmp_path):
         return {
             path.relative_to(tmp_path / name): path.read_bytes()
             for path in (tmp_path / name).rglob("*.*")
+            if path.name != "small.nc"  # older HDF5 writes the time into it
         }
 
     expected = written("alone")
     with ThreadPoolExecutor(3) as pool:
         assert all(found == expected for found in pool.map(written, "abc"))
-    assert len(expected) == 8
+    assert len(expected) == 7
 
 
 def test_a_report_is_the_same_while_threads_read(folder, tmp_path):
