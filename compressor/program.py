@@ -65,6 +65,13 @@ def ignore_warnings(message: str = "") -> Iterator[None]:
         yield
 
 
+def printable(text: str) -> str:
+    """Return text in which no character can steer a terminal."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | None = None) -> str:
     """What was probably meant by a word that is not known, as `did you mean A or B?`, or "".
 

@@ -17,6 +17,7 @@ from compsim.screen import (
     limit,
     one_thread_each,
     plural,
+    print_text,
     say,
     setting,
 )
@@ -104,11 +105,11 @@ def tell(found: "list[xr.Dataset]", as_json: bool) -> None:
     """Files of judged machines on stdout, with what they say."""
     told = {one.encoding["source"]: [*sentences(one)] for one in found}
     if as_json:
-        click.echo(json.dumps(told, indent=1))
+        print_text(json.dumps(told, indent=1))
         return
     for path, said in told.items():
-        click.echo(path)
-        click.echo("\n".join(f"  {text}" for text in said))
+        print_text(path)
+        print_text("\n".join(f"  {text}" for text in said))
 
 
 def sentences(found: "xr.Dataset") -> Iterator[str]:

@@ -40,11 +40,13 @@ from compsim import (
     verify,
     wear,
 )
-from compsim.screen import DONE, INTERNAL, say
+from compsim.screen import DONE, INTERNAL, STORE, discard_output, open_streams, say
 from compsim.usage import Commands, one_line
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
+UNREAD = 128 + signal.SIGPIPE  # exit code, as of a program that SIGPIPE ends
+COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click prints and exits
 AGAIN = 0.02  # s until a dropped signal is sent again
 
 
@@ -155,6 +157,7 @@ def warnings_told() -> Iterator[None]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
+    open_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)
     command = shlex.join(["compsim", *arguments])
     try:
@@ -169,6 +172,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         else:
             say(one_line(error, arguments))
         return error.exit_code
+    except (SystemExit, BrokenPipeError):
+        if COMPLETING in os.environ:
+            raise
+        discard_output()  # otherwise click exits only where nobody reads on
+        return UNREAD
     except Exception as error:
         return told(error)
 
@@ -178,6 +186,10 @@ def told(error: Exception) -> int:
     if isinstance(error, CompsimError):
         say(f"{error.prefix}{error}")
         return error.exit_code
+    if isinstance(error, OSError) and traceback.extract_tb(error.__traceback__)[-1].name == "echo":
+        say(f"compsim: stdout: {error.strerror}; the same command prints it again")
+        discard_output()
+        return STORE
     lines = traceback.format_exception(error)
     if os.environ.get("COMPSIM_DEBUG"):
         say("".join(lines), end="")

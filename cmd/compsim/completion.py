@@ -5,7 +5,11 @@ import sys
 import click
 from click.shell_completion import get_completion_class
 
-from compsim.screen import DONE, say
+from compsim.screen import (
+    DONE,
+    print_text,
+    say,
+)
 
 INSTALL = {
     "bash": """echo 'eval "$(compsim completion bash)"' >> ~/.bashrc""",
@@ -29,12 +33,12 @@ def completion(context: click.Context, shell: str | None) -> int:
     """
     if shell is None:
         for name, line in INSTALL.items():
-            click.echo(f"{name:<5} {line}")
+            print_text(f"{name:<5} {line}")
         return DONE
     kind = get_completion_class(shell)
     root = context.find_root().command
     assert kind is not None
-    click.echo(kind(root, {}, "compsim", "_COMPSIM_COMPLETE").source())
+    print_text(kind(root, {}, "compsim", "_COMPSIM_COMPLETE").source())
     if sys.stdout.isatty():
         say(f"to install it: {INSTALL[shell]}; then open a new shell")
     return DONE

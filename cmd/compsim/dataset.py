@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 from compsim.results import of_results, one_word, results_folder, studies
-from compsim.screen import DONE, Screen, say, size
+from compsim.screen import (
+    DONE,
+    Screen,
+    print_text,
+    say,
+    size,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,9 +70,9 @@ def dataset(
     finally:
         screen.end()
     for line in told(made):
-        click.echo(line)
+        print_text(line)
     for name, count in written.files.items():
-        click.echo(f"{os.path.join(output, name)}  {size(count)}")
+        print_text(f"{os.path.join(output, name)}  {size(count)}")
     if written.remark:
         say(written.remark)
     if not quiet:

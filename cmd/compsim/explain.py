@@ -15,6 +15,7 @@ from compsim.screen import (
     configs_argument,
     limit,
     plural,
+    print_text,
     say,
     setting,
 )
@@ -57,10 +58,10 @@ def explain(
         finally:
             screen.end()
         if not as_json:
-            click.echo("\n".join(lines(found[-1])))
+            print_text("\n".join(lines(found[-1])))
     if as_json:
         plain = [without_nan(dataclasses.asdict(one)) for one in found]
-        click.echo(json.dumps(plain, indent=1, ensure_ascii=False))
+        print_text(json.dumps(plain, indent=1, ensure_ascii=False))
     return SOME_FAILED if any(one.reason for one in found) else DONE
 
 

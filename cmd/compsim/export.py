@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 import click
 
 from compsim.results import jobs, of_results, results_folder
-from compsim.screen import DONE, STORE, Screen, plural, say, size
+from compsim.screen import (
+    DONE,
+    STORE,
+    Screen,
+    plural,
+    print_text,
+    say,
+    size,
+)
 
 if TYPE_CHECKING:
     from compressor.store import Exported
@@ -52,10 +60,10 @@ def export(
     finally:
         screen.end()
     if as_json:
-        click.echo(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
+        print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
     else:
         for line in told(found, output):
-            click.echo(line)
+            print_text(line)
     for damage in damaged:
         say(f"{damage}: left out")
     return STORE if damaged else DONE

@@ -19,6 +19,7 @@ from compsim.screen import (
     one_thread_each,
     output_option,
     plural,
+    print_text,
     setting,
 )
 from compsim.show import sayable
@@ -85,10 +86,10 @@ def find(
     finally:
         screen.end()
     if as_json:
-        click.echo(json.dumps(plain(question, answer), indent=1))
+        print_text(json.dumps(plain(question, answer), indent=1))
     else:
         for line in lines(question, answer, output):
-            click.echo(line)
+            print_text(line)
     return SOME_FAILED if answer.failed else DONE
 
 

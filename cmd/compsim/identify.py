@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from compsim.results import files, of_results, one_word, results_folder, studies
-from compsim.screen import DONE, Screen, as_json, one_thread_each, plural
+from compsim.screen import (
+    DONE,
+    Screen,
+    as_json,
+    one_thread_each,
+    plural,
+    print_text,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,14 +65,14 @@ def identify(
     finally:
         screen.end()
     if as_json:
-        click.echo(json.dumps(plain(record, fitted, answer), indent=1))
+        print_text(json.dumps(plain(record, fitted, answer), indent=1))
         return DONE
     pulses = found.tacho
     rpm_told = 60.0 * (len(pulses) - 1) / (pulses[-1] - pulses[0])
     rate = 1.0 / (found.times[1] - found.times[0])
-    click.echo(f"{record}: {len(pulses) - 1} revolutions at {rpm_told:.4g} rpm, {rate:.6g} Hz")
+    print_text(f"{record}: {len(pulses) - 1} revolutions at {rpm_told:.4g} rpm, {rate:.6g} Hz")
     for line in (*verdict(answer), *ranking(answer), *grounds(fitted, answer, folder)):
-        click.echo(line)
+        print_text(line)
     return DONE
 
 

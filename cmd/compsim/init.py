@@ -9,7 +9,7 @@ from click.shell_completion import CompletionItem
 
 from compressor.program import did_you_mean
 from compsim.results import Items, files
-from compsim.screen import DONE, say
+from compsim.screen import DONE, print_text, say
 from compsim.usage import CASE_FILES
 
 
@@ -35,8 +35,8 @@ def init(template: str | None, output: str | None) -> int:
     known = templates()
     if template is None:
         for one in known.values():
-            click.echo(f"{one.name:<{max(map(len, known))}}  {one.question}")
-            click.echo(f"{'':<{max(map(len, known))}}  {one.jobs}")
+            print_text(f"{one.name:<{max(map(len, known))}}  {one.question}")
+            print_text(f"{'':<{max(map(len, known))}}  {one.jobs}")
         say("next: compsim init wear")
         return DONE
     if template not in known:
@@ -44,7 +44,7 @@ def init(template: str | None, output: str | None) -> int:
     path = Path(output or known[template].path.name)
     path = path / known[template].path.name if path.is_dir() else path
     write(path, known[template].text(path), template)
-    click.echo(path)
+    print_text(str(path))
     say(f"next: {known[template].commands(path).partition(';')[0]}")
     return DONE
 

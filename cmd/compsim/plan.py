@@ -17,6 +17,7 @@ from compsim.screen import (
     only_option,
     output_option,
     plural,
+    print_text,
     say,
     setting,
     size,
@@ -77,29 +78,29 @@ def plan(
     workers = jobs or cores()
     if as_json:
         more = {"regimes": [one._asdict() for one in ahead]} if ahead else {}
-        click.echo(json.dumps(dataclasses.asdict(found.timed(workers, say)) | more, indent=1))
+        print_text(json.dumps(dataclasses.asdict(found.timed(workers, say)) | more, indent=1))
         return DONE
     tell_chains(ahead, as_json)
     width = max(len(part.study) for part in found.counts.studies)
     for part in found.counts.studies:
-        click.echo(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
+        print_text(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
                    f"{part.missing:>4} missing")  # fmt: skip
     if found.counts.missing:
         whole = found.timed(workers, say)
         with_workers = plural(whole.workers, "worker")
-        click.echo(f"about {duration(whole.seconds)} with {with_workers}, and {size(whole.bytes)}")
+        print_text(f"about {duration(whole.seconds)} with {with_workers}, and {size(whole.bytes)}")
     for job in found.counts.first:
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
-        click.echo(f"next: {job.study}{point}")
+        print_text(f"next: {job.study}{point}")
     return DONE
 
 
 def tell_chains(ahead: "list[Standing]", as_json: bool) -> None:
     """Say how many values the chains of regimes have, and how many of them are stored."""
     if as_json:
-        click.echo(json.dumps({"regimes": [one._asdict() for one in ahead]}, indent=1))
+        print_text(json.dumps({"regimes": [one._asdict() for one in ahead]}, indent=1))
         return
     for one in ahead:
         missing = one.chains * one.values - one.done
         chains = f"{plural(one.chains, 'chain')} x {plural(one.values, 'value')}"
-        click.echo(f"{one.study}  {chains}  {one.done:>4} done  {missing:>4} missing")
+        print_text(f"{one.study}  {chains}  {one.done:>4} done  {missing:>4} missing")

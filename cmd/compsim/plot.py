@@ -4,7 +4,10 @@ import click
 
 from compressor.program import did_you_mean
 from compsim.results import folders, jobs, of_results, one_word, results_folder
-from compsim.screen import DONE
+from compsim.screen import (
+    DONE,
+    print_text,
+)
 
 FIGURES = (
     "signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map",
@@ -72,6 +75,6 @@ def plot(
     else:
         drawn = write_plots(folder, output, target, choice)
     for found in drawn:
-        click.echo(" ".join(map(str, found.paths)))
-        click.echo(f"  {found.caption}")
+        print_text(" ".join(map(str, found.paths)))
+        print_text(f"  {found.caption}")
     return DONE

@@ -4,8 +4,7 @@ import os
 from collections import Counter
 from typing import TYPE_CHECKING
 
-import click
-
+from compressor.program import printable
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -13,8 +12,10 @@ from compsim.screen import (
     all_stored,
     duration,
     plural,
+    print_text,
     say,
     stored_before,
+    unread,
 )
 
 if TYPE_CHECKING:
@@ -58,12 +59,13 @@ def tell(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
         where = os.path.join(folder, "regimes", count.study)
         chains = f"{plural(count.chains, 'chain')} x {plural(count.values, 'value')}"
         ok = count.done - count.failed
-        click.echo(f"{count.study}  {chains}  {ok:>4} ok  {count.failed:>4} failed  {where}")
-        click.echo(f"{count.study}  {regimes_of(folder, count.study)}")
-        if count.differ:
-            apart = plural(count.differ, "value")
-            click.echo(f"{count.study}  up and down differ at {apart}; second attractors "
-                       f"confirmed at {count.confirmed}")  # fmt: skip
+        with unread():
+            print_text(f"{count.study}  {chains}  {ok:>4} ok  {count.failed:>4} failed  {where}")
+            print_text(f"{count.study}  {regimes_of(folder, count.study)}")
+            if count.differ:
+                apart = plural(count.differ, "value")
+                print_text(f"{count.study}  up and down differ at {apart}; second attractors "
+                           f"confirmed at {count.confirmed}")  # fmt: skip
     if not quiet:
         new = summary.total - summary.done_before
         done = f"{plural(new, 'value')} run in {duration(summary.seconds)}"
@@ -71,7 +73,6 @@ def tell(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
         say(done if new else all_stored(summary.total, folder, "value"))
     if not summary.failed:
         return
-    from compressor.cases import printable
     from compressor.reasons import remedy
 
     for one in summary.failed[:MOST_FAILURES]:

@@ -3,7 +3,10 @@
 import click
 
 from compsim.results import folders, of_results, results_folder
-from compsim.screen import DONE
+from compsim.screen import (
+    DONE,
+    print_text,
+)
 
 
 @click.command()
@@ -24,5 +27,5 @@ def report(
     writable_folder(output, make=False)
     from compressor.report import write_report
 
-    click.echo(write_report(folder, output, context.obj, claims))
+    print_text(str(write_report(folder, output, context.obj, claims)))
     return DONE

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.program import PROGRAM
+from compressor.program import PROGRAM, printable
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -24,10 +24,12 @@ from compsim.screen import (
     only_option,
     output_option,
     plural,
+    print_text,
     say,
     setting,
     stored_before,
     tell_changes,
+    unread,
 )
 
 if TYPE_CHECKING:
@@ -209,10 +211,11 @@ def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
     for count in summary.counts:
         where = os.path.join(folder, "studies", f"{count.study}.json")
         good = count.jobs - count.failed
-        click.echo(
-            f"{count.study:<{width}}  {plural(count.jobs):>9}  {good:>4} ok  "
-            f"{count.failed:>4} failed  {where}"
-        )
+        with unread():
+            print_text(
+                f"{count.study:<{width}}  {plural(count.jobs):>9}  {good:>4} ok  "
+                f"{count.failed:>4} failed  {where}"
+            )
     if not quiet:
         if not summary.run_now:
             say(all_stored(summary.total, folder))
@@ -245,7 +248,6 @@ def report_failures(summary: "Summary") -> None:
     failures = summary.failed
     if not failures:
         return
-    from compressor.cases import printable
     from compressor.reasons import remedy
 
     say(f"{plural(len({failure.key for failure in failures}))} failed:")

@@ -4,7 +4,10 @@ import json
 
 import click
 
-from compsim.screen import DONE
+from compsim.screen import (
+    DONE,
+    print_text,
+)
 
 
 @click.command()
@@ -17,5 +20,5 @@ def schema() -> int:
     """
     from compressor.cases import case_schema
 
-    click.echo(json.dumps(case_schema(), indent=1))
+    print_text(json.dumps(case_schema(), indent=1))
     return DONE

@@ -6,12 +6,13 @@ import re
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from compressor.program import printable
 from compsim.results import files, folders
 
 if TYPE_CHECKING:
@@ -227,10 +228,52 @@ class Pace:
         return max(0.0, seconds / things * (total - self.last[0]) - since)
 
 
+def harmless(text: str) -> str:
+    """Return lines of text in which no character can steer a terminal."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
+def print_text(text: str) -> None:
+    """Print lines on stdout."""
+    click.echo(harmless(text))
+
+
+@contextlib.contextmanager
+def unread() -> Iterator[None]:
+    """Go on where nobody reads stdout any more: what it would tell is done all the same."""
+    try:
+        yield
+    except BrokenPipeError:
+        discard_output()
+
+
+def discard_output() -> None:
+    """Let what is still written to stdout go nowhere, also what is in its buffer."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
+
+
+def open_streams() -> None:
+    """Open /dev/null as each of stdin, stdout and stderr that is closed.
+
+    A file of results would get its number, and what a library prints.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            place = os.open(os.devnull, os.O_RDWR)
+            if place != number:
+                os.dup2(place, number)
+                os.close(place)
+            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))
+
+
 def say(text: str, end: str = "\n") -> None:
     """Write to stderr; nobody may be there to read it."""
     with contextlib.suppress(OSError):
-        print(text, end=end, file=sys.stderr, flush=True)
+        print(harmless(text), end=end, file=sys.stderr, flush=True)
 
 
 def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:

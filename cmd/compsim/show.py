@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from compressor.program import printable
 from compsim.results import jobs, of_results, results_folder
-from compsim.screen import DONE, as_json, run_commands, say
+from compsim.screen import (
+    DONE,
+    as_json,
+    print_text,
+    run_commands,
+    say,
+)
 
 if TYPE_CHECKING:
     from compressor.store import JobReport
@@ -69,9 +76,9 @@ def show(
 
     found = report_job(folder, *words)
     if as_json:
-        click.echo(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
+        print_text(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
     elif only_case:
-        click.echo(whole_case(found, folder), nl=False)
+        print_text(whole_case(found, folder).removesuffix("\n"))
     else:
         tell(found, folder, reversal)
     return DONE
@@ -79,30 +86,30 @@ def show(
 
 def tell(found: "JobReport", folder: str, reversal: tuple[float, float]) -> None:
     """Say what is known of a job."""
-    from compressor.cases import Case, printable, to_yaml
+    from compressor.cases import Case, to_yaml
     from compressor.reasons import remedy
     from compsim.job_text import sections
 
-    click.echo(f"job {found.key}: {printable(ending(found))}")
+    print_text(f"job {found.key}: {printable(ending(found))}")
     for study, point in found.studies.items():
         values = "".join(f" {key}={value}" for key, value in point.items())
-        click.echo(f"  in {study}{printable(values)}")
+        print_text(f"  in {study}{printable(values)}")
     if found.status == "failed":
-        click.echo(f"  what to do: {remedy(found.reason)}")
+        print_text(f"  what to do: {remedy(found.reason)}")
     if found.status == "missing":
         for command in run_commands(found.again, folder):
             say(f"next: {command}")
         return
     for heading, lines in sections(found, reversal):
         if lines and heading:
-            click.echo(heading)
+            print_text(heading)
         for line in lines:
-            click.echo(f"  {printable(line)}")
+            print_text(f"  {printable(line)}")
     if "case" in found.attributes:
-        click.echo("the case, as far as it differs from the defaults (--case prints it whole)")
+        print_text("the case, as far as it differs from the defaults (--case prints it whole)")
         case = Case.from_attribute(found.attributes["case"])
         for line in to_yaml(case, brief=True).splitlines():
-            click.echo(f"  {line}")
+            print_text(f"  {line}")
 
 
 def whole_case(found: "JobReport", folder: str) -> str:

@@ -6,7 +6,14 @@ import json
 import click
 
 from compsim.results import of_results, results_folder
-from compsim.screen import DONE, as_json, plural, run_commands, say
+from compsim.screen import (
+    DONE,
+    as_json,
+    plural,
+    print_text,
+    run_commands,
+    say,
+)
 
 PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
 REGIMES = {
@@ -32,21 +39,21 @@ def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 
     found = standings(folder)
     if as_json:
-        click.echo(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
+        print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
         return DONE
     width = max(len(one.study) for one in found)
     for one in found:
-        click.echo(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
+        print_text(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
                    f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
         if one.former_of:
-            click.echo(f"{'':<{width}}  {one.former_of} as it was run on {one.written[:10]}, with "
+            print_text(f"{'':<{width}}  {one.former_of} as it was run on {one.written[:10]}, with "
                        "finished jobs that it has no longer; opens by this name")  # fmt: skip
         for words, known in ((PROMISES, one.promises), (REGIMES, one.regimes)):
             said = [f"{number} {words[word]}" for word, number in known.items() if words.get(word)]
             if said:
-                click.echo(f"{'':<{width}}  of those ok: {', '.join(said)}")
+                print_text(f"{'':<{width}}  of those ok: {', '.join(said)}")
         for reason, number in one.reasons.items():
-            click.echo(f"{'':<{width}}  {number:>4} {reason}: {remedy(reason)}")
+            print_text(f"{'':<{width}}  {number:>4} {reason}: {remedy(reason)}")
     wanting = [one.again for one in found if one.missing and not one.former_of]
     for command in run_commands(wanting, folder):
         say(f"next: {command}")

@@ -16,6 +16,7 @@ from compsim.screen import (
     jobs_option,
     one_thread_each,
     plural,
+    print_text,
     say,
 )
 
@@ -64,7 +65,7 @@ def stress(
     from compressor.sweep import cores
 
     if scene is not None:
-        click.echo("\n".join(repeated(scene, seed, drawn or "")))
+        print_text("\n".join(repeated(scene, seed, drawn or "")))
         return DONE
     from compressor.measure import Budget, campaign
     from compressor.report import draw_outcomes, render
@@ -79,7 +80,7 @@ def stress(
     drawing = draw_outcomes(study)
     for kind in ("png", "svg"):
         publish(Path(output, f"stress.{kind}"), render(drawing, kind))
-    click.echo("\n".join(summary(study)))
+    print_text("\n".join(summary(study)))
     if not quiet:
         say(study.encoding["source"])
         say(os.path.join(output, "stress.png"))

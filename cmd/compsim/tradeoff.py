@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from compsim.results import files, folders
-from compsim.screen import DONE, Screen, say, setting
+from compsim.screen import (
+    DONE,
+    Screen,
+    print_text,
+    say,
+    setting,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +64,7 @@ def tradeoff(
     finally:
         screen.end()
     write_dataset(folder / "modelling.nc", trade)
-    click.echo("\n".join([*fastest_lines(study), "", *trade_lines(trade)]))
+    print_text("\n".join([*fastest_lines(study), "", *trade_lines(trade)]))
     if not quiet:
         for name in ("tradeoff.png", "tradeoff.nc", "modelling.nc"):
             say(os.path.join(output, name))

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from compsim.results import of_results, results_folder
-from compsim.screen import DONE, STORE, as_json, plural, run_commands, say
+from compsim.screen import (
+    DONE,
+    STORE,
+    as_json,
+    plural,
+    print_text,
+    run_commands,
+    say,
+)
 
 if TYPE_CHECKING:
     from compressor.store import Damage
@@ -26,14 +34,14 @@ def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 
     damages = compare(folder)
     if as_json:
-        click.echo(json.dumps([plain(damage) for damage in damages], indent=1))
+        print_text(json.dumps([plain(damage) for damage in damages], indent=1))
     for damage in () if as_json else damages:
-        click.echo(f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy))
+        print_text(f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy))
         for job in damage.jobs:
-            click.echo(f"  job {job.key}")
+            print_text(f"  job {job.key}")
             for study, point in job.studies.items():
                 values = "".join(f" {key}={value}" for key, value in point.items())
-                click.echo(f"    in {study}{values}")
+                print_text(f"    in {study}{values}")
     if not damages:
         say("no damage")
         return DONE

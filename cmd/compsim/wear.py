@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from compressor.program import printable
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -21,6 +22,7 @@ from compsim.screen import (
     one_thread_each,
     output_option,
     plural,
+    print_text,
     say,
     setting,
     stored_before,
@@ -76,10 +78,10 @@ def wear(
         raise
     screen.end()
     if as_json:
-        click.echo(json.dumps([plain(one, output) for one in summary.machines], indent=1))
+        print_text(json.dumps([plain(one, output) for one in summary.machines], indent=1))
     else:
         for line in table(summary.machines):
-            click.echo(line)
+            print_text(line)
     drawn = [*draw(summary, output)]
     if not quiet:
         tell(summary, output, drawn)
@@ -180,7 +182,6 @@ def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
 
 def fail(one: "Machine") -> None:
     """Say why a machine ended early, and what to do."""
-    from compressor.cases import printable
     from compressor.reasons import remedy
 
     point = "".join(f" {key}={value}" for key, value in one.point.items())

@@ -32,4 +32,3 @@ from compressor.cases.table import table
 from compressor.cases.vibration import Body, Sensor
 from compressor.cases.wear import Wear
 from compressor.cases.written import to_yaml
-from compressor.cases.yaml_reader import printable

@@ -16,6 +16,7 @@ import yaml
 
 from compressor.cases.near_files import START, no_text, unreadable
 from compressor.cases.parameter import NO_VALUE
+from compressor.program import printable
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 20
@@ -76,11 +77,6 @@ class Node:
 
 class _Unreadable(Exception):
     """Ends the reading of a file; carries the last problem."""
-
-
-def printable(text: str) -> str:
-    """Text in which no character can steer a terminal."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shortened(text: str, most: int = 60) -> str:

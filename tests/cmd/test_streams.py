@@ -1,0 +1,101 @@
+"""Streams that are closed, full or no longer read, and names that would steer a terminal."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from compsim import cli
+
+ROOT = Path(__file__).parent.parent.parent
+STORED = ["run", str(ROOT / "configs/big-end.yaml"), "--set", "solve.accuracy=draft", "-o"]
+
+
+@pytest.fixture
+def compsim(paper_store, tmp_path):
+    """Runs a command on a store that has all its jobs: compsim(words, ...) -> what happened."""
+
+    def run(*words, **options):
+        words = [str(paper_store) if word == "STORE" else word for word in words]
+        call = [sys.executable, "-m", "compsim", *words]
+        options = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, **options}
+        return subprocess.run(call, cwd=tmp_path, text=True, timeout=100, **options)
+
+    return run
+
+
+@pytest.mark.parametrize("closed", [(0,), (1,), (2,), (0, 1, 2)])
+def test_a_command_runs_where_streams_are_closed(closed, compsim):
+    def close():
+        for number in closed:
+            os.close(number)
+
+    kept = {} if 1 in closed else {"stdout": subprocess.PIPE}
+    done = compsim(*STORED, "STORE", preexec_fn=close, stderr=subprocess.PIPE, **kept)
+    assert done.returncode == 0, done.stderr
+    assert 1 in closed or done.stdout.startswith("big-end     3 jobs     3 ok")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["status", "STORE"], 141),
+        (["schema"], 141),
+        (["--help"], 141),
+        ([*STORED, "STORE"], 0),  # what was to be done is done
+    ],
+)
+def test_output_that_nobody_reads_ends_in_silence(words, code, compsim):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = compsim(*words, stdout=writer, stderr=subprocess.PIPE)
+    os.close(writer)
+    assert done.returncode == code
+    assert all(line.startswith(("nothing to do", "next: ")) for line in done.stderr.splitlines())
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
+@pytest.mark.parametrize("words", [["status", "STORE"], ["--help"], [*STORED, "STORE"]])
+def test_output_that_does_not_fit_is_told_in_one_line(words, compsim):
+    with open("/dev/full", "w") as full:
+        done = compsim(*words, stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 5
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("compsim: stdout: No space left on device; ")
+
+
+def test_ctrl_c_amid_an_import_leaves_no_traceback(tmp_path):
+    begun = tmp_path / "begun"
+    (tmp_path / "click.py").write_text(
+        f"import pathlib, time\npathlib.Path({str(begun)!r}).touch()\ntime.sleep(60)\n",
+        encoding="utf-8",
+    )
+    call = [sys.executable, "-m", "compsim", "status"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    running = subprocess.Popen(call, env=environment, stderr=subprocess.PIPE, text=True)
+    while not begun.exists():
+        assert running.poll() is None
+        time.sleep(0.01)
+    running.send_signal(signal.SIGINT)
+    assert running.communicate(timeout=30)[1] == ""
+    assert running.returncode == -signal.SIGINT
+
+
+STEERING = "x\x1b]0;mine\x07\x1b[31m\u202e"
+
+
+@pytest.mark.parametrize("line", [["status"], ["verify"], [*STORED], ["show", "big-end", "-i"], []])
+def test_a_folder_s_name_cannot_steer_the_terminal(
+    line, paper_store, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    Path(STEERING).symlink_to(paper_store)
+    cli.main([*line, STEERING])
+    shown = "".join(capsys.readouterr())
+    if line in ([], STORED):  # which name it
+        assert "\\x1b]0;mine\\x07\\x1b[31m\\u202e" in shown
+    assert not {"\x1b", "\x07", "\u202e"} & {*shown}
