@@ -22,7 +22,7 @@ from compressor.cases.load import load_studies
 from compressor.metrics import NUMBERS
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
-from compressor.store.files import publish_pending
+from compressor.store.files import name_pending
 from compressor.store.reader import finished_keys, read_store
 from compressor.store.series_file import series_path, write_series
 from compressor.store.studies import write_study
@@ -132,7 +132,7 @@ def write_named(place, dataset, output):
     """Write a job's file and give it its name, without a row; returns its path."""
     file = write_series(place, dataset, output)
     path = series_path(place, dataset.attrs["key"], file.digest)
-    publish_pending([path])
+    name_pending([path])
     return path
 
 

@@ -10,7 +10,7 @@ import os
 import re
 import time
 import uuid
-from collections.abc import Collection, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -27,6 +27,7 @@ LOCK_NAME = "writer.lock"
 FULL = "free some space there, then run the same command again"
 IS_FILE = "is a file, where a folder is needed"
 ELSEWHERE = "choose another folder"
+NO_LOCKS = "choose a folder on a file system with locks"
 FORBIDDEN = f"get the permission to use it, or {ELSEWHERE}"
 REMEDIES = {
     errno.ENOSPC: FULL,
@@ -36,7 +37,9 @@ REMEDIES = {
     errno.EPERM: FORBIDDEN,
     errno.EROFS: FORBIDDEN,
     errno.ENOTDIR: ELSEWHERE,
-    errno.ENOLCK: "choose a folder on a file system with locks",
+    errno.ENOLCK: NO_LOCKS,
+    errno.ENOSYS: NO_LOCKS,
+    errno.EOPNOTSUPP: NO_LOCKS,
     errno.EMFILE: "allow more open files (ulimit -n)",
 }
 
@@ -123,7 +126,7 @@ def publishing(path: Path) -> Iterator[BinaryIO]:
             with contextlib.suppress(OSError):
                 temporary.unlink()
             raise
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     except OSError as error:
         raise system_error(path, error) from error
 
@@ -133,8 +136,16 @@ def pending_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.tmp")
 
 
+def final_path(path: Path) -> Path:
+    """Return what a file that waits will be called; one with its name keeps it."""
+    return path.with_name(path.name.removeprefix(".").removesuffix(".tmp"))
+
+
 def write_pending(path: Path, data: bytes) -> None:
-    """Write a whole file that `publish_pending` will give its name. Raises StoreError."""
+    """Write a whole file that waits for its name. Raises StoreError.
+
+    It is durable once its folder has been synced (`sync_folder`).
+    """
     make_folder(path.parent)
     try:
         try:
@@ -150,8 +161,8 @@ def write_pending(path: Path, data: bytes) -> None:
         raise system_error(path, error) from error
 
 
-def publish_pending(paths: Collection[Path]) -> None:
-    """Give files that wait their names, durably; one that has its name stays. Raises StoreError."""
+def name_pending(paths: Iterable[Path]) -> None:
+    """Give files that wait their names; one that has its name stays. Raises StoreError."""
     for path in paths:
         with refusals(path):
             try:
@@ -159,9 +170,6 @@ def publish_pending(paths: Collection[Path]) -> None:
             except FileNotFoundError:
                 if not path.exists():
                     raise
-    for folder in {path.parent for path in paths}:
-        with refusals(folder):
-            _sync_folder(folder)
 
 
 def is_locked(place: Path) -> bool:
@@ -208,13 +216,17 @@ def _make_folder(folder: Path) -> None:
             folder.mkdir(exist_ok=True)
         except FileExistsError as error:
             raise WrongName(folder, IS_FILE, ELSEWHERE) from error
-        _sync_folder(folder.parent)
+        sync_folder(folder.parent)
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder durable, where its file system can."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.EOPNOTSUPP):  # as FUSE and SMB say
+            raise
     finally:
         os.close(descriptor)
 

@@ -12,6 +12,7 @@ no index: what is stored is read from the rows. `compressor.store.writer` writes
 """
 
 import os
+import re
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -24,12 +25,18 @@ import numpy as np
 from compressor.cases import Case
 from compressor.outcome import Outcome
 from compressor.reasons import Reason
-from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
+from compressor.store.files import (
+    HEX20,
+    KEY,
+    Folder,
+    StoreError,
+    StoreWarning,
+    system_error,
+)
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.names import find_study
 from compressor.store.rows import Rows
 from compressor.store.segment import NAME, Cut, Segment, read_segment
-from compressor.store.series_file import NAME as SERIES_NAME
 from compressor.store.series_file import read_series, read_values
 from compressor.store.stale import stale
 from compressor.store.studies import read_studies
@@ -39,6 +46,7 @@ if TYPE_CHECKING:
 
 # reasons that leave no time series
 BROKEN = {Reason.INTERNAL_ERROR, Reason.WORKER_DIED, Reason.OUT_OF_MEMORY, Reason.INVALID_INPUT}
+NAMED = re.compile(rf"{HEX20}-{HEX20}\.h5")  # a file of time series that waits no longer
 ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 
 
@@ -212,7 +220,8 @@ def _usable(segment: Segment) -> np.ndarray:
     kept = columns["samples"] > 0
     if not kept.any():
         return ~kept
-    names = np.array(_names(segment.place / "jobs"), "S")
+    listed = _names(segment.place / "jobs")
+    names = np.array([name.removeprefix(".").removesuffix(".tmp") for name in listed], "S")
     wanted = np.char.add(np.char.add(np.char.add(columns["key"], b"-"), columns["digest"]), b".h5")
     return ~kept | np.isin(wanted, names)
 
@@ -235,7 +244,7 @@ def unowned_series(place: Path, rows: Rows) -> list[str]:
     """
     if (place / "jobs").is_symlink():
         return []
-    names = [name for name in _names(place / "jobs") if SERIES_NAME.fullmatch(name)]
+    names = [name for name in _names(place / "jobs") if NAMED.fullmatch(name)]
     keys = {name[:20] for name in names}
     known = {key for key, at in zip(keys, rows.find([*keys]).tolist(), strict=True) if at >= 0}
     return sorted(name for name in names if name[:20] not in known)

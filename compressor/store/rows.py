@@ -15,6 +15,7 @@ import numpy as np
 
 from compressor.metrics import HORIZON
 from compressor.outcome import ROW
+from compressor.store.files import pending_path
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.segment import (
     COLUMNS,
@@ -147,11 +148,13 @@ class Rows:
             raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY) from error
 
     def path(self, position: int) -> Path | None:
-        """The file with a job's time series; None where none are kept."""
+        """The file with a job's time series, which may wait for its name; None without any."""
         if not self.columns["samples"][position]:
             return None
         key, checksum = (self.columns[name][position].decode() for name in ("key", "digest"))
-        return series_path(self.segments[self.source[position]].place, key, checksum)
+        path = series_path(self.segments[self.source[position]].place, key, checksum)
+        waiting = pending_path(path)
+        return waiting if not path.exists() and waiting.exists() else path
 
     def intact(self, position: int) -> bool:
         """Whether the file with a job's time series, if there is one, is what was written."""

@@ -4,8 +4,9 @@
 
 The digest of the file's bytes is in its name and in the job's row, and compared whenever the file
 is read. A job that is run again gets a new name, so that its old result stays whole until the new
-row is on disk. A new file waits under a temporary name until the `Writer` is about to store its
-row: a file with its name belongs to a row, and what a run that was killed leaves has no name.
+row is on disk. A new file waits under a temporary name, `.<key>-<digest>.h5.tmp`, until the
+`Writer` has stored its row: a file with its name belongs to a row, and what a run that was killed
+leaves has no name, unless its row was stored. Readers know both names.
 """
 
 import errno
@@ -20,13 +21,21 @@ from compressor.cases import Output
 from compressor.metrics import NUMBERS
 from compressor.outcome import SeriesFile, Table
 from compressor.store import hdf5
-from compressor.store.files import HEX20, KEY, StoreError, publish, system_error, write_pending
+from compressor.store.files import (
+    HEX20,
+    KEY,
+    StoreError,
+    final_path,
+    publish,
+    system_error,
+    write_pending,
+)
 from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened, sealed, unsealed
 
 if TYPE_CHECKING:
     import xarray as xr
 
-NAME = re.compile(rf"({HEX20})-({HEX20})\.h5")
+NAME = re.compile(rf"\.?({HEX20})-({HEX20})\.h5(?:\.tmp)?")
 ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
 
 
@@ -99,18 +108,26 @@ def intact(path: Path) -> bool:
     """
     named = NAME.fullmatch(path.name)
     try:
-        return named is not None and digest(path.read_bytes()) == named[2]
+        return named is not None and digest(_read_file(path)) == named[2]
     except OSError as error:
         if error.errno in (errno.ENOENT, errno.EIO):
             return False
         raise system_error(path, error) from error
 
 
+def _read_file(path: Path) -> bytes:
+    """Return the bytes of a job's file, which may get its name at this moment."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return final_path(path).read_bytes()
+
+
 def read_bytes(path: Path) -> bytes:
     """The bytes of a job's file, compared with their digest. Raises DamagedJob."""
     named = NAME.fullmatch(path.name)
     try:
-        data = path.read_bytes()
+        data = _read_file(path)
     except FileNotFoundError as error:
         raise StoreError(path, "is not there any more", "run its study again") from error
     except OSError as error:
@@ -126,7 +143,7 @@ def read_series(path: Path) -> "xr.Dataset":
 
     with opened(read_bytes(path), path) as file:
         attributes = hdf5.attributes(file)
-        if attributes["key"] != path.name[:20]:
+        if attributes["key"] != final_path(path).name[:20]:
             raise ValueError
         dataset = xr.Dataset(hdf5.variables(file), attrs=attributes)
         for name, (dims, _, _) in NUMBERS.items():

@@ -24,10 +24,12 @@ from compressor.store.files import (
     Folder,
     StoreError,
     discard_leftovers,
+    final_path,
     make_folder,
+    name_pending,
     publish,
-    publish_pending,
     refusals,
+    sync_folder,
     system_error,
 )
 from compressor.store.reader import places, read_store, segment_paths, unowned_series
@@ -72,7 +74,6 @@ class Writer:
     def __enter__(self) -> "Writer":
         self.lock = _locked(self.place / LOCK_NAME, self.wait, self.command)
         try:
-            discard_leftovers(self.place)
             self.found = read_store(self.folder)
             self.number = max(map(_number, self._all_paths()), default=0)
             with refusals(self.place):
@@ -80,6 +81,8 @@ class Writer:
                 _set_aside(damaged)
                 mine = [s for s in self.found.segments if s.place == self.place]
                 rows = Rows.of(mine)
+                self._name_stored(rows)
+                discard_leftovers(self.place)
                 self._discard_replaced(mine, rows)
                 self.unowned = 0 if damaged else len(unowned_series(self.place, rows))
                 if self.place == self.folder:
@@ -119,10 +122,13 @@ class Writer:
         if not self.pending:
             return []
         keys = list(self.pending)
-        series = [(one.key, one.series.digest) for one in self.pending.values() if one.series]
-        publish_pending([series_path(self.place, *names) for names in series])
         segment = of_outcomes(self.pending.values(), self.number + 1)
+        series = _series_paths(self.place, segment.columns)
+        if series:  # whose names, even if they wait for others, must not be lost to a power cut
+            with refusals(self.place):
+                sync_folder(self.place / "jobs")
         path = self._publish(encode(segment))
+        name_pending(series)
         if len(segment) < MOST_ROWS:
             self.small[path] = len(segment)
         self.pending, self.flushed = {}, time.monotonic()
@@ -178,6 +184,12 @@ class Writer:
                     _set_aside(damaged)
                     os.close(lock)
 
+    def _name_stored(self, rows: Rows) -> None:
+        """Give files of time series their names that wait though their row is stored: a kill."""
+        waiting = [*(self.place / "jobs").glob(".*.h5.tmp")]
+        known = {*_series_paths(self.place, rows.columns)} if waiting else set()
+        name_pending(known.intersection(map(final_path, waiting)))
+
     def _discard_replaced(self, segments: Sequence[Segment], rows: Segment | Rows) -> None:
         """Remove the time series of rows that better ones have replaced, where these have theirs.
 
@@ -190,6 +202,11 @@ class Writer:
         for key, checksum in set().union(*(_series_names(s.columns) for s in segments)) - chosen:
             if key in better and series_path(self.place, key, better[key]).exists():
                 series_path(self.place, key, checksum).unlink(missing_ok=True)
+
+
+def _series_paths(place: Path, columns: Mapping[str, np.ndarray]) -> list[Path]:
+    """Return the files of the rows that have time series."""
+    return [series_path(place, key, checksum) for key, checksum in _series_names(columns)]
 
 
 def _series_names(columns: Mapping[str, np.ndarray]) -> set[tuple[str, str]]:
@@ -232,9 +249,8 @@ def _locked(path: Path, wait: bool, command: str) -> int:
             remedy = "wait for it to end, or choose another folder"
             raise StoreError(path, f"the store is in use by {holder}", remedy) from error
         os.ftruncate(descriptor, 0)
-        os.write(
-            descriptor, f"process {os.getpid()} on {socket.gethostname()}: {command}\n".encode()
-        )
+        holder = f"process {os.getpid()} on {socket.gethostname()}: {command}\n"
+        os.write(descriptor, holder.encode(errors="backslashreplace"))
     except OSError as error:
         raise system_error(path, error) from error
     return descriptor

@@ -414,6 +414,20 @@ def test_file_system_errors_have_a_remedy(call, number, remedy, ideal, tmp_path,
     assert len(waiting) == (call == "replace")  # written whole; without its name it is no result
 
 
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.EOPNOTSUPP])
+def test_a_folder_that_cannot_be_synced_is_let_pass(number, ideal, tmp_path, monkeypatch):
+    real = os.fsync
+
+    def sync(descriptor):
+        if os.path.isdir(f"/proc/self/fd/{descriptor}"):
+            raise OSError(number, os.strerror(number))
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    keep(tmp_path / "fuse", ideal)
+    assert store.finished_keys(tmp_path / "fuse") == {ideal.attrs["key"]}
+
+
 def test_a_file_where_a_folder_is_needed(ideal, tmp_path):
     (tmp_path / "results").write_text("mine")
     with pytest.raises(StoreError, match="is a file, where a folder is needed"):

@@ -110,7 +110,9 @@ def kept_as(precision):
 @pytest.mark.parametrize("shard", ["", "a"])
 def test_a_better_row_stays_whoever_writes_last(better, worse, shard, tmp_path, monkeypatch):
     monkeypatch.setattr(store, "_usable", lambda segment: np.ones(len(segment), bool))
-    monkeypatch.setattr(writer, "publish_pending", list)
+    monkeypatch.setattr(writer, "name_pending", list)
+    (tmp_path / "jobs").mkdir()
+    (tmp_path / "shards/a/jobs").mkdir(parents=True)
     put(tmp_path, better)
     put(tmp_path, worse, shard=shard)
     rows = store.read_store(tmp_path).rows
@@ -243,6 +245,16 @@ def test_one_writer_at_a_time(tmp_path):
     assert peaks(tmp_path) == {1: 1, 2: 2}
 
 
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_told(number, tmp_path, monkeypatch):
+    def refuse(*arguments):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with pytest.raises(StoreError, match="choose a folder on a file system with locks"):
+        Writer(tmp_path).__enter__()
+
+
 def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
     monkeypatch.setattr(writer, "PATIENCE", 60.0)
     with Writer(tmp_path, command="the first"):
@@ -331,6 +343,27 @@ def test_a_crash_before_the_row_leaves_the_old_result(tmp_path):
         pass
     assert len(list(tmp_path.glob("jobs/*.h5"))) == 1
     xr.testing.assert_identical(store.read_job(tmp_path, case.key), job)
+
+
+def test_a_crash_after_the_row_leaves_the_new_result(tmp_path, monkeypatch):
+    """Its file waits for its name, which readers know, until the next run."""
+    case = short_cases()[0]
+    job = simulate(case)
+    monkeypatch.setattr(writer, "name_pending", list)  # SIGKILL in its place
+    with Writer(tmp_path) as open_writer:
+        series = write_series(tmp_path, job, case.output)
+        open_writer.add(Outcome("ok", "", np.zeros(1, ROW)[0], {**job.attrs, "name": ""}, series))
+    monkeypatch.undo()
+    assert list(tmp_path.glob("jobs/*.h5")) == []
+    for _ in range(2):
+        xr.testing.assert_identical(store.read_job(tmp_path, case.key), job)
+        assert read_values(store.read_store(tmp_path).rows.path(0), ["time"])["time"].size
+        assert verify(tmp_path) == []
+        (waiting,) = tmp_path.glob("jobs/*")
+        os.utime(waiting, (0, 0))  # as old as a file that nobody needs
+        with Writer(tmp_path):
+            pass
+    assert len(list(tmp_path.glob("jobs/*.h5"))) == 1
 
 
 def test_a_full_disk_is_an_error_with_a_name_and_rows_wait(tmp_path, monkeypatch):

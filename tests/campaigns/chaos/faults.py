@@ -185,11 +185,13 @@ def grown(complete: Path, place: Path) -> None:
     """A store with some jobs missing, and what dead writers left."""
     shutil.copytree(complete, place)
     victim = next(iter(sorted((place / "jobs").iterdir())))
-    (place / "jobs" / f"{'0' * 20}-{'0' * 20}.h5").write_bytes(victim.read_bytes())
+    unnamed = place / "jobs" / f".{'0' * 20}-{'0' * 20}.h5.tmp"
+    unnamed.write_bytes(victim.read_bytes())
     victim.unlink()
     leftover = place / "rows" / ".old.tmp"
     leftover.write_bytes(b"torn")
-    os.utime(leftover, (0, 0))
+    for path in (unnamed, leftover):
+        os.utime(path, (0, 0))
 
 
 def damaged(complete: Path, place: Path) -> None:

@@ -70,13 +70,16 @@ def rows(folder):
 
 
 def torn(folder):
-    """Files of a store that are under their names, but not whole; those of no row, too."""
+    """Files of a store that are under their names, but not whole; those of no row, too.
+
+    Not a study with jobs that have not run yet.
+    """
     found = []
     for place in places(folder):
         found += [path for path in place.glob("jobs/*.h5") if not intact(path)]
     stored = read_store(folder, DamagedJob)
     if stored.segments or stored.damaged or study_paths(folder):
-        found += [damage.path for damage in verify(folder)]
+        found += [one.path for one in verify(folder) if not one.problem.endswith("or gone")]
     return [*dict.fromkeys(str(path) for path in found)]
 
 
