@@ -74,7 +74,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "sklearn": set(),  # of campaigns alone
 }
 MOST_NAMES = 23  # that cross a wall between two rooms, a package
-MOST_LINES, MOST_FUNCTION, MOST_PARAMETERS = 350, 60, 6
+MOST_LINES, MOST_FUNCTION, MOST_PARAMETERS = 600, 60, 6
 
 Sources = dict[str, str]  # module -> text; a package's door has the package's name
 
@@ -274,7 +274,7 @@ def test_few_names_cross_a_wall():
 def test_physics_needs_numpy_alone(module):
     outside = {source.partition(".")[0] for source, _ in imports(SOURCES[module])}
     allowed = {"numpy", "math", "enum", "typing", "dataclasses", "collections", "compressor"}
-    door = {"numba", "functools", "os", "shutil", "pathlib"}
+    door = {"numba", "functools", "os", "shutil", "pathlib", "threading"}
     assert outside - allowed <= (door if module == "compressor.physics._jit" else set())
 
 
