@@ -190,6 +190,9 @@ def told(error: Exception) -> int:
         say(f"compsim: stdout: {error.strerror}; the same command prints it again")
         discard_output()
         return STORE
+    if isinstance(error, MemoryError):
+        say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
+        return INTERNAL
     lines = traceback.format_exception(error)
     if os.environ.get("COMPSIM_DEBUG"):
         say("".join(lines), end="")

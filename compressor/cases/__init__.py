@@ -1,7 +1,7 @@
 """A YAML text -> checked cases and studies."""
 
 from compressor.cases.accuracy import ACCURACY, TIGHTEST
-from compressor.cases.case import MODEL_VERSION, Case
+from compressor.cases.case import MODEL_VERSION, Case, require_case
 from compressor.cases.examples import templates
 from compressor.cases.file_error import CaseFileError
 from compressor.cases.groups import (

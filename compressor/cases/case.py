@@ -138,15 +138,20 @@ class Case(Settings):
     def from_attribute(cls, text: str) -> "Case":
         """The case of a stored Dataset, from its attribute `case` (JSON of `values`).
 
-        Raises CaseError where this version of the program has no such case, ValueError where the
-        text is no JSON.
+        Raises CaseError where this version of the program has no such case, and where the text is
+        no JSON.
 
         >>> import compressor
         >>> case = compressor.Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
         >>> compressor.Case.from_attribute(case.attributes()["case"]) == case
         True
         """
-        return cls.from_values(json.loads(text))
+        try:
+            values = json.loads(text)
+        except (TypeError, ValueError, RecursionError) as error:
+            message = f"needs JSON text, such as the attribute `case` of a run, not {shown(text)}"
+            raise CaseError([Problem("", message)]) from error
+        return cls.from_values(values)
 
     def values(self) -> dict[str, Any]:
         """The case as plain nested values; `from_values` reads them back to an equal case.
@@ -245,6 +250,13 @@ class Case(Settings):
         with contextlib.suppress(ArithmeticError, TypeError, ValueError):
             keys = {"key": self.key, "physics_key": self.physics_key}
         return found | keys
+
+
+def require_case(value: Any) -> Case:
+    """Return a value that is a Case. Raises CaseError for any other."""
+    if isinstance(value, Case):
+        return value
+    raise CaseError([Problem("", f"needs a Case, as of Case.from_values, not {shown(value)}")])
 
 
 def parts_of(values: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:

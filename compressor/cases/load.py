@@ -12,6 +12,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from compressor.cases import blocks, regimes
 from compressor.cases.case import Case
@@ -19,7 +20,7 @@ from compressor.cases.combinations import Block, columns
 from compressor.cases.conditions import NoComparison, Test, comparison
 from compressor.cases.file_error import CaseFileError
 from compressor.cases.keys import Leaves, leaves, merged, nested, overridden, read_overrides
-from compressor.cases.parameter import CaseError, Problem
+from compressor.cases.parameter import CaseError, Problem, shown
 from compressor.cases.regimes import GROUP, Regimes
 from compressor.cases.study import Axis, Cases, Study, Told, unheard
 from compressor.cases.swept import SAMPLED, counted
@@ -83,7 +84,7 @@ def load_studies(
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
     test = _read_only(only, problems) if only else None
-    drafts = [_draft(os.fsdecode(path), changes, problems) for path in paths]
+    drafts = [_draft(_path_of(path), changes, problems) for path in paths]
     _refuse_shared_names(drafts)
     if not follow:
         _refuse_regimes(drafts)
@@ -94,6 +95,15 @@ def load_studies(
     if problems:
         raise CaseFileError(problems)
     return studies
+
+
+def _path_of(path: Any) -> str:
+    """Return a path as text. Raises CaseFileError for what is none."""
+    try:
+        return os.fsdecode(path)
+    except TypeError as error:
+        message = f"needs the path of a case file, not {shown(path)}"
+        raise CaseFileError([FileProblem(Place("load_cases"), "", message)]) from error
 
 
 def _read_only(text: str, problems: list[FileProblem]) -> Test | None:

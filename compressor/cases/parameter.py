@@ -7,6 +7,7 @@
 import math
 import re
 import reprlib
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
@@ -190,6 +191,8 @@ class Parameter:
             return self._refused(value)
         if not self.holds(value):
             return f"{value:g} is outside {self.range}" + (f" {self.unit}" if self.unit else "")
+        if value and abs(to_si(value, self.unit)) < sys.float_info.min:
+            return f"{value:g} is too small to be told from 0: write 0, or a larger number"
         return None
 
     def _refused(self, value: Any, word: Any = None) -> str:

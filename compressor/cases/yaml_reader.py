@@ -22,6 +22,7 @@ MAX_BYTES = 1 << 20
 MAX_DEPTH = 20
 MAX_PARTS = 50_000  # keys, values and brackets, which take a second
 
+NOT_ZERO = re.compile("[^eE]*[1-9]")
 ODD_BREAKS = re.compile("[\x85\u2028\u2029]")  # lines for PyYAML, not for YAML 1.2 or an editor
 
 NULLS = {"", "~", "null", "Null", "NULL"}
@@ -147,7 +148,12 @@ def resolved(text: str) -> Any:
         return float(text.replace(".", ""))
     if INTEGER.fullmatch(text):
         return _integer(text)
-    return float(text) if REAL.fullmatch(text) else text
+    if not REAL.fullmatch(text):
+        return text
+    number = float(text)
+    if number == 0 and NOT_ZERO.match(text):  # smaller than any float: not the 0 of an ideal joint
+        return math.nextafter(0, -1 if text[0] == "-" else 1)
+    return number
 
 
 def _integer(text: str) -> float:

@@ -68,7 +68,7 @@ def write_data_set(folder: Folder, dataset: "xr.Dataset") -> Written:
         (place / FEATURES_FILE).unlink(missing_ok=True)  # of an earlier data set
     else:
         publish(place / FEATURES_FILE, table)
-    publish(place / CARD, data_card(dataset, table is not None).encode())
+    publish(place / CARD, data_card(dataset, table is not None).encode(errors="replace"))
     names = [WINDOWS, *([FEATURES_FILE] if table is not None else []), CARD]
     files = {name: (place / name).stat().st_size for name in names}
     return Written(files, NO_PARQUET if table is None else "")

@@ -103,7 +103,7 @@ def write_report(
     for key, text in made.series.items():
         publish(folder / f"{series_name(key)}.js", text.encode())
     publish_library(folder)
-    publish(folder / "index.html", made.page.encode())
+    publish(folder / "index.html", made.page.encode(errors="backslashreplace"))
     remove_stale(folder, made)
     return folder / "index.html"
 
@@ -114,7 +114,8 @@ def restate(report: Folder, before: Running, now: Running) -> None:
     Raises OSError where the page cannot be read, StoreError where it cannot be written.
     """
     path = Path(report) / "index.html"
-    publish(path, restated(path.read_text(encoding="utf-8"), before, now).encode())
+    text = restated(path.read_text(encoding="utf-8"), before, now)
+    publish(path, text.encode(errors="backslashreplace"))
 
 
 class Made(NamedTuple):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import MODEL_VERSION, Case
+from compressor.cases import MODEL_VERSION, Case, require_case
 from compressor.metrics import SERIES
 from compressor.outcome import Outcome, Table, row, without_run
 from compressor.physics import FLOWS, is_featured, state_names
@@ -38,9 +38,10 @@ def simulate(case: Case) -> "xr.Dataset":
     (m/s2) of the crosshead and `contact_force` (N) on the rod; with `output.keep: metrics` there
     are none. `solve/README.md` lists all of them, and tells how they are made.
 
-    Nothing is raised: a run that fails has the `status` "failed", a `reason` by a stable name and
-    the attribute `detail`, and its series are nan from where it stopped. `attrs["promise"]` says
-    whether the accuracy was kept, `attrs["regime"]` how far the motion can be foretold.
+    Raises CaseError for what is no Case, and nothing else: a run that fails has the `status`
+    "failed", a `reason` by a stable name and the attribute `detail`, and its series are nan from
+    where it stopped. `attrs["promise"]` says whether the accuracy was kept, `attrs["regime"]` how
+    far the motion can be foretold.
 
     The first run in a process takes a few seconds to load the machine code, or a minute to
     compile it where that was never done; the next take some milliseconds.
@@ -60,7 +61,7 @@ def simulate(case: Case) -> "xr.Dataset":
     >>> run.contact_force.dims, run.contact_force.attrs["units"]
     (('time', 'joint', 'axis'), 'N')
     """
-    return as_dataset(observe(case)[1])
+    return as_dataset(observe(require_case(case))[1])
 
 
 def as_dataset(table: Table) -> "xr.Dataset":

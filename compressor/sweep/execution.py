@@ -11,7 +11,6 @@ import mmap
 import multiprocessing
 import os
 import signal
-import sys
 import tempfile
 import threading
 import time
@@ -25,14 +24,15 @@ from typing import Any
 
 from joblib import Parallel, cpu_count, delayed
 from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.backend import resource_tracker as loky_tracker
 from joblib.externals.loky.backend.process import LokyProcess
 from joblib.externals.loky.process_executor import BrokenProcessPool
 from joblib.parallel import LokyBackend
 
-from compressor.program import CompsimError
+from compressor.program import CompsimError, ignore_warnings
 from compressor.reasons import Reason
 from compressor.sweep.batches import MOST_BATCH, TICK, Batches, End, Input, Job
-from compressor.sweep.worker import ENDING, NOTE, Lost, Workers, do_batch, settle
+from compressor.sweep.worker import ENDING, NOTE, WHY, Lost, Workers, do_batch, settle
 
 STALL = 60.0  # s without any result, while no job runs, after which all workers are killed
 STARTING = 600.0  # s that workers may take to begin: what they prepare may have to be compiled
@@ -109,7 +109,7 @@ class Local(Batches):
         super().__init__(jobs, rules.target_seconds, rules.count)
         self.rules = replace(rules, memory=rules.memory or memory_share(rules.count))
         self.places = 4 * max(rules.count, 2)  # for notes: more than joblib asks for
-        self.shared, self.path = shared_file(self.places * NOTE.size)
+        self.shared, self.path = shared_file(self.places * NOTE.size + WHY)
         self.notes: Any = mmap.mmap(self.shared, 0)
         self.initargs = (work, self.rules, self.path, os.getpid())
         self.pool = self.executor = None  # type: Any
@@ -153,6 +153,7 @@ class Local(Batches):
 
     def watch(self, now: float, news: bool) -> None:
         """Kill workers whose jobs take too long, and all of them where nothing moves any more."""
+        revive_tracker()
         self.processes |= {child.pid: child for child in children()}
         if news:
             self.heard, self.fruitless, self.most = now, 0, MOST_BATCH
@@ -206,7 +207,8 @@ class Local(Batches):
         if not running:  # nobody is named: smaller batches will tell
             self.fruitless, self.most = self.fruitless + 1, max(1, largest // 2)
             if self.fruitless > FRUITLESS:
-                how = ending(next((codes[pid] for pid in died), None))
+                why = self.notes[-WHY:].rstrip(b"\0").decode(errors="replace")
+                how = why or ending(next((codes[pid] for pid in died), None))
                 raise WorkersFailed(f"jobs could not even begin: {how}")
         self.discard()
 
@@ -246,18 +248,38 @@ class Local(Batches):
 
 
 def shared_file(size: int) -> tuple[int, str]:
-    """A file that workers can map, and its path: on Linux one in memory, which ends with us.
+    """A file that workers can map, and its path: where it can be one in memory, which ends with us.
 
     Python's own shared memory is removed by whichever process of it ends first, once the process
     that keeps count of it has been killed.
     """
-    if sys.platform == "linux":
+    try:
         number = os.memfd_create("notes of compsim's workers")
         path = f"/proc/{os.getpid()}/fd/{number}"
-    else:
+        if not os.path.exists(path):
+            os.close(number)
+            raise FileNotFoundError(path)
+    except (AttributeError, OSError):  # not Linux, an old kernel, a sandbox, no /proc
         number, path = tempfile.mkstemp()
     os.truncate(number, size)
     return number, path
+
+
+def revive_tracker() -> None:
+    """Start loky's helper again where it was killed, silent: it never knew the names it is told."""
+    pid = loky_tracker._resource_tracker._pid
+    with contextlib.suppress(ChildProcessError):
+        if pid is None or os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+            return
+    ours, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        with ignore_warnings():
+            loky_tracker.ensure_running()
+    finally:
+        os.dup2(ours, 2)
+        os.close(ours)
+        os.close(nowhere)
 
 
 def children() -> list[Any]:

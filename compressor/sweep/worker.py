@@ -25,6 +25,8 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 NOTE = struct.Struct("ddd")  # process; job of the batch; since when it runs, or minus its end (s)
 
+WHY = 400  # bytes behind the notes: what kept a worker from beginning
+
 
 @dataclass(frozen=True)
 class Done:
@@ -83,7 +85,13 @@ def settle(work: Callable[[Any], Any], rules: Workers, notes: str, parent: int) 
     with contextlib.suppress(OSError):  # there may be no stderr
         os.dup2(2, 1)  # stdout is for data
     os.environ["PYTHONFAULTHANDLER"] = ""  # or loky has a crash print where it was
-    rules.prepare()
+    try:
+        rules.prepare()
+    except BaseException as error:  # which joblib would print from each worker
+        with open(notes, "r+b") as file:
+            file.seek(-WHY, os.SEEK_END)
+            file.write(described(error)[0].encode()[:WHY])
+        os._exit(1)
     gc.freeze()  # what is there by now stays: looking at it took a thirtieth of short jobs' time
     assert rules.memory
     with open(notes, "r+b") as file:
@@ -97,10 +105,13 @@ def limit(memory: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, most))
     if sys.platform != "linux":
         return
-    with open("/proc/self/oom_score_adj", "w") as file:
-        file.write("500")  # should memory run out, a worker is a better victim than its parent
-    with open("/proc/self/statm") as file:
-        present = int(file.read().split()[5]) * resource.getpagesize()
+    try:
+        with open("/proc/self/oom_score_adj", "w") as file:
+            file.write("500")  # should memory run out, a worker is a better victim than its parent
+        with open("/proc/self/statm") as file:
+            present = int(file.read().split()[5]) * resource.getpagesize()
+    except OSError:  # there is no /proc: only the system's own limits hold
+        return
     _, most = resource.getrlimit(resource.RLIMIT_DATA)
     wanted = present + memory
     if most == resource.RLIM_INFINITY or wanted < most:

@@ -12,9 +12,12 @@ from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.groups import Machine
 from compressor.cases.laws import USUAL
+from compressor.cases.load import load_cases
 from compressor.cases.parameter import CaseError, Problem, shown, to_si
 from compressor.cases.table import table
 from compressor.metrics import JOINTS
+from compressor.program import CompsimError
+from compressor.solve.simulate import simulate
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
 EXACT_GAS = {"switching": "exact"}
@@ -180,11 +183,11 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
         ({"load": "typical", "gas": {"exponent": 1.3}}, "gas.switching", "set switching: exact"),
         ({"load": "typical", "gas": {"discharge_MPa": 10, **EXACT_GAS}},
          "gas.head_clearance_mm", "never expands"),
-        ({"load": "typical", "gas": {"suction_MPa": 5e-324, **EXACT_GAS}},
+        ({"load": "typical", "gas": {"suction_MPa": 1e-300, **EXACT_GAS}},
          "gas.head_clearance_mm", "never expands"),
         ({"solve": {"output_step_deg": 0.7}}, "solve.output_step_deg", "2057.14 output steps"),
         ({"solve": {"output_step_s": 1}}, "solve.output_step_s", "longer than the duration"),
-        ({"solve": {"output_step_s": 5e-324}}, "solve.output_step_s", "makes inf samples"),
+        ({"solve": {"output_step_s": 1e-307}}, "solve.output_step_s", "makes 4.8e+306 samples"),
         ({"solve": {"settle_rev": 4}}, "solve.settle_rev", "leave nothing of a run of 4"),
         ({"lubricant": True}, "lubricant", "joint: none has none: name a joint"),
         ({**BIG_END, "lubricant": {"bearing_length_mm": 40}}, "lubricant.bearing_length_mm",
@@ -490,3 +493,27 @@ def test_groups_that_are_alike_are_shared_but_not_with_other_types():
     with pytest.raises(CaseError, match=r"needs a number in .* not true"):
         Case.from_values({"machine": {"gravity_m_per_s2": True}})
     assert Case.from_values(values | {"machine": {"gravity_m_per_s2": 1.0}}) == one
+
+
+@pytest.mark.parametrize(
+    ("call", "value"),
+    [
+        (simulate, None),
+        (simulate, {}),
+        (load_cases, None),
+        (load_cases, 3),
+        (Case.from_attribute, "{"),
+        (Case.from_attribute, None),
+        (Case.from_attribute, "[" * 10**5),
+    ],
+)
+def test_values_of_another_kind_are_told(call, value):
+    with pytest.raises(CompsimError, match="needs "):
+        call(value)
+
+
+@pytest.mark.parametrize("text", ["5e-324", "1e-400", "1e-310"])
+def test_a_clearance_that_no_float_can_hold_in_metres_is_refused(text, tmp_path):
+    (tmp_path / "tiny.yaml").write_text(f"joint: big_end\nclearance_mm: {text}\n")
+    with pytest.raises(CompsimError, match="is too small to be told from 0: write 0, or a larger"):
+        load_cases(tmp_path / "tiny.yaml")

@@ -85,6 +85,18 @@ def test_ctrl_c_amid_an_import_leaves_no_traceback(tmp_path):
     assert running.returncode == -signal.SIGINT
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
+def test_a_folder_whose_name_is_no_utf_8_holds_results(tmp_path):
+    (tmp_path / "healthy.yaml").write_text(
+        "solve: {duration_rev: 0.1, settle_rev: 0, accuracy: draft, output_step_deg: 1}\n"
+    )
+    for words in (["run", "healthy.yaml", "-j", "1", "-o"], ["status"], ["verify"]):
+        call = [os.fsencode(word) for word in (sys.executable, "-m", "compsim", *words)]
+        done = subprocess.run([*call, b"r\xff"], cwd=tmp_path, capture_output=True, timeout=100)
+        assert done.returncode == 0, done.stderr
+    assert next(os.scandir(os.fsencode(tmp_path) + b"/r\xff/rows")).is_file()
+
+
 STEERING = "x\x1b]0;mine\x07\x1b[31m\u202e"
 
 

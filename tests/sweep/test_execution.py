@@ -1,5 +1,6 @@
 """Worker processes: a poison job costs itself only, and no process outlives its parent."""
 
+import errno
 import fcntl
 import itertools
 import multiprocessing
@@ -330,6 +331,39 @@ def test_workers_that_cannot_begin_end_the_call(monkeypatch):
     monkeypatch.setattr(execution, "FRUITLESS", 4)
     with pytest.raises(WorkersFailed, match="jobs could not even begin: exit code 7"):
         list(run_batches(work, named(range(100)), Workers(2, lambda: os._exit(7))))
+
+
+def test_what_keeps_workers_from_beginning_is_told(monkeypatch):
+    def prepare():
+        raise MemoryError("no room for machine code")
+
+    monkeypatch.setattr(execution, "FRUITLESS", 2)
+    with pytest.raises(WorkersFailed, match="even begin: MemoryError: no room for machine code"):
+        list(run_batches(work, named(range(10)), Workers(1, prepare)))
+
+
+def test_a_killed_helper_of_loky_s_is_not_heard_of():
+    ends, killed = [], 0
+    for end in run_batches(sleep, named([0.02 + n / 1e6 for n in range(100)]), Workers(2)):
+        ends.append(end)
+        if len(ends) in (20, 60):
+            os.kill(loky_tracker._resource_tracker._pid, signal.SIGKILL)
+            killed += 1
+    assert killed == 2
+    assert len(results(ends)) == 100
+
+
+def test_no_memory_file_and_no_proc_cost_nothing_else(monkeypatch):
+    def refuse(name):
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    monkeypatch.setattr(os, "memfd_create", refuse)
+    assert len(results(run_batches(work, named(range(20)), Workers(1)))) == 20
+    monkeypatch.undo()
+    monkeypatch.setattr(os.path, "exists", lambda path: False)
+    number, path = execution.shared_file(8)
+    os.close(number)
+    Path(path).unlink()  # a file on disk
 
 
 def test_no_room_for_workers_ends_the_call(monkeypatch):
