@@ -55,6 +55,7 @@ TOGETHER = {
     "tests/solve/test_feature_runs.py": "features",
     "tests/physics/test_film.py": "features",
     "tests/solve/test_lubricated.py": "features",
+    "tests/solve/test_model_version.py": "features",
     "tests/solve/test_references.py": "features",
     "tests/physics/test_worn_bore.py": "features",
     "tests/wear/test_stages.py": "features",

@@ -76,7 +76,7 @@ def cli() -> None:
     To begin: compsim init. To let your shell complete names: compsim completion.
 
     Exit codes: 0 done, 1 internal error, 2 usage or case file, 3 some jobs failed, 5 store,
-    130/143/129 interrupted.
+    130/143/129 interrupted, 141 where nobody reads the output.
     """
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.program import PROGRAM, printable
+from compressor.program import printable
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -235,7 +235,7 @@ def tell_stale(summary: "Summary") -> None:
         return
     what = ", ".join(
         f"{number} {'is' if number == 1 else 'are'} not of {name}"
-        if name == PROGRAM
+        if name.startswith("model ")
         else f"{number} lack{'s' * (number == 1)} {name}"
         for name, number in summary.stale.items()
     )

@@ -22,7 +22,10 @@ from compressor.cases.unknown import SWEEP, meant
 from compressor.cases.wear import filled_wear
 from compressor.metrics import JOINTS
 
-MODEL_VERSION = "2"  # of the equations and the meaning of what is stored; part of a job's identity
+# of the equations and the meaning of what is stored; part of a job's identity. Results of one key
+# agree within the sum of their error bars, whichever version of the program made them; to the bit
+# they are equal only for one version of program and libraries on one kind of processor
+MODEL_VERSION = "2"
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 NO_SWEEP = (
     "would be swept, and a case has one value of each key: build a case for each, or write a case "
@@ -235,7 +238,7 @@ class Case(Settings):
     def key(self) -> str:
         """The job's identity, 20 hexadecimal digits: a hash of physics, solver and model version.
 
-        Equal keys have equal results, and a store holds each once. Name, output, time limit and
+        Equal keys have equal results, within error bars, and a store holds each once. Name, output, time limit and
         error bars are no part of it.
         """
         return digest(canonical(identity(self, with_solver=True)))

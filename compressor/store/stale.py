@@ -1,23 +1,28 @@
-"""Stored jobs of which this version of the program would tell more, or other things."""
+"""Stored jobs of which this version of the program would tell more, or other numbers.
+
+Results of one version of the model agree within their error bars (`MODEL_VERSION`), so that those
+of another version of the program are not stale for that alone.
+"""
 
 from collections.abc import Iterable
 
 import numpy as np
 
+from compressor.cases import MODEL_VERSION
 from compressor.metrics import METRICS, ROD_LOAD
-from compressor.program import PROGRAM
 from compressor.store.rows import Rows
 from compressor.store.segment import GIVEN
 
+MODEL = f"model {MODEL_VERSION}"
 WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
 
 
 def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
-    """The stored jobs, of those with some keys, that another version has made.
+    """Return the stored jobs, of those with some keys, that would gain by running again.
 
-    By what a run of this version would give that they lack, a metric or the name of this program;
-    a job may stand under several. Jobs that this version has made are none of them, whatever
-    metric has no value there.
+    They are the values, by what a run of this version would give that they lack: a metric, or the
+    numbers of this version of the model. A job may stand under several. Jobs that this version has
+    made are none of them, whatever metric has no value there.
     """
     found: dict[str, set[str]] = {}
     positions = rows.find(list(keys))
@@ -30,9 +35,9 @@ def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
     others = {
         rows.columns["key"][position].decode()
         for position in old.tolist()
-        if rows.attributes(position).get("program") != PROGRAM
+        if rows.attributes(position).get("model_version", MODEL_VERSION) != MODEL_VERSION
     }
-    return found | ({PROGRAM: others} if others else {})
+    return found | ({MODEL: others} if others else {})
 
 
 def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
