@@ -238,8 +238,8 @@ class Case(Settings):
     def key(self) -> str:
         """The job's identity, 20 hexadecimal digits: a hash of physics, solver and model version.
 
-        Equal keys have equal results, within error bars, and a store holds each once. Name, output, time limit and
-        error bars are no part of it.
+        Equal keys have equal results, within error bars, and a store holds each once. Name, output,
+        time limit and error bars are no part of it.
         """
         return digest(canonical(identity(self, with_solver=True)))
 
