@@ -215,7 +215,8 @@ def _make_folder(folder: Path) -> None:
         try:
             folder.mkdir(exist_ok=True)
         except FileExistsError as error:
-            raise WrongName(folder, IS_FILE, ELSEWHERE) from error
+            problem = "is a link that leads nowhere" if folder.is_symlink() else IS_FILE
+            raise WrongName(folder, problem, ELSEWHERE) from error
         sync_folder(folder.parent)
 
 

@@ -251,9 +251,12 @@ def unowned_series(place: Path, rows: Rows) -> list[str]:
 
 
 def places(folder: Folder) -> list[Path]:
-    """The folders that hold `rows` and `jobs`: the store's own, and its shards'."""
-    shards = sorted(_names(Path(folder) / "shards"))
-    return [Path(folder), *(Path(folder) / "shards" / name for name in shards)]
+    """Return the folders that hold `rows` and `jobs`: the store's own, and its shards'.
+
+    A link among the shards may lead out of the store, or back: it is none of them.
+    """
+    shards = (Path(folder) / "shards" / name for name in sorted(_names(Path(folder) / "shards")))
+    return [Path(folder), *(place for place in shards if not place.is_symlink())]
 
 
 def segment_paths(place: Path) -> list[Path]:

@@ -103,7 +103,7 @@ def _gone(
     for place in (place for place in places(folder) if place not in busy):
         series = unowned_series(place, rows)
         if keys := {name[:20] for name in series} - lost:
-            problem = f"{len(series)} files belong to jobs that no row knows"
+            problem = f"no row knows the jobs of {len(series)} of its files"
             yield Damage(place / "jobs", problem, tuple(sorted(keys)), ROWS_REMEDY)
             lost = lost | keys
     for study in () if busy else studies:

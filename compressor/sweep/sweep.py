@@ -133,8 +133,10 @@ def sweep(
     cases = Wanted(studies)
     with Writer(folder, name, options.wait, options.command) as writer:
         if writer.unowned:
-            progress(0, len(cases), f"{writer.place / 'jobs'}: {writer.unowned} files belong to "
-                     "jobs that no row knows, and stay; compsim verify tells more")  # fmt: skip
+            files = (
+                f"{writer.place / 'jobs'}: no row knows the jobs of {writer.unowned} of its files"
+            )
+            progress(0, len(cases), f"{files}; they stay, and compsim verify tells more")
         ends = stored(writer.found, cases)
         if options.rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}

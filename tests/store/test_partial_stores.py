@@ -6,7 +6,8 @@ import shutil
 import pytest
 
 from compressor.cases.load import load_studies
-from compressor.store.reader import open_study, read_job
+from compressor.store.files import StoreError
+from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.verify import verify
 from compressor.store.writer import Writer
 from compressor.sweep.sweep import sweep
@@ -53,7 +54,7 @@ def test_a_run_amid_a_copy_leaves_the_series_that_came_first(run, tmp_path):
     shutil.copytree(tmp_path / "whole/jobs", tmp_path / "copy/jobs")
     (remark,) = run(tmp_path / "copy", "other", speed=600)
     assert remark == (
-        f"{tmp_path / 'copy/jobs'}: 2 files belong to jobs that no row knows, and stay; "
+        f"{tmp_path / 'copy/jobs'}: no row knows the jobs of 2 of its files; they stay, and "
         "compsim verify tells more"
     )
     shutil.copytree(tmp_path / "whole", tmp_path / "copy", dirs_exist_ok=True)
@@ -103,7 +104,7 @@ def test_rows_that_are_gone_are_told_by_series_and_studies(run, tmp_path):
     (study,) = load_studies(tmp_path / "small.yaml")
     shutil.rmtree(tmp_path / "out/rows")
     (damage,) = verify(tmp_path / "out")
-    assert damage.problem == "2 files belong to jobs that no row knows"
+    assert damage.problem == "no row knows the jobs of 2 of its files"
     assert {*damage.keys} == {*study.keys}
     assert damage.again[0].case_file == str(tmp_path / "small.yaml")
     shutil.rmtree(tmp_path / "out/jobs")
@@ -125,6 +126,23 @@ def test_a_study_that_is_gone_is_told_by_rows(run, tmp_path):
     assert damage.remedy == "run its case file again, which computes nothing anew"
     assert run(tmp_path / "out") == []
     assert verify(tmp_path / "out") == []
+
+
+def test_a_link_among_shards_does_not_lead_out_of_the_store(run, tmp_path):
+    run(tmp_path / "out")
+    run(tmp_path / "other", speed=600)
+    (tmp_path / "out/shards").mkdir()
+    for name, target in (("up", tmp_path / "other"), ("here", "."), ("nowhere", "gone")):
+        (tmp_path / "out/shards" / name).symlink_to(target)
+    assert len(read_store(tmp_path / "out").keys()) == 2
+    assert verify(tmp_path / "out") == []
+    assert run(tmp_path / "out") == []
+
+
+def test_a_link_that_leads_nowhere_is_called_so(run, tmp_path):
+    (tmp_path / "out").symlink_to("nowhere")
+    with pytest.raises(StoreError, match="out: is a link that leads nowhere; choose another"):
+        run(tmp_path / "out")
 
 
 def test_jobs_that_a_run_is_about_to_store_are_not_missed(run, tmp_path):

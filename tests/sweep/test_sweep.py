@@ -323,7 +323,7 @@ def test_a_copied_folder_compiles_anew(tmp_path, monkeypatch):
 def test_a_job_that_cannot_be_stored_ends_the_sweep(workers, studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/jobs").symlink_to("nowhere")
-    with pytest.raises(store.StoreError, match=r"out/jobs: is a file, where a folder is needed"):
+    with pytest.raises(store.StoreError, match=r"out/jobs: is a link that leads nowhere"):
         sweep(studies(one={"load": ["none", "design"]}), tmp_path / "out", workers)
 
 
