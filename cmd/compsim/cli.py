@@ -45,6 +45,7 @@ from compsim.usage import Commands, one_line
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
+NO_ROOM = ("failed to map segment", "Cannot allocate memory")  # as a library that is loaded says
 UNREAD = 128 + signal.SIGPIPE  # exit code, as of a program that SIGPIPE ends
 COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click prints and exits
 AGAIN = 0.02  # s until a dropped signal is sent again
@@ -190,7 +191,7 @@ def told(error: Exception) -> int:
         say(f"compsim: stdout: {error.strerror}; the same command prints it again")
         discard_output()
         return STORE
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or any(words in str(error) for words in NO_ROOM):
         say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
         return INTERNAL
     lines = traceback.format_exception(error)

@@ -68,6 +68,19 @@ def test_output_that_does_not_fit_is_told_in_one_line(words, compsim):
     assert line.startswith("compsim: stdout: No space left on device; ")
 
 
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("Unable to allocate 8 GiB"),
+        ImportError("numpy.so: failed to map segment from shared object"),
+        OSError(12, "Cannot allocate memory"),
+    ],
+)
+def test_a_lack_of_memory_is_told_in_one_line(error, capsys):
+    assert cli.told(error) == 1
+    assert capsys.readouterr().err.startswith("compsim: not enough memory: allow more (ulimit -v)")
+
+
 def test_ctrl_c_amid_an_import_leaves_no_traceback(tmp_path):
     begun = tmp_path / "begun"
     (tmp_path / "click.py").write_text(
