@@ -187,13 +187,13 @@ def told(error: Exception) -> int:
     if isinstance(error, CompsimError):
         say(f"{error.prefix}{error}")
         return error.exit_code
+    if isinstance(error, MemoryError) or any(words in str(error) for words in NO_ROOM):
+        say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
+        return INTERNAL
     if isinstance(error, OSError) and traceback.extract_tb(error.__traceback__)[-1].name == "echo":
         say(f"compsim: stdout: {error.strerror}; the same command prints it again")
         discard_output()
         return STORE
-    if isinstance(error, MemoryError) or any(words in str(error) for words in NO_ROOM):
-        say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
-        return INTERNAL
     lines = traceback.format_exception(error)
     if os.environ.get("COMPSIM_DEBUG"):
         say("".join(lines), end="")
