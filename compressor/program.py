@@ -56,12 +56,13 @@ _FILTERS = threading.RLock()
 
 @contextlib.contextmanager
 def ignore_warnings(message: str = "") -> Iterator[None]:
-    """Ignore the warnings that begin with a message, all of them by default.
+    """Ignore the warnings of others that begin with a message, all of them by default.
 
     Filters belong to the process: threads take turns, or one would restore the other's.
     """
     with _FILTERS, warnings.catch_warnings():
         warnings.filterwarnings("ignore", message)
+        warnings.filterwarnings("default", category=CompsimWarning)
         yield
 
 

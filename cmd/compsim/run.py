@@ -230,15 +230,11 @@ def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
 
 
 def tell_stale(summary: "Summary") -> None:
-    """Say how many stored jobs another version has made, and how they are brought up to date."""
+    """Say what stored jobs of another version lack, and how they are brought up to date."""
     if not summary.gaining:
         return
-    what = ", ".join(
-        f"{number} {'is' if number == 1 else 'are'} not of {name}"
-        if name.startswith("model ")
-        else f"{number} lack{'s' * (number == 1)} {name}"
-        for name, number in summary.stale.items()
-    )
+    lacks = summary.stale.items()
+    what = ", ".join(f"{number} lack{'s' * (number == 1)} {name}" for name, number in lacks)
     say(f"{plural(summary.gaining)} of another version would gain by running again ({what}): "
         "--rerun stale")  # fmt: skip
 

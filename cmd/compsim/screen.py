@@ -267,6 +267,7 @@ def open_streams() -> None:
             if place != number:
                 os.dup2(place, number)
                 os.close(place)
+            os.set_inheritable(number, True)  # by workers
             setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))
 
 

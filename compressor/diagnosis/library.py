@@ -117,7 +117,9 @@ def _place(stored: Stored, key: str) -> int | None:
 
 def _digest(stored: Stored, positions: dict[str, int]) -> str:
     """What features are made of: files by their digests, and the code that makes them."""
-    names = [path.name for place in positions.values() if (path := stored.rows.path(place))]
+    parts = (stored.rows.columns[name] for name in ("key", "digest"))
+    keys, digests = (column[[*positions.values()]].tolist() for column in parts)
+    names = [f"{k.decode()}-{d.decode()}.h5" for k, d in zip(keys, digests, strict=True)]
     return hashlib.sha256("\n".join([inspect.getsource(table), *names]).encode()).hexdigest()
 
 

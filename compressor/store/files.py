@@ -27,6 +27,7 @@ LOCK_NAME = "writer.lock"
 FULL = "free some space there, then run the same command again"
 IS_FILE = "is a file, where a folder is needed"
 ELSEWHERE = "choose another folder"
+NO_SYNC = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP)  # of a folder, as FUSE and SMB say
 NO_LOCKS = "choose a folder on a file system with locks"
 FORBIDDEN = f"get the permission to use it, or {ELSEWHERE}"
 REMEDIES = {
@@ -40,6 +41,7 @@ REMEDIES = {
     errno.ENOLCK: NO_LOCKS,
     errno.ENOSYS: NO_LOCKS,
     errno.EOPNOTSUPP: NO_LOCKS,
+    errno.ENOTSUP: NO_LOCKS,
     errno.EMFILE: "allow more open files (ulimit -n)",
 }
 
@@ -226,7 +228,7 @@ def sync_folder(folder: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.EOPNOTSUPP):  # as FUSE and SMB say
+        if error.errno not in NO_SYNC:
             raise
     finally:
         os.close(descriptor)

@@ -31,6 +31,7 @@ from compressor.store.files import (
     Folder,
     StoreError,
     StoreWarning,
+    pending_path,
     system_error,
 )
 from compressor.store.hdf5 import DamagedJob
@@ -223,7 +224,11 @@ def _usable(segment: Segment) -> np.ndarray:
     listed = _names(segment.place / "jobs")
     names = np.array([name.removeprefix(".").removesuffix(".tmp") for name in listed], "S")
     wanted = np.char.add(np.char.add(np.char.add(columns["key"], b"-"), columns["digest"]), b".h5")
-    return ~kept | np.isin(wanted, names)
+    found = ~kept | np.isin(wanted, names)
+    for position in np.flatnonzero(~found):  # a listing may miss what gets its name meanwhile
+        path = segment.place / "jobs" / wanted[position].decode()
+        found[position] = path.exists() or pending_path(path).exists() or path.exists()
+    return found
 
 
 def _names(folder: Path) -> list[str]:

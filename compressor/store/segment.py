@@ -15,15 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import MODEL_VERSION
 from compressor.metrics import METRICS, NUMBERS, ROD_LOAD, SOMETIMES
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
+from compressor.program import PROGRAM
 from compressor.store.files import HEX20
 from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
 
 NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
-# what this version gives of a job, as a hash
-GIVEN = digest(" ".join([MODEL_VERSION, *METRICS, *ROD_LOAD]).encode())[:8]
+GIVEN = digest(" ".join([PROGRAM, *METRICS, *ROD_LOAD]).encode())[:8]  # by this version
 DIGITS = re.compile(rb"[0-9a-f]{20,}")  # in which keys may stand
 REMEDY = "move it away, then run its studies again"
 WORDS = {  # columns -> what their texts look like
@@ -54,7 +53,7 @@ COLUMNS = {
     "promise": ("S", "kept, or none given; empty in files of before 2026-11-22"),
     "regime": ("S", "how far the motion can be foretold; empty where that is not known"),
     "signals": ("S", "yes where signals are kept beside the time series"),
-    "given": ("S8", "hash of the model's version and of the names of the metrics"),
+    "given": ("S8", "hash of the program and of the names of its metrics"),
 }
 LATER = ("promise", "regime", "signals", "given")  # columns that older files do not have
 

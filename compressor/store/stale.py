@@ -1,43 +1,34 @@
-"""Stored jobs of which this version of the program would tell more, or other numbers.
+"""Stored jobs of which this version of the program would tell more.
 
-Results of one version of the model agree within their error bars (`MODEL_VERSION`), so that those
-of another version of the program are not stale for that alone.
+A key holds the version of the model, and results of one version agree within their error bars
+(`MODEL_VERSION`): a job that another version of the program has made is not stale for that alone.
 """
 
 from collections.abc import Iterable
 
 import numpy as np
 
-from compressor.cases import MODEL_VERSION
 from compressor.metrics import METRICS, ROD_LOAD
 from compressor.store.rows import Rows
 from compressor.store.segment import GIVEN
 
-MODEL = f"model {MODEL_VERSION}"
 WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
 
 
 def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
-    """Return the stored jobs, of those with some keys, that would gain by running again.
+    """Return the stored jobs, of those with some keys, by what a run of this version would add.
 
-    They are the values, by what a run of this version would give that they lack: a metric, or the
-    numbers of this version of the model. A job may stand under several. Jobs that this version has
-    made are none of them, whatever metric has no value there.
+    A job may stand under several metrics. Jobs that this version has made are none of them,
+    whatever metric has no value there.
     """
     found: dict[str, set[str]] = {}
     positions = rows.find(list(keys))
     positions = positions[positions >= 0]
     old = positions[rows.columns["given"][positions] != GIVEN.encode()]
-    old = old[np.argsort(rows.source[old], kind="stable")]  # attributes are read by segment
     for name, lack in _lacking(rows, old).items() if len(old) else ():
         if lack.any():
             found[name] = {key.decode() for key in rows.columns["key"][old[lack]]}
-    others = {
-        rows.columns["key"][position].decode()
-        for position in old.tolist()
-        if rows.attributes(position).get("model_version", MODEL_VERSION) != MODEL_VERSION
-    }
-    return found | ({MODEL: others} if others else {})
+    return found
 
 
 def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compressor.metrics import NUMBERS
-from compressor.store.files import Folder
+from compressor.store.files import Folder, final_path
 from compressor.store.names import find_job
 from compressor.store.reader import read_store
 from compressor.store.studies import Again, Change, change_of, owners, read_studies
@@ -115,7 +115,7 @@ def report_job(folder: Folder, *words: str) -> JobReport:
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in store.rows.attributes(position).items()
     }
-    file = "" if path is None else os.fspath(path)
+    file = "" if path is None else os.fspath(final_path(path))
     return JobReport(
         key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes
     )

@@ -58,6 +58,7 @@ def verify(
     not run, or their row is gone. `progress` is told how many files of time series were read, of
     how many. Raises StoreError for a folder that cannot be read.
     """
+    busy = {place for place in places(folder) if is_locked(place)}
     stored = read_store(folder, DamagedJob)
     followed = [path for pattern in FOLLOWED for path in sorted(Path(folder).glob(pattern))]
     if not (stored.segments or stored.damaged or study_paths(folder) or followed):
@@ -90,16 +91,19 @@ def verify(
             problem = "is damaged" if place.exists() else "is missing"
             found.append(Damage(place, problem, (key,)))
         progress(position + 1, len(rows))
-    found += _gone(folder, rows, studies, {key for damage in found for key in damage.keys})
+    busy |= {place for place in places(folder) if is_locked(place)}
+    found += _gone(folder, rows, studies, {key for damage in found for key in damage.keys}, busy)
     return _owned(found, studies)
 
 
 def _gone(
-    folder: Folder, rows: Rows, studies: list[StoredStudy], lost: set[str]
+    folder: Folder, rows: Rows, studies: list[StoredStudy], lost: set[str], busy: set[Path]
 ) -> Iterator[Damage]:
-    """Yield what the files of a store show to be gone, but for jobs known to be lost."""
+    """Yield what the files of a store show to be gone, but for jobs known to be lost.
+
+    busy: the places that a run was at work in, whose rows may have come since they were read.
+    """
     stored = {key.decode() for key in rows.columns["key"]}
-    busy = [place for place in places(folder) if is_locked(place)]
     for place in (place for place in places(folder) if place not in busy):
         series = unowned_series(place, rows)
         if keys := {name[:20] for name in series} - lost:
@@ -116,6 +120,7 @@ def _gone(
     strays = [
         at for at, key in enumerate(rows.columns["key"].tolist()) if key.decode() not in known
     ]
+    strays.sort(key=rows.source.__getitem__)  # attributes are read by segment
     names = Counter(str(rows.attributes(at).get("name", "")) for at in strays)
     for name, count in sorted(names.items()):
         path = Path(folder) / "studies" / f"{name}.json"

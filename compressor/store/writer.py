@@ -188,7 +188,8 @@ class Writer:
         """Give files of time series their names that wait though their row is stored: a kill."""
         waiting = [*(self.place / "jobs").glob(".*.h5.tmp")]
         known = {*_series_paths(self.place, rows.columns)} if waiting else set()
-        name_pending(known.intersection(map(final_path, waiting)))
+        stored = known.intersection(map(final_path, waiting))
+        name_pending(path for path in stored if not path.exists())
 
     def _discard_replaced(self, segments: Sequence[Segment], rows: Segment | Rows) -> None:
         """Remove the time series of rows that better ones have replaced, where these have theirs.

@@ -11,6 +11,7 @@ import mmap
 import multiprocessing
 import os
 import signal
+import sys
 import tempfile
 import threading
 import time
@@ -268,8 +269,10 @@ def shared_file(size: int) -> tuple[int, str]:
 def revive_tracker() -> None:
     """Start loky's helper again where it was killed, silent: it never knew the names it is told."""
     pid = loky_tracker._resource_tracker._pid
+    if pid is None or sys.platform != "linux":
+        return
     with contextlib.suppress(ChildProcessError):
-        if pid is None or os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+        if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
             return
     ours, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

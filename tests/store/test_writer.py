@@ -366,6 +366,20 @@ def test_a_crash_after_the_row_leaves_the_new_result(tmp_path, monkeypatch):
     assert len(list(tmp_path.glob("jobs/*.h5"))) == 1
 
 
+def test_half_a_file_that_a_copy_left_does_not_replace_a_whole_one(tmp_path):
+    case = short_cases()[0]
+    job = simulate(case)
+    with Writer(tmp_path) as open_writer:
+        series = write_series(tmp_path, job, case.output)
+        open_writer.add(Outcome("ok", "", np.zeros(1, ROW)[0], {**job.attrs, "name": ""}, series))
+    (path,) = tmp_path.glob("jobs/*.h5")
+    path.with_name(f".{path.name}.tmp").write_bytes(path.read_bytes()[:100])
+    with Writer(tmp_path):
+        pass
+    xr.testing.assert_identical(store.read_job(tmp_path, case.key), job)
+    assert verify(tmp_path) == []
+
+
 def test_a_full_disk_is_an_error_with_a_name_and_rows_wait(tmp_path, monkeypatch):
     def full(*arguments):
         raise OSError(28, os.strerror(28))
