@@ -61,8 +61,8 @@ class Part(click.ParamType):
 @only_option
 @limit
 @click.option("--rerun", type=click.Choice(["failed", "stale"]), multiple=True,
-              help="Run stored jobs again, too: those that failed, or stale ones, which another "
-              "version has made or which lack a metric that this one gives. Can be given twice.",
+              help="Run stored jobs again, too: those that failed, or stale ones, which lack a "
+              "metric that this version gives. Can be given twice.",
 )  # fmt: skip
 @click.option("--shard", "part", type=Part(), metavar="I/N",
               help="Run part I of N: for machines that share the folder.")  # fmt: skip
