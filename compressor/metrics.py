@@ -22,7 +22,7 @@ class Bar(NamedTuple):
 
     own: float = 5.0  # share of the metric's own difference
     path: float = 0.3  # of the distance of the time series that it is taken from
-    relative: bool = True  # False: of a share or a count, whose bar is a number of its own unit
+    relative: bool = True  # False: of a share, a count or a mean that may be 0
     least: float = 1e-13  # share of the metric that a relative bar has at least: rounding, or more
 
 
@@ -83,6 +83,15 @@ METRICS = {
             "contact_loss_fraction", ("joint",), "1",
             "share of time without contact (F_N = 0)", "penetration",
             Bar(1.5, 0.01, False), Shown("time without contact", "%", 1e2), True,
+        ),
+        Metric(
+            "mean_crank_torque", (), "N m", "mean torque that drives the crank against the rod",
+            "acceleration", Bar(relative=False, least=1e-12),
+        ),
+        Metric(
+            "mean_guide_moment", (), "N m",
+            "mean moment of the crosshead on its guide about the crank centre", "acceleration",
+            Bar(relative=False, least=1e-12),
         ),
         Metric(
             "impact_count", ("joint",), "1", "contacts that began after flight", "penetration",
@@ -159,9 +168,10 @@ STATISTICS["revolutions_to_one_percent"] = (
 HORIZON = "predictability_horizon"
 # energy flows and how the run went
 LEDGER: Rows = {
-    "crank_work": ((), "J", "work put in by the crank over the run"),
+    "crank_work": ((), "J", "work put in by the crank, or by its motor, over the run"),
     "load_work": ((), "J", "work put in by the piston force over the run"),
-    "contact_damping_loss": ((), "J", "energy lost to contact damping over the run"),
+    "contact_damping_loss": ((), "J", "energy lost to damping of contacts and oil over the run"),
+    "rod_damping_loss": ((), "J", "energy lost in the material of an elastic rod over the run"),
     "friction_loss": ((), "J", "energy lost to joint friction over the run"),
     "energy_residual": ((), "1", "worst energy imbalance relative to the contact's losses"),
     "steps": ((), "1", "accepted integration steps"),

@@ -38,6 +38,19 @@ class Reason(StrEnum):
         "the contact is too soft for the forces: check contact.stiffness, masses and speed, and "
         "their units",
     )
+    GUIDE_IMPLAUSIBLE = (
+        "guide_implausible",
+        "a corner of the crosshead sank deeper into its guide than a tenth of half its length or "
+        "height, for which no contact law is meant",
+        "the guide is too soft, or its friction lets the crosshead jam: check guide.stiffness, "
+        "guide.friction and the crosshead's sizes",
+    )
+    ROD_IMPLAUSIBLE = (
+        "rod_implausible",
+        "an elastic rod is bent, pressed or stretched by more than a tenth of its length, for "
+        "which a linear bar is not meant",
+        "the rod is too soft for the forces: check rod.youngs_modulus_GPa, depth_mm and width_mm",
+    )
     STEP_UNDERFLOW = (
         "step_underflow",
         "the integrator's step has become too short to move the time",

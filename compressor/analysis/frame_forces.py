@@ -7,10 +7,7 @@ import xarray as xr
 
 from compressor.analysis.runs import case_of, record_of, settled
 from compressor.cases import Case, with_ideal_joints
-from compressor.metrics import JOINTS
-from compressor.solve import forces_on_frame, simulate
-
-BIG_END = JOINTS.index("big_end")
+from compressor.solve import SIGNALS, signals_of_scene, simulate
 
 
 class NoSeriesError(ValueError):
@@ -18,39 +15,30 @@ class NoSeriesError(ValueError):
 
 
 def frame_forces(run: xr.Dataset) -> dict[str, np.ndarray]:
-    """The signals of `compressor.solve.signals` by name, at all samples of a run; SI.
+    """Return the signals of `compressor.solve.signals` by name, at all samples of a run; SI.
 
-    They follow from contact_force, piston_force, displacement and penetration, so that no run needs
-    `output: {signals: true}` for them. Raises NoSeriesError for a run without time series.
+    They are those that the run has stored, or follow from its time series. A machine with features
+    is simulated again where they are not stored: its guide, oil and drive show in no other series.
+    Raises NoSeriesError for a run without time series.
     """
     if "time" not in run.dims or "contact_force" not in run:
         raise NoSeriesError("the run has no time series (output.keep: series)")
-    force = run["contact_force"].transpose("time", "joint", "axis").values
-    series = (run[name].values for name in ("piston_force", "displacement"))
-    found = forces_on_frame(record_of(run), force, *series)
-    return found | {"crank_torque": crank_torque(run)}
-
-
-def crank_torque(run: xr.Dataset) -> np.ndarray:
-    """Torque (N m) that drives the crank along its rotation, (m,).
-
-    R (cos theta F_by - sin theta F_bx) - (R_j - depth) F_t with the friction F_t at the big end's
-    journal (compressor/solve/README.md, The Dataset). The force on the rod is F_N n - F_t t with n
-    along the eccentricity, and t a quarter turn from it, counter-clockwise.
-    """
-    p = record_of(run)
-    at = run.sel(joint=JOINTS[BIG_END])
-    force = at["contact_force"].transpose("time", "axis").values
-    angle = run["crank_angle"].values
-    lever = float(p["crank_radius"])
-    torque = lever * (np.cos(angle) * force[:, 1] - np.sin(angle) * force[:, 0])
-    if p["clearance"][BIG_END] > 0:
-        place = at["eccentricity"].transpose("time", "axis").values
-        size = np.linalg.norm(place, axis=1)
-        across = place[:, 0] * force[:, 1] - place[:, 1] * force[:, 0]
-        friction = -np.divide(across, size, out=np.zeros_like(size), where=size > 0)
-        torque = torque - (float(p["pin_radius"]) - at["penetration"].values) * friction
-    return torque
+    if all(name in run for name in SIGNALS):
+        return {
+            name: run[name].transpose("time", *dims).values
+            for name, (dims, _, _) in SIGNALS.items()
+        }
+    case = case_of(run)
+    if not case.has_features:
+        return signals_of_scene(record_of(run), run)
+    values = case.values()
+    solve = {name: value for name, value in values["solve"].items() if name != "accuracy"}
+    values["solve"] = solve | {"rtol": float(run.attrs["rtol"]), "error_bars": False}
+    values["output"] = {"keep": "series", "signals": True}
+    again = simulate(Case.from_values(values))
+    return frame_forces(
+        again.isel(time=np.isin(again["crank_angle"].values, run["crank_angle"].values))
+    )
 
 
 def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:

@@ -84,9 +84,23 @@ class Machine:
         14.0, "kg", (0, 1e6), "assumed", "crosshead, piston rod and piston", above=True
     )
     pin_radius_mm: float = parameter(
-        10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3", "journal radius R_j", above=True
+        10.0,
+        "mm",
+        (0, 1e4),
+        "inferred from Eq. 15 and Table 3",
+        "journal radius R_j of both joints, or of the big end",
+        above=True,
     )
     gravity_m_per_s2: float = parameter(0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y")
+    small_end_pin_radius_mm: float | None = parameter(
+        None, "mm", (0, 1e4), "as the big end's", "journal radius of the small end",
+        above=True, optional=True,
+    )  # fmt: skip
+
+    def pin_radius(self, joint: str) -> float:
+        """Return the journal radius of a joint, mm."""
+        own = self.small_end_pin_radius_mm if joint == "small_end" else None
+        return self.pin_radius_mm if own is None else own
 
 
 @documented

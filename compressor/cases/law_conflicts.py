@@ -42,6 +42,13 @@ def contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem
 
 def friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     friction = case.friction
+    if friction and friction.law == "lugre" and bool(friction.static) != bool(friction.dynamic):
+        zero = "dynamic" if friction.static else "static"
+        yield Problem(
+            f"friction.{zero}",
+            "is 0 and the other coefficient is not: LuGre's bristles divide by it; give more than "
+            "0, or 0 for both",
+        )
     if not friction or law_of(friction) not in READ_BY["friction"]["friction_velocity_mm_per_s"]:
         return
     if friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:

@@ -12,8 +12,9 @@ OURS = "ours"
 class Guide:
     """The crosshead's guide; a case's `guide`, None unless a case asks: ideal, without friction.
 
-    With a clearance the crosshead moves across and tilts, and its four corners meet the guide by
-    ADAMS's IMPACT. `True` stands for the defaults, an ideal guide with friction:
+    With a clearance the crosshead moves across and tilts, and its four corners meet the guide as
+    journals meet their bores: by `contact.law` where that has a restitution, else by ADAMS's
+    IMPACT. `True` stands for the defaults, an ideal guide with friction:
 
     >>> import compressor
     >>> case = compressor.Case.from_values({"guide": {"clearance_mm": 0.1}})
@@ -40,6 +41,21 @@ class Guide:
     stiffness_N_per_mm15: float = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
         "contact stiffness of a corner, in N/mm^exponent", above=True,
+    )  # fmt: skip
+    exponent: float | None = parameter(
+        None, "", (1, 3), "as the joints'", "force exponent of a corner", optional=True
+    )
+    damping_N_s_per_mm: float | None = parameter(
+        None, "N s/mm", (0, 1e9), "as the joints'", "greatest contact damping of a corner",
+        optional=True,
+    )  # fmt: skip
+    full_damping_mm: float | None = parameter(
+        None, "mm", (0, 1e3), "as the joints'", "penetration of full damping of a corner",
+        above=True, optional=True,
+    )  # fmt: skip
+    restitution: float | None = parameter(
+        None, "", (0, 1), "as the joints'", "coefficient of restitution of a corner, with a "
+        "contact.law that has one", above=True, optional=True,
     )  # fmt: skip
 
 

@@ -69,6 +69,11 @@ def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
             "friction.ideal_joints", "have no bristles, as friction.law: lugre needs: choose "
             "another law, or leave the key out",
         )  # fmt: skip
+    if case.guide and case.guide.restitution is not None and case.contact.restitution is None:
+        yield Problem(
+            "guide.restitution", "is read with a contact.law that has one, and contact.restitution "
+            "for the joints: give both, or leave the key out",
+        )  # fmt: skip
     rubs = case.guide and case.guide.clearance_mm == 0 and not case.guide.friction
     if rubs and any(key.startswith("guide.") for key in given):
         yield Problem(

@@ -1,6 +1,6 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
-from compressor.physics.contact import choose_laws
+from compressor.physics.contact import choose_laws, hysteresis
 from compressor.physics.contact_laws import elastic_form
 from compressor.physics.film import film_constants
 from compressor.physics.friction_laws import steepest
@@ -15,9 +15,10 @@ from compressor.physics.loads import (
     static_load,
 )
 from compressor.physics.march import march
-from compressor.physics.mechanism_rows import wear_all
+from compressor.physics.mechanism_rows import IMPLAUSIBLE, STALLED, wear_all
 from compressor.physics.observe import (
     COLUMNS,
+    WIDE,
     Column,
 )
 from compressor.physics.onset import meeting
@@ -33,6 +34,7 @@ from compressor.physics.record import (
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
 from compressor.physics.systems import (
+    beyond_model,
     derivative_with_flows,
     observe_all,
     start,

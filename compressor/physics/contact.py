@@ -25,7 +25,15 @@ def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
     law = Law[contact.upper()]
     p["law"], p["friction"] = law, FrictionLaw[friction.upper()]
     if law in HYSTERESIS:
-        p["hysteresis"] = HYSTERESIS[law](restitution)
+        p["hysteresis"] = hysteresis(contact, restitution)
+
+
+def hysteresis(contact: str, restitution: float) -> float:
+    """Return chi, the damping force over the elastic one at the approach speed, by a law's name.
+
+    Raises KeyError for a law that has none.
+    """
+    return HYSTERESIS[Law[contact.upper()]](restitution)
 
 
 @merged
@@ -57,15 +65,16 @@ NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
-def joint_contact(eccentricity, spins, clearance, stiffness, carried, p):
+def joint_contact(eccentricity, spins, bearing, carried, p):
     """Contact between a joint's journal and the rod's bore.
 
     eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); spins of
-    journal and rod (rad/s, counter-clockwise); the joint's clearance (m) and stiffness (N/m^p);
-    carried: as by `carried_by`. Returns a `Contact`; one contact point serves both bodies, so that
-    angular momentum balances. Concentric circles exert no force.
+    journal and rod (rad/s, counter-clockwise); bearing: the joint's journal radius (m), clearance
+    (m) and stiffness (N/m^p); carried: as by `carried_by`. Returns a `Contact`; one contact point
+    serves both bodies, so that angular momentum balances. Concentric circles exert no force.
     """
     ex, ey, ex_rate, ey_rate = eccentricity
+    pin, clearance, stiffness = bearing
     distance = square_root(fused(ex, ex, ey * ey))
     penetration = distance - clearance
     if distance == 0.0:
@@ -74,8 +83,8 @@ def joint_contact(eccentricity, spins, clearance, stiffness, carried, p):
     nx = ex * per_distance
     ny = ey * per_distance
     rate = fused(ex_rate, nx, ey_rate * ny)
-    bore = p.pin_radius + clearance
-    arm = p.pin_radius - penetration
+    bore = pin + clearance
+    arm = pin - penetration
     journal_spin, rod_spin = spins
     turning = fused(journal_spin, arm, -(rod_spin * bore))
     slip = fused(ey_rate, nx, fused(-ex_rate, ny, turning))

@@ -15,12 +15,19 @@ endlicher Breite unter instationaerer Belastung, Karlsruhe 1976), which are some
 tables, times polynomials that make them those of Reynolds' equation (`solve.bearing`), which his
 tables are.
 
-Where both parts act, |w| and the sides of the squeeze change smoothly with the direction of the
-velocity; of a film that only turns, or is only squeezed, the numbers are exact.
+Where both parts act, |w| and |eps'| of the formulas along the line of centres are made smooth:
+
+    |w eps|  becomes  (w eps)^2 / sqrt((w eps)^2 + eps'^2)
+    |eps'|   becomes  eps'^2 / sqrt(eps'^2 + ((1 - eps) w eps)^2)
+
+which is nearer to one Reynolds field than the sum is (physics/README.md, Oil film); of a film that
+only turns, or is only squeezed, the numbers are exact.
 
 Below `CENTRED` the numbers go to those that make the centre smooth: a force against the velocity.
-In the film's last share the numbers stay what they are where it begins: the film bears no more,
-and the dry contact takes over.
+In the film's last share the numbers stay what they are where it begins: the film bears no more.
+Beyond the wall, as deep as that share is wide, it fades, and the dry contact is left alone: the
+transition of Flores, Ambrosio, Claro and Lankarani (Proc. IMechE K 218, 2004), whose dry force also
+grows over it.
 """
 
 import math
@@ -135,39 +142,44 @@ def kept(eps, share):
 
 
 @jit
-def film(eccentricity, spins, clearance, p):
+def film(joint, eccentricity, spins, p):
     """Force on the journal x, y (N), moments on journal and bore (N m), and the power lost (W).
 
     eccentricity: journal centre less bore centre, x and y (m), and its rate (m/s); spins: of
-    journal and bore (rad/s); clearance (m). The moments balance: both have half of that of the
+    journal and bore (rad/s). The moments balance: both have half of that of the
     force pair, and the shear of the film (Petroff's over sqrt(1 - eps^2)) against their spin.
     """
     ex, ey, ex_rate, ey_rate = eccentricity
+    pin, clearance, constants = p.pin_radius[joint], p.clearance[joint], p.film_constants[joint]
     distance = math.sqrt(ex * ex + ey * ey)
+    fade = 1.0 - rise((distance / clearance - 1.0) / p.film_share)
+    if fade == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     nx, ny = (ex / distance, ey / distance) if distance > 0.0 else (1.0, 0.0)
     radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
     eps = kept(distance / clearance, p.film_share)
-    ratio = 0.5 * p.film_length / p.pin_radius
-    relative = clearance / p.pin_radius
-    size = 2.0 * p.film_length * p.pin_radius * p.viscosity / (relative * relative)
+    ratio = 0.5 * p.film_length / pin
+    relative = clearance / pin
+    size = fade * 2.0 * p.film_length * pin * p.viscosity / (relative * relative)
     journal_spin, bore_spin = spins
     per_distance = eps / distance if distance > 0.0 else 1.0 / clearance
     wedge = eps * (journal_spin + bore_spin) - 2.0 * across * per_distance  # eps w
-    rotation = size * rotation_number(eps, ratio, p.film_constants)
-    beta = attitude(eps, ratio, p.film_constants)
+    rotation = size * rotation_number(eps, ratio, constants)
+    beta = attitude(eps, ratio, constants)
     # speeds along and across the line of centres, each smooth where the other one is not zero
     closing = radial / clearance
     speed = math.sqrt(wedge * wedge + closing * closing)
-    turning, pressing = 0.0, 0.0
-    if speed > 0.0:
-        turning, pressing = wedge * wedge / speed, closing * closing / speed
-    pressed = size * squeeze_number(eps, ratio, p.film_constants)
-    pulled = size * squeeze_number(-eps, ratio, p.film_constants)
+    turning = wedge * wedge / speed if speed > 0.0 else 0.0
+    # sharper near the wall, where a film that is pulled apart has next to nothing of a pressed one
+    sharp = math.sqrt(closing * closing + ((1.0 - eps) * wedge) ** 2)
+    pressing = closing * closing / sharp if sharp > 0.0 else 0.0
+    pressed = size * squeeze_number(eps, ratio, constants)
+    pulled = size * squeeze_number(-eps, ratio, constants)
     normal = -rotation * turning * math.cos(beta)
     normal -= 0.5 * (pressed + pulled) * closing + 0.5 * (pressed - pulled) * pressing
     side = rotation * wedge * math.sin(beta)
     fx, fy = normal * nx - side * ny, normal * ny + side * nx
-    shear = 2.0 * math.pi * p.viscosity * p.film_length * p.pin_radius**3
+    shear = fade * 2.0 * math.pi * p.viscosity * p.film_length * pin**3
     shear *= (journal_spin - bore_spin) / (clearance * math.sqrt(1.0 - eps * eps))
     half = 0.5 * distance * side
     lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)

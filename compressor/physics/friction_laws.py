@@ -60,7 +60,9 @@ def stribeck(slip, p):
 
 @jit
 def bristle_rate(slip, bristle, p):
-    """How fast LuGre's bristles bend (m/s), of a mean deflection (m)."""
+    """How fast LuGre's bristles bend (m/s), of a mean deflection (m); there are none at mu 0."""
+    if p.static == 0.0 and p.dynamic == 0.0:
+        return 0.0
     held = p.bristle_stiffness * abs(slip) * bristle / stribeck(slip, p)
     return slip - held
 

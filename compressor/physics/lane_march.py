@@ -30,6 +30,7 @@ from compressor.physics.lane_rows import (
     LANES,
     LOSS_SECONDS,
     MAX_PENETRATION,
+    MOMENT_SUM,
     NEXT_SAMPLE,
     PEAK,
     PEAK_KINETIC,
@@ -51,6 +52,7 @@ from compressor.physics.lane_rows import (
     STATE,
     STEPS,
     TOO_DEEP,
+    TORQUE_SUM,
     TOUCHING,
     H,
     K,
@@ -160,6 +162,7 @@ def load(W, j, runs, job, work, most):
     W[SECONDS + j] = tally.seconds
     W[SQUARE_ACCELERATION + j] = tally.square_acceleration
     W[SQUARE_DEVIATION + j] = tally.square_deviation
+    W[TORQUE_SUM + j], W[MOMENT_SUM + j] = tally.crank_torque, tally.guide_moment
     for i in range(PEAKED):
         W[PEAK + i * LANES + j] = tally.peak[i]
     for joint in range(2):
@@ -197,6 +200,7 @@ def unload(W, j, runs, job, work):
     tally.seconds = W[SECONDS + j]
     tally.square_acceleration = W[SQUARE_ACCELERATION + j]
     tally.square_deviation = W[SQUARE_DEVIATION + j]
+    tally.crank_torque, tally.guide_moment = W[TORQUE_SUM + j], W[MOMENT_SUM + j]
     for i in range(PEAKED):
         tally.peak[i] = W[PEAK + i * LANES + j]
     for joint in range(2):

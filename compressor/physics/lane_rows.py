@@ -16,7 +16,7 @@ LANES = 16
 MOST = 8  # numbers of a motion
 STATE = MOST + 4  # and energy flows
 STAGE_COUNT = 7
-SEEN_COUNT = 16  # columns from ACCELERATION to NEARNESS, kinetic and potential energy
+SEEN_COUNT = 18  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potential energy
 PEAKED = 7  # of these the first ones, of which the greatest size is kept
 NODE_COUNT = 5
 
@@ -61,6 +61,7 @@ SEEN = _rows(SEEN_COUNT)
 NODE_ROWS = _rows(NODE_COUNT * SEEN_COUNT)
 # the tally
 SECONDS, SQUARE_ACCELERATION, SQUARE_DEVIATION = _rows(), _rows(), _rows()
+TORQUE_SUM, MOMENT_SUM = _rows(), _rows()
 PEAK = _rows(PEAKED)
 MAX_PENETRATION, LOSS_SECONDS, IMPACTS, RELEASES, TOUCHING, FLOWN = (_rows(2) for _ in range(6))
 DEEPEST, ENERGY, IMBALANCE, PEAK_KINETIC = (_rows() for _ in range(4))

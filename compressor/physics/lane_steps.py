@@ -50,18 +50,19 @@ def record_of(scene, W, j):
     b = FIRST_FIELD + j
     number = len(scene)
     freedoms = 4 if number == 3 else 2
-    clearance = W[b + 9 * LANES], W[b + 10 * LANES]
-    stiffness = W[b + 11 * LANES], W[b + 12 * LANES]
+    pins = W[b + 8 * LANES], W[b + 9 * LANES]
+    clearance = W[b + 10 * LANES], W[b + 11 * LANES]
+    stiffness = W[b + 12 * LANES], W[b + 13 * LANES]
     return LaneRecord(  # type: ignore[call-arg]
         number, DESIGN, IMPACT, 1, freedoms, 0,
         W[b], W[b + LANES], W[b + 2 * LANES], W[b + 3 * LANES], W[b + 4 * LANES], W[b + 5 * LANES],
-        W[b + 6 * LANES], W[b + 7 * LANES], W[b + 8 * LANES], clearance, stiffness, 1.5,
-        W[b + 13 * LANES], W[b + 14 * LANES], W[b + 15 * LANES], W[b + 16 * LANES],
-        W[b + 17 * LANES], W[b + 18 * LANES], NO_CORNERS,
-        W[b + 19 * LANES], W[b + 20 * LANES], W[b + 21 * LANES], W[b + 22 * LANES],
-        W[b + 23 * LANES], W[b + 24 * LANES], W[b + 25 * LANES], W[b + 26 * LANES],
-        W[b + 27 * LANES], W[b + 28 * LANES], W[b + 29 * LANES], W[b + 30 * LANES],
-        W[b + 31 * LANES], W[b + 32 * LANES], W[b + 33 * LANES], W[b + 34 * LANES],
+        W[b + 6 * LANES], W[b + 7 * LANES], pins, clearance, stiffness, 1.5,
+        W[b + 14 * LANES], W[b + 15 * LANES], W[b + 16 * LANES], W[b + 17 * LANES],
+        W[b + 18 * LANES], W[b + 19 * LANES], NO_CORNERS,
+        W[b + 20 * LANES], W[b + 21 * LANES], W[b + 22 * LANES], W[b + 23 * LANES],
+        W[b + 24 * LANES], W[b + 25 * LANES], W[b + 26 * LANES], W[b + 27 * LANES],
+        W[b + 28 * LANES], W[b + 29 * LANES], W[b + 30 * LANES], W[b + 31 * LANES],
+        W[b + 32 * LANES], W[b + 33 * LANES], W[b + 34 * LANES], W[b + 35 * LANES],
         0.0, 0.0, 0.0, 0.0, 0.0, (0.0,),
     )  # fmt: skip
 
@@ -133,7 +134,8 @@ def put_seen(W, j, g, energy):
         g[11],
     )
     W[s + 12 * LANES], W[s + 13 * LANES] = g[12], g[13]
-    W[s + 14 * LANES], W[s + 15 * LANES] = energy
+    W[s + 14 * LANES], W[s + 15 * LANES] = g[14], g[15]
+    W[s + 16 * LANES], W[s + 17 * LANES] = energy
 
 
 @inlined
@@ -178,6 +180,9 @@ def keep_stage(scene, W, k, s):
 def keep_glance(W, k, a):
     move(W, k, a, SEEN)
     move(W, k, a + 8 * LANES, SEEN + 8 * LANES)
+    for j in range(k):
+        W[a + 16 * LANES + j] = W[SEEN + 16 * LANES + j]
+        W[a + 17 * LANES + j] = W[SEEN + 17 * LANES + j]
 
 
 @jit
@@ -215,7 +220,7 @@ def look_at_node(scene, W, k, fraction, w, i):
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
         y = state_of(scene, W, j, w)
         now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
-        put_seen(W, j, glanced(now, joint_forces(now, y, p), p), energies(now, y, p))
+        put_seen(W, j, glanced(now, y, joint_forces(now, y, p), p), energies(now, y, p))
     keep_seen(W, k, i)
 
 

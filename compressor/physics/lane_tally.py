@@ -20,6 +20,7 @@ from compressor.physics.lane_rows import (
     LOSS_SECONDS,
     MAX_PENETRATION,
     MEASURED,
+    MOMENT_SUM,
     NEAR,
     NEW,
     PEAK,
@@ -31,6 +32,7 @@ from compressor.physics.lane_rows import (
     SETTLE,
     SQUARE_ACCELERATION,
     SQUARE_DEVIATION,
+    TORQUE_SUM,
     TOUCHING,
     H,
     T,
@@ -47,7 +49,8 @@ G0, _, G2, _, G4 = (float(weight) for weight in COARSE_WEIGHTS)
 FINE_WHOLE = sum(float(width) for width in np.diff(NODES))
 COARSE_WHOLE = sum(float(width) for width in np.diff(NODES[::2]))
 DEVIATION, PENETRATION, NORMAL, NEARNESS = 7 * LANES, 8 * LANES, 10 * LANES, 12 * LANES
-KINETIC, POTENTIAL = 14 * LANES, 15 * LANES
+TORQUE, MOMENT = 14 * LANES, 15 * LANES
+KINETIC, POTENTIAL = 16 * LANES, 17 * LANES
 
 
 @inlined
@@ -215,6 +218,17 @@ def squared(W, c, total, h, fine):
     return total + h * (F4 if fine else G4) * W[R4 + c] ** 2
 
 
+@inlined
+def integrated(W, c, total, h, fine):
+    """A column added to a total at the nodes, by their weights."""
+    b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
+    total += h * (F0 if fine else G0) * W[R0 + c]
+    total += h * F1 * b
+    total += h * (F2 if fine else G2) * W[R2 + c]
+    total += h * F3 * d
+    return total + h * (F4 if fine else G4) * W[R4 + c]
+
+
 @jit
 def tally_lanes(scene, W, k):
     """Tally the steps of plain lanes: as `tally_energy` and `tally_step`."""
@@ -244,6 +258,8 @@ def tally_lanes(scene, W, k):
         W[SECONDS + j] += h
         W[SQUARE_ACCELERATION + j] = squared(W, j, W[SQUARE_ACCELERATION + j], h, fine)
         W[SQUARE_DEVIATION + j] = squared(W, DEVIATION + j, W[SQUARE_DEVIATION + j], h, fine)
+        W[TORQUE_SUM + j] = integrated(W, TORQUE + j, W[TORQUE_SUM + j], h, fine)
+        W[MOMENT_SUM + j] = integrated(W, MOMENT + j, W[MOMENT_SUM + j], h, fine)
     for column in range(PEAKED):
         o = column * LANES
         for j in range(k):

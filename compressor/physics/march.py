@@ -35,7 +35,7 @@ from compressor.physics.step_control import (
     first_step,
     refuse,
 )
-from compressor.physics.systems import derivative_with_flows, gauge, glance
+from compressor.physics.systems import beyond_model, derivative_with_flows, gauge, glance
 from compressor.physics.tally import (
     near_record,
     share_apart,
@@ -43,6 +43,7 @@ from compressor.physics.tally import (
     tally_step,
 )
 from compressor.physics.walker import (
+    BEYOND_MODEL,
     COARSE_WEIGHTS,
     DONE,
     NODE_WEIGHTS,
@@ -327,3 +328,5 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             w.status = PENETRATION_IMPLAUSIBLE
         elif not finite(z):
             w.status = NON_FINITE
+        elif beyond_model(z, p):
+            w.status = BEYOND_MODEL

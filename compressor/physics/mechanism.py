@@ -56,6 +56,7 @@ class Pose(NamedTuple):
     height: float  # of the crosshead's pin
     tilt: float
     speed: float  # of the crank, rad/s
+    slip: float  # of the crank: its speed over the steady one, less 1
     spin: float  # of the rod, counter-clockwise
 
 
@@ -91,8 +92,12 @@ def speed_of(y, p):
 
 @jit
 def unpack(y, p, w, rates):
-    """Write the coordinates and their rates into w and rates, (11,); 0 of what is left out."""
+    """Write the coordinates and their rates into w and rates, (11,); 0 of what is left out.
+
+    The crank has its slip in place of a coordinate.
+    """
     n = p.freedoms
+    w[0] = y[p.at[0]] if p.driven else 0.0
     for i in range(1, COORDINATES):
         place = p.at[i]
         w[i], rates[i] = (y[place], y[n + place]) if place >= 0 else (0.0, 0.0)
@@ -110,7 +115,7 @@ def pose_of(motion, w, rates, p):
     x = p.crank_radius * c - w[1] + w[3] + length * cos_phi
     falling = p.crank_radius * c * rates[0] - rates[2] + rates[4] - rates[5]
     phi_rate = (falling - sin_phi * rates[STRETCH]) / (length * cos_phi)
-    return Pose(c, s, sin_phi, cos_phi, length, x, w[5], w[6], rates[0], -phi_rate)
+    return Pose(c, s, sin_phi, cos_phi, length, x, w[5], w[6], rates[0], w[0], -phi_rate)
 
 
 @jit
@@ -157,11 +162,11 @@ def fill_bias(pose, rates, p, bias):
 
 
 @jit
-def oiled(contact, eccentricity, spins, clearance, p):
+def oiled(joint, contact, eccentricity, spins, p):
     """A joint's `Contact` with its film's force and moment on the rod, and the `Film`."""
     if p.viscosity == 0.0:
         return contact, NO_FILM
-    fx, fy, journal, bore, lost = film(eccentricity, spins, clearance, p)
+    fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
     found = Contact(
         contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
         contact.penetration, contact.rate, contact.slip, contact.elastic, contact.unclamped,
@@ -182,7 +187,8 @@ def touching(joint, eccentricity, axes, spins, carried, p):
     """A joint's `Contact`, with a round bore or a worn one."""
     if p.sectors:
         return worn_contact(joint, eccentricity, axes, spins, carried, p)
-    return joint_contact(eccentricity, spins, p.clearance[joint], p.stiffness[joint], carried, p)
+    bearing = p.pin_radius[joint], p.clearance[joint], p.stiffness[joint]
+    return joint_contact(eccentricity, spins, bearing, carried, p)
 
 
 @jit
@@ -201,7 +207,7 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         spins = pose.speed, big_spin
         axes = bore_axes(BIG_SLOPE, w[7:11], pose, p)
         big = touching(BIG_END, off, axes, spins, kept, p)
-        big, big_film = oiled(big, off, spins, p.clearance[0], p)
+        big, big_film = oiled(BIG_END, big, off, spins, p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
         off = y[place], y[place + 1], y[n + place], y[n + place + 1]
@@ -209,7 +215,7 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         spins = pin_spin, small_spin
         axes = bore_axes(SMALL_SLOPE, w[7:11], pose, p)
         small = touching(SMALL_END, off, axes, spins, kept, p)
-        small, small_film = oiled(small, off, spins, p.clearance[1], p)
+        small, small_film = oiled(SMALL_END, small, off, spins, p)
     guide = UNGUIDED
     if p.tilting:
         rates = velocity[8], velocity[9], velocity[10]
@@ -227,7 +233,7 @@ def add_forces(pose, joints, p, force):
     big, small, guide = joints.big, joints.small, joints.guide
     c, s = pose.cos_theta, pose.sin_theta
     force[0] -= p.crank_radius * (c * big.fy - s * big.fx)
-    force[0] += (p.pin_radius - big.penetration) * big.friction + joints.big_film.moment
+    force[0] += (p.pin_radius[0] - big.penetration) * big.friction + joints.big_film.moment
     force[0] -= p.unbalance * p.gravity * c
     if p.driven:
         force[0] += motor_torque(pose, p)
@@ -235,7 +241,7 @@ def add_forces(pose, joints, p, force):
     force[8] += guide.fx - joints.load - small.fx
     force[9] += guide.fy - p.reciprocating_mass * p.gravity - small.fy
     force[10] += guide.moment + joints.small_film.moment
-    force[10] += (p.pin_radius - small.penetration) * small.friction
+    force[10] += (p.pin_radius[1] - small.penetration) * small.friction
 
 
 @jit
@@ -253,7 +259,8 @@ def add_on_rod(pose, big, small, p, force):
 @jit
 def motor_torque(pose, p):
     """Torque (N m) of the motor at the crank's speed: a line."""
-    return p.torque + p.torque_slope * (p.omega - pose.speed)
+    # by the slip: of a steep line the difference of two speeds would leave no digits
+    return p.torque - p.torque_slope * p.omega * pose.slip
 
 
 @jit

@@ -115,9 +115,11 @@ def reactions_of(pose, joints, needed, velocity, last, p):
         big_x, big_y = needed[0] - small_x, needed[1] - small_y
     big_torque, small_torque, rubbing = 0.0, 0.0, 0.0
     if p.rubbing and not p.clearance[0] > 0.0:
-        big_torque = ideal_torque(pose.speed - joints.big_spin, big_x, big_y, p)
+        turning = pose.speed - joints.big_spin
+        big_torque = ideal_torque(turning, big_x, big_y, p.pin_radius[0], p)
     if p.rubbing and not p.clearance[1] > 0.0:
-        small_torque = ideal_torque(joints.pin_spin - joints.small_spin, small_x, small_y, p)
+        turning = joints.pin_spin - joints.small_spin
+        small_torque = ideal_torque(turning, small_x, small_y, p.pin_radius[1], p)
     guide = joints.guide.fy
     if not p.tilting:
         guide = p.reciprocating_mass * p.gravity + small_y
@@ -126,10 +128,13 @@ def reactions_of(pose, joints, needed, velocity, last, p):
 
 
 @jit
-def ideal_torque(turning, fx, fy, p):
-    """Friction torque (N m) on the rod in an ideal joint; turning: the journal's spin in it."""
-    size = square_root(fx * fx + fy * fy) * p.pin_radius
-    return friction_coefficient(turning * p.pin_radius, 0.0, p) * size
+def ideal_torque(turning, fx, fy, pin, p):
+    """Friction torque (N m) on the rod in an ideal joint.
+
+    turning: the journal's spin in it (rad/s); pin: the journal's radius (m).
+    """
+    size = square_root(fx * fx + fy * fy) * pin
+    return friction_coefficient(turning * pin, 0.0, p) * size
 
 
 @jit

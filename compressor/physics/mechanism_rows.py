@@ -18,20 +18,24 @@ from compressor.physics.elastic_rod import (
     summed,
 )
 from compressor.physics.friction_laws import LUGRE, bristle_rate
+from compressor.physics.guide import corner_depth
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import COORDINATES, ROWS, bore_axes, motor_torque
 from compressor.physics.mechanism_motion import solve
 from compressor.physics.observe import (
     ACCELERATION,
     CRANK_POWER,
+    CRANK_TORQUE,
     DEVIATION,
     DISPLACEMENT,
     ECCENTRICITY,
     FORCE,
     FORCE_SIZE,
+    GUIDE_MOMENT,
     KINETIC,
     NEARNESS,
     NORMAL,
+    PACE,
     PENETRATION,
     PISTON_FORCE,
     POTENTIAL,
@@ -43,9 +47,12 @@ from compressor.physics.observe import (
 )
 from compressor.physics.worn_bore import at_the_wall, wear_off
 
-GUIDE_FORCE, GUIDE_MOMENT = int(Column.GUIDE_FORCE), int(Column.GUIDE_MOMENT)
-GUIDE_FRICTION, GUIDE_GAP = int(Column.GUIDE_FRICTION), int(Column.GUIDE_GAP)
-CRANK_SPEED = int(Column.CRANK_SPEED)
+GUIDE_FORCE, GUIDE_FRICTION = int(Column.GUIDE_FORCE), int(Column.GUIDE_FRICTION)
+GUIDE_GAP, CRANK_SPEED = int(Column.GUIDE_GAP), int(Column.CRANK_SPEED)
+MOTOR_TORQUE, UNBALANCE = int(Column.MOTOR_TORQUE), int(Column.UNBALANCE)
+
+STALLED = 0.01  # of the steady speed: a crank that is slower has all but stopped
+IMPLAUSIBLE = 0.1  # of half the crosshead, or of the rod: more than any contact or bar bears
 
 
 @jit
@@ -73,29 +80,53 @@ def write_rates(now, y, p, out):
     if p.driven:
         out[p.at[0] - 1] = pace - 1.0
         out[p.at[0]] = now.accelerations[0] / p.omega * pace
+    if p.elastic:
+        out[p.rod_loss] = rod_damping_power(now, p) * pace
+
+
+@jit
+def rod_damping_power(now, p):
+    """Power (W) that the rod's material takes."""
+    modes = now.rates[7:11]
+    return p.rod_damping * material_work(modes, modes, p)
 
 
 @jit
 def crank_torque(now, p):
-    """Torque (N m) that the motor gives the crank, or that keeps its speed."""
-    if p.driven:
-        return motor_torque(now.pose, p)
+    """Torque (N m) that drives the crank against the rod."""
     pose, forces, big = now.pose, now.reactions, now.joints.big
     torque = p.crank_radius * (pose.cos_theta * forces.big_y - pose.sin_theta * forces.big_x)
-    torque += forces.big_torque + p.unbalance * p.gravity * pose.cos_theta
-    return torque - (p.pin_radius - big.penetration) * big.friction - now.joints.big_film.moment
+    torque += forces.big_torque
+    return torque - (p.pin_radius[0] - big.penetration) * big.friction - now.joints.big_film.moment
+
+
+@jit
+def guide_moment(now, p):
+    """Moment (N m) of the crosshead on its guide about the crank's centre, counter-clockwise.
+
+    An ideal guide lets no crosshead tilt: it bears the couple on the pin as well.
+    """
+    pose, guide, forces = now.pose, now.joints.guide, now.reactions
+    moment = guide.moment - pose.height * (guide.fx + forces.rubbing)
+    moment = -(pose.x * forces.guide + moment)
+    if not p.tilting:
+        small = now.joints.small
+        moment += (p.pin_radius[1] - small.penetration) * small.friction
+        moment += now.joints.small_film.moment - forces.small_torque
+    return moment
 
 
 @jit
 def write_powers(now, p, row):
     """Write four powers (W) into row, (4,): of crank and load, lost to damping and friction."""
     big, small, guide, pose = now.joints.big, now.joints.small, now.joints.guide, now.pose
-    forces, modes = now.reactions, now.rates[7:11]
-    row[0] = crank_torque(now, p) * pose.speed
+    forces = now.reactions
+    torque = crank_torque(now, p) + p.unbalance * p.gravity * pose.cos_theta
+    row[0] = (motor_torque(pose, p) if p.driven else torque) * pose.speed
     row[1] = -now.joints.load * now.velocity[8]
     damped = damping_power(big) + damping_power(small) + guide.damped
     damped += now.joints.big_film.loss + now.joints.small_film.loss
-    row[2] = damped + p.rod_damping * material_work(modes, modes, p)
+    row[2] = damped + rod_damping_power(now, p)
     rubbed = guide.rubbed - big.friction * big.slip - small.friction * small.slip
     rubbed += forces.big_torque * (pose.speed - now.joints.big_spin)
     rubbed += forces.small_torque * (now.joints.pin_spin - now.joints.small_spin)
@@ -122,20 +153,31 @@ def write_energies(now, p, row):
 
 
 @jit
+def ideal_acceleration(now, p):
+    """Acceleration (m/s^2) of the ideal machine's crosshead, whose crank turns as this one does."""
+    if not p.driven:
+        return now.motion.a
+    speed = 1.0 + now.pose.slip
+    return now.motion.a * speed * speed + now.motion.v / p.omega * now.accelerations[0]
+
+
+@jit
 def write_glanced(now, p, row):
-    """Write the columns from ACCELERATION to NEARNESS."""
+    """Write the columns from ACCELERATION to GUIDE_MOMENT, and the pace."""
     forces = now.reactions
     row[ACCELERATION] = now.body[8]
     row[FORCE], row[FORCE + 1] = forces.big_x, forces.big_y
     row[FORCE + 2], row[FORCE + 3] = forces.small_x, forces.small_y
     row[FORCE_SIZE] = square_root(forces.big_x**2 + forces.big_y**2)
     row[FORCE_SIZE + 1] = square_root(forces.small_x**2 + forces.small_y**2)
-    row[DEVIATION] = now.body[8] - now.motion.a
+    row[DEVIATION] = now.body[8] - ideal_acceleration(now, p)
     big, small = now.joints.big, now.joints.small
     row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration
     row[NORMAL], row[NORMAL + 1] = big.normal, small.normal
     row[NEARNESS] = nearness(big, p.stiffness[0], p.clearance[0], p)
     row[NEARNESS + 1] = nearness(small, p.stiffness[1], p.clearance[1], p)
+    row[CRANK_TORQUE], row[GUIDE_MOMENT] = crank_torque(now, p), guide_moment(now, p)
+    row[PACE] = pace_of(now, p)
 
 
 @jit
@@ -205,10 +247,13 @@ def observe(t, y, phase, p, row):
     write_row(now, p, row)
     if row.size == WIDE:
         row[GUIDE_FORCE] = -forces.guide
-        along = guide.fx + forces.rubbing
-        row[GUIDE_MOMENT] = -(pose.x * forces.guide + guide.moment - pose.height * along)
-        row[GUIDE_FRICTION], row[CRANK_SPEED] = -along, pose.speed
+        row[GUIDE_FRICTION], row[CRANK_SPEED] = -(guide.fx + forces.rubbing), pose.speed
         row[GUIDE_GAP] = -guide.deepest
+        row[MOTOR_TORQUE] = motor_torque(pose, p)
+        inward, along = pose.speed * pose.speed, now.accelerations[0]
+        c, s = pose.cos_theta, pose.sin_theta
+        row[UNBALANCE] = p.unbalance * (inward * c + along * s)
+        row[UNBALANCE + 1] = p.unbalance * (inward * s - along * c)
 
 
 @jit
@@ -261,6 +306,27 @@ def write_eccentricities(t, y, p, row):
     for i in range(4):
         place = p.at[1 + i]
         row[ECCENTRICITY + i] = y[place] if place >= 0 else 0.0
+
+
+@jit
+def beyond_model(y, p):
+    """What a state has that no machine can: 1 a crank that has all but stopped, 2 a corner of the
+    crosshead deep in its guide, 3 a rod bent or pressed out of shape; 0 nothing.
+    """
+    if p.driven and y[p.at[0]] <= STALLED - 1.0:
+        return 1
+    if p.tilting:
+        height, tilt = y[p.at[5]], y[p.at[6]]
+        most = IMPLAUSIBLE * min(p.guide_length, p.guide_height)
+        for end in (-1.0, 1.0):
+            for side in (-1.0, 1.0):
+                if corner_depth(height, tilt, end, side, p) > most:
+                    return 2
+    if p.elastic:
+        for i in range(7, COORDINATES):
+            if abs(y[p.at[i]]) > IMPLAUSIBLE * p.rod_length:
+                return 3
+    return 0
 
 
 @jit

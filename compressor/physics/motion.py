@@ -145,8 +145,8 @@ def contact_big_end(y, motion, turn, p):
     """`joint_contact` of the big end in scene big_end."""
     big = eccentricity_big_end(y, turn, p)
     spins = p.omega, -motion.rate - y[3]
-    kept = carried_by(AT_BIG_END, y, p)
-    return joint_contact(big, spins, p.clearance[0], p.stiffness[0], kept, p)
+    bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
+    return joint_contact(big, spins, bearing, carried_by(AT_BIG_END, y, p), p)
 
 
 @inlined
@@ -154,8 +154,8 @@ def contact_small_end(y, motion, turn, p):
     """`joint_contact` of the small end in scene small_end."""
     small = eccentricity_small_end(y, turn, p)
     spins = 0.0, -motion.rate - y[3]
-    kept = carried_by(AT_SMALL_END, y, p)
-    return joint_contact(small, spins, p.clearance[1], p.stiffness[1], kept, p)
+    bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
+    return joint_contact(small, spins, bearing, carried_by(AT_SMALL_END, y, p), p)
 
 
 @inlined
@@ -163,10 +163,10 @@ def contacts_both(y, motion, turn, p):
     """`joint_contact` of the big end and of the small end in scene both."""
     big, small = eccentricities_both(y, turn, p)
     spin = -motion.rate - y[7]
-    kept = carried_by(AT_BIG_END, y, p)
-    at_big = joint_contact(big, (p.omega, spin), p.clearance[0], p.stiffness[0], kept, p)
-    kept = carried_by(AT_SMALL_END, y, p)
-    at_small = joint_contact(small, (0.0, spin), p.clearance[1], p.stiffness[1], kept, p)
+    bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
+    at_big = joint_contact(big, (p.omega, spin), bearing, carried_by(AT_BIG_END, y, p), p)
+    bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
+    at_small = joint_contact(small, (0.0, spin), bearing, carried_by(AT_SMALL_END, y, p), p)
     return at_big, at_small
 
 

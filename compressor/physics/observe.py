@@ -42,21 +42,25 @@ class Column(IntEnum):
     PENETRATION = 16  # two
     NORMAL = 18  # two
     NEARNESS = 20  # two: of contact
-    CRANK_POWER = 22  # put into the mechanism by the crank
-    LOAD_POWER = 23  # put into the mechanism by the piston force
-    DAMPING_POWER = 24  # lost in the contacts' normal direction
-    FRICTION_POWER = 25  # lost to friction
-    KINETIC = 26
-    POTENTIAL = 27  # contacts' springs and gravity
-    GUIDE_FORCE = 28  # on the guide, upwards; from here on: of a mechanism with features alone
-    GUIDE_MOMENT = 29  # of this and its lever, about the crank's centre, counter-clockwise
-    GUIDE_FRICTION = 30  # on the guide, along x
-    GUIDE_GAP = 31  # least gap of the crosshead's corners, negative where one presses
-    CRANK_SPEED = 32  # rad/s
+    CRANK_TORQUE = 22  # that drives the crank against the rod, along its rotation
+    GUIDE_MOMENT = 23  # of the crosshead on its guide, about the crank's centre
+    CRANK_POWER = 24  # put into the mechanism by the crank, or by the motor that drives it
+    LOAD_POWER = 25  # put into the mechanism by the piston force
+    DAMPING_POWER = 26  # lost in the contacts' normal direction and in an elastic rod
+    FRICTION_POWER = 27  # lost to friction
+    KINETIC = 28
+    POTENTIAL = 29  # contacts' springs and gravity
+    PACE = 30  # time that passes over that of a steady crank; from here on: of features alone
+    GUIDE_FORCE = 31  # on the guide, upwards; from here on: not in a march
+    GUIDE_FRICTION = 32  # on the guide, along x
+    GUIDE_GAP = 33  # least gap of the crosshead's corners, negative where one presses
+    CRANK_SPEED = 34  # rad/s
+    MOTOR_TORQUE = 35
+    UNBALANCE = 36  # two: the crank's own force on its bearing, x and y
 
 
-COLUMNS = 28  # that a march reads, and that scenes have
-WIDE = int(Column.CRANK_SPEED) + 1  # that a mechanism with features has
+COLUMNS = int(Column.PACE) + 1  # that a march reads
+WIDE = int(Column.UNBALANCE) + 2  # that a mechanism with features has
 # numba wants plain integers
 DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, int(Column.ACCELERATION)
 ROD_ANGLE, PISTON_FORCE = int(Column.ROD_ANGLE), int(Column.PISTON_FORCE)
@@ -64,9 +68,11 @@ FORCE, ECCENTRICITY = int(Column.FORCE), int(Column.ECCENTRICITY)
 PENETRATION, NORMAL = int(Column.PENETRATION), int(Column.NORMAL)
 NEARNESS = int(Column.NEARNESS)
 FORCE_SIZE, DEVIATION = int(Column.FORCE_SIZE), int(Column.DEVIATION)
+CRANK_TORQUE, GUIDE_MOMENT = int(Column.CRANK_TORQUE), int(Column.GUIDE_MOMENT)
 CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
 DAMPING_POWER, FRICTION_POWER = int(Column.DAMPING_POWER), int(Column.FRICTION_POWER)
 KINETIC, POTENTIAL = int(Column.KINETIC), int(Column.POTENTIAL)
+PACE = int(Column.PACE)
 
 
 @jit
@@ -164,13 +170,30 @@ def damping_power(contact):
 
 
 @inlined
+def torque_and_moment(now, y, forces, p):
+    """Torque (N m) that drives the crank, and moment of the crosshead on its guide.
+
+    The guide bears the crosshead's force at its lever and, since the crosshead cannot tilt, the
+    couple that the small end's friction puts on the pin.
+    """
+    motion, big, small = now.motion, now.big, now.small
+    torque = p.crank_radius * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
+    if p.clearance[0] > 0.0:
+        torque -= (p.pin_radius[0] - big.penetration) * big.friction
+    moment = -(motion.x + y[0]) * (forces[3] + p.reciprocating_mass * p.gravity)
+    if p.clearance[1] > 0.0:
+        moment += (p.pin_radius[1] - small.penetration) * small.friction
+    return torque, moment
+
+
+@inlined
 def powers(now, y, forces, p):
     """The four powers (W): of crank and load, lost to damping and friction."""
     motion, big, small = now.motion, now.big, now.small
     crank = p.crank_radius * p.omega
     turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
     if p.clearance[0] > 0.0:
-        turning -= p.omega * (p.pin_radius - big.penetration) * big.friction
+        turning -= p.omega * (p.pin_radius[0] - big.penetration) * big.friction
     pressing = -now.load * (motion.v + y[p.freedoms])
     damping = damping_power(big) + damping_power(small)
     return turning, pressing, damping, -big.friction * big.slip - small.friction * small.slip
@@ -197,23 +220,24 @@ def energies(now, y, p):
 
 
 @inlined
-def glanced(now, forces, p):
-    """The columns from ACCELERATION to NEARNESS."""
+def glanced(now, y, forces, p):
+    """The columns from ACCELERATION to GUIDE_MOMENT."""
     big, small = now.big, now.small
+    torque, moment = torque_and_moment(now, y, forces, p)
     return (
         now.a, forces[0], forces[1], forces[2], forces[3],
         square_root(forces[0] * forces[0] + forces[1] * forces[1]),
         square_root(forces[2] * forces[2] + forces[3] * forces[3]),
         now.a - now.motion.a, big.penetration, small.penetration, big.normal, small.normal,
         nearness(big, p.stiffness[0], p.clearance[0], p),
-        nearness(small, p.stiffness[1], p.clearance[1], p),
+        nearness(small, p.stiffness[1], p.clearance[1], p), torque, moment,
     )  # fmt: skip
 
 
 @inlined
-def write_glanced(now, forces, p, row):
-    """Write the columns from ACCELERATION to NEARNESS into the row."""
-    columns = glanced(now, forces, p)
+def write_glanced(now, y, forces, p, row):
+    """Write the columns from ACCELERATION to GUIDE_MOMENT into the row."""
+    columns = glanced(now, y, forces, p)
     for i in range(CRANK_POWER - ACCELERATION):
         row[ACCELERATION + i] = columns[i]
 
@@ -221,7 +245,7 @@ def write_glanced(now, forces, p, row):
 @inlined
 def write_gauged(now, y, forces, p, row):
     """Write the columns from ACCELERATION on into the row."""
-    write_glanced(now, forces, p, row)
+    write_glanced(now, y, forces, p, row)
     write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
     row[KINETIC], row[POTENTIAL] = energies(now, y, p)
 
@@ -241,13 +265,14 @@ def observe(t, y, phase, p, row):
     row[PISTON_FORCE] = now.load
     eccentricity_row(y, turn, p, row)
     write_gauged(now, y, joint_forces(now, y, p), p, row)
+    row[PACE] = 1.0
 
 
 @merged
 def glance(motion, y, phase, p, row):
-    """The columns from ACCELERATION to NEARNESS: what a step is tallied by between its ends."""
+    """The columns from ACCELERATION to GUIDE_MOMENT: what a step is tallied by within its ends."""
     now = evaluate(motion, y, phase, p)
-    write_glanced(now, joint_forces(now, y, p), p, row)
+    write_glanced(now, y, joint_forces(now, y, p), p, row)
 
 
 @merged

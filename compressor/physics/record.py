@@ -83,6 +83,7 @@ COORDINATE_NAMES = {
 }
 # of a crank whose speed gives way: behind a steady one's time, and speed over the steady one's
 CRANK = ("crank's lag, s", "crank's slip")
+ROD_LOSS = ("energy lost in the rod, J",)
 
 FIELDS: list[tuple] = [
     ("scene", "i8"),
@@ -101,7 +102,7 @@ FIELDS: list[tuple] = [
     ("reciprocating_mass", "f8"),  # crosshead, piston rod and piston, kg
     ("gravity", "f8"),  # along -y, m/s^2
     # contact, per joint: big end, small end
-    ("pin_radius", "f8"),  # journal radius R_j, m
+    ("pin_radius", "f8", (2,)),  # journal radius R_j, m
     ("clearance", "f8", (2,)),  # radial, m; 0 for an ideal joint
     ("stiffness", "f8", (2,)),  # K, N/m^p
     ("exponent", "f8"),  # p
@@ -143,7 +144,7 @@ FILM: list[tuple] = [
     ("viscosity", "f8"),  # of the oil, Pa s; 0 of dry joints
     ("film_length", "f8"),  # of the bearings, m
     ("film_share", "f8"),  # of the clearance: the film's last, in which the contact takes over
-    ("film_constants", "f8", (51,)),  # `film.film_constants`
+    ("film_constants", "f8", (2, 51)),  # of each joint, `film.film_constants`
 ]
 MOST_SECTORS = 180
 # of a mechanism whose bores wear
@@ -170,12 +171,18 @@ FEATURES: list[tuple] = [
     ("guide_length", "f8"),  # half the crosshead's, m
     ("guide_height", "f8"),  # half the crosshead's, m
     ("guide_stiffness", "f8"),  # of a corner on the guide, N/m^p
+    ("guide_exponent", "f8"),  # p
+    ("guide_damping", "f8"),  # C_max of ADAMS's IMPACT, N s/m
+    ("per_guide_full_damping", "f8"),  # 1 / d_max, 1/m
+    ("guide_restituting", "i8"),  # whether corners are damped by a restitution instead
+    ("guide_hysteresis", "f8"),  # chi
     ("guide_friction", "f8"),  # coefficient
     ("guide_stiction", "f8"),  # m/s
     ("crosshead_inertia", "f8"),  # about the pin, kg m^2
     ("axial_stiffness", "f8"),  # of the rod: E A / L, N/m
     ("bending_stiffness", "f8"),  # E I / L^3, N/m
     ("rod_damping", "f8"),  # of the rod's material, over its stiffness, s
+    ("rod_loss", "i8"),  # place in a state of what that has taken; -1 of a rigid rod
 ]
 # The last field's length tells compiled functions, by its type alone, which kind a record is of:
 # those for the default one hold nothing of the others (`_jit.by_kind`).
@@ -225,6 +232,8 @@ def place_coordinates(p: np.record) -> None:
     if p["driven"]:
         at[Coordinate.CRANK] = 2 * len(found) + len(CARRIED) + 1
     p["at"], p["freedoms"] = at, len(found)
+    behind = 2 * len(found) + len(CARRIED) + (len(CRANK) if p["driven"] else 0)
+    p["rod_loss"] = behind if p["elastic"] else -1
     moving = [one for one in Coordinate if at[one] >= 0]
     p["degrees"], p["coordinates"] = len(moving), moving + [-1] * (len(at) - len(moving))
 
@@ -232,8 +241,8 @@ def place_coordinates(p: np.record) -> None:
 def state_names(p: np.record) -> tuple[str, ...]:
     """Names of the numbers of a record's state: deviations, their rates, what contacts carry.
 
-    Of a mechanism: its coordinates and their rates in place of deviations, and the crank's lag and
-    slip at the end; numbers that are not used fill the state up to whole fours.
+    Of a mechanism: its coordinates and their rates in place of deviations, the crank's lag and slip
+    and the rod's loss at the end; numbers that are not used fill the state up to whole fours.
     """
     if not is_featured(p):
         names = STATE_NAMES[Scene(int(p["scene"]))]
@@ -241,7 +250,7 @@ def state_names(p: np.record) -> tuple[str, ...]:
     found = present(p)
     names = tuple(COORDINATE_NAMES[one][0] for one in found)
     names += tuple(COORDINATE_NAMES[one][1] for one in found) + CARRIED
-    names += CRANK if p["driven"] else ()
+    names += (CRANK if p["driven"] else ()) + (ROD_LOSS if p["elastic"] else ())
     return names + ("unused",) * (-len(names) % 4) if found or p["driven"] else ()
 
 

@@ -5,7 +5,7 @@ speed; that both agree is a test.
 """
 
 from compressor.physics import mechanism_rows
-from compressor.physics._jit import by_kind
+from compressor.physics._jit import by_kind, jit
 from compressor.physics.motion import contact_at as scene_contact_at
 from compressor.physics.motion import derivative as scene_derivative
 from compressor.physics.motion import start as scene_start
@@ -18,6 +18,14 @@ from compressor.physics.observe import write_eccentricities as scene_eccentricit
 from compressor.physics.observe import write_flowing_derivative as scene_flowing_derivative
 from compressor.physics.record import MECHANISM
 
+
+@jit
+def within_model(y, p):
+    """`mechanism_rows.beyond_model` of a scene, whose depths the tally watches."""
+    return 0
+
+
+beyond_model = by_kind(MECHANISM, mechanism_rows.beyond_model, within_model)
 derivative = by_kind(MECHANISM, mechanism_rows.derivative, scene_derivative)
 derivative_with_flows = by_kind(
     MECHANISM, mechanism_rows.derivative_with_flows, scene_derivative_with_flows

@@ -8,19 +8,22 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import jit, merged
+from compressor.physics._jit import by_kind, jit, merged
 from compressor.physics.contact_laws import in_contact
 from compressor.physics.observe import (
     ACCELERATION,
     CRANK_POWER,
+    CRANK_TORQUE,
     DEVIATION,
+    GUIDE_MOMENT,
     KINETIC,
     NEARNESS,
     NORMAL,
+    PACE,
     PENETRATION,
     POTENTIAL,
 )
-from compressor.physics.record import MOST_SECTORS, is_featured, zero
+from compressor.physics.record import MECHANISM, MOST_SECTORS, is_featured, zero
 
 NEAR = 0.98  # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
@@ -40,6 +43,8 @@ TALLY = np.dtype(
         ("seconds", "f8"),  # of machine time measured
         ("square_acceleration", "f8"),
         ("square_deviation", "f8"),
+        ("crank_torque", "f8"),  # integrals over time, N m s
+        ("guide_moment", "f8"),
         ("peak", "f8", (PEAKED,)),  # of acceleration, of FORCE (joint, axis) and of FORCE_SIZE
         ("top", "f8", (PEAKED,)),  # the same at the present step's nodes
         ("max_penetration", "f8", (2,)),
@@ -232,6 +237,41 @@ def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
         tally.loss_seconds[joint] += apart[joint] * span
 
 
+@jit
+def steady_pace(rows, i, p):
+    """Time that passes at a node of a step over that of a steady crank: 1."""
+    return 1.0
+
+
+@jit
+def crank_pace(rows, i, p):
+    """`steady_pace` of a crank whose speed may give way."""
+    return rows[i, PACE] if p.driven else 1.0
+
+
+pace_at = by_kind(MECHANISM, crank_pace, steady_pace)
+
+
+@jit
+def steady_pace_of_step(weights, rows, every, p):
+    """Mean of `pace_at` over a step: 1."""
+    return 1.0
+
+
+@jit
+def crank_pace_of_step(weights, rows, every, p):
+    """Mean of `pace_at` over a step; weights: of its nodes."""
+    if not p.driven:
+        return 1.0
+    pace = 0.0
+    for i in range(0, weights.size, every):
+        pace += weights[i] * rows[i, PACE]
+    return pace
+
+
+pace_of_step = by_kind(MECHANISM, crank_pace_of_step, steady_pace_of_step)
+
+
 @merged
 def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
@@ -240,20 +280,25 @@ def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
     the nodes; every: 1, or 2 where only the first, third, ... row is filled, with `weights` zero
     at the others; apart: (2,), share of the step without contact, by joint; measured: whether the
     metrics count (after settling); the depth of contact over the whole run always does.
+
+    span is that of a steady crank; what is tallied are shares and means of the time that passes.
     """
+    passing = span * pace_of_step(weights, rows, every, p)
     if p.clearance[0] > 0.0:
-        tally_contact(0, span, nodes, rows, every, apart, measured, tally)
+        tally_contact(0, passing, nodes, rows, every, apart, measured, tally)
     if p.clearance[1] > 0.0:
-        tally_contact(1, span, nodes, rows, every, apart, measured, tally)
+        tally_contact(1, passing, nodes, rows, every, apart, measured, tally)
     if not measured:
         return
-    tally.seconds += span
+    tally.seconds += passing
     for k in range(PEAKED):
         tally.top[k] = 0.0
     for i in range(0, nodes.size, every):
-        weight = span * weights[i]
+        weight = span * weights[i] * pace_at(rows, i, p)
         tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
         tally.square_deviation += weight * rows[i, DEVIATION] ** 2
+        tally.crank_torque += weight * rows[i, CRANK_TORQUE]
+        tally.guide_moment += weight * rows[i, GUIDE_MOMENT]
         for k in range(PEAKED):
             tally.top[k] = max(tally.top[k], abs(rows[i, ACCELERATION + k]))
     for k in range(PEAKED):

@@ -27,10 +27,11 @@ class Status(IntEnum):
     NON_FINITE = 2
     STEP_UNDERFLOW = 3
     PENETRATION_IMPLAUSIBLE = 4
+    BEYOND_MODEL = 5  # as of `mechanism_rows.beyond_model`
 
 
 # numba wants plain integers
-RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE = map(int, Status)
+RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE, BEYOND_MODEL = map(int, Status)
 
 WALKER = np.dtype(
     [

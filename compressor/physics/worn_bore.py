@@ -178,7 +178,7 @@ def worn_contact(joint, eccentricity, axes, spins, carried, p):
     size = square_root(gx * gx + gy * gy)
     nx, ny = gx / size, gy / size
     rate = gx * vx + gy * vy
-    arm = p.pin_radius - penetration
+    arm = p.pin_radius[joint] - penetration
     bore = nx * ex + ny * ey + arm
     slip = nx * vy - ny * vx + (journal_spin - rod_spin) * arm
     approach, bristle = carried

@@ -11,7 +11,7 @@ from compressor.solve.scales import JointScales, expected_cost, joint_scales
 from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.si_record import record
 from compressor.solve.side_by_side import side_by_side
-from compressor.solve.signals import forces_on_frame
+from compressor.solve.signals import SIGNALS, signals_of_scene
 from compressor.solve.simulate import measure, observe, simulate
 from compressor.solve.solution import solve
 from compressor.solve.statistics import mean_bar, sure

@@ -1,6 +1,6 @@
 """Reynolds' equation of a journal bearing of finite length, and the film's numbers from it.
 
-    d/dtheta (h^3 dp/dtheta) + (D / B)^2 d/dz (h^3 dp/dz) = 6 dh/dtheta  or  12 eps' cos(theta)
+    d/dtheta (h^3 dp/dtheta) + (D / B)^2 d/dz (h^3 dp/dz) = 6 w dh/dtheta + 12 eps' cos(theta)
 
 on theta around the bearing from the widest gap, h = 1 + eps cos(theta), and z from -1 to 1, with
 pressures that never pull (Reynolds' condition: p and its slope end together). A film that turns
@@ -36,12 +36,23 @@ def reynolds(eps: float, ratio: float, squeeze: int = 0, grid: tuple[int, int] =
 
     squeeze: 0 of a film that turns, 1 of one that is pressed, -1 of one that is pulled apart.
     """
-    coarse = _forces(eps, ratio, squeeze, (grid[0] // 2, grid[1] // 2))
-    fine = _forces(eps, ratio, squeeze, grid)
-    return Reynolds(*((4.0 * fine - coarse) / 3.0))
+    return Reynolds(*forces(eps, ratio, 0.0 if squeeze else 1.0, squeeze, grid))
 
 
-def _forces(eps: float, ratio: float, squeeze: int, grid: tuple[int, int]) -> np.ndarray:
+def forces(
+    eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int] = GRID
+) -> np.ndarray:
+    """Return the numbers of `Reynolds`, (2,), of a film that turns and is squeezed at once.
+
+    turning: w eps, squeeze: eps', both over one speed.
+    """
+    coarse = _forces(eps, ratio, turning, squeeze, (grid[0] // 2, grid[1] // 2))
+    return (4.0 * _forces(eps, ratio, turning, squeeze, grid) - coarse) / 3.0
+
+
+def _forces(
+    eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int]
+) -> np.ndarray:
     """Both numbers on one grid, (2,)."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.linalg import spsolve
@@ -56,9 +67,8 @@ def _forces(eps: float, ratio: float, squeeze: int, grid: tuple[int, int]) -> np
     sine = np.sin(xi) * width / step
     conductance = (1.0 + eps * at_wall) ** 3 * (1.0 - finer * np.cos(wall)) / root / step
     side = (1.0 + eps * cosine) ** 3 * width * (along / ratio) ** 2
-    source = 12.0 * squeeze * cosine * width
-    if not squeeze:  # over eps, which stays finite
-        source = 6.0 * (at_wall - np.roll(at_wall, 1))
+    # of the wedge over eps, which stays finite
+    source = 12.0 * squeeze * cosine * width + 6.0 * turning * (at_wall - np.roll(at_wall, 1))
     i, j = (index.ravel() for index in np.mgrid[:around, :along])
     cell = i * along + j
     ahead, behind = conductance[i], np.roll(conductance, 1)[i]

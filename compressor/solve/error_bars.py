@@ -73,12 +73,12 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
         return {name: np.full(np.shape(value), np.inf) for name, value in metrics.items()}
     found = {}
     for name, value in metrics.items():
-        bar = METRICS[name].bar
-        size = np.abs(value) if bar.relative else np.ones(np.shape(value))
+        bar, own_unit = METRICS[name].bar, METRICS[name].unit.startswith("1")
+        size = np.ones(np.shape(value)) if own_unit else np.abs(value)
         own = bar.own * np.abs(np.asarray(value) - other.metrics[name])
         path = bar.path * spread(other.apart[METRICS[name].series], np.ndim(value)) * size
         found[name] = other.closeness * np.hypot(own, path)
-        if bar.relative:
+        if not own_unit:
             found[name] = np.maximum(found[name], max(FLOOR * residual, bar.least) * size)
     return found
 

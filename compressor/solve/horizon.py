@@ -104,7 +104,7 @@ def followed(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting
                 phases, request.times, states, tally, rows, far, min(CHUNK, left),
             )  # fmt: skip
             if Status.DONE not in (walker.status, fellow.status):
-                check_march(request, walker, float(tally.deepest), deadline)
+                check_march(request, walker, z, float(tally.deepest), deadline)
     except Stop:
         return Parting(float(walker.t), False, False)
     parted = fellow.status == Status.DONE

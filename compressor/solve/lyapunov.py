@@ -78,7 +78,10 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
         raise ValueError(f"{revolutions} revolutions: an exponent needs one at least")
     turning = max(TURNING, math.ceil(revolutions / 4))
     times = case.turn * np.arange(1, INTERVALS * (turning + revolutions) + 1) / INTERVALS
-    push = np.full(state.size, CLOSE / math.sqrt(state.size))
+    # positions and rates alone: what else a state holds, such as a crank's lag, need not fade
+    moving = 2 * int(record(case)["freedoms"])
+    push = np.zeros(state.size)
+    push[:moving] = CLOSE / math.sqrt(moving)
     deadline = time.monotonic() + timeout
     for rtol, of_steps in zip(RTOLS, OF_STEPS, strict=True):
         twins = _Twins(case, state, times, rtol, deadline)
@@ -155,7 +158,7 @@ class _Twins:
                 request.rtol * size, size, self.edges[: last + 1], self.phases[:last],
                 request.times, self.states, self.tally, self.rows, math.inf, CHUNK,
             )  # fmt: skip
-            check_march(request, walker, float(self.tally.deepest), self.deadline)
+            check_march(request, walker, self.z, float(self.tally.deepest), self.deadline)
             if self.fellow.status != Status.RUNNING or not np.isfinite(self.twin).all():
                 raise Stop(Reason.NON_FINITE, "the twin is no longer finite")
         return (self.twin[:n] - self.z[:n]) / size

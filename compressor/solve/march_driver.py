@@ -8,7 +8,7 @@ from compressor.physics import FLOWS, Status, new_work
 from compressor.reasons import Reason
 from compressor.solve.last_steps import retrace
 from compressor.solve.marching import March, Snapshot, Standing, ready_walker
-from compressor.solve.request import LAST, Request, Stop, Trajectory, check_speed, overdue, too_deep
+from compressor.solve.request import LAST, Request, Stop, Trajectory, check_state, overdue, too_deep
 from compressor.solve.sizes import natural_sizes
 from compressor.solve.turns import with_cuts, with_edge
 
@@ -41,8 +41,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
         if walker.status == Status.DONE:
             return
         try:
-            check_speed(request.p, z)
-            check_march(request, walker, float(result.tally.deepest), deadline)
+            check_march(request, walker, z, float(result.tally.deepest), deadline)
         except Stop:
             result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
             enough = result.steps + result.rejected >= seen + LAST
@@ -50,9 +49,12 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             raise
 
 
-def check_march(request: Request, walker: np.record, deepest: float, deadline: float) -> None:
-    """Raise Stop where a march has stopped, or may go no further."""
+def check_march(
+    request: Request, walker: np.record, z: np.ndarray, deepest: float, deadline: float
+) -> None:
+    """Raise Stop where a march has stopped at z, or may go no further."""
     status = Status(int(walker.status))
+    check_state(request.p, z)
     if status == Status.PENETRATION_IMPLAUSIBLE:
         raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest, request.p))
     if status == Status.NON_FINITE:

@@ -13,6 +13,10 @@ MODES = {  # of the rod: stiffness over E I / L^3 or E A / L, share of its mass 
     Coordinate.STRETCH: (7 / 3, 2 / 15),
 }
 
+# J: of an energy that is integrated beside the motion and moves nothing, so that it neither holds
+# steps back nor tells two motions apart
+UNCONTROLLED = 1e12
+
 
 def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -> np.ndarray:
     """Size of each number of a mechanism's state, (n,): deflections under the forces at hand.
@@ -44,15 +48,19 @@ def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -
         place = p["at"][Coordinate.CRANK]
         moving = p["reciprocating_mass"] + p["rod_mass"]
         inertia = p["crank_inertia"] + moving * p["crank_radius"] ** 2
-        sizes[place] = min(1.0, force * p["crank_radius"] / (inertia * p["omega"] ** 2))
+        # a steep line holds the speed nearer than inertia does
+        held = inertia * p["omega"] ** 2 + p["torque_slope"] * p["omega"]
+        sizes[place] = min(1.0, force * p["crank_radius"] / held)
         sizes[place - 1] = sizes[place] / p["omega"]
+    if p["elastic"]:
+        sizes[p["rod_loss"]] = UNCONTROLLED
     return sizes
 
 
 def _guide_sizes(p: np.record, force: float) -> tuple[float, float]:
     """Length (m) and speed (m/s) of the crosshead in its guide, as of a journal."""
     across = force * p["crank_ratio"] + p["reciprocating_mass"] * p["gravity"]
-    stiffness, exponent = p["guide_stiffness"], p["exponent"]
+    stiffness, exponent = p["guide_stiffness"], p["guide_exponent"]
     depth = (across / stiffness) ** (1.0 / exponent)
     length = max(min(p["guide_clearance"], depth), 1e-3 * depth)
     tangent = exponent * stiffness * depth ** (exponent - 1.0)

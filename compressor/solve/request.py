@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compressor.cases import IMPLAUSIBLE
-from compressor.physics import Coordinate, elastic_form, is_featured
+from compressor.physics import STALLED, beyond_model, elastic_form
 from compressor.reasons import Reason
 from compressor.solve.turns import Cuts
 
 LAST = 16  # attempts that a history keeps
 NONE = -1  # in place of a number of the state
-STALLED = 0.01  # of the steady speed: a crank that is slower has all but stopped
 
 
 @dataclass
@@ -78,6 +77,11 @@ class Trajectory:
     seconds: float = 0.0
 
 
+def last_state(run: Trajectory) -> np.ndarray:
+    """Return the motion, (k,), where a run ended or stopped."""
+    return run.stop_state if run.reason and run.stop_state.size else run.states[-1]
+
+
 class Stop(Exception):
     """A run that cannot go on, by its named reason."""
 
@@ -91,9 +95,10 @@ def overdue(timeout: float) -> str:
     return f"more than {timeout:g} s of wall time"
 
 
-def check_speed(p: np.record, state: np.ndarray) -> None:
-    """Raise Stop where a crank whose speed gives way has all but come to a stop."""
-    if is_featured(p) and p["driven"] and state[p["at"][Coordinate.CRANK]] <= STALLED - 1.0:
+def check_state(p: np.record, state: np.ndarray) -> None:
+    """Raise Stop where a state leaves what a mechanism with features can do."""
+    beyond = beyond_model(state, p)
+    if beyond == 1:
         least = STALLED * p["omega"] * 30.0 / math.pi
         detail = (
             f"slower than {least:.3g} rpm: the motor gives {p['torque']:g} N m at full speed and "
@@ -101,13 +106,22 @@ def check_speed(p: np.record, state: np.ndarray) -> None:
             f"{p['crank_inertia']:g} kg m2"
         )
         raise Stop(Reason.CRANK_STALLED, detail)
+    if beyond == 2:
+        most = IMPLAUSIBLE * 1e3 * min(p["guide_length"], p["guide_height"])
+        detail = f"a corner of the crosshead is more than {most:.3g} mm deep in its guide"
+        raise Stop(Reason.GUIDE_IMPLAUSIBLE, f"{detail}, a tenth of half its smaller side")
+    if beyond == 3:
+        most = IMPLAUSIBLE * 1e3 * p["rod_length"]
+        detail = f"the rod is bent or pressed by more than {most:.3g} mm, a tenth of its length"
+        raise Stop(Reason.ROD_IMPLAUSIBLE, detail)
 
 
 def greatest_depth(p: np.record) -> tuple[float, str]:
     """Penetration (m) beyond which a run stops, and what that is in words."""
-    tenth = IMPLAUSIBLE * float(p["pin_radius"])
-    joints = [j for j in zip(p["stiffness"], p["clearance"].tolist(), strict=True) if j[1] > 0.0]
-    most = min((elastic_form(*joint, p).deepest for joint in joints), default=math.inf)
+    each = zip(p["stiffness"], p["clearance"].tolist(), p["pin_radius"].tolist(), strict=True)
+    joints = [joint for joint in each if joint[1] > 0.0]
+    tenth = IMPLAUSIBLE * min((pin for *_, pin in joints), default=math.inf)
+    most = min((elastic_form(k, c, p).deepest for k, c, _ in joints), default=math.inf)
     if most < tenth:
         return most, "half the clearance, up to which contact.law: johnson holds"
     return tenth, "a tenth of the pin radius"

@@ -31,7 +31,7 @@ from compressor.solve.request import (
     Request,
     Stop,
     Trajectory,
-    check_speed,
+    check_state,
     greatest_depth,
     overdue,
     too_deep,
@@ -167,7 +167,7 @@ class Segment:
             result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
             taken = solver.t - solver.t_old
             result.history.add(solver.t_old, taken, math.nan, f"{request.method} taken")
-            check_speed(request.p, solver.y)
+            check_state(request.p, solver.y)
             self.check()
         z = solver.y.copy()
         if self.landings and bound < self.end:

@@ -12,7 +12,7 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import SERIES, SIZES
-from compressor.physics import COLUMNS, Column, is_featured, observe_all
+from compressor.physics import COLUMNS, WIDE, Column, is_featured, observe_all
 from compressor.solve.request import Trajectory
 
 COLUMN = {
@@ -25,7 +25,6 @@ COLUMN = {
     "eccentricity": Column.ECCENTRICITY,
     "penetration": Column.PENETRATION,
 }
-WIDE = Column.CRANK_SPEED + 1  # columns of a mechanism with features
 A_TURN = 150  # times a revolution at which two runs are compared
 OF_A_PERIOD = 24  # samples of the forces in one of the body's fastest motion
 FEWEST, MOST = 64, 20_000  # of these times over a settled part

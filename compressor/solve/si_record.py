@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, joint_stiffness, to_si
+from compressor.cases import Case, Guide, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     MOST_SECTORS,
@@ -18,6 +18,7 @@ from compressor.physics import (
     bore_fields,
     choose_laws,
     complete,
+    hysteresis,
     new_record,
 )
 
@@ -73,7 +74,7 @@ def offsets(case: Case) -> np.ndarray:
 def stiffness_of(case: Case, joint: str) -> float:
     """The contact stiffness of a joint, as of `joint_stiffness`."""
     clearance = getattr(case.clearance_mm, joint)
-    return joint_stiffness(case.contact, case.machine.pin_radius_mm, clearance)
+    return joint_stiffness(case.contact, case.machine.pin_radius(joint), clearance)
 
 
 def _machine(case: Case, p: dict[str, Any]) -> None:
@@ -86,7 +87,7 @@ def _machine(case: Case, p: dict[str, Any]) -> None:
     p["rod_inertia"] = machine.rod_inertia_kg_m2 or 0.0
     p["reciprocating_mass"] = machine.reciprocating_mass_kg
     p["gravity"] = machine.gravity_m_per_s2
-    p["pin_radius"] = to_si(machine.pin_radius_mm, "mm")
+    p["pin_radius"] = [to_si(machine.pin_radius(joint), "mm") for joint in JOINTS]
 
 
 def _contact(case: Case, p: dict[str, Any]) -> None:
@@ -136,7 +137,28 @@ def _film(case: Case, p: dict[str, Any]) -> None:
     length = to_si(lubricant.bearing_length_mm, "mm")
     p["viscosity"] = to_si(lubricant.viscosity_mPa_s, "mPa s")
     p["film_length"], p["film_share"] = length, lubricant.last_share
-    p["film_constants"] = film_numbers(0.5 * length / p["pin_radius"], lubricant.last_share)
+    p["film_constants"] = [
+        film_numbers(0.5 * length / pin, lubricant.last_share) for pin in p["pin_radius"]
+    ]
+
+
+def _guide_contact(case: Case, guide: Guide, p: dict[str, Any]) -> None:
+    """How a corner of the crosshead meets its guide: as the joints do, where it has no keys of its
+    own; without their restitution by ADAMS's IMPACT.
+    """
+    contact = case.contact
+    exponent = guide.exponent or contact.exponent
+    damping = guide.damping_N_s_per_mm
+    damping = contact.damping_N_s_per_mm if damping is None else damping
+    p["guide_stiffness"] = guide.stiffness_N_per_mm15 * 1000.0**exponent
+    p["guide_exponent"] = exponent
+    p["guide_damping"] = to_si(damping, "N s/mm")
+    p["per_guide_full_damping"] = 1.0 / to_si(
+        guide.full_damping_mm or contact.full_damping_mm, "mm"
+    )
+    restitution = guide.restitution or contact.restitution
+    if restitution is not None:
+        p["guide_restituting"], p["guide_hysteresis"] = 1, hysteresis(contact.law, restitution)
 
 
 def _features(case: Case, p: dict[str, Any]) -> None:
@@ -150,7 +172,7 @@ def _features(case: Case, p: dict[str, Any]) -> None:
         p["guide_clearance"] = to_si(guide.clearance_mm, "mm")
         p["guide_length"] = to_si(guide.crosshead_length_mm, "mm") / 2
         p["guide_height"] = to_si(guide.crosshead_height_mm, "mm") / 2
-        p["guide_stiffness"] = guide.stiffness_N_per_mm15 * 1000.0**case.contact.exponent
+        _guide_contact(case, guide, p)
         p["guide_friction"] = guide.friction
         p["guide_stiction"] = to_si(guide.stiction_velocity_mm_per_s, "mm/s")
         p["crosshead_inertia"] = guide.crosshead_inertia_kg_m2 or 0.0

@@ -30,17 +30,21 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
     length = max(min(clearance, depth), 1e-3 * depth)
     mass = min(p["rod_mass"], moving)
     speed = length * math.sqrt(contact.tangent(depth) / mass)
-    if (damping := film_damping(p, clearance)) > 0.0:
+    if (damping := film_damping(p)) > 0.0:
         speed = min(speed, force / damping)
     return length, speed
 
 
-def film_damping(p: np.record, clearance: float) -> float:
-    """Damping (N s/m) of a joint's film that is pressed against the wall; 0 of a dry joint."""
+def film_damping(p: np.record) -> float:
+    """Damping (N s/m) of a film that is pressed against the wall; 0 of dry joints.
+
+    Of the joint with the smaller clearance, whose film is the stiffer one.
+    """
     if not is_featured(p) or p["viscosity"] == 0.0:
         return 0.0
-    size = 2.0 * p["film_length"] * p["viscosity"] * p["pin_radius"] ** 3 / clearance**2
-    return float(size * p["film_constants"][-1] / clearance)
+    clearance, joint = min((one, j) for j, one in enumerate(p["clearance"].tolist()) if one > 0.0)
+    size = 2.0 * p["film_length"] * p["viscosity"] * p["pin_radius"][joint] ** 3 / clearance**2
+    return float(size * p["film_constants"][joint, -1] / clearance)
 
 
 def natural_sizes(p: np.record) -> np.ndarray:

@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 
-from compressor.physics import Column
+from compressor.physics import Column, is_featured
 from compressor.solve.energy_audit import energy_residual
 from compressor.solve.error_bars import Metrics
-from compressor.solve.request import Trajectory
+from compressor.solve.request import Trajectory, last_state
+
+ROUNDING = 1e-12
 
 
 def metrics(p: np.record, tally: np.record) -> Metrics:
@@ -23,18 +25,25 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
         "peak_contact_force_axis": tally["peak"][axes:sizes].reshape(2, 2),
         "max_penetration": np.where(ideal, 0.0, tally["max_penetration"]),
         "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
+        "mean_crank_torque": tally["crank_torque"] / seconds,
+        "mean_guide_moment": tally["guide_moment"] / seconds,
         "impact_count": np.where(ideal, 0.0, tally["impacts"]),
         "release_count": np.where(ideal, 0.0, tally["releases"]),
     }
 
 
-def ledger(trajectory: Trajectory) -> dict[str, float]:
+def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
     """Energy flows and counts by name."""
-    tally = trajectory.tally
+    tally, state = trajectory.tally, last_state(trajectory)
+    elastic = is_featured(p) and p["elastic"]
+    lost = float(state[p["rod_loss"]]) if elastic else 0.0
+    # both are integrated by the same stages: without a contact they are equal but for rounding
+    contact = tally["damping_loss"] - lost
     return {
         "crank_work": tally["crank_work"],
         "load_work": tally["load_work"],
-        "contact_damping_loss": tally["damping_loss"],
+        "contact_damping_loss": 0.0 if abs(contact) <= ROUNDING * lost else contact,
+        "rod_damping_loss": lost,
         "friction_loss": tally["friction_loss"],
         "energy_residual": energy_residual(tally) if tally["started"] else math.nan,
         "steps": trajectory.steps,

@@ -9,7 +9,8 @@ from compressor.physics import FLOWS, new_tally
 
 Turns = list[np.record]  # tallies, of one revolution each
 SUMS = (
-    "seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts", "releases",
+    "seconds", "square_acceleration", "square_deviation", "crank_torque", "guide_moment",
+    "loss_seconds", "impacts", "releases",
 )  # fmt: skip
 GREATEST = ("peak", "max_penetration")  # the others go on from the start of the run
 WORN = ("slid", "worn")  # sums of a mechanism with features

@@ -13,7 +13,7 @@ BUGS = [
      "return max(0.0, unclamped), elastic, unclamped\n\n\n@merged\ndef elastic_force",
      "return unclamped, elastic, unclamped\n\n\n@merged\ndef elastic_force"),
     ("the bore's radius is the pin's", "physics/contact.py",
-     "bore = p.pin_radius + clearance", "bore = p.pin_radius"),
+     "bore = pin + clearance", "bore = pin"),
     ("journal and bearing swapped in the slip", "physics/contact.py",
      "fused(journal_spin, arm, -(rod_spin * bore))",
      "fused(rod_spin, bore, -(journal_spin * arm))"),

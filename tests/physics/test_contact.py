@@ -116,7 +116,8 @@ vectors = st.tuples(
 
 def touch(state, p):
     """Contact at the big end, by its eccentricity, the rate of that, and both spins."""
-    return joint_contact(state[:4], state[4:], p.clearance[0], p.stiffness[0], NOTHING, p)
+    bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
+    return joint_contact(state[:4], state[4:], bearing, NOTHING, p)
 
 
 @given(vectors)
@@ -124,7 +125,7 @@ def test_joint_contact_balances_angular_momentum(state):
     (ex, ey), p = state[:2], law()
     found = touch(state, p)
     # the journal's moment about its own centre, moved to the bore's centre with its force there
-    journal = (p.pin_radius - found.penetration) * found.friction
+    journal = (p.pin_radius[0] - found.penetration) * found.friction
     moved = journal + ex * -found.fy - ey * -found.fx
     cancelled = found.normal * math.hypot(ex, ey)
     rounding = 1e-9 * (1 + abs(journal)) + 1e-15 * cancelled

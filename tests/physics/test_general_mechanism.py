@@ -40,6 +40,7 @@ NUMBERS = {
     "crank_inertia": 0.4, "unbalance": 0.3, "torque": 90.0, "torque_slope": 12.0,
     "guide_clearance": 2e-4, "guide_length": 0.06, "guide_height": 0.04, "guide_stiffness": 1e10,
     "guide_friction": 0.05, "guide_stiction": 0.01, "crosshead_inertia": 0.03,
+    "guide_exponent": 1.5, "guide_damping": 3.36e5, "per_guide_full_damping": 1e4,
     "axial_stiffness": 3.4e8, "bending_stiffness": 1.3e5, "rod_damping": 1e-6,
 }  # fmt: skip
 # natural sizes of the coordinates and of their rates

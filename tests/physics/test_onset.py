@@ -355,7 +355,7 @@ def walk(p, y, begin, edges, phases, rtol, watch, times=None, method=METHODS["DO
     walker, work, size = new_walker(mode), new_work(y.size), natural_sizes(p)
     length, speed = length_and_speed(p)
     walker.pair, walker.rtol, walker.watch, walker.t = pair, rtol, watch, begin
-    walker.contact_step, walker.deepest = CONTACT_STEP * length / speed, p.pin_radius
+    walker.contact_step, walker.deepest = CONTACT_STEP * length / speed, p.pin_radius[0]
     tally = new_tally()
     z, states = np.append(y, np.zeros(FLOWS)), np.empty((times.size, y.size))
     march(
