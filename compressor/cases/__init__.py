@@ -1,7 +1,7 @@
 """A YAML text -> checked cases and studies."""
 
 from compressor.cases.accuracy import ACCURACY, TIGHTEST
-from compressor.cases.case import MODEL_VERSION, Case, require_case
+from compressor.cases.case import Case, require_case
 from compressor.cases.examples import templates
 from compressor.cases.file_error import CaseFileError
 from compressor.cases.groups import (
@@ -18,6 +18,7 @@ from compressor.cases.groups import (
 )
 from compressor.cases.ideal import with_ideal_joints
 from compressor.cases.json_schema import case_schema
+from compressor.cases.laws import CYLINDRICAL
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.lubricant import Lubricant
 from compressor.cases.materials import joint_stiffness
@@ -25,6 +26,7 @@ from compressor.cases.mechanism import Drive, Guide, Rod
 from compressor.cases.one_way import back_action
 from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
 from compressor.cases.regimes import Regimes
+from compressor.cases.revisions import MODEL, MODEL_VERSION, SUSPECT, changes_since, model_of
 from compressor.cases.shorthands import row_of, value_in
 from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design

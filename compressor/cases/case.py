@@ -15,6 +15,7 @@ from compressor.cases.conflicts import conflicts
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, with_law
 from compressor.cases.mechanism import filled_guide
 from compressor.cases.parameter import CaseError, Problem, shown
+from compressor.cases.revisions import MODEL_VERSION
 from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
 from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
@@ -22,10 +23,10 @@ from compressor.cases.unknown import SWEEP, meant
 from compressor.cases.wear import filled_wear
 from compressor.metrics import JOINTS
 
-# of the equations and the meaning of what is stored; part of a job's identity. Results of one key
-# agree within the sum of their error bars, whichever version of the program made them; to the bit
-# they are equal only for one version of program and libraries on one kind of processor
-MODEL_VERSION = "2"
+# MODEL_VERSION is that of equations and of the meaning of what is stored; part of a job's identity.
+# Results of one key agree within the sum of their error bars, whichever version of the program made
+# them, unless a revision has changed them (`revisions`); to the bit they are equal only for one
+# version of program and libraries on one kind of processor
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 NO_SWEEP = (
     "would be swept, and a case has one value of each key: build a case for each, or write a case "
@@ -112,6 +113,8 @@ class Case(Settings):
             usual = (length / 2, mass * (length / 1000) ** 2 / 12)
             centre, inertia = (u if g is None else g for g, u in zip(given, usual, strict=True))
             machine = replace(machine, rod_centre_mm=centre, rod_inertia_kg_m2=inertia)
+        if machine.small_end_pin_radius_mm == machine.pin_radius_mm:  # as without the key
+            machine = replace(machine, small_end_pin_radius_mm=None)
         if solve.duration_s is not None:
             solve = replace(solve, duration_rev=None)
         if solve.output_step_s is not None:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import MODEL_VERSION, Case, CaseError
+from compressor.cases import MODEL, Case, CaseError
 from compressor.measure import extremes
 from compressor.measure.extremes import Budget
 from compressor.program import PROGRAM
@@ -214,7 +214,7 @@ def drawn_ranges() -> dict[str, dict[str, Any]]:
 def settings(budget: Budget) -> str:
     """What scenes and verdicts depend on beside the seed."""
     return (
-        f"model {MODEL_VERSION}; {budget.revolutions:g} revolutions, "
+        f"model {MODEL}; {budget.revolutions:g} revolutions, "
         f"{budget.max_steps} steps or {budget.seconds:g} s{DRAWN[budget.drawn]}"
     )
 

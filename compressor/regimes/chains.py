@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import MODES
-from compressor.cases import MODEL_VERSION, Case, Regimes
+from compressor.cases import MODEL, Case, Regimes, model_of
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM
 from compressor.regimes.values import COORDINATES, NUMBERS, TEXTS, Row, empty, run_value
@@ -57,7 +57,8 @@ class Chain:
     def key(self) -> str:
         """Hash of what decides the numbers: cases, their start, what is asked for, the model."""
         what = [case.key for case in self.cases], self.asked.plain(), self.direction
-        text = json.dumps([what, MODEL_VERSION, SCHEMA], sort_keys=True)
+        model = model_of(self.cases[0].values())
+        text = json.dumps([what, model, SCHEMA], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
@@ -140,7 +141,7 @@ def dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
         "regimes": json.dumps(chain.asked.plain()),
         "case": chain.cases[0].attributes()["case"],
         "program": PROGRAM,
-        "model_version": MODEL_VERSION,
+        "model_version": MODEL,
     }
     return xr.Dataset(found, {"value": ("value", value, units), **labels()}, attrs)
 

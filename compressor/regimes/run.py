@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compressor.cases import MODEL_VERSION, Study, points
+from compressor.cases import MODEL, Study, points
 from compressor.program import PROGRAM
 from compressor.regimes.chains import FLUSH, FOLDER, Chain, Ended, Task, read_chain, run_chain
 from compressor.regimes.confirm import Book, Pair, Verdict, confirm
@@ -133,7 +133,7 @@ def write_manifest(folder: Path, study: Study) -> None:
         "is_grid": study.is_grid,
         "chains": [[chain.key for chain in chains] for chains in every],
         "pairs": [Pair(*chains).key for chains in every if len(chains) == 2],
-        "model_version": MODEL_VERSION,
+        "model_version": MODEL,
         "program": PROGRAM,
     }
     text = json.dumps(plain, indent=1) + "\n"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compressor.cases import MODEL_VERSION
+from compressor.cases import MODEL
 from compressor.program import PROGRAM, library_versions
 from compressor.report.page import Section
 from compressor.store import Folder, StoredStudy
@@ -31,7 +31,7 @@ def provenance_section(studies: Sequence[StoredStudy], results: Folder, command:
     """What made this page now, and the studies it is about."""
     versions = library_versions(*LIBRARIES)
     content = Provenance(
-        program=f"{PROGRAM}, model {MODEL_VERSION}",
+        program=f"{PROGRAM}, model {MODEL}",
         libraries=", ".join(f"{name} {version}" for name, version in versions.items()),
         platform=f"Python {platform.python_version()}, {platform.platform()}",
         results=Path(results).absolute(),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import MODEL_VERSION, Case, require_case
+from compressor.cases import MODEL, Case, require_case
 from compressor.metrics import SERIES
 from compressor.outcome import Outcome, Table, row, without_run
 from compressor.physics import FLOWS, is_featured, state_names
@@ -13,9 +13,8 @@ from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
 from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
 from compressor.solve.foundation import foundation
-from compressor.solve.request import NONE, Trajectory
+from compressor.solve.request import NONE, Trajectory, last_state
 from compressor.solve.series import block, finer, rows_of
-from compressor.solve.si_record import record
 from compressor.solve.signals import SIGNALS, features, passed, signals
 from compressor.solve.solution import solve
 from compressor.solve.tallied import ledger
@@ -125,9 +124,11 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     rows, times = whole[::every], solution.trajectory.times[::every]
     states = solution.trajectory.states[::every]
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
+    time = passed(p, times, states)
+    turned = np.where(np.isnan(time), np.nan, p.omega * times)  # a stalled crank turns no further
     variables: dict[str, tuple] = {
-        "time": (("time",), passed(p, times, states), {"units": "s", "long_name": "time"}),
-        "crank_angle": (("time",), p.omega * times, angle),
+        "time": (("time",), time, {"units": "s", "long_name": "time"}),
+        "crank_angle": (("time",), turned, angle),
     }
     for name, (dims, unit, phrase) in SERIES.items():
         attrs = {"units": unit, "long_name": phrase}
@@ -144,7 +145,7 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
 def outcome(case: Case, solution: Solution) -> Outcome:
     """What is kept of a solution without its series."""
     numbers = row()
-    known = solution.metrics | solution.reversal | ledger(solution.trajectory)
+    known = solution.metrics | solution.reversal | ledger(solution.p, solution.trajectory)
     errors = solution.bars | solution.series_errors | solution.reversal_bars
     known |= {f"{name}_error": error for name, error in errors.items()}
     known |= solution.statistics
@@ -166,30 +167,49 @@ def attributes(case: Case, solution: Solution) -> dict[str, object]:
         "Conventions": "SI units; forces act on the rod; the frame of the README",
         **case.attributes(),
         "complete": 0 if trajectory.reason else 1,
-        "settle": solution.settle,
+        "settle": settle_time(solution),
         "rtol": solution.rtol,
         "error_bars": int(case.wants_bars),
         "signals": int(case.output.signals),
         "promise": solution.promise,
         "regime": solution.regime,
         "method": case.solve.method,
-        "model_version": MODEL_VERSION,
+        "model_version": MODEL,
         "program": PROGRAM,
         "libraries": libraries(),
     }
     if solution.reason:
         attrs["detail"] = solution.detail
     if trajectory.reason:
-        attrs |= stop_attributes(case, trajectory)
+        attrs |= stop_attributes(case, solution)
     return attrs
 
 
-def stop_attributes(case: Case, trajectory: Trajectory) -> dict[str, object]:
+def settle_time(solution: Solution) -> float:
+    """Return the time (s) from which metrics count, also of a crank whose speed gives way."""
+    p, run = solution.p, solution.trajectory
+    if not (is_featured(p) and p["driven"]) or not run.tally["seconds"]:
+        return solution.settle
+    inside = np.isfinite(run.states[:, 0])
+    if run.times.size > 2 and inside.any() and run.times[inside][-1] >= solution.settle:
+        times = run.times[inside]
+        return float(np.interp(solution.settle, times, passed(p, times, run.states[inside])))
+    return stop_time(p, run) - float(run.tally["seconds"])
+
+
+def stop_time(p: np.record, run: Trajectory) -> float:
+    """Return the time (s) at which a run stopped or ended."""
+    at = run.stop_time if run.reason else float(run.times[-1])
+    return float(passed(p, np.array([at]), last_state(run)[np.newaxis])[0])
+
+
+def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:
     """Where a run stopped, in which state, and how its last steps went."""
-    history, names = trajectory.history, state_names(record(case))
+    trajectory = solution.trajectory
+    history, names = trajectory.history, state_names(solution.p)
     flows = ("energy flow, J",) * FLOWS
     return {
-        "stop_time": trajectory.stop_time,
+        "stop_time": stop_time(solution.p, trajectory),
         "stop_crank_angle": case.omega * trajectory.stop_time,
         "stop_state": trajectory.stop_state,
         "stop_state_names": "; ".join(names),

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from compressor.cases import MODEL
 from compressor.metrics import METRICS, NUMBERS, ROD_LOAD, SOMETIMES
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
 from compressor.program import PROGRAM
@@ -22,7 +23,7 @@ from compressor.store.files import HEX20
 from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
 
 NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
-GIVEN = digest(" ".join([PROGRAM, *METRICS, *ROD_LOAD]).encode())[:8]  # by this version
+GIVEN = digest(" ".join([PROGRAM, MODEL, *METRICS, *ROD_LOAD]).encode())[:8]  # by this version
 DIGITS = re.compile(rb"[0-9a-f]{20,}")  # in which keys may stand
 REMEDY = "move it away, then run its studies again"
 WORDS = {  # columns -> what their texts look like
@@ -53,7 +54,7 @@ COLUMNS = {
     "promise": ("S", "kept, or none given; empty in files of before 2026-11-22"),
     "regime": ("S", "how far the motion can be foretold; empty where that is not known"),
     "signals": ("S", "yes where signals are kept beside the time series"),
-    "given": ("S8", "hash of the program and of the names of its metrics"),
+    "given": ("S8", "hash of the program, its model and the names of its metrics"),
 }
 LATER = ("promise", "regime", "signals", "given")  # columns that older files do not have
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import MODEL_VERSION, Case, Wear, to_si
+from compressor.cases import MODEL, Case, Wear, model_of, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
 from compressor.solve import Rubbed, rub
@@ -64,7 +64,8 @@ class Worn:
     @cached_property
     def key(self) -> str:
         """Hash of what decides the numbers."""
-        what = [self.case.key, self.case.values()["wear"], MODEL_VERSION, SCHEMA]
+        values = self.case.values()
+        what = [self.case.key, values["wear"], model_of(values), SCHEMA]
         return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:20]
 
     @property
@@ -162,7 +163,7 @@ def dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
         "angle": ("angle", angles, told),
         "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
     }
-    attrs = {"key": of.key, "program": PROGRAM, "model_version": MODEL_VERSION}
+    attrs = {"key": of.key, "program": PROGRAM, "model_version": MODEL}
     attrs["case"] = of.case.attributes()["case"]
     return xr.Dataset(found, where, attrs)
 
