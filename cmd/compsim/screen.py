@@ -299,7 +299,8 @@ def caution(studies: "Sequence[Study]") -> None:
     for study in studies:
         found = cautions(study)
         for one in found[:MOST_CAUTIONS]:
-            share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs looked at)"
+            looked = "" if one.of == len(study.selected) else " that were looked at"
+            share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs{looked})"
             say(f"{study.path}: warning: {one.key}: {one.message}{share}")
         if len(found) > MOST_CAUTIONS:
             say(f"{study.path}: and {plural(len(found) - MOST_CAUTIONS, 'more warning')}")

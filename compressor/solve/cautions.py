@@ -4,14 +4,31 @@ Nothing here is refused: a case is spoken of once, before it runs, and grouped o
 cannot be simulated at all is refused by `compressor.cases.conflicts`.
 """
 
+import math
 import random
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from compressor.cases import Case, Study
+import numpy as np
+
+from compressor.cases import (
+    CYLINDRICAL,
+    Case,
+    Contact,
+    Machine,
+    Study,
+    joint_stiffness,
+    with_ideal_joints,
+)
+from compressor.solve.ideal_scene import closed_form
 from compressor.solve.request import greatest_depth
-from compressor.solve.scales import JointScales, contact_scales, expected_cost
+from compressor.solve.scales import (
+    JointScales,
+    contact_scales,
+    expected_cost,
+    greatest_force,
+)
 from compressor.solve.si_record import record
 from compressor.solve.unit_slips import slips
 
@@ -19,6 +36,9 @@ SHALLOW = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not me
 LEAST_STICTION = 0.1  # mm/s: below it, friction all but sticks
 MOST_JOBS = 500  # of a study that are looked at
 SHORT = 4.0  # a budget this many times below what is expected; so far is that to be trusted
+NEAR_BUCKLING = 0.5  # of Euler's load, beyond which a rod bends by more than its own inertia asks
+TURN_PIECES = 8  # of the quadrature over a revolution of the ideal machine
+DENSITIES = 1000.0, 20_000.0  # kg/m3, of what rods are made of
 
 
 class Remark(NamedTuple):
@@ -44,8 +64,14 @@ def remarks(case: Case) -> Iterator[Remark]:
     joints = list(contact_scales(case))
     yield from _inertias(case)
     for joint in joints:
+        yield from _default_stiffness(case, joint.joint)
         yield from _depths(case, joint)
+    yield from _rod(case)
+    yield from _drive(case)
     friction = case.friction
+    if friction and friction.law in (None, "lugre") and friction.static < friction.dynamic:
+        text = f"{friction.static:g} is below the dynamic one, {friction.dynamic:g}"
+        yield Remark("friction.static", f"{text}: friction grows as bodies slide", "coefficients")
     if joints and friction and 0 < friction.stiction_velocity_mm_per_s < LEAST_STICTION:
         key = "friction.stiction_velocity_mm_per_s"
         slow = f"{friction.stiction_velocity_mm_per_s:g} mm/s, below {LEAST_STICTION:g} mm/s"
@@ -78,8 +104,70 @@ def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
     if depth > SHALLOW * clearance:
         text = f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm"
         yield Remark(
-            "clearance_mm", f"{text}: the joint acts as a spring more than as a gap", "shallow"
+            "clearance_mm",
+            f"{text}: the joint acts as a spring more than as a gap; check the "
+            "stiffness (contact.materials), or raise the clearance",
+            "shallow",
         )
+
+
+def _default_stiffness(case: Case, joint: str) -> Iterator[Remark]:
+    """The paper's stiffness at a pin that is not the paper's."""
+    contact, usual = case.contact, Contact()
+    pin, clearance = case.machine.pin_radius(joint), getattr(case.clearance_mm, joint)
+    if pin == Machine().pin_radius_mm or contact.law in CYLINDRICAL:
+        return
+    if contact.stiffness_N_per_mm15 != usual.stiffness_N_per_mm15:
+        return
+    found = []
+    for geometry in ("external", "internal"):
+        steel = replace(contact, materials=("steel", "steel"), geometry=geometry, exponent=1.5)
+        found.append(joint_stiffness(steel, pin, clearance) / 1000.0**1.5)
+    yield Remark(
+        "contact.stiffness_N_per_mm15",
+        f"{usual.stiffness_N_per_mm15:g} N/mm^1.5 is the paper's, of a pin of 10 mm radius; of "
+        f"steel on steel Eq. 15 gives {found[1]:.3g} for one of {pin:g} mm in its bore "
+        f"({found[0]:.3g} as of two discs): give contact.materials, such as [steel, copper], or "
+        "the stiffness",
+        "default stiffness",
+    )
+
+
+def _rod(case: Case) -> Iterator[Remark]:
+    """An elastic rod that would buckle, or whose mass is not that of its section."""
+    rod, machine = case.rod, case.machine
+    if rod is None:
+        return
+    p = record(case)
+    euler = math.pi**2 * float(p["bending_stiffness"]) * float(p["rod_length"])
+    force = greatest_force(p, "small_end")
+    if force > NEAR_BUCKLING * euler:
+        text = f"forces of up to about {force:.3g} N come near Euler's load, {euler:.3g} N"
+        yield Remark("rod.depth_mm", f"{text}: this rod is linear and does not buckle", "buckling")
+    volume = machine.rod_length_mm * rod.depth_mm * rod.width_mm / 1e9
+    density = machine.rod_mass_kg / volume
+    if not DENSITIES[0] <= density <= DENSITIES[1]:
+        text = f"{machine.rod_mass_kg:g} kg in {rod.width_mm:g} x {rod.depth_mm:g} x "
+        text += f"{machine.rod_length_mm:g} mm are {density:.3g} kg/m3: check mass and section"
+        yield Remark("machine.rod_mass_kg", text, "density")
+
+
+def _drive(case: Case) -> Iterator[Remark]:
+    """A motor that cannot bear the load, by the mean torque of the ideal machine."""
+    drive = case.drive
+    if drive is None or case.load == "none":
+        return
+    plain = replace(
+        with_ideal_joints(case), friction=None, guide=None, drive=None, rod=None,
+        body=None, sensor=None,
+    )  # fmt: skip
+    p, turn = record(plain), plain.turn
+    tally = closed_form(p, np.array([0.0, turn]), 0.0, TURN_PIECES).tally
+    needed, slope = float(tally["crank_torque"]) / turn, drive.slope_N_m_s
+    most = drive.torque_N_m + slope * case.omega
+    if needed > 0.0 and needed > most:
+        text = f"the load takes {needed:.3g} N m on average, more than the motor ever gives, "
+        yield Remark("drive.torque_N_m", f"{text}{most:.3g} N m: the crank will stall", "load")
 
 
 def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
