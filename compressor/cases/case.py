@@ -157,6 +157,10 @@ class Case(Settings):
         except (TypeError, ValueError, RecursionError) as error:
             message = f"needs JSON text, such as the attribute `case` of a run, not {shown(text)}"
             raise CaseError([Problem("", message)]) from error
+        contact = values.get("contact") if isinstance(values, Mapping) else None
+        cylinder = isinstance(contact, dict) and contact.get("law") in CYLINDRICAL
+        if isinstance(contact, dict) and contact.get("materials") and not cylinder:
+            contact.setdefault("geometry", "external")  # the default when older texts were stored
         return cls.from_values(values)
 
     def values(self) -> dict[str, Any]:
@@ -182,6 +186,9 @@ class Case(Settings):
             )
         if self.contact.materials:
             plain["contact"]["materials"] = list(self.contact.materials)
+            if self.contact.law not in CYLINDRICAL:
+                # also the default: that of a file depends on whether it gives a pin radius
+                plain["contact"].setdefault("geometry", "external")
         if self.joint == "none":
             for name in OF_JOINTS:
                 del plain[name]
@@ -278,12 +285,18 @@ def parts_of(values: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]
     parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
     if problems:
         raise CaseError(_as_written(values, _everything_wrong(whole, parts, problems)))
-    return parts, frozenset(keys_given(whole))
+    given = frozenset(keys_given(whole))
+    contact, pins = parts.get("contact"), {key for key in given if key.endswith("pin_radius_mm")}
+    if contact and contact.materials and pins and "contact.geometry" not in given:
+        parts["contact"] = replace(contact, geometry="internal")
+    return parts, given
 
 
 def identity(case: Case, with_solver: bool) -> dict[str, Any]:
     """What makes a case's results: nested values whose text a key is the hash of."""
     values, solve = case.values(), case.solve
+    if values["contact"].get("geometry") == "external":  # as no key was, once
+        del values["contact"]["geometry"]
     for unread in (*_groups_outside_identity(), "solve"):
         values.pop(unread, None)
     values["model"] = MODEL_VERSION

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from functools import partial
+from types import FunctionType
 from typing import Any, cast
 
 from compressor.cases.law_conflicts import (
@@ -84,6 +85,8 @@ class _Known:
         made = getattr(type(self._values), name, None)
         if isinstance(made, property) and made.fget:
             return made.fget(self)
+        if isinstance(made, FunctionType):
+            return partial(made, self)
         value = getattr(self._values, name)
         return _Known(value, self._wrong, f"{key}.") if name in GROUPS and value else value
 
@@ -169,7 +172,7 @@ def _geometry_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
 
 
 def _clearance_conflicts(case: Settings, given: frozenset[str], joint: str) -> Iterator[Problem]:
-    clearance, pin = getattr(case.clearance_mm, joint), case.machine.pin_radius_mm
+    clearance, pin = getattr(case.clearance_mm, joint), case.machine.pin_radius(joint)
     key = f"clearance_mm.{joint}"
     if clearance > pin:
         yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it")

@@ -190,7 +190,8 @@ class Contact:
     )  # fmt: skip
     geometry: str | None = choice(
         None, ("external", "internal"), "Eq. 15",
-        "of the materials' stiffness: radii as of two discs (the paper's), or of a pin in a bore",
+        "of the materials' stiffness: radii as of two discs (the paper's, and the default for its "
+        "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
         optional=True,
     )  # fmt: skip
     exponent: float = parameter(1.5, "", (1, 3), "Table 3", "force exponent p")

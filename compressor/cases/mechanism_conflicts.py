@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from compressor.cases.lubricant import GREATEST_RATIO, LEAST_RATIO
 from compressor.cases.parameter import Problem
 from compressor.cases.table import Settings
+from compressor.metrics import JOINTS
 
 SLIM = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
 
@@ -15,14 +16,15 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
         return
     if case.joint == "none":
         yield Problem("lubricant", "fills clearances, and joint: none has none: name a joint")
-    width = 2.0 * case.machine.pin_radius_mm
-    ratio = case.lubricant.bearing_length_mm / width
-    if not LEAST_RATIO <= ratio <= GREATEST_RATIO:
-        yield Problem(
-            "lubricant.bearing_length_mm",
-            f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers hold "
-            f"from {LEAST_RATIO:g} to {GREATEST_RATIO:g} times",
-        )
+    for joint in JOINTS:
+        width = 2.0 * case.machine.pin_radius(joint)
+        ratio = case.lubricant.bearing_length_mm / width
+        if case.joint in (joint, "both") and not LEAST_RATIO <= ratio <= GREATEST_RATIO:
+            yield Problem(
+                "lubricant.bearing_length_mm",
+                f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
+                f"hold from {LEAST_RATIO:g} to {GREATEST_RATIO:g} times",
+            )
 
 
 def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:

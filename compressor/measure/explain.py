@@ -12,7 +12,15 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.cases import ACCURACY, Case, Study, points, with_ideal_joints
+from compressor.cases import (
+    ACCURACY,
+    CYLINDRICAL,
+    Case,
+    Contact,
+    Study,
+    points,
+    with_ideal_joints,
+)
 from compressor.measure.feature_rows import FEATURES, Feature
 from compressor.measure.features import Effect, comparable, compare
 from compressor.measure.work_precision import SLOW, Progress, complete, faulty
@@ -24,6 +32,7 @@ from compressor.solve import (
     joint_scales,
     record,
     simulate,
+    stiffness_of,
 )
 
 SCENES = {  # by the joints with clearance
@@ -176,21 +185,38 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
         return active, (*absent, "clearance", "contact")
     widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
               for joint in faulty(case)]  # fmt: skip
-    contact = case.contact
     active["clearance"] = ", ".join(widths)
-    stiffness = contact.stiffness_N_per_mm15
-    material = f"K = {stiffness:g} N/mm^p" if stiffness else " on ".join(contact.materials or ())
-    if contact.modulus_GPa is not None:
-        material = f"E* = {contact.modulus_GPa:g} GPa"
+    active["contact"] = contact_words(case)
+    return active, absent
+
+
+def contact_words(case: Case) -> str:
+    """Return the law, stiffness, exponent and damping of a contact in words, with their sources."""
+    contact, usual = case.contact, Contact()
     shape = f"p = {contact.exponent:g}"
-    if contact.length_mm is not None:
+    if contact.law in CYLINDRICAL:
+        material = " on ".join(contact.materials or ()) or f"E* = {contact.modulus_GPa:g} GPa"
         shape = f"{contact.length_mm:g} mm long"
-    damped = f"C_max = {contact.damping_N_s_per_mm:g} N s/mm"
+    elif contact.materials:
+        where = "in their bores" if contact.geometry == "internal" else "as of two discs"
+        each = {
+            f"{stiffness_of(case, joint) / 1000.0**contact.exponent:.4g}" for joint in faulty(case)
+        }
+        material = f"K = {' and '.join(sorted(each))} N/mm^p (Eq. 15, pins {where}: "
+        material += " on ".join(contact.materials) + ")"
+    else:
+        paper = contact.stiffness_N_per_mm15 == usual.stiffness_N_per_mm15
+        source = "Table 3, of a pin of 10 mm radius" if paper else "given"
+        material = f"K = {contact.stiffness_N_per_mm15:g} N/mm^p ({source})"
     if contact.law != "impact":
         restitution = contact.restitution
-        damped = "undamped" if restitution is None else f"restitution {restitution:g}"
-    active["contact"] = f"{contact.law}, {material}, {shape}, {damped}"
-    return active, absent
+        damped = "undamped" if restitution is None else f"restitution {restitution:g} (given)"
+    else:
+        damping = contact.damping_N_s_per_mm, contact.full_damping_mm
+        paper = damping == (usual.damping_N_s_per_mm, usual.full_damping_mm)
+        damped = f"C_max = {damping[0]:g} N s/mm from {damping[1]:g} mm on "
+        damped += "(Table 3)" if paper else "(given)"
+    return f"{contact.law}, {material}, {shape}, {damped}"
 
 
 def spoken(case: Case, feature: Feature) -> str:

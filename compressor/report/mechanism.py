@@ -92,7 +92,8 @@ def mechanism_svg(case: Case, angle: float = ANGLE) -> Markup:
 def mechanism_words(case: Case) -> str:
     """What the picture does not show: speed, masses and the pin."""
     machine = case.machine
+    pins = " and ".join(dict.fromkeys(f"{machine.pin_radius(joint):g}" for joint in JOINTS))
     return (
         f"{machine.speed_rpm:g} rpm; rod {machine.rod_mass_kg:g} kg, crosshead with piston "
-        f"{machine.reciprocating_mass_kg:g} kg; pins of {machine.pin_radius_mm:g} mm radius."
+        f"{machine.reciprocating_mass_kg:g} kg; pins of {pins} mm radius."
     )

@@ -9,7 +9,7 @@ from compressor.solve.lyapunov import largest_exponent
 from compressor.solve.marching import COMPILED
 from compressor.solve.scales import JointScales, expected_cost, joint_scales
 from compressor.solve.scipy_driver import LOCAL
-from compressor.solve.si_record import record
+from compressor.solve.si_record import record, stiffness_of
 from compressor.solve.side_by_side import side_by_side
 from compressor.solve.signals import SIGNALS, signals_of_scene
 from compressor.solve.simulate import measure, observe, simulate

@@ -87,7 +87,8 @@ class Worn:
     @property
     def sector_area(self) -> np.ndarray:
         """Of a bore, by joint (m^2)."""
-        radius = to_si(self.case.machine.pin_radius_mm, "mm") + self.clearances
+        pins = [to_si(self.case.machine.pin_radius(joint), "mm") for joint in JOINTS]
+        radius = np.array(pins) + self.clearances
         width = 2.0 * math.pi / self.how.sectors * radius
         return np.asarray(width * to_si(self.how.bore_length_mm, "mm"))
 
