@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,20 @@ def test_what_another_version_has_stored_is_told_by_what_it_lacks(older, told, w
     assert (again.run_now, again.stale) == (max(told.values()), {})
     assert found() == {}
     assert sweep(made, "results", 1, options=Options(rerun_stale=True)).run_now == 0
+
+
+def test_what_a_revision_has_changed_is_told_though_keys_stay(wear, monkeypatch):
+    """Jobs with oil of model 2 are stale under 2.1; those without are not."""
+    made = wear(blocks=[{"lubricant": True}, {"friction": False}], clearance_mm=[0.1, 0.2])
+    with monkeypatch.context() as patch:
+        patch.setattr(import_module("compressor.solve.simulate"), "MODEL", "2")
+        sweep(made, "results", 1)
+    made_older(monkeypatch)
+    assert found() == {"this version's oil film": 2}
+    assert sweep(made, "results", 1).stale == {"this version's oil film": 2}
+    again = sweep(made, "results", 1, options=Options(rerun_stale=True))
+    assert (again.run_now, again.stale) == (2, {})
+    assert found() == {}
 
 
 def test_a_metric_without_a_value_is_not_missed_twice(wear, monkeypatch):
