@@ -128,6 +128,9 @@ def cost_lines(told: "Explanation") -> Iterator[str]:
     """What a job and the sweep cost."""
     work = f" ({told.steps} steps, {told.evaluations} evaluations)" if told.steps else ""
     yield heading("cost", f"{1e3 * told.seconds:.3g} ms a job{work}")
+    solved = f"{1e3 * told.solution_seconds:.3g} ms of it for the solution (`seconds` in show)"
+    rest = f", the rest for {', '.join(told.other_work)}" if told.other_work else ""
+    yield heading("", solved + rest)
     if told.expected_steps:
         yield heading("", f"by the scales alone about {told.expected_steps:.1g} steps, "
                       f"{1e3 * told.expected_seconds:.1g} ms")  # fmt: skip
@@ -144,7 +147,9 @@ def advised(told: "Explanation", number: int) -> str:
     if effect.reason:
         return f"{advice.name}: the run failed, {effect.reason}"
     saved = 1 - effect.time_ratio
-    told_time = f"{'saves' if saved >= 0 else 'costs'} {100 * abs(saved):.0f} % of the time"
+    told_time = (
+        f"{'saves' if saved >= 0 else 'costs'} {100 * abs(saved):.0f} % of the solution's time"
+    )
     text = (
         f"{advice.name}: peak acceleration {percent(effect.change_peak_acceleration, '+')}, "
         f"contact force {percent(effect.change_peak_contact_force, '+')}, {told_time}"

@@ -80,6 +80,8 @@ class Explanation:
     reason: str  # why the job failed; empty when it did not
     detail: str
     seconds: float  # wall time of the job, without storing it
+    solution_seconds: float  # part of it: `seconds` of the job's results
+    other_work: tuple[str, ...]  # what takes the rest of it
     steps: int
     evaluations: int
     workers: int
@@ -99,7 +101,7 @@ def explain(
     many features have been tried, of how many.
     """
     case = study.cases[0]
-    run, seconds = timed(case, repeats)
+    run, seconds, solution_seconds = timed(case, repeats)
     repeats = repeats if seconds < SLOW else 1
     ended = complete(run)
     active, absent = terms(case)
@@ -124,6 +126,8 @@ def explain(
         reason=run["reason"].item(),
         detail=run.attrs.get("detail", ""),
         seconds=seconds,
+        solution_seconds=solution_seconds,
+        other_work=other_work(case),
         steps=int(run["steps"]),
         evaluations=int(run["evaluations"]),
         workers=workers,
@@ -143,15 +147,27 @@ def unknowns(case: Case) -> tuple[str, ...]:
     return found + tuple(name for name in names[2 * n + 4 :] if name.startswith("crank's lag"))
 
 
-def timed(case: Case, repeats: int) -> tuple[xr.Dataset, float]:
-    """A run of a case and the median of its wall times (s), compiled code being there already."""
+def timed(case: Case, repeats: int) -> tuple[xr.Dataset, float, float]:
+    """Run a case and return it, its wall time and that of its solution alone (s), both medians.
+
+    Compiled code is there already.
+    """
     run = simulate(case)
-    seconds = []
+    seconds, of_solution = [], []
     for _ in range(repeats if complete(run) and run["seconds"].item() < SLOW else 1):
         began = time.perf_counter()
         run = simulate(case)
         seconds.append(time.perf_counter() - began)
-    return run, statistics.median(seconds)
+        of_solution.append(run["seconds"].item())
+    return run, statistics.median(seconds), statistics.median(of_solution)
+
+
+def other_work(case: Case) -> tuple[str, ...]:
+    """Return what a job does beside its solution, in words."""
+    found = ["the runs that its error bars come from"] if case.wants_bars else []
+    found += ["its time series"] if case.output.keep == "series" else []
+    found += ["the motion of its body"] if case.body else []
+    return (*found, "the record of its sensor") if case.sensor else (*found,)
 
 
 def asked(case: Case) -> str:

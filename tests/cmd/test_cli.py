@@ -402,6 +402,9 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     assert "2 degrees of freedom\n" in out
     assert "x deviation; phi deviation\n" in out
     assert "for 2 jobs with 1 worker," in out
+    assert re.search(
+        r" ms of it for the solution .* the rest for the runs that its error bars", out
+    )
     assert "; less than 2 %: leave it out (machine.gravity_m_per_s2: 0)" in out
     assert re.search(r"friction: peak acceleration .* needed for peak acceleration", out)
     assert err.startswith("running the first of 2 jobs of two")

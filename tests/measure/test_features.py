@@ -78,6 +78,12 @@ def test_the_same_model_changes_nothing():
     assert effect.time_ratio > 0
 
 
+def test_the_time_of_a_machine_on_a_body_is_measured():
+    """A body asks for time series, and what is timed keeps none."""
+    moving = case(body={"start": "rest"}, sensor={"place": "guide"})
+    assert 0 < compare(moving, replace(moving, friction=None), 1).time_ratio < 100
+
+
 def test_a_weightless_change_is_small_and_friction_is_not():
     light = case(machine={"gravity_m_per_s2": 1e-9})
     assert compare(case(), light, 1).change_acceleration < 1e-6
