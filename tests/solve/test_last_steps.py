@@ -93,6 +93,25 @@ def test_what_is_not_finite_is_named():
     assert not np.isfinite(found.attrs["stop_history_error"][-1])
 
 
+@pytest.mark.parametrize(
+    ("values", "rates"),
+    [
+        ({"joint": "small_end"}, ["rate of x deviation, m/s", "rate of phi deviation, rad/s"]),
+        ({"joint": "big_end", "drive": True, "guide": {"clearance_mm": 0.1}},
+         ["rate of big end eccentricity x, m/s", "rate of big end eccentricity y, m/s",
+          "rate of height in the guide, m/s", "rate of tilt in the guide, rad/s"]),
+    ],
+)  # fmt: skip
+def test_each_rate_of_a_stopped_state_has_a_name_of_its_own(values, rates):
+    """Three and more numbers were called "its rate"."""
+    case = Case.from_values({**values, "clearance_mm": 0.2, "solve": {"max_steps": 5}})
+    attributes = measure(case).attributes
+    names = attributes["stop_state_names"].split("; ")
+    assert len(names) == len(attributes["stop_state"])
+    assert names[len(rates) : 2 * len(rates)] == rates
+    assert attributes["stop_dominant"] in names
+
+
 def test_a_run_that_ends_well_has_no_history():
     found = measure(Case.from_values({**BOTH, "solve": {"duration_rev": 0.1, "settle_rev": 0}}))
     assert not [name for name in found.attributes if name.startswith("stop")]
