@@ -13,16 +13,18 @@ from compressor.metrics import JOINTS
 
 
 class Shorthand(NamedTuple):
-    """The keys that a group's name stands for, and what their value is."""
+    """The keys that a group's name stands for, what their value is, and a name for each of it."""
 
     keys: tuple[str, ...]
     phrase: str
+    each: str
 
 
 SHORTHANDS = {
     "clearance_mm": Shorthand(
         tuple(f"clearance_mm.{joint}" for joint in JOINTS),
         "radial clearance, of both joints or each",
+        "radial clearance",
     )
 }
 
@@ -35,6 +37,12 @@ def stands_for(key: str) -> tuple[str, ...]:
 def row_of(key: str) -> Parameter | None:
     """The row of the table that a key's values must keep; None where there is none."""
     return table().get(next(iter(stands_for(key)), key))
+
+
+def phrase_of(key: str) -> str:
+    """Return what a key's values are called: of a shorthand, what each of its keys' is."""
+    row = row_of(key)
+    return SHORTHANDS[key].each if key in SHORTHANDS else row.phrase if row else key
 
 
 def expanded(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Regimes
+from compressor.analysis import SPOKEN
+from compressor.cases import Case, Regimes
 from compressor.metrics import JOINTS
 from compressor.regimes.chains import FOLDER, REMEDY, labels, read_chain
 from compressor.regimes.confirm import verdict_attrs
@@ -38,6 +39,7 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     over = names[asked.over]
     outer, shape = layout(manifest, names)
     values, said = swept_column(asked.over, asked.values)
+    said["long_name"] += of_joint(asked.over, chains)
     coordinates = outer | {
         "direction": ("direction", [*asked.directions], {"long_name": "which way it is followed"}),
         over: (over, values, said),
@@ -63,6 +65,16 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     attrs = {"study": study, "over": over, "over_key": asked.over, "log": int(asked.log)}
     attrs |= {name: getattr(asked, name) for name in ("section_deg", "settle_rev", "measure_rev")}
     return xr.Dataset(variables, coordinates, attrs)
+
+
+def of_joint(over: str, chains: Sequence[Sequence[xr.Dataset | None]]) -> str:
+    """Return whose clearance is followed, " of the small end"; "" of another key or of several."""
+    cases = {str(chain.attrs["case"]) for pair in chains for chain in pair if chain is not None}
+    joints = {Case.from_attribute(case).joint for case in cases if over == "clearance_mm"}
+    if len(joints) != 1:
+        return ""
+    joint = joints.pop()
+    return f" of {'' if joint == 'both' else 'the '}{SPOKEN[joint]}" if joint in SPOKEN else ""
 
 
 def followed_studies(results: Folder) -> list[str]:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from compressor.cases import MODEL_VERSION, Study, points, row_of, table
+from compressor.cases import MODEL_VERSION, Study, phrase_of, points, row_of, table
 from compressor.program import VERSION, library_versions
 from compressor.store.files import (
     KEY,
@@ -103,7 +103,7 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
     import numpy as np  # status does without
 
     row = row_of(key)
-    attrs = {"long_name": row.phrase if row else key, "case_key": key}
+    attrs = {"long_name": phrase_of(key), "case_key": key}
     if row and row.kind in ("number", "integer") and not any(isinstance(v, str) for v in values):
         numbers = [math.nan if value is None else value for value in values]
         return np.array(numbers, float), attrs | {"units": row.unit or "1"}

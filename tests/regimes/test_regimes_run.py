@@ -8,11 +8,13 @@ import pytest
 import xarray as xr
 from compsim import cli
 
+from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.regimes.chains import FOLDER
-from compressor.regimes.dataset import open_regimes
+from compressor.regimes.dataset import of_joint, open_regimes
 from compressor.regimes.values import NUMBERS, TEXTS
 from compressor.store.files import StoreError
+from compressor.store.studies import swept_column
 from compressor.sweep.worker import Done
 
 TEXT = """
@@ -63,6 +65,7 @@ def test_the_dataset_has_the_study_s_axes_and_both_ways(place):
     assert found["section"].dims[3:] == ("revolution", "joint", "coordinate")
     assert found["clearance_mm"].values.tolist() == [0.1, 0.2, 0.3]
     assert found["clearance_mm"].attrs["units"] == "mm"
+    assert found["clearance_mm"].attrs["long_name"] == "radial clearance of the big end"
     assert found["direction"].values.tolist() == ["up", "down"]
     assert found["coordinate"].values.tolist() == ["x", "y", "x_rate", "y_rate"]
     assert found["mode"].values.tolist() == ["flight", "impact", "following"]
@@ -76,6 +79,25 @@ def test_the_dataset_has_the_study_s_axes_and_both_ways(place):
         assert found[name].attrs["long_name"], name
         assert name in TEXTS or found[name].attrs["units"], name
     assert {*NUMBERS, *TEXTS} <= {*found.data_vars}
+
+
+@pytest.mark.parametrize(
+    ("joints", "told"),
+    [
+        (["small_end"], " of the small end"), (["both"], " of both joints"), (["none"], ""),
+        (["big_end", "small_end"], ""), ([], ""),
+    ],
+)  # fmt: skip
+def test_what_is_followed_names_the_joint_of_the_study(joints, told):
+    """A bifurcation of the small end was said to be over the clearance of the big end."""
+    worn = {"clearance_mm": 0.2}
+    cases = [
+        Case.from_values({"joint": joint, **(worn if joint != "none" else {})}) for joint in joints
+    ]
+    chains = [[None, xr.Dataset(attrs=case.attributes())] for case in cases]
+    assert swept_column("clearance_mm", [0.1])[1]["long_name"] == "radial clearance"
+    assert of_joint("clearance_mm", chains) == told
+    assert of_joint("machine.speed_rpm", chains) == ""
 
 
 def test_values_belong_to_the_parameter_whichever_way_it_goes(place):
