@@ -2,12 +2,12 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compressor.diagnosis.data_set import LABELS, WORDS
+from compressor.diagnosis.data_set import LABELS, MODELS, WORDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,17 +22,13 @@ LEFT_OUT = {  # reasons that are the data set's; others are those of `compsim st
 ABSENT = (
     "**Measured data.** Everything is simulated. Scores on this data say nothing of a real machine "
     "until they are repeated on one.",
-    "**Other models.** One contact law, one law of friction, one way of coupling machine and body: "
-    "the machine drives the body, and the body's motion does not come back.",
-    "**Flexible parts.** The rod is rigid. The casing has one mode at the guide and one at the "
-    "main bearing, or none.",
+    "**Feedback of the body.** The machine drives the body, and the body's motion does not come "
+    "back.",
     "**Sound joints with a clearance.** A joint that `joint` does not name is ideal, while a sound "
     "bearing has a working clearance: to tell faults from sound joints is easier here.",
-    "**Oil.** No film carries, damps or separates the journals.",
     "**Other faults.** Valves, rings, pistons, bearings and couplings are sound. Other machines on "
     "the same floor are absent. Noise is white: neighbours, flow and gear meshes are not.",
     "**Progress.** A clearance is constant over a record; nothing wears, and there is no history.",
-    "**Changing speed.** But for the sensor's slow jitter, the speed of a record is constant.",
     "**Frequencies of faults.** Kinds of joints are as often as the case file makes them, not as "
     "they are in the field, so that prior probabilities are not to be taken from here.",
 )
@@ -40,18 +36,20 @@ ABSENT = (
 
 def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
     """The card of a data set (`make_data_set`) as Markdown; parquet: whether that is written."""
-    fixed = json.loads(dataset.attrs["fixed"])
+    fixed, models = (json.loads(dataset.attrs[name]) for name in ("fixed", "models"))
     parts = [
         f"# {dataset.attrs['title'].removeprefix('compsim: ').capitalize()}",
         made_by(dataset),
         "## What was simulated", simulated(dataset, fixed),
+        "The model of these jobs, by part:",
+        table(("part", "kind, and how many jobs have it"), model_rows(models)),
         "## Windows, noise and split", cut(dataset),
         table(("joint", "split", "machines", "windows"), counted(dataset)),
         "## The body and its sensor", groups(fixed),
         "## Labels", labels(dataset),
         "## Features", feature_table(dataset),
         "## Files", files(dataset, parquet),
-        "## What is not in it", "\n".join(f"- {line}" for line in absent(fixed)),
+        "## What is not in it", "\n".join(f"- {line}" for line in absent(fixed, models)),
     ]  # fmt: skip
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
@@ -198,10 +196,45 @@ def files(dataset: "xr.Dataset", parquet: bool) -> str:
     return "\n".join(lines)
 
 
-def absent(fixed: dict[str, Any]) -> list[str]:
+def model_rows(models: dict[str, dict[str, int]]) -> list[tuple[str, str]]:
+    """Return the kinds of each part of the model, with the number of jobs that have them."""
+    return [
+        (MODELS[part], ", ".join(f"{kind} ({count:,})" for kind, count in kinds.items()))
+        for part, kinds in models.items() if kinds
+    ]  # fmt: skip
+
+
+def unmodelled(models: dict[str, dict[str, int]]) -> Iterator[str]:
+    """Yield what the chosen models leave out, each with the jobs that it is said of."""
+
+    def of_jobs(part: str, kind: str) -> str:
+        count, every = models[part].get(kind, 0), sum(models[part].values())
+        return "" if count == every else f" This is said of {count:,} of {every:,} jobs."
+
+    laws = {*models["contact"]}, {*models["friction"]} - {"none"}
+    told = " and ".join(
+        f"one law of {name}" for name, known in zip(("contact", "friction"), laws, strict=True)
+        if len(known) == 1
+    )  # fmt: skip
+    if told:
+        yield f"**Other laws.** The joints have {told} (see the table above)."
+    stiff = "Crank, crosshead and guide are rigid, the rod" + (
+        f" too.{of_jobs('rod', 'rigid')}" if "rigid" in models["rod"] else " is elastic."
+    )
+    yield (f"**Flexible parts.** {stiff} The casing has one mode at the guide and one at the main "
+           "bearing, or none.")  # fmt: skip
+    if "dry" in models["journals"]:
+        text = "No film carries, damps or separates the journals."
+        yield f"**Oil.** {text}{of_jobs('journals', 'dry')}"
+    if "constant" in models["crank"]:
+        text = "But for the sensor's slow jitter, the speed of a record is constant."
+        yield f"**Changing speed.** {text}{of_jobs('crank', 'constant')}"
+
+
+def absent(fixed: dict[str, Any], models: dict[str, dict[str, int]]) -> list[str]:
     """What the data set does not have."""
     body, sensor = fixed.get("body") or {}, fixed.get("sensor") or {}
-    found = list(ABSENT)
+    found = [*ABSENT, *unmodelled(models)]
     if body:
         found.append(
             f"**Other foundations.** The body of the first job has {body['mass_kg']:g} kg and "

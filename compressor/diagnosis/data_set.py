@@ -41,6 +41,14 @@ WORDS = {
     "load": "load on the piston",
     "regime": "predictable, periodic, chaotic or undecided",
 }
+MODELS = {  # parts of the model whose kind a study chooses: in words
+    "contact": "contact law of joints with clearance",
+    "friction": "friction law of the joints",
+    "journals": "between journal and bore",
+    "rod": "rod",
+    "guide": "crosshead's guide",
+    "crank": "crank's speed",
+}
 RECORD_NEEDED = "`body: true` and `sensor: {length_rev: 11}`"
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
@@ -176,14 +184,17 @@ def make_data_set(
         raise without_sensor(of)
     rows: list[dict[str, Any]] = []
     left: Counter[str] = Counter()
+    models: dict[str, Counter[str]] = {part: Counter() for part in MODELS}
     keys = list(dict.fromkeys(of.keys))
     for number, key in enumerate(keys):
         progress(number, len(keys), "")
         found = job_rows(stored, key, options)
         if isinstance(found, str):
             left[found] += 1
-        else:
-            rows += found
+            continue
+        rows += found
+        for part, kind in found[0]["models"].items():
+            models[part][kind] += 1
     progress(len(keys), len(keys), "")
     if not rows and {*left} == {"without_record"}:
         raise without_sensor(of)
@@ -196,7 +207,8 @@ def make_data_set(
         title=f"compsim: labelled windows of {of.name}", program=PROGRAM, study=of.name,
         case_file=of.case_file, fixed=json.dumps(of.fixed), versions=json.dumps(of.versions),
         axes=json.dumps([[a.key, a.units, *_reach(a.values)] for a in of.axes]),
-        jobs=len(keys), left_out=json.dumps(left), revolutions=options.revolutions,
+        jobs=len(keys), left_out=json.dumps(left), models=json.dumps(models),
+        revolutions=options.revolutions,
         hop=options.hop or options.revolutions, test_share=options.test_share, seed=options.seed,
     )  # fmt: skip
 
@@ -232,6 +244,7 @@ def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str
     base = {
         "key": key, "machine": machine_of(case), "joint": case.joint, "load": case.load,
         "regime": str(attributes.get("regime", "")), **labels_of(case),
+        "models": models_of(case),
     }  # fmt: skip
     rows = []
     hop = options.hop or options.revolutions
@@ -242,6 +255,21 @@ def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str
     except RecordError:
         return "silent_record"
     return rows or "too_short"
+
+
+def models_of(case: Case) -> dict[str, str]:
+    """Return the kind of each of the `MODELS` that a case has; a part that it lacks is left out."""
+    friction, guide = case.friction, case.guide
+    rubs = friction and (case.joint != "none" or friction.ideal_joints)
+    found = {
+        "friction": friction.law or "adams" if friction and rubs else "none",
+        "rod": "elastic" if case.rod else "rigid",
+        "guide": "ideal" if not guide else "with play" if guide.clearance_mm else "with friction",
+        "crank": "of a motor" if case.drive else "constant",
+    }
+    if case.joint == "none":
+        return found
+    return found | {"contact": case.contact.law, "journals": "oil" if case.lubricant else "dry"}
 
 
 def labels_of(case: Case) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """Data sets on disk: three files that say the same, and a card that leaves nothing out."""
 
 import io
+import json
 import sys
 
 import numpy as np
@@ -8,9 +9,17 @@ import pytest
 import xarray as xr
 from compsim import cli
 
-from compressor.diagnosis.data_card import ABSENT, counts, escaped
+from compressor.cases.case import Case
+from compressor.diagnosis.data_card import ABSENT, counts, data_card, escaped
 from compressor.diagnosis.data_files import write_data_set
-from compressor.diagnosis.data_set import LABELS, WORDS, DataSetError, DataSetOptions, make_data_set
+from compressor.diagnosis.data_set import (
+    LABELS,
+    WORDS,
+    DataSetError,
+    DataSetOptions,
+    make_data_set,
+    models_of,
+)
 from compressor.diagnosis.features import FEATURES
 
 
@@ -70,6 +79,63 @@ def test_the_card_tells_what_is_and_what_is_not_in_it(folder):
     assert "0, 0.5 m/s² rms of white noise" in card
     assert "500 kg and natural frequencies of 30 Hz and 30 Hz" in card
     assert "| big_end | test | 1 | 4 |" in card
+
+
+def test_the_card_names_the_models_of_the_jobs_that_gave_windows(folder):
+    card = (folder / "README.md").read_text(encoding="utf-8")
+    assert "| contact law of joints with clearance | impact (8) |" in card
+    assert "| friction law of the joints | none (2), adams (8) |" in card
+    assert "| between journal and bore | dry (8) |" in card
+    assert "Crank, crosshead and guide are rigid, the rod too. The casing" in card
+    assert "- **Oil.** No film carries, damps or separates the journals.\n" in card
+    assert "- **Changing speed.** But for the sensor's slow jitter, the speed of a record" in card
+
+
+def absent_words(made, **models):
+    """What the card says is missing from a data set of other models."""
+    known = json.loads(made.attrs["models"]) | models
+    return data_card(made.assign_attrs(models=json.dumps(known)), False).partition(
+        "## What is not in it"
+    )[2]
+
+
+def test_the_card_does_not_deny_what_the_study_has(made):
+    """Every card said "no oil", "the rod is rigid" and "one contact law"."""
+    rich = absent_words(
+        made, journals={"oil": 8}, rod={"elastic": 10}, crank={"of a motor": 10},
+        contact={"impact": 4, "flores": 4}, friction={"adams": 4, "lugre": 4},
+    )  # fmt: skip
+    assert "the rod is elastic. The casing" in rich
+    for word in ("Oil", "rigid, the rod too", "Changing speed", "Other laws"):
+        assert word not in rich
+    mixed = absent_words(
+        made, journals={"oil": 6, "dry": 2}, crank={"constant": 3, "of a motor": 7}
+    )
+    assert "separates the journals. This is said of 2 of 8 jobs.\n" in mixed
+    assert "speed of a record is constant. This is said of 3 of 10 jobs.\n" in mixed
+    assert "The joints have one law of contact and one law of friction" in mixed
+
+
+@pytest.mark.parametrize(
+    ("values", "kinds"),
+    [
+        ({"lubricant": True}, {"journals": "oil"}),
+        ({"rod": True}, {"rod": "elastic", "journals": "dry"}),
+        ({"contact": {"law": "flores", "restitution": 0.5}}, {"contact": "flores"}),
+        ({"friction": {"law": "lugre"}}, {"friction": "lugre"}),
+        ({"friction": False}, {"friction": "none"}),
+        ({"guide": True}, {"guide": "with friction"}),
+        ({"guide": {"clearance_mm": 0.1}}, {"guide": "with play"}),
+        ({"drive": True}, {"crank": "of a motor"}),
+    ],
+)
+def test_a_case_has_its_models(values, kinds):
+    plain = {"contact": "impact", "friction": "adams", "journals": "dry", "rod": "rigid",
+             "guide": "ideal", "crank": "constant"}  # fmt: skip
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.1, **values})
+    assert models_of(case) == plain | kinds
+    ideal = models_of(Case.from_values({}))
+    assert ideal == {"friction": "none", "rod": "rigid", "guide": "ideal", "crank": "constant"}
 
 
 def test_counts(made):
