@@ -132,6 +132,14 @@ def test_every_figure_is_drawn_and_shown(full):
         assert f"figure-{number:02d}" in found.ids
 
 
+def test_every_csv_has_the_curves_of_its_figure(full):
+    """That of Figure 3 was one empty line, and that of the orbits had their marks alone."""
+    for path in full.glob("*.csv"):
+        head, *rows = path.read_text(encoding="utf-8").splitlines()
+        assert head, path.name
+        assert len(rows) > 100, path.name
+
+
 def test_the_first_screen_is_the_answer(full, paper_runs):
     """What was run, the three findings by the runs' numbers, and the claims."""
     text = (full / "index.html").read_text(encoding="utf-8")

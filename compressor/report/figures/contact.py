@@ -59,7 +59,7 @@ def plot_orbit(panel: Axes, run: xr.Dataset, joint: str) -> None:
     place = kept["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
     clearance = joints_with_clearance(run)[joint] * MICROMETRE
     panel.add_patch(Circle((0, 0), clearance, fill=False, linewidth=1.0, color=BLACK))
-    panel.plot(*place.T, **PATH.properties())
+    panel.plot(*place.T, label="path of the journal's centre", **PATH.properties())
     for angle, (_, shape) in CORNERS.items():
         nearest = np.argmin(np.abs((degrees - angle + 180) % 360 - 180))
         panel.plot(*place[nearest], **corner(shape))

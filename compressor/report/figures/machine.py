@@ -28,7 +28,7 @@ def draw_pressure_volume(runs: Runs) -> Figure:
     volume, pressure = gas_state(run)
     figure, panels = sheet(1, 1, 5.2)
     (panel,) = panels.flat
-    panel.plot(volume, pressure, **CLOSED.properties())
+    panel.plot(volume, pressure, label="gas in the cylinder", **CLOSED.properties())
     name_phases(panel, run, volume, pressure)
     panel.set_xlim(0, 1.05 * volume.max())
     panel.set_ylim(0, 1.15 * pressure.max())
