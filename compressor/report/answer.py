@@ -13,13 +13,13 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN, Claim
-from compressor.digits import by_bar, is_known
+from compressor.digits import is_known
 from compressor.metrics import METRICS
 from compressor.report.figures.sweep_metric import Measure, measures
 from compressor.report.page import Section
+from compressor.report.tables import measured
 
 MOST_FINDINGS = 3
-FINE = 1e-4  # of a number: a bar below it is told in percent
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 FROM_ZERO = 5.0  # rank of what appears: as of a value 150 times as large
 
@@ -161,7 +161,7 @@ def finding(
     low, high = (pick(sure, key=lambda n: values[n]) for pick in (min, max))
 
     def told(n: int) -> str:
-        return quantity(float(values[n]), float(bars[n]), measure)
+        return f"{measured(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
 
     title = measure.title[0].upper() + measure.title[1:]
     if len(values) == 1:
@@ -172,13 +172,6 @@ def finding(
     rank = min(math.log(ratio), FROM_ZERO) if values[low] > 0.0 else FROM_ZERO
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
     return Finding(title, told(low), names[low], told(high), names[high], change, rank)
-
-
-def quantity(value: float, bar: float, measure: Measure) -> str:
-    """A number with its bar and unit; a bar that five digits do not show in percent."""
-    if bar < FINE * abs(value):
-        return f"{value:.5g} {measure.unit}".rstrip() + f" ± {100.0 * bar / abs(value):.1g} %"
-    return f"{by_bar(value, bar, METRICS[measure.variable].bar.relative)} {measure.unit}".rstrip()
 
 
 def round_robin(

@@ -59,12 +59,16 @@ def number_cell(value: float) -> Cell:
     return Cell(number(value), "number", None if math.isnan(value) else value)
 
 
-def measured_cell(measure: Measure, value: float, bar: float) -> Cell:
-    """A metric and its error bar, in its unit, to the digits that the bar allows."""
+def measured(measure: Measure, value: float, bar: float) -> str:
+    """Return a metric and its error bar, both in its unit, to the digits that the bar allows."""
     if math.isnan(bar):
-        return number_cell(value)
-    text = by_bar(value, bar, METRICS[measure.variable].bar.relative)
-    return Cell(text, "number", None if math.isnan(value) else value)
+        return number(value)
+    return by_bar(value, bar, METRICS[measure.variable].bar.relative)
+
+
+def measured_cell(measure: Measure, value: float, bar: float) -> Cell:
+    """A metric and its error bar."""
+    return Cell(measured(measure, value, bar), "number", None if math.isnan(value) else value)
 
 
 def value_cell(value: Any) -> Cell:

@@ -8,13 +8,13 @@ from compressor.report.answer import (
     Finding,
     Points,
     finding,
-    quantity,
     ranked,
     round_robin,
     study_findings,
     worded,
 )
 from compressor.report.figures.sweep_metric import MEASURES
+from compressor.report.tables import measured
 
 PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
 FORCE = next(m for m in MEASURES if m.variable == "peak_contact_force")
@@ -63,11 +63,11 @@ def test_what_appears_ranks_before_what_grows():
 
 @pytest.mark.parametrize(
     ("value", "bar", "text"),
-    [(1234.5678, 1.3, "1234.6 ± 1.3 m/s²"), (1234.5678, 0.000123, "1234.6 m/s² ± 1e-05 %"),
-     (1234.5678, np.nan, "1234.57 m/s²"), (1234.5678, 2000.0, "unknown m/s²")],
+    [(1234.5678, 1.3, "1234.6 ± 1.3"), (1234.5678, 0.000123, "1234.56780 ± 0.00013"),
+     (1234.5678, np.nan, "1235"), (1234.5678, 2000.0, "unknown")],
 )  # fmt: skip
 def test_numbers_have_the_digits_of_their_bars(value, bar, text):
-    assert quantity(value, bar, PEAK) == text
+    assert measured(PEAK, value, bar) == text
 
 
 @pytest.mark.parametrize(
@@ -111,6 +111,12 @@ def test_a_study_s_findings_name_its_points(study):
 def test_a_single_job_is_told_by_its_numbers(study):
     (found,) = study_findings(study.isel(speed_rpm=[0], clearance_mm=[0]))
     assert (found.low, found.high) == ("", "100 ± 1 m/s²")
+
+
+def test_a_short_bar_has_the_unit_of_its_number():
+    """It was told as 394.78 m/s² ± 5e-07 %."""
+    found = told(PEAK, [394.784176, 784.7], [2e-6, 0.3])
+    assert (found.low, found.high) == ("394.784176 ± 0.000002 m/s²", "784.7 ± 0.3 m/s²")
 
 
 def test_three_findings_are_shared_among_studies():
