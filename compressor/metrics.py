@@ -45,7 +45,13 @@ class Metric(NamedTuple):
     bar: Bar = Bar()
     shown: Shown | None = None  # None: not drawn
     contact: bool = False  # of a contact: of an ideal joint it tells nothing
-    kind: Literal["greatest", "root", "share", "count"] = "share"  # how it comes from the run
+    # how it comes from the run; a count grows with it, a rate is a count by revolutions
+    kind: Literal["greatest", "root", "share", "count", "rate"] = "share"
+
+    @property
+    def counted(self) -> bool:
+        """Whether it counts events: contact that grazes begins any number of times."""
+        return self.kind in ("count", "rate")
 
 
 METRICS = {
@@ -95,11 +101,21 @@ METRICS = {
         ),
         Metric(
             "impact_count", ("joint",), "1", "contacts that began after flight", "penetration",
-            Bar(1.0, 0.0, False), Shown("impacts after flight", ""), True, "count",
+            Bar(1.0, 0.0, False), None, True, "count",
         ),
         Metric(
             "release_count", ("joint",), "1", "contacts that began while pressed in", "penetration",
-            Bar(1.0, 0.0, False), Shown("releases while pressed in", ""), True, "count",
+            Bar(1.0, 0.0, False), None, True, "count",
+        ),
+        Metric(
+            "impacts_per_rev", ("joint",), "1/rev",
+            "contacts in a revolution that began after flight", "penetration",
+            Bar(1.0, 0.0, False), Shown("impacts after flight", "per rev"), True, "rate",
+        ),
+        Metric(
+            "releases_per_rev", ("joint",), "1/rev",
+            "contacts in a revolution that began while pressed in", "penetration",
+            Bar(1.0, 0.0, False), Shown("releases while pressed in", "per rev"), True, "rate",
         ),
     )
 }  # fmt: skip

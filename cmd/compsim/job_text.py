@@ -28,7 +28,9 @@ FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[str, list[str]]]:
     """Headings and lines of a job; limits: of the rod load's reversal, degrees and percent."""
     yield "", aligned(stop(found))
-    known = numbers(found, [*metrics.METRICS, *metrics.STATISTICS, *metrics.ROD_LOAD])
+    # a count grows with the run: the number per revolution is shown in its place
+    shown = [name for name, row in metrics.METRICS.items() if row.kind != "count"]
+    known = numbers(found, [*shown, *metrics.STATISTICS, *metrics.ROD_LOAD])
     told = aligned([*known, *reversal_verdict(found, *limits)])
     yield "metrics, with their error bars", [*told, *cautions(found)]
     yield (
@@ -133,7 +135,7 @@ def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], 
         "axis": metrics.AXES,
         "quantile": metrics.QUANTILES,
     }
-    first = name.removesuffix("_error").removesuffix("_rev").replace("_", " ")
+    first = name.removesuffix("_error").removesuffix("_rev").removesuffix("_per").replace("_", " ")
     for choice in itertools.product(*(enumerate(words[dim]) for dim in dims)):
         told = [first, *(str(word).replace("_", " ") for _, word in choice)]
         yield tuple(number for number, _ in choice), ", ".join(told)

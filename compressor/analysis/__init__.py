@@ -17,7 +17,13 @@ from compressor.analysis.frame_forces import (
 from compressor.analysis.impacts import impacts
 from compressor.analysis.paper_cases import CLEARANCES, FAULTS, SPOKEN, cases_of, label, paper_cases
 from compressor.analysis.plot_captions import PLOT_CAPTIONS
-from compressor.analysis.runs import case_of, force_relation, load_phases, settled
+from compressor.analysis.runs import (
+    case_of,
+    force_relation,
+    load_phases,
+    settled,
+    settled_revolutions,
+)
 from compressor.analysis.shaking import (
     ORDER,
     Shaking,

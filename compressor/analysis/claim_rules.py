@@ -42,6 +42,7 @@ from compressor.analysis.runs import (
     ideal_motion,
     load_corners,
     settled,
+    settled_revolutions,
 )
 from compressor.metrics import JOINTS
 
@@ -226,15 +227,20 @@ def impact_rows(runs: Runs) -> Iterator[tuple[str, str]]:
     for c in CLEARANCES:
         big, small = (active_share(runs[label(joint, c)]) for joint in JOINTS)
         impacts, releases = (
-            [float(runs[label(joint, c)][name].sel(joint=joint)) for joint in JOINTS]
+            [per_revolution(runs[label(joint, c)], name, joint) for joint in JOINTS]
             for name in ("impact_count", "release_count")
         )
         yield (
             f"{c:g} mm, vibrating",
             f"active: big end {big:.0%}, small end {small:.0%}; "
-            f"impacts {impacts[0]:.0f} and {impacts[1]:.0f}, "
-            f"releases {releases[0]:.0f} and {releases[1]:.0f}",
+            f"a revolution {impacts[0]:.3g} and {impacts[1]:.3g} impacts, "
+            f"{releases[0]:.3g} and {releases[1]:.3g} releases",
         )
+
+
+def per_revolution(run: xr.Dataset, count: str, joint: str) -> float:
+    """Return a count of a joint's contacts by the revolutions that it was counted over."""
+    return float(run[count].sel(joint=joint)) / settled_revolutions(run)
 
 
 def vibrating(runs: Runs) -> Margin:

@@ -12,6 +12,7 @@ from compressor.analysis.impacts import impacts
 from compressor.analysis.orbit import orbit
 from compressor.analysis.paper_cases import SPOKEN
 from compressor.analysis.regime_captions import REGIME_CAPTIONS
+from compressor.analysis.runs import settled_revolutions
 from compressor.analysis.shaking import ORDER, deviation_spectrum, sensor_envelope, shaking
 from compressor.analysis.swept_rows import SweptRow, rows_modes
 from compressor.analysis.words import plural
@@ -113,7 +114,7 @@ def struck(run: xr.Dataset, twin: Twin) -> str:
     found = impacts(run)
     if not found.sizes["impact"]:
         return f"No impacts: after settling no journal came back from flight.{caution(run)}"
-    sentences = []
+    sentences, turns = [], settled_revolutions(run)
     for joint in joints_with_clearance(run):
         mine = found.isel(impact=found["joint"].values == joint)
         if not mine.sizes["impact"]:
@@ -122,11 +123,14 @@ def struck(run: xr.Dataset, twin: Twin) -> str:
         lost = float(mine["lost_energy"].sum())
         hardest = mine.isel(impact=int(np.argmax(mine["approach_speed"].values)))
         sentences.append(
-            f"{plural(mine.sizes['impact'], 'impact')} at the {SPOKEN[joint]}; the hardest at "
+            f"At the {SPOKEN[joint]} {mine.sizes['impact'] / turns:.3g} impacts a revolution; the "
+            f"hardest at "
             f"{float(hardest['approach_speed']):.3g} m/s and {float(hardest['crank_angle']):.0f}°"
             + (f"; together they lost {lost:.3g} J." if lost > 0.0 else ".")
         )
-    return " ".join(["Contacts after flight, all settled revolutions.", *sentences]) + caution(run)
+    return " ".join(
+        [f"Contacts after flight, over {turns:.3g} rev after settling.", *sentences]
+    ) + caution(run)
 
 
 def waterfall(rows: Sequence[SweptRow], axis: str) -> str:

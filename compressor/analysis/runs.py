@@ -1,5 +1,6 @@
 """What a stored run says: its case, its load, and how it moves once start-up is over."""
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,6 +18,11 @@ def settled(run: xr.Dataset) -> xr.Dataset:
     """The samples from `settle_rev` on: start-up is not the machine."""
     time, begin = run["time"].values, run.attrs["settle"] * (1 - 1e-12)
     return run if time[0] >= begin else run.isel(time=time >= begin)
+
+
+def settled_revolutions(run: xr.Dataset) -> float:
+    """Return the revolutions that a run's metrics are taken over."""
+    return float(np.ptp(settled(run)["crank_angle"].values)) / math.tau
 
 
 @dataclass(frozen=True)

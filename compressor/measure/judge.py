@@ -42,7 +42,7 @@ EXPECTED, MOST_EXPECTED = 1e3, 0.05  # times rtol: the relative error that nobod
 TIGHTER, TENTH = 1e-2, 0.1  # a judge's tolerance, of statistics
 PARTS = 16  # of a span, in which horizons are counted
 LENGTHS = (PARTS, PARTS // 4, 1)  # parts that are judged where the whole is too much
-JUDGED = tuple(name for name, row in METRICS.items() if row.kind != "count")
+JUDGED = tuple(name for name, row in METRICS.items() if not row.counted)
 ABSOLUTE = ("contact_loss_fraction",)  # is a share: errors are not relative
 RESOLVED = 1e-4  # of the span: steps tell the time without contact no better
 STATISTICS = {

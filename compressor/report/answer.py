@@ -134,7 +134,7 @@ def ranked(
     """The findings of measures over jobs, the greatest change first, one a metric."""
     best: dict[str, Finding] = {}
     for measure, values, bars in rows:
-        if METRICS[measure.variable].kind == "count" or measure.variable in FROM_IDEAL:
+        if METRICS[measure.variable].counted or measure.variable in FROM_IDEAL:
             continue
         found = finding(measure, values, bars, names)
         if found and (measure.variable not in best or found.rank > best[measure.variable].rank):

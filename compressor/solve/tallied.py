@@ -17,6 +17,8 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
     ideal = p["clearance"] == 0
     seconds = tally["seconds"] or math.nan
     axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
+    # the spans of steps add up to within rounding: whole revolutions are to stay whole
+    revolutions = round(float(seconds * p["omega"]) / math.tau, 9)
     return {
         "peak_acceleration": tally["peak"][0],
         "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
@@ -29,6 +31,8 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
         "mean_guide_moment": tally["guide_moment"] / seconds,
         "impact_count": np.where(ideal, 0.0, tally["impacts"]),
         "release_count": np.where(ideal, 0.0, tally["releases"]),
+        "impacts_per_rev": np.where(ideal, 0.0, tally["impacts"] / revolutions),
+        "releases_per_rev": np.where(ideal, 0.0, tally["releases"] / revolutions),
     }
 
 

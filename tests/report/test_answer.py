@@ -19,7 +19,7 @@ from compressor.report.tables import measured
 PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
 FORCE = next(m for m in MEASURES if m.variable == "peak_contact_force")
 LOSS = next(m for m in MEASURES if m.variable == "contact_loss_fraction")
-COUNT = next(m for m in MEASURES if m.variable == "impact_count")
+RATE = next(m for m in MEASURES if m.variable == "impacts_per_rev")
 NAMES = ["a", "b", "c"]
 
 
@@ -51,7 +51,7 @@ def test_what_appears_ranks_before_what_grows():
     rows = [
         (PEAK, np.array([100.0, 200.0, 300.0]), np.full(3, 0.1)),
         (LOSS, np.array([0.0, 0.0, 5.0]), np.full(3, 0.01)),
-        (COUNT, np.array([0.0, 0.0, 999.0]), np.full(3, 1.0)),
+        (RATE, np.array([0.0, 0.0, 999.0]), np.full(3, 1.0)),
         (FORCE, np.array([1.0, 2.0, 2.0]), np.full(3, 0.001)),
     ]
     found = ranked(rows, NAMES)

@@ -85,6 +85,21 @@ def test_metrics_agree_with_the_series(faulty):
     assert float(faulty.max_penetration.sel(joint="big_end")) == pytest.approx(depth, rel=0.1)
 
 
+def test_impacts_of_one_motion_are_as_many_a_revolution_however_long_it_is_watched():
+    """The count grows with the window: 2, 6 and 12 impacts of one motion."""
+    values = {"joint": "small_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 50}}
+    found = [
+        simulate(Case.from_values(
+            {**values, "solve": {"duration_rev": 3 + n, "settle_rev": 3, "accuracy": "draft"}}
+        )).sel(joint="small_end")
+        for n in (1, 3, 6)
+    ]  # fmt: skip
+    assert [run["impact_count"].item() for run in found] == [2, 6, 12]
+    assert [run["impacts_per_rev"].item() for run in found] == [2, 2, 2]
+    assert [run["impacts_per_rev_error"].item() for run in found] == [0, 0, 0]
+    assert found[0]["impacts_per_rev"].attrs["units"] == "1/rev"
+
+
 def test_only_metrics_are_kept_when_asked():
     found = run(output={"keep": "metrics"})
     assert "time" not in found.dims

@@ -20,6 +20,8 @@ from compressor.solve.statistics import (
 from compressor.solve.tallied import metrics
 from compressor.solve.turns import merged
 
+TURN = 0.1  # s
+
 
 def turns(rng, count, pull=0.0):
     """Tallies of revolutions whose mean square acceleration follows a walk about 100."""
@@ -27,7 +29,7 @@ def turns(rng, count, pull=0.0):
     for _ in range(count):
         level = pull * level + math.sqrt(1 - pull**2) * rng.normal()
         tally = new_tally()
-        tally.seconds = 0.1
+        tally.seconds = TURN
         tally.square_acceleration = 0.1 * (100.0 + 10.0 * level)
         tally.square_deviation = 0.1 * 25.0
         tally.peak[:] = rng.exponential(size=tally.peak.shape)
@@ -42,13 +44,15 @@ def turns(rng, count, pull=0.0):
 def record():
     p = new_record()
     p["clearance"][:] = 1e-4
+    p["omega"] = 2.0 * math.pi / TURN
     return p
 
 
 @pytest.mark.parametrize(("count", "pull"), [(30, 0.0), (90, 0.0), (90, 0.3)])
 def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     rng = np.random.default_rng(1)
-    exact = {"rms_acceleration": 10.0, "contact_loss_fraction": 0.3, "impact_count": 20.0 * count}
+    exact = {"rms_acceleration": 10.0, "contact_loss_fraction": 0.3, "impact_count": 20.0 * count,
+             "impacts_per_rev": 20.0}  # fmt: skip
     held = dict.fromkeys(exact, 0)
     for _ in range(200):
         each = turns(rng, count, pull)

@@ -17,6 +17,7 @@ from compressor.analysis import (
     impacts,
     joints_with_clearance,
     last_revolution,
+    settled_revolutions,
 )
 from compressor.metrics import JOINTS
 from compressor.report.figures.curves import ANGLE_AXIS
@@ -130,7 +131,7 @@ def draw_impacts(run: xr.Dataset) -> Figure:
     found = impacts(run)
     figure, panels = sheet(1, 1, 3.6)
     (panel,) = panels.flat
-    handles = []
+    handles, turns = [], settled_revolutions(run)
     for joint in joints_with_clearance(run):
         color, shape = BY_JOINT[joint]
         mine = found.isel(impact=found["joint"].values == joint)
@@ -143,7 +144,14 @@ def draw_impacts(run: xr.Dataset) -> Figure:
         angle, speed = mine["crank_angle"].values, mine["approach_speed"].values
         panel.vlines(angle, 0, speed, color=color, linewidth=0.8)
         panel.plot(angle, speed, **look)
-        handles.append(Line2D([], [], label=f"{SPOKEN[joint]}: {angle.size} impacts", **look))
+        handles.append(
+            Line2D(
+                [],
+                [],
+                label=f"{SPOKEN[joint]}: {angle.size / turns:.3g} impacts a revolution",
+                **look,
+            )
+        )
     if not found.sizes["impact"]:
         panel.text(180, 0.5, "no impact: no journal came back from flight", ha="center")
         panel.set_ylim(0, 1)

@@ -18,7 +18,6 @@ from compressor.report.figures.sweep_panels import (
     plot_jobs,
     scale_x,
     scale_y,
-    unit_of,
 )
 
 MOST_POINTS = 1000
@@ -43,7 +42,7 @@ def draw_curves(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
         mark_points(panel, x[chaotic], values[chaotic], None if keys is None else keys[chaotic],
                     RING, CHAOTIC)  # fmt: skip
         mark_feet(panel, x, status, keys)
-        panel.set_ylabel(unit_of(measure))
+        panel.set_ylabel(measure.unit)
     figure.supxlabel(axis.title, fontsize="medium")
     handles = marks_shown(status, chaotic)
     if handles:

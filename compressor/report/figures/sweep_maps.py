@@ -23,7 +23,6 @@ from compressor.report.figures.sweep_panels import (
     marks_shown,
     metric_panels,
     thinned,
-    unit_of,
 )
 
 COLORS = "cividis"
@@ -97,7 +96,7 @@ def plot_map(
     mesh.set_label(measure.title)
     if cells.keys is not None:
         with_jobs(mesh, cells.keys)
-    bar = figure.colorbar(mesh, ax=panel, label=unit_of(measure), pad=0.02, aspect=14)
+    bar = figure.colorbar(mesh, ax=panel, label=measure.unit, pad=0.02, aspect=14)
     inside = steps[(steps > low) & (steps < high)]
     inside = inside[:: -(-inside.size // MOST_CONTOURS)] if inside.size else inside
     if inside.size and has_lines(table, cells.axes):

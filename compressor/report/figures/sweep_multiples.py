@@ -26,7 +26,6 @@ from compressor.report.figures.sweep_panels import (
     scale_x,
     scale_y,
     thinned,
-    unit_of,
 )
 
 MOST_COLUMNS, MOST_ROWS = 4, 3
@@ -89,7 +88,7 @@ def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Fig
         whole = whole_part(sweep, measure, role)
         parts = [line_part(whole, role, {role.color: int(n)}) for n in colors]
         entries |= plot_parts(panel, sweep, role, parts, whole)
-        panel.set_ylabel(unit_of(measure))
+        panel.set_ylabel(measure.unit)
     figure.supxlabel(sweep.axes[role.x].title, fontsize="medium")
     legend_above(figure, [*entries.values(), *marks_of(sweep, role)])
     return figure
@@ -128,7 +127,7 @@ def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Fi
             words = [] if has_rows else [measure.title]
             words += [sweep.axes[axis].told(n) for axis, n in at.items()]
             panel.set_title("\n".join(words), fontsize=9)
-        line[0].set_ylabel(unit_of(measure))
+        line[0].set_ylabel(measure.unit)
     figure.supxlabel(sweep.axes[role.x].title, fontsize="medium")
     legend_above(figure, [*entries.values(), *marks_of(sweep, role)])
     return figure

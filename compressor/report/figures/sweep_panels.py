@@ -43,11 +43,6 @@ def metric_panels(measures: Sequence[Measure], height: float) -> tuple[Figure, l
     return figure, panels[: len(measures)]
 
 
-def unit_of(measure: Measure) -> str:
-    """What stands along the axis of a measure."""
-    return measure.unit or "count"
-
-
 def plot_jobs(
     panel: Axes, points: tuple[np.ndarray, np.ndarray, np.ndarray], keys: Keys, name: str,
     line: dict[str, Any], span: float,

@@ -51,7 +51,7 @@ def leading(sweep: Sweep, measures: Sequence[Measure], most: int) -> list[Measur
         values = sweep.known(measure)
         values = values[np.isfinite(values) & (values >= 0.0)]
         row = METRICS[measure.variable]
-        if values.size and row.kind != "count" and measure.variable not in FROM_IDEAL:
+        if values.size and not row.counted and measure.variable not in FROM_IDEAL:
             ratios[measure] = values.max() / values.min() if values.min() > 0.0 else 1.0
     chosen: dict[str, Measure] = {}
     for measure in sorted(ratios, key=lambda one: -ratios[one]):

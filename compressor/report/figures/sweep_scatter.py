@@ -24,7 +24,6 @@ from compressor.report.figures.sweep_panels import (
     scale_x,
     scale_y,
     thinned,
-    unit_of,
 )
 
 MOST_POINTS = 2000  # in a panel
@@ -39,7 +38,7 @@ def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) 
     for panel, axis, measure in zip(panels, axes, measures, strict=True):
         plot_points(panel, sweep, axis, measure)
         panel.set_xlabel(sweep.axes[axis].title)
-        panel.set_ylabel(unit_of(measure))
+        panel.set_ylabel(measure.unit)
     legend_above(figure, entries(sweep))
     return figure
 
@@ -54,7 +53,7 @@ def draw_scatter(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure])
         for panel, axis in zip(row, axes, strict=True):
             plot_points(panel, sweep, axis, measure)
         row[0].set_title(measure.title)
-        row[0].set_ylabel(unit_of(measure))
+        row[0].set_ylabel(measure.unit)
     for panel, axis in zip(grid[-1], axes, strict=True):
         panel.set_xlabel(sweep.axes[axis].title)
     legend_above(figure, entries(sweep))
