@@ -1,7 +1,8 @@
 """Where the contacts of a joint begin and end, in a run with time series.
 
 In contact means F_N > 0, as everywhere in the program (physics/README.md, Contact). The force on
-the rod is F_N n - F_t t with n along the eccentricity, so that F_N is its part along n.
+the rod is F_N n - F_t t with n along the eccentricity, so that F_N is its part along n. Contact is
+dry contact: the force of a film across a gap is none.
 """
 
 from dataclasses import dataclass
@@ -75,6 +76,7 @@ def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
     distance = np.linalg.norm(place, axis=1)
     along = (force * place).sum(axis=1)
     normal = np.divide(along, distance, out=np.zeros_like(distance), where=distance > 0)
+    normal[depth[there] < 0] = 0.0  # what acts across a gap is a film of oil
     return ContactSeries(
         joint,
         clearance_of(run, joint),

@@ -12,6 +12,7 @@ from compressor.analysis.contact_modes import (
     mode_map,
     mode_shares,
 )
+from compressor.analysis.impacts import impacts
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
@@ -121,3 +122,17 @@ def test_the_paper_s_journals_only_follow(paper_runs):
     assert found["share"].sel(mode="following").values.tolist() == [1.0, 1.0]
     both = found["combination_share"].sel(big_end_mode="following", small_end_mode="following")
     assert float(both) == 1.0
+
+
+@pytest.mark.parametrize(("viscosity", "struck"), [(1, 4), (30, 4), (3000, 0)])
+def test_a_film_is_no_contact(viscosity, struck):
+    """The force of the film across the gap was taken for contact: 0, 2 and 4 impacts were seen."""
+    run = simulate(Case.from_values({
+        "joint": "big_end", "clearance_mm": 0.1, "friction": False, "machine": {"rod_mass_kg": 1},
+        "contact": {"damping_N_s_per_mm": 10}, "lubricant": {"viscosity_mPa_s": viscosity},
+        "solve": {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "output_step_deg": 0.1},
+    }))  # fmt: skip
+    assert impacts(run).sizes["impact"] == run["impact_count"].sel(joint="big_end") == struck
+    flight = mode_shares(contact_modes(run))["share"].sel(joint="big_end", mode="flight")
+    lost = run["contact_loss_fraction"].sel(joint="big_end")
+    assert flight == pytest.approx(float(lost), abs=0.1)
