@@ -22,6 +22,7 @@ UNITS = {
     "1": ("", 1.0),
 }  # fmt: skip
 OF_CONTACT = ("eccentricity_error", "penetration_error")  # whose joint has clearance
+LABELS = {"contact_loss_fraction": "time without dry contact"}  # of others than their names
 FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
 
@@ -135,7 +136,8 @@ def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], 
         "axis": metrics.AXES,
         "quantile": metrics.QUANTILES,
     }
-    first = name.removesuffix("_error").removesuffix("_rev").removesuffix("_per").replace("_", " ")
+    first = name.removesuffix("_error")
+    first = LABELS.get(first, first.removesuffix("_rev").removesuffix("_per").replace("_", " "))
     for choice in itertools.product(*(enumerate(words[dim]) for dim in dims)):
         told = [first, *(str(word).replace("_", " ") for _, word in choice)]
         yield tuple(number for number, _ in choice), ", ".join(told)

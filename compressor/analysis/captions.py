@@ -144,7 +144,7 @@ def motion(courses: Sequence[Course]) -> str:
         )
     else:
         shares = ", ".join(map(percent, apart))
-        stays = f"The journal is without contact for {shares} of the time."
+        stays = f"The journal is without dry contact for {shares} of the time."
     return f"{reverses} {stays}"
 
 

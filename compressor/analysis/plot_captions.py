@@ -12,7 +12,7 @@ from compressor.analysis.impacts import impacts
 from compressor.analysis.orbit import orbit
 from compressor.analysis.paper_cases import SPOKEN
 from compressor.analysis.regime_captions import REGIME_CAPTIONS
-from compressor.analysis.runs import settled_revolutions
+from compressor.analysis.runs import case_of, settled_revolutions
 from compressor.analysis.shaking import ORDER, deviation_spectrum, sensor_envelope, shaking
 from compressor.analysis.swept_rows import SweptRow, rows_modes
 from compressor.analysis.words import plural
@@ -23,12 +23,18 @@ CHAOTIC = (
     " The motion is chaotic: another correct solution has other peaks and lines; more settled "
     "revolutions (solve.duration_rev) make averages that hold."
 )
+FILM = " The joints have oil: contact is dry contact, and without it the film bears the journal."
 LEAST = 0.05  # N: below it a force is told as less than 0.1
 
 
 def caution(run: xr.Dataset) -> str:
     """What is added to the captions of a chaotic run."""
     return CHAOTIC if run.attrs.get("regime") == "chaotic" else ""
+
+
+def film(run: xr.Dataset) -> str:
+    """Return what captions of contacts add for joints with oil: nothing of dry ones."""
+    return FILM if case_of(run).lubricant else ""
 
 
 def signals(run: xr.Dataset, twin: Twin) -> str:
@@ -85,14 +91,17 @@ def orbits(run: xr.Dataset, twin: Twin) -> str:
         depth = 1e6 * float(kept["penetration"].sel(joint=joint).max())
         one = found.sel(joint=joint)
         off = 100.0 * float(one["off_wall_share"])
-        leaves = f"is off its wall for {off:.2g} % of the time" if off else "never leaves its wall"
+        leaves = f"is off its wall for {off:.3g} % of the time" if off else "never leaves its wall"
+        sinks = f"sinks in by up to {depth:.0f} µm" if depth >= 0.0 else (
+            f"comes as near to it as {-depth:.2g} µm"
+        )  # fmt: skip
         size = 1e3 * joints_with_clearance(run)[joint]
         sentences.append(
-            f"At the {SPOKEN[joint]}, clearance {size:.3g} mm, the journal {leaves} and sinks in "
-            f"by up to {depth:.0f} µm; it goes round {float(one['laps']):+.2f} times a revolution, "
+            f"At the {SPOKEN[joint]}, clearance {size:.3g} mm, the journal {leaves} and {sinks}; "
+            f"it goes round {float(one['laps']):+.2f} times a revolution, "
             "counter-clockwise positive."
         )
-    return " ".join(sentences) + caution(run)
+    return " ".join(sentences) + film(run) + caution(run)
 
 
 def modes(run: xr.Dataset, twin: Twin) -> str:
@@ -106,14 +115,16 @@ def modes(run: xr.Dataset, twin: Twin) -> str:
         else:
             said = ", ".join(f"{mode} {x:.3g} %" for mode, x in zip(MODES, each, strict=True))
         sentences.append(f"At the {SPOKEN[joint]}: {said}.")
-    return " ".join(["Shares of the settled time.", *sentences]) + caution(run)
+    return " ".join(["Shares of the settled time.", *sentences]) + film(run) + caution(run)
 
 
 def struck(run: xr.Dataset, twin: Twin) -> str:
     """Of the impacts: how many, the hardest, and what they lost."""
     found = impacts(run)
     if not found.sizes["impact"]:
-        return f"No impacts: after settling no journal came back from flight.{caution(run)}"
+        return (
+            f"No impacts: after settling no journal came back from flight.{film(run)}{caution(run)}"
+        )
     sentences, turns = [], settled_revolutions(run)
     for joint in joints_with_clearance(run):
         mine = found.isel(impact=found["joint"].values == joint)
@@ -128,9 +139,11 @@ def struck(run: xr.Dataset, twin: Twin) -> str:
             f"{float(hardest['approach_speed']):.3g} m/s and {float(hardest['crank_angle']):.0f}°"
             + (f"; together they lost {lost:.3g} J." if lost > 0.0 else ".")
         )
-    return " ".join(
-        [f"Contacts after flight, over {turns:.3g} rev after settling.", *sentences]
-    ) + caution(run)
+    return (
+        " ".join([f"Contacts after flight, over {turns:.3g} rev after settling.", *sentences])
+        + film(run)
+        + caution(run)
+    )
 
 
 def waterfall(rows: Sequence[SweptRow], axis: str) -> str:
@@ -157,7 +170,8 @@ def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
                 f"At the {SPOKEN[joint]} it is flight over at most {flight.max():.2g} % of the "
                 f"revolution, at {at}."
             )
-    return " ".join(sentences) + left_out(rows)
+    oil = FILM if any(row.lubricated for row in rows) else ""
+    return " ".join(sentences) + oil + left_out(rows)
 
 
 def left_out(rows: Sequence[SweptRow]) -> str:

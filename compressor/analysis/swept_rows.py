@@ -17,7 +17,7 @@ class SweptRow:
 
     `shaking` is None, and `problem` says why, where the job has none. `modes`: as `angle_modes`
     gives them, None of ideal joints. `chaotic`: single lines hold for this course of the motion
-    only.
+    only. `lubricated`: its joints have oil.
     """
 
     value: str
@@ -25,6 +25,7 @@ class SweptRow:
     modes: xr.Dataset | None = None
     problem: str = ""
     chaotic: bool = False
+    lubricated: bool = False
 
 
 def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:

@@ -44,7 +44,7 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "rms_acceleration": ((), "m/s2", "root mean square of acceleration"),
     "rms_acceleration_standard_error": ((), "m/s2", "standard error of rms_acceleration"),
     "peak_contact_force": (("joint",), "N", "greatest joint force on the rod"),
-    "contact_loss_fraction": (("joint",), "1", "share of time without contact"),
+    "contact_loss_fraction": (("joint",), "1", "share of time without dry contact"),
     "end_state": (("number",), "1", "motion at the end, as the solver holds it, in SI"),
 }
 METRICS = (

@@ -10,6 +10,7 @@ from compressor.analysis import (
     NoSeriesError,
     SweptRow,
     angle_modes,
+    case_of,
     healthy_twin,
     joints_with_clearance,
     shaking,
@@ -211,7 +212,8 @@ def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
     except NoSeriesError:
         return SweptRow(name, problem="too short")
     try:
-        return SweptRow(name, found, angle_modes(run), chaotic=chaotic)
+        oil = bool(case_of(run).lubricant)
+        return SweptRow(name, found, angle_modes(run), chaotic=chaotic, lubricated=oil)
     except ValueError:  # ideal joints
         return SweptRow(name, found, chaotic=chaotic)
 

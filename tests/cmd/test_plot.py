@@ -9,9 +9,13 @@ import pytest
 from compsim import cli
 from conftest import store
 
+from compressor.analysis.contact_modes import angle_modes
 from compressor.analysis.frame_forces import frame_forces
-from compressor.analysis.plot_captions import PLOT_CAPTIONS
+from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS
+from compressor.analysis.swept_rows import SweptRow
+from compressor.cases.case import Case
 from compressor.report.figures.job import draw_spectra
+from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 
@@ -98,6 +102,25 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder):
     told = float(re.search(r"At the big end ([\d.]+) impacts a revolution", impacts)[1])
     counted = float(run["impacts_per_rev"].sel(joint="big_end"))
     assert 0.9 * counted <= told <= 1.001 * counted  # some lie between two samples
+
+
+def test_captions_of_oiled_joints_speak_of_dry_contact():
+    """A full film was "100 % flight", which reads as a disaster."""
+    values = {"joint": "big_end", "clearance_mm": 0.05, "solve": SOLVE}
+    dry = simulate(Case.from_values(values))
+    full = simulate(Case.from_values({**values, "lubricant": {"viscosity_mPa_s": 3000}}))
+    told = {name: PLOT_CAPTIONS["job"][name](full, None) for name in ("orbits", "modes", "impacts")}
+    for name, text in told.items():
+        assert text.endswith("contact is dry contact, and without it the film bears the journal.")
+        assert "film" not in PLOT_CAPTIONS["job"][name](dry, None)
+    assert "At the big end: flight 100 %" in told["modes"]
+    assert told["impacts"].startswith("No impacts")
+    nearest = -1e6 * float(full["penetration"].sel(joint="big_end").values[2 * 720 :].max())
+    assert "is off its wall for 100 % of the time" in told["orbits"]
+    near = re.search(r"comes as near to it as ([\d.]+) µm", told["orbits"])[1]
+    assert float(near) == pytest.approx(nearest, rel=0.06)
+    rows = [SweptRow("0.05", modes=angle_modes(full), lubricated=True)]
+    assert FILM in PLOT_CAPTIONS["study"]["map"](rows, "clearance")
 
 
 def test_chosen_figures_in_both_formats(plot, folder):

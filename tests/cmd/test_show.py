@@ -50,7 +50,7 @@ def test_numbers_have_labels_units_and_error_bars(paper_store, show):
     assert told["max penetration, big end"] == f"{by_bar(depth * 1e6, bar * 1e6)} µm"
     share = numbers["contact_loss_fraction"][0]
     bar = numbers["contact_loss_fraction_error"][0]
-    assert told["contact loss fraction, big end"] == f"{by_bar(100 * share, 100 * bar, False)} %"
+    assert told["time without dry contact, big end"] == f"{by_bar(100 * share, 100 * bar, False)} %"
     assert float(told["acceleration"]) == pytest.approx(numbers["acceleration_error"], rel=0.05)
     assert told["friction loss"] == f"{numbers['friction_loss']:.6g} J"
 

@@ -56,7 +56,7 @@ def test_what_appears_ranks_before_what_grows():
     ]
     found = ranked(rows, NAMES)
     assert [one.title.partition(",")[0] for one in found] == [
-        "Time without contact", "Peak acceleration", "Peak contact force",
+        "Time without dry contact", "Peak acceleration", "Peak contact force",
     ]  # fmt: skip
     assert found[0].change == "from nearly nothing"
 
