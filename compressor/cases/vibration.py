@@ -96,8 +96,10 @@ class Sensor:
         0.0015, "m/s2", (0, 1e6), "usual: piezoelectric", "rms of white noise up to half the rate"
     )
     speed_jitter: float = parameter(
-        0.0, "", (0, 0.1), OURS, "rms of the speed's relative deviation, slow over a revolution"
-    )
+        0.0, "", (0, 0.1), OURS,
+        "rms of the speed's relative deviation, drawn once a revolution and smooth between: 0.93 "
+        "of it at all times, 0.81 of it in a revolution's mean speed",
+    )  # fmt: skip
     seed: int = parameter(1, "", (0, 2**31), OURS, "of noise and jitter", kind="integer")
     length_rev: int | None = parameter(
         None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",

@@ -89,7 +89,9 @@ def repeated(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
 def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: float) -> np.ndarray:
     """The time (s) of the undisturbed course at which the crank is as far as at each of `times`.
 
-    The speed's deviation is a Gaussian course of `speed_jitter` rms through one point a revolution.
+    The speed's deviation is a cubic spline through a Gaussian draw of `speed_jitter` rms for each
+    revolution. Between these points it is smaller: 0.93 of that rms over all times, and 0.81 of it
+    for the mean speed of a revolution.
     """
     if not sensor.speed_jitter:
         return times
