@@ -70,6 +70,7 @@ TALLY = np.dtype(
 WORN = np.dtype(
     [
         # first: to numba, a record with fields behind another's is one of those
+        ("steady_seconds", "f8"),  # that a steady crank takes for the angle of `seconds`
         ("slid", "f8", (2,)),  # integral of N |v| by joint, J: what wear is in proportion to
         ("worn", "f8", (2, MOST_SECTORS)),  # its parts, by node of the bore
         *[(name, TALLY[name]) for name in TALLY.names or ()],
@@ -272,6 +273,22 @@ def crank_pace_of_step(weights, rows, every, p):
 pace_of_step = by_kind(MECHANISM, crank_pace_of_step, steady_pace_of_step)
 
 
+@jit
+def add_seconds(span, passing, tally, p):
+    """Add a measured step to the tally's time."""
+    tally.seconds += passing
+
+
+@jit
+def add_both_seconds(span, passing, tally, p):
+    """Add a measured step to the tally's time, and to that of a steady crank."""
+    tally.seconds += passing
+    tally.steady_seconds += span
+
+
+add_time = by_kind(MECHANISM, add_both_seconds, add_seconds)
+
+
 @merged
 def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
@@ -290,7 +307,7 @@ def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
         tally_contact(1, passing, nodes, rows, every, apart, measured, tally)
     if not measured:
         return
-    tally.seconds += passing
+    add_time(span, passing, tally, p)
     for k in range(PEAKED):
         tally.top[k] = 0.0
     for i in range(0, nodes.size, every):

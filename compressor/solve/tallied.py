@@ -18,7 +18,9 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
     seconds = tally["seconds"] or math.nan
     axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
     # the spans of steps add up to within rounding: whole revolutions are to stay whole
-    revolutions = round(float(seconds * p["omega"]) / math.tau, 9)
+    name = "steady_seconds" if is_featured(p) else "seconds"
+    steady = tally[name] or math.nan
+    revolutions = round(float(steady * p["omega"]) / math.tau, 9)
     return {
         "peak_acceleration": tally["peak"][0],
         "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),

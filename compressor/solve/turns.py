@@ -13,7 +13,7 @@ SUMS = (
     "loss_seconds", "impacts", "releases",
 )  # fmt: skip
 GREATEST = ("peak", "max_penetration")  # the others go on from the start of the run
-WORN = ("slid", "worn")  # sums of a mechanism with features
+WORN = ("steady_seconds", "slid", "worn")  # sums of a mechanism with features
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
 

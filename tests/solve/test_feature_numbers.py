@@ -105,6 +105,7 @@ def test_shares_and_means_of_a_drive_are_of_the_time():
     """By the samples of a machine that slows by a third within each revolution."""
     values = {"drive": {"flywheel_kg_m2": 0.5, "slope_N_m_s": 20}, "load": "typical"}
     found = run(**values, joint="both", clearance_mm=0.2, solve=SHORT | {"output_step_deg": 0.05})
+    assert (found["impacts_per_rev"] == found["impact_count"] / 0.5).all()
     kept = found.isel(time=found["time"].values >= found.attrs["settle"] * (1 - 1e-12))
     time, step = kept["time"].values, np.diff(kept["time"].values)
     assert step.max() > 1.2 * step.min()
