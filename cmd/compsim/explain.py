@@ -1,4 +1,6 @@
-"""`compsim explain`: what a case asks for, and which of its features it pays for in vain."""
+"""`compsim explain`: what a case asks for, which of its features it pays for in vain, and how far
+other choices of the model move its metrics.
+"""
 
 import dataclasses
 import json
@@ -7,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compsim.model_text import model_lines
+from compsim.results import folders
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -21,6 +25,7 @@ from compsim.screen import (
 )
 
 if TYPE_CHECKING:
+    from compressor.cases import Study
     from compressor.measure import Explanation
     from compressor.solve import JointScales
 
@@ -31,21 +36,38 @@ INDENT = 12  # columns of a heading
 @configs_argument
 @click.option("-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
               help="Worker processes that the sweep's cost is told for.")  # fmt: skip
+@click.option("--models", is_flag=True,
+              help="Instead: how far choices of the model move each metric.")  # fmt: skip
+@click.option("-o", "--output", shell_complete=folders, show_default="results",
+              help="Folder of results that keeps what --models finds.")  # fmt: skip
 @setting
 @limit
 @click.option("--json", "as_json", is_flag=True, help="The same as JSON, a list of studies.")
 def explain(
-    configs: tuple[str, ...], jobs: int, overrides: tuple[str, ...], max_jobs: int, as_json: bool
+    configs: tuple[str, ...],
+    jobs: int,
+    models: bool,
+    output: str | None,
+    overrides: tuple[str, ...],
+    max_jobs: int,
+    as_json: bool,
 ) -> int:
     """Tell what case files ask for: terms, natural scales, cost, and what is paid for in vain.
 
-    Runs the first job of each case file, and again without each feature that it pays for. Exit
-    code 3 where such a job fails.
+    Runs the first job of each case file, and again without each feature that it pays for. With
+    --models it runs that job by other contact and friction laws, twice and half the contact
+    stiffness and damping, with an oil film, an elastic rod and play in the guide, or without where
+    the case has them. The table says how far each choice moves each metric; it is stored in models/
+    of the folder -o, and the report of that folder shows it. Exit code 3 where such a job fails.
     """
+    if output is not None and not models:
+        raise click.UsageError("-o keeps what --models finds: add --models, or leave -o out")
     from compressor.cases import load_studies
 
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, follow=False)
     caution(studies)
+    if models:
+        return explain_models(studies, output or "results", as_json)
     from compressor.measure import explain as explained
 
     found = []
@@ -63,6 +85,36 @@ def explain(
         plain = [without_nan(dataclasses.asdict(one)) for one in found]
         print_text(json.dumps(plain, indent=1, ensure_ascii=False))
     return SOME_FAILED if any(one.reason for one in found) else DONE
+
+
+def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
+    """Print and store how far choices of the model move the metrics of each study's first job."""
+    from compressor.measure import explain_models as run_models
+    from compressor.report import model_table, place_text
+    from compressor.store import models_file, writable_folder, write_dataset
+
+    writable_folder(folder)
+    failed, found = False, []
+    for study in studies:
+        screen = Screen(False, "choices of the model", alike=False)
+        try:
+            data = run_models(study, progress=screen)
+        finally:
+            screen.end()
+        if data["status"].values[0] != "ok":
+            failed = True
+            say(f"{study.name}: the job failed, {data['reason'].values[0]}: {data.attrs['detail']}")
+            continue
+        path = models_file(folder, study.name)
+        write_dataset(path, data)
+        table = model_table(data)
+        found.append({"study": study.name, "file": str(path), **dataclasses.asdict(table)})
+        if not as_json:
+            print_text("\n".join(model_lines(place_text(data), table)))
+            say(str(path))
+    if as_json:
+        print_text(json.dumps(without_nan(found), indent=1, ensure_ascii=False))
+    return SOME_FAILED if failed else DONE
 
 
 def without_nan(value):

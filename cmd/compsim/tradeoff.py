@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compsim.model_text import model_lines
 from compsim.results import files, folders
 from compsim.screen import (
     DONE,
@@ -60,7 +61,7 @@ def tradeoff(
         write_study(folder, study)
         screen.end()
         screen = Screen(quiet, "changes of the model", alike=False)
-        trade = feature_trade(cases, progress=screen)
+        trade = feature_trade(cases, repeats=repeats, progress=screen)
     finally:
         screen.end()
     write_dataset(folder / "modelling.nc", trade)
@@ -68,7 +69,7 @@ def tradeoff(
     if not quiet:
         for name in ("tradeoff.png", "tradeoff.nc", "modelling.nc"):
             say(os.path.join(output, name))
-        say("next: compsim explain CONFIG tells what a case of yours pays for")
+        say("next: compsim explain --models CONFIG does the same for a case, in seconds")
     return DONE
 
 
@@ -131,36 +132,16 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
 
 
 def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
-    """What each change of the model does; changes that do not apply to a scene are left out."""
-    from compressor.measure import SERIES
+    """What each change of the model does to each scene; those that do not apply are left out."""
+    from compressor.report import model_table
 
-    scenes = max(len(name) for name in trade["scene"].values)
-    names = max(len(name) for name in trade["change"].values)
-    yield (
-        f"{'scene':<{scenes}}  {'change of the model':<{names}}  {'peak a':>7}  {'peak F':>7}  "
-        f"{'time':>5}"
-    )
     for scene in trade["scene"].values:
-        for change in trade["change"].values:
-            row = trade.sel(scene=scene, change=change)
-            reason = row["reason"].item()
-            peak, force = (
-                row[f"change_peak_{name}"].item() for name in ("acceleration", "contact_force")
-            )
-            if (peak != peak and not reason) or change == SERIES:
-                continue
-            ratio = row["time_ratio"].item()
-            cells = f"{shown(peak, '+z.1%')}  {shown(force, '+z.1%')}  {shown(ratio, '.2f', 5)}"
-            yield f"{scene:<{scenes}}  {change:<{names}}  {reason or cells}"
+        yield from model_lines(scene, model_table(trade.sel(scene=scene)), times=True)
+        yield ""
     for scene in trade["scene"].values:
-        row = trade.sel(scene=scene, change=SERIES)
+        one = trade.sel(scene=scene)
         yield (
             f"{scene}: the series of Eq. 3-4 would misplace the crosshead by "
-            f"{row['place_error'].item():.0%} of the clearance, and change the ideal acceleration "
-            f"by {row['change_acceleration'].item():.2%}"
+            f"{one['place_error'].item():.0%} of the clearance, and change the ideal acceleration "
+            f"by {one['acceleration_error'].item():.2%}"
         )
-
-
-def shown(value: float, form: str, width: int = 7) -> str:
-    """A number in a cell; a dash for nan."""
-    return f"{'-' if value != value else format(value, form):>{width}}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from compressor.cases import Case
@@ -11,23 +12,25 @@ from compressor.metrics import JOINTS
 GRAVITY = 9.81  # m/s2
 SMALL_CLEARANCE = 0.001  # mm, in the joint that was ideal
 PLAY = 0.05  # mm, of the crosshead in its guide
-# contact laws with what they need beside their name, for steel
-STEEL = {"materials": ("steel", "steel"), "stiffness_N_per_mm15": None, "length_mm": 20.0}
-LAWS: dict[str, dict[str, Any]] = {
-    "hertz": {},
-    "lankarani_nikravesh": {"restitution": 0.9},
-    "flores": {"restitution": 0.9},
-    "johnson": STEEL,
-    "liu": STEEL,
+RESTITUTION = 0.9  # of a law that damps by it, where the case has none
+STEEL = ("steel", "steel")  # where a law needs materials, and the case has none
+# words of a case file -> the laws' names
+CONTACT_LAWS = {
+    "impact": "IMPACT (ADAMS)",
+    "hertz": "Hertz",
+    "lankarani_nikravesh": "Lankarani-Nikravesh",
+    "flores": "Flores",
+    "johnson": "Johnson",
+    "liu": "Liu",
 }
-FRICTION_LAWS = ("coulomb_tanh", "threlfall", "ambrosio", "lugre")
-# groups that a case may name: name, key, the case without and with it
-MECHANISM = (
-    ("oil film", "lubricant", "dry joints", "oil film"),
-    ("friction of the guide", "guide", "ideal guide", "friction of the guide"),
-    ("speed that gives way", "drive", "steady speed", "speed that gives way"),
-    ("elastic rod", "rod", "rigid rod", "elastic rod"),
-)
+FRICTION_LAWS = {
+    "adams": "ADAMS",
+    "coulomb_tanh": "Coulomb (tanh)",
+    "threlfall": "Threlfall",
+    "ambrosio": "Ambrósio",
+    "lugre": "LuGre",
+}
+UNDAMPED = ("impact", "hertz")  # laws that no restitution damps
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class Feature:
 
     `add` gives None where a case has no use for the feature, or cannot have it; `off` and `on`
     name a case that is changed so, and `neutral` is how a case file leaves the feature out.
+    `is_choice`: it is another model of the same machine, no other machine.
     """
 
     name: str
@@ -46,6 +50,7 @@ class Feature:
     off: str
     on: str
     neutral: str
+    is_choice: bool = False
 
 
 def without_clearance(case: Case, joint: str) -> Case:
@@ -87,20 +92,43 @@ def contact_feature(law: str) -> Feature:
     return Feature(
         f"contact law {law}",
         "contact.law",
-        lambda case: case.contact.law == law,
-        lambda case: replace(case, contact=Case().contact),
+        lambda case: case.contact.law == law and bool(faulty(case)),
+        lambda case: with_contact(case, "impact") or case,
         lambda case: with_contact(case, law),
-        "contact law impact",
-        f"contact law {law}",
+        f"contact law: {CONTACT_LAWS['impact']}",
+        f"contact law: {CONTACT_LAWS[law]}",
         "contact.law: impact",
+        is_choice=True,
     )
 
 
 def with_contact(case: Case, law: str) -> Case | None:
-    """A case of ADAMS's contact law with another one; None of another case."""
-    if case.contact.law != "impact" or not faulty(case):
+    """Return a case with another contact law; None for its own law, or without any contact.
+
+    What the law needs and the case does not have is a default: its stiffness, steel on steel, a
+    joint as long as wide, a restitution of 0.9.
+    """
+    contact = case.contact
+    if contact.law == law or not faulty(case):
         return None
-    return changed(case, "contact", law=law, **LAWS[law])
+    values: dict[str, Any] = {"law": law}
+    if law not in UNDAMPED:
+        values["restitution"] = contact.restitution or RESTITUTION
+    known = contact.materials or contact.modulus_GPa
+    if law in ("johnson", "liu"):
+        values["length_mm"] = contact.length_mm or bearing_length(case)
+        if not known:
+            values |= {"materials": STEEL, "stiffness_N_per_mm15": None}
+    elif not (contact.materials or contact.stiffness_N_per_mm15):
+        values["stiffness_N_per_mm15"] = type(contact)().stiffness_N_per_mm15
+    return changed(case, "contact", **values)
+
+
+def bearing_length(case: Case) -> float:
+    """Return the length of a case's bearings (mm): of its oil film, or as long as wide."""
+    if case.lubricant:
+        return case.lubricant.bearing_length_mm
+    return 2.0 * case.machine.pin_radius_mm
 
 
 def friction_feature(law: str) -> Feature:
@@ -111,17 +139,48 @@ def friction_feature(law: str) -> Feature:
         lambda case: bool(case.friction and case.friction.law == law),
         lambda case: changed(case, "friction", law=None),
         lambda case: with_friction(case, law),
-        "friction law adams",
-        f"friction law {law}",
+        f"friction law: {FRICTION_LAWS['adams']}",
+        f"friction law: {FRICTION_LAWS[law]}",
         "friction.law: adams",
+        is_choice=True,
     )
 
 
 def with_friction(case: Case, law: str) -> Case | None:
-    """A case of ADAMS's friction law with another one; None of another case."""
-    if not case.friction or case.friction.law or not faulty(case):
+    """Return a case with another friction law; None for its own law, or where nothing rubs."""
+    if not case.friction or case.friction.law == law or not faulty(case):
+        return None
+    if law == "lugre" and case.friction.ideal_joints:  # which have no bristles
         return None
     return changed(case, "friction", law=law)
+
+
+def oiled(case: Case) -> Case | None:
+    """Return a case with an oil film in its bearings; None without any clearance."""
+    if not faulty(case):
+        return None
+    film = named("lubricant", True)
+    return replace(case, lubricant=replace(film, bearing_length_mm=bearing_length(case)))
+
+
+def with_elastic_rod(case: Case) -> Case:
+    """Return a case with an elastic steel bar as its rod, of the section that has the rod's mass.
+
+    The default section is that of the default rod; another one is as wide to its depth.
+    """
+    machine, usual = case.machine, Case().machine
+    mass = machine.rod_mass_kg / usual.rod_mass_kg
+    scale = (mass * usual.rod_length_mm / machine.rod_length_mm) ** 0.5
+    bar = named("rod", True)
+    size = {name: round(scale * getattr(bar, name), 2) for name in ("depth_mm", "width_mm")}
+    return replace(case, rod=replace(bar, **size))
+
+
+def with_play(case: Case) -> Case:
+    """Return a case with play of the crosshead in its guide."""
+    if case.guide:
+        return changed(case, "guide", clearance_mm=PLAY)
+    return with_group(case, "guide", named("guide", {"clearance_mm": PLAY}))
 
 
 def named(key: str, value: Any) -> Any:
@@ -136,18 +195,26 @@ def with_group(case: Case, key: str, group: Any) -> Case:
     return replace(case, **groups)
 
 
-def group_feature(name: str, key: str, off: str, on: str) -> Feature:
-    """A group of the mechanism that a case may name; added, it has its defaults."""
+def group_feature(
+    name: str, key: str, off: str, add: Callable[[Case], Case | None], is_choice: bool = False
+) -> Feature:
+    """A group of the mechanism that a case may name."""
     return Feature(
         name,
         key,
         lambda case: getattr(case, key) is not None,
         lambda case: with_group(case, key, None),
-        lambda case: with_group(case, key, named(key, True)),
+        add,
         off,
-        on,
+        name,
         f"no {key}",
+        is_choice,
     )
+
+
+def with_defaults(key: str, case: Case) -> Case:
+    """Return a case with a group of the mechanism, as its defaults are."""
+    return with_group(case, key, named(key, True))
 
 
 def rubbing(case: Case) -> Case | None:
@@ -211,19 +278,18 @@ FEATURES = (
         "load: none",
     ),
     *map(clearance_feature, JOINTS),
-    *map(contact_feature, LAWS),
-    *map(friction_feature, FRICTION_LAWS),
+    *(contact_feature(law) for law in CONTACT_LAWS if law != "impact"),
+    *(friction_feature(law) for law in FRICTION_LAWS if law != "adams"),
     Feature(
         "play of the guide",
         "guide.clearance_mm",
         lambda case: bool(case.guide and case.guide.clearance_mm > 0),
         lambda case: changed(case, "guide", clearance_mm=0.0),
-        lambda case: None if case.guide else with_group(
-            case, "guide", named("guide", {"clearance_mm": PLAY})
-        ),
+        with_play,
         "guide without play",
         f"{1000 * PLAY:g} µm of play in the guide",
         "guide.clearance_mm: 0",
+        is_choice=True,
     ),
     Feature(
         "friction of ideal joints",
@@ -235,5 +301,12 @@ FEATURES = (
         "friction of ideal joints",
         "friction.ideal_joints: false",
     ),
-    *(group_feature(*row) for row in MECHANISM),
+    group_feature("oil film", "lubricant", "dry joints", oiled, is_choice=True),
+    group_feature(
+        "friction of the guide", "guide", "ideal guide", partial(with_defaults, "guide")
+    ),
+    group_feature(
+        "speed that gives way", "drive", "steady speed", partial(with_defaults, "drive")
+    ),
+    group_feature("elastic rod", "rod", "rigid rod", with_elastic_rod, is_choice=True),
 )  # fmt: skip

@@ -1,30 +1,26 @@
-"""The modelling trade: what each feature of the model changes in the answer, and costs in time.
+"""What leaving a feature out changes in the answer, and saves in time; and the paper's shortcuts.
 
-A feature is a row of `compressor.measure.feature_rows`. `trade` quotes them all;
-`compressor.measure.explain` those that a case pays for.
+A feature is a row of `compressor.measure.feature_rows`.
 """
 
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 
 from compressor.cases import ACCURACY, Case, Output
-from compressor.measure.feature_rows import FEATURES
 from compressor.measure.work_precision import (
-    Progress,
     complete,
     faulty,
     grid_values,
     solved,
     stored_values,
 )
-from compressor.metrics import JOINTS
+from compressor.metrics import JOINTS, METRICS
 from compressor.physics import exact_motion, series_motion
-from compressor.program import PROGRAM
 from compressor.solve import simulate
 
 EXACT = "fine"  # accuracy at which answers are compared
@@ -84,106 +80,37 @@ def changes(
     return float(peak), float(force), float(np.linalg.norm(b - a) / np.linalg.norm(a))
 
 
-def series_kinematics(case: Case) -> tuple[Effect, float]:
-    """The paper's series (Eq. 3-4) in place of the exact ideal motion, and its error of place.
+SERIES_ERRORS = {  # of the paper's series (Eq. 3-4) in place of the exact ideal motion
+    "place_error": "greatest error of the series' displacement over the smallest clearance",
+    "acceleration_error": "relative L2 error of the series' acceleration",
+}
 
-    Never simulated with: the effect is on the ideal machine's acceleration; the second number is
-    the greatest error of displacement as a share of the smallest clearance.
+
+def series_errors(case: Case) -> tuple[float, float]:
+    """Return the errors of the series kinematics of a case, by `SERIES_ERRORS`.
+
+    No run uses the series: both errors are those of the ideal machine.
     """
     machine = case.machine
     lengths = machine.crank_radius_mm / 1000, machine.rod_length_mm / 1000
     theta = np.linspace(0, 2 * np.pi, 3601)
     x, _, a = exact_motion(theta, *lengths, case.omega)
     series_x, _, series_a = series_motion(theta, *lengths, case.omega)
-    peak = np.abs(series_a).max() / np.abs(a).max() - 1
-    apart = np.linalg.norm(series_a - a) / np.linalg.norm(a)
     clearance = min(getattr(case.clearance_mm, joint) for joint in faulty(case)) / 1000
-    share = float(np.abs(series_x - x).max() / clearance)
-    return Effect(float(peak), change_acceleration=float(apart)), share
+    place = float(np.abs(series_x - x).max() / clearance)
+    return place, float(np.linalg.norm(series_a - a) / np.linalg.norm(a))
 
 
-def output_grid(case: Case) -> Effect:
-    """Peaks read from the output grid, 0.1 ms in the paper, in place of the dense solution."""
-    run = simulate(comparable(case))
-    if not complete(run):
-        return Effect(reason=run["reason"].item())
-    joints = faulty(case)
-    peak, force, _ = changes(stored_values(run, joints), grid_values(run, joints))
-    return Effect(peak, force)
+def read_from_grid(run: xr.Dataset, with_series: xr.Dataset) -> xr.Dataset:
+    """Return a run with peaks as its output grid (0.1 ms in the paper) shows them.
 
-
-def variants(case: Case) -> dict[str, Case]:
-    """The models that a case is compared with: features toggled, and the other load, by name."""
-    found = {}
-    for feature in FEATURES:
-        if feature.key == "load":
-            continue
-        if feature.paid(case):
-            found[feature.off] = feature.remove(case)
-        elif added := feature.add(case):
-            found[feature.on] = added
-    other = {"design": "typical", "typical": "design"}.get(case.load)
-    if other:
-        found[f"{other} load"] = replace(case, load=other)
-    return found
-
-
-SERIES, GRID = "series kinematics (Eq. 3-4)", "peaks from the output grid"
-
-
-def trade(
-    cases: Mapping[str, Case],
-    repeats: int = 9,
-    progress: Progress = lambda done, total, remark: None,
-) -> xr.Dataset:
-    """What each change of the model does to each case; dims (scene, change), nan where it cannot.
-
-    `place_error` is that of the series kinematics as a share of the clearance. Each case needs a
-    joint with clearance.
+    with_series: the same run with its time series. Metrics that no grid gives are nan; bars are 0,
+    since the grid changes the run's own numbers.
     """
-    toggled = {name: variants(case) for name, case in cases.items()}
-    names = [*dict.fromkeys(change for found in toggled.values() for change in found), GRID, SERIES]
-    rows: dict[tuple[str, str], Effect] = {}
-    place = []
-    total, done = sum(map(len, toggled.values())), 0
-    for scene, case in cases.items():
-        for change, other in toggled[scene].items():
-            rows[scene, change] = compare(case, other, repeats)
-            done += 1
-            progress(done, total, "")
-        rows[scene, GRID] = output_grid(case)
-        rows[scene, SERIES], share = series_kinematics(case)
-        place.append(share)
-    return labelled(list(cases), names, rows, place)
-
-
-MEANINGS = {
-    "change_peak_acceleration": "relative change of peak acceleration",
-    "change_peak_contact_force": "relative change of peak contact force where it changes most",
-    "change_acceleration": "relative L2 change of acceleration",
-    "time_ratio": "wall time over that of the case itself",
-}
-
-
-def labelled(
-    scenes: Sequence[str], names: Sequence[str], rows: Mapping, place: Sequence[float]
-) -> xr.Dataset:
-    """Effects as a Dataset; what does not apply is nan."""
-    dims, shape = ("scene", "change"), (len(scenes), len(names))
-    variables: dict[str, tuple] = {}
-    for field, phrase in MEANINGS.items():
-        values = [getattr(rows.get((s, n)), field, np.nan) for s in scenes for n in names]
-        attrs = {"units": "1", "long_name": phrase}
-        variables[field] = (dims, np.reshape(values, shape), attrs)
-    reasons = [getattr(rows.get((s, n)), "reason", "") for s in scenes for n in names]
-    attrs = {"long_name": "why a run failed, by a stable name"}
-    variables["reason"] = (dims, np.reshape(np.array(reasons, object), shape), attrs)
-    phrase = "greatest error of the series' displacement over the smallest clearance"
-    variables["place_error"] = ("scene", list(place), {"units": "1", "long_name": phrase})
-    coordinates = {
-        "scene": ("scene", np.array(scenes, object), {"long_name": "case"}),
-        "change": ("change", np.array(names, object), {"long_name": "change of the model"}),
+    values = grid_values(with_series, JOINTS) if complete(with_series) else {}
+    found = {
+        name: run[name].copy(data=values[name]) if name in values else run[name] * math.nan
+        for name in METRICS
     }
-    attrs = {"title": "what the model's features change and cost", "compared_at": EXACT,
-             "program": PROGRAM}  # fmt: skip
-    return xr.Dataset(variables, coordinates, attrs)
+    found |= {f"{name}_error": 0.0 * run[f"{name}_error"] for name in METRICS}
+    return run.assign(found | {"seconds": math.nan})

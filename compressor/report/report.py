@@ -41,6 +41,7 @@ from compressor.report.machines_section import (
     machine_sections,
 )
 from compressor.report.mechanism import mechanism_svg, mechanism_words
+from compressor.report.model_choices import headline, model_table, models_section, read_models
 from compressor.report.page import Plate, Running, Section, document, restated
 from compressor.report.paper_runs import PaperRuns, find_paper_runs, is_of_paper
 from compressor.report.paper_sections import missing_sections, paper_sections, spoken
@@ -59,6 +60,7 @@ from compressor.report.study_section import (
     file_name,
     job_counts,
     job_facts,
+    models_anchor,
     study_sections,
     table_anchor,
 )
@@ -141,7 +143,10 @@ def compose(results: Folder, command: str, claims: Folder, running: Running | No
     of_faults = [draw(*parts) for parts in diagnosis_drawings(found, paper)]
     shown = {run.attrs["key"] for run in paper.stored.values()}
     own = [study for study in studies if not shown.issuperset(study.keys)]
-    drawn = [drawn_study(stored, study, others.get(study.name)) for study in own]
+    chosen = {study.name: models_line(results, study) for study in studies}
+    drawn = [
+        drawn_study(stored, study, others.get(study.name), chosen[study.name][0]) for study in own
+    ]
     sets = [
         second_section(one, of_others[name], of_paper, table_anchor(name))
         for name, one in others.items()
@@ -155,6 +160,7 @@ def compose(results: Folder, command: str, claims: Folder, running: Running | No
         *sets,
         *diagnosis_sections(found, of_faults),
         *machine_sections(of_machines),
+        *(section for _, section in chosen.values() if section),
         *(one.table for one in drawn),
         *tables,
         assumptions_section(stored, studies, bool(paper.stored)),
@@ -192,8 +198,18 @@ class DrawnStudy(NamedTuple):
     jobs: dict[str, dict[str, Any]]
 
 
-def drawn_study(stored: Stored, study: StoredStudy, other: SecondSet | None) -> DrawnStudy:
-    """A user's own study: its sections, and its sweep, drawn.
+def models_line(results: Folder, study: StoredStudy) -> tuple[str, Section | None]:
+    """Return the line on choices of the model of a study's job, and their section, if stored."""
+    data = read_models(results, study)
+    if data is None:
+        return "", None
+    return headline(model_table(data)), models_section(models_anchor(study.name), data)
+
+
+def drawn_study(
+    stored: Stored, study: StoredStudy, other: SecondSet | None, models: str
+) -> DrawnStudy:
+    """A user's own study: its sections, and its sweep, drawn; `models`: its line on choices.
 
     The sweep is not drawn where all of the study is shown as another set of the paper's figures.
     """
@@ -205,7 +221,7 @@ def drawn_study(stored: Stored, study: StoredStudy, other: SecondSet | None) -> 
                  one.caption, one.figure)
             for one in ([] if whole else draw_sweep(data))
         ]  # fmt: skip
-        figures, table = study_sections(stored, study, data, plates, anchor)
+        figures, table = study_sections(stored, study, data, plates, anchor, models)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MOST_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(

@@ -51,7 +51,9 @@ class Counts(NamedTuple):
 class StudyContent:
     """What a page says of a study; `chaotic` counts jobs of which statistics alone hold.
 
-    `second_set`: the id of the section with its own Figures 8 to 16; empty where it has none.
+    `second_set`: the id of the section with its own Figures 8 to 16; `models`: a line on how far
+    choices of the model move its numbers, and `models_table` the id of their section; empty where
+    it has none.
     """
 
     case_file: str
@@ -62,6 +64,8 @@ class StudyContent:
     plates: Sequence[Plate]
     jobs: str
     second_set: str = ""
+    models: str = ""
+    models_table: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,8 +83,12 @@ def study_sections(
     data: xr.Dataset,
     plates: Sequence[Plate],
     second_set: str = "",
+    models: str = "",
 ) -> tuple[Section, Section]:
-    """A study as `open_study` gives it: its figures and failures, and its table."""
+    """A study as `open_study` gives it: its figures and failures, and its table.
+
+    models: the line on choices of the model, if there is a section of them.
+    """
     reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
     anchor = table_anchor(study.name)
     content = StudyContent(
@@ -92,6 +100,8 @@ def study_sections(
         plates=plates,
         jobs=anchor,
         second_set=second_set,
+        models=models,
+        models_table=models_anchor(study.name) if models else "",
     )
     table = JobsContent(study.name, data["status"].size, jobs_table(data))
     return (
@@ -103,6 +113,11 @@ def study_sections(
 def table_anchor(study: str) -> str:
     """The id of the section with a study's table."""
     return file_name("jobs", study)
+
+
+def models_anchor(study: str) -> str:
+    """The id of the section with the choices of the model of a study."""
+    return file_name("models", study)
 
 
 def file_name(*words: str) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 from compressor.program import did_you_mean
 from compressor.store.files import Folder, WrongName
 
-PARTS = ("rows", "jobs", "studies", "shards", "regimes", "features", "wear")  # folders in a store
+# folders in a store
+PARTS = ("rows", "jobs", "studies", "shards", "regimes", "features", "wear", "models")
 HELD = ("studies/*.json", "regimes/*/*.json", "wear/*.nc")  # of which each is a result
 MOST_LOOKED_AT = 1000  # entries of a folder in which results are sought
 MOST_NAMES = 5  # that are listed
@@ -71,6 +72,11 @@ def found_in(folder: Path) -> Iterator[Path]:
     except OSError:
         return
     yield from (one for one in entries if one.is_dir() and holds_results(one))
+
+
+def models_file(folder: Folder, study: str) -> Path:
+    """Return where the choices of the model of a study's job are stored, or would be."""
+    return Path(folder) / "models" / f"{study}.nc"
 
 
 def listed(names: list[str]) -> str:

@@ -20,7 +20,8 @@ from compressor.store.series_file import read_dataset
 from compressor.store.studies import Again, StoredStudy, owners, read_study, study_paths
 
 FORMER_REMEDY = "delete it: its jobs stay stored"
-FOLLOWED = ("regimes/*/*.nc", "wear/*.nc")  # machines over values and over hours
+# machines over values and over hours, and by choices of the model
+FOLLOWED = ("regimes/*/*.nc", "wear/*.nc", "models/*.nc")
 ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
 STUDY_REMEDY = "run its case file again, which computes nothing anew"
 FOLLOWED_REMEDY = "delete it: the command that made it makes it again"
@@ -52,7 +53,8 @@ class Damage:
 def verify(
     folder: Folder, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Damage]:
-    """Return all damage to a store: to segments, files of time series, studies, chains and wear.
+    """Return all damage to a store: to segments, files of time series, studies, chains, wear and
+    choices of the model.
 
     Jobs that a study has and no row knows are damage, too, unless a run is at work there: they have
     not run, or their row is gone. `progress` is told how many files of time series were read, of

@@ -437,17 +437,9 @@ def test_explain_of_an_effect_that_failed():
 def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     import xarray as xr
 
-    from compressor.measure import features
     from compressor.measure.work_precision import work_precision
 
-    whole = features.variants
-
-    def plain(case):
-        """Without laws and mechanisms, which take a minute to compile: tests/measure has them."""
-        return {name: other for name, other in whole(case).items() if other.is_plain}
-
-    monkeypatch.setattr(features, "variants", plain)
-    monkeypatch.setattr(features.trade, "__defaults__", (1, *features.trade.__defaults__[1:]))
+    without_laws(monkeypatch)
     few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
     defaults = (*few.values(), *work_precision.__defaults__[2:])
     monkeypatch.setattr(work_precision, "__defaults__", defaults)
@@ -459,10 +451,12 @@ def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
         assert (study["status"] == "ok").all()
         error = study["error_acceleration"].sel({"scene": "a both", "method": "auto"})
     with xr.open_dataset("out dir/modelling.nc", engine="h5netcdf") as trade:
-        assert "no friction" in trade["change"]
+        assert {"no friction", "contact stiffness × 2"} < {*trade["choice"].values}
     decade = 10.0 ** -(next(k for k in range(1, 9) if error.values[0] > 10.0**-k) - 1)
     assert re.search(rf"^a both +{decade:.0e}  auto +1e-0[35]", out, re.MULTILINE)
-    assert re.search(r"^a big_end  no friction +[+-]", out, re.MULTILINE)
+    for scene in ("a big_end", "a both"):
+        below = out.split(f"\n{scene}:\n")[1]
+        assert re.search(r"^  no friction +[+-].* × \d", below, re.MULTILINE)
     assert "the paper's BDF at 1e-5 takes" in out
     assert "a both: the series of Eq. 3-4 would misplace the crosshead by 61% of" in out
     assert Path("out dir/tradeoff.png").read_bytes().startswith(b"\x89PNG")
@@ -470,9 +464,78 @@ def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     assert "\nout dir/tradeoff.png\n" in err
 
 
+def without_laws(monkeypatch):
+    """Leave out laws and mechanisms, which take a minute to compile: tests/measure has them."""
+    from compressor.measure import model_choices as module
+
+    for name in ("model_variants", "model_choices"):
+        whole = getattr(module, name)
+
+        def plain(case, whole=whole):
+            return [one for one in whole(case) if one.case and one.case.is_plain]
+
+        monkeypatch.setattr(module, name, plain)
+
+
+def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch):
+    from compressor.report.report import write_report
+    from compressor.store.reader import open_study
+
+    without_laws(monkeypatch)
+    case_file("worn.yaml", joint="big_end", clearance_mm=[0.2, 0.3], machine={"rod_mass_kg": 3})
+    assert cli.main(["explain", "--models", "worn.yaml", "-o", "kept"]) == 0
+    out, err = capsys.readouterr()
+    lines = out.splitlines()
+    assert lines[0] == "the first of 2 jobs of worn (clearance_mm = 0.2):"
+    assert err.endswith("kept/models/worn.nc\n")
+    rows = {line[2:30].split("  ")[0]: line for line in lines}
+    scaled = [f"contact {what} {sign} 2" for what in ("stiffness", "damping") for sign in "×÷"]
+    assert [name for name in rows if name in scaled] == scaled
+    assert rows["contact stiffness × 2"].endswith("stiffness_N_per_mm15 6.72e+05")
+    last = re.fullmatch(
+        r"Peak .*: [\d.]+ (kN|m/s²); numerical error (below )?[\d.]+ %; choices of the model move "
+        r"this peak by (\S+) to (\S+) %", lines[-1],
+    )  # fmt: skip
+    assert last
+    assert f"{last[3]} to {last[4]} %" in rows["all of them"]
+    for end in {last[3], last[4]} - {"0"}:  # the span is that of a row
+        assert any(f" {end} %" in rows[name] for name in scaled)
+
+    assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
+    write_report("kept", "page")
+    page = Path("page/index.html").read_text(encoding="utf-8")
+    assert f'<p>{lines[-1]}. <a href="#models-worn">' in page
+    assert '<section id="models-worn">' in page
+    assert "the first of 2 jobs of worn (clearance_mm = 0.2)" in page
+    with open_study("kept", "worn") as study:
+        peak = study["peak_acceleration"].sel(clearance_mm=0.2).item()
+    itself = next(line for line in lines if line.startswith("  the case itself"))
+    assert float(itself.split()[3]) == pytest.approx(peak, rel=1e-2)  # at draft
+
+    case_file("worn.yaml", joint="big_end", clearance_mm=[0.25, 0.3], machine={"rod_mass_kg": 3})
+    assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
+    with pytest.warns(match="is of a job that worn no longer has: compsim explain --models "):
+        write_report("kept", "page")
+    assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
+
+
+def test_explain_models_as_json_and_of_a_job_that_fails(case_file, capsys, monkeypatch):
+    without_laws(monkeypatch)
+    case_file("a.yaml", joint="both", clearance_mm=0.1)
+    case_file("b.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": 5})
+    assert cli.main(["explain", "--models", "a.yaml", "b.yaml", "--json"]) == 3
+    out, err = capsys.readouterr()
+    (found,) = json.loads(out)
+    assert (found["study"], found["file"]) == ("a", "results/models/a.nc")
+    assert len(found["rows"][0]["changes"]) == len(found["measures"]) == len(found["spans"])
+    assert "b: the job failed, budget_steps: more than 5 steps" in err
+    assert not Path("results/models/b.nc").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
+        (["explain", "calm.yaml", "-o", "kept"], "-o keeps what --models finds: add --models"),
         (["tradeoff", "calm.yaml"], "calm.yaml: calm has no joint with clearance"),
         (["tradeoff", "--set", "load=none"], "--set changes case files: name one"),
         (["tradeoff", "calm.yaml", "--repeats", "0"], "0 is not in the range"),

@@ -1,4 +1,4 @@
-"""The modelling trade: which features a case pays for, and what leaving them out changes."""
+"""The features of the model: which a case pays for, and what leaving them out changes."""
 
 from dataclasses import replace
 
@@ -7,16 +7,15 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.groups import Friction
-from compressor.measure.features import (
+from compressor.cases.mechanism import Rod
+from compressor.measure.feature_rows import (
+    CONTACT_LAWS,
     FEATURES,
-    GRID,
-    SERIES,
-    compare,
-    output_grid,
-    series_kinematics,
-    trade,
-    variants,
+    with_contact,
+    with_elastic_rod,
 )
+from compressor.measure.features import compare, read_from_grid, series_errors
+from compressor.solve.simulate import simulate
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 BY_NAME = {feature.name: feature for feature in FEATURES}
@@ -97,51 +96,54 @@ def test_a_run_that_fails_is_named():
     effect = compare(case(), few, 1)
     assert effect.reason == "budget_steps"
     assert np.isnan(effect.change_peak_acceleration)
-    assert output_grid(few).reason == "budget_steps"
 
 
 def test_the_series_is_off_by_more_than_the_smallest_clearance():
-    effect, share = series_kinematics(case(clearance_mm=0.1))
-    assert share == pytest.approx(1.2246, abs=1e-3)  # 0.122 mm over 0.1 mm
-    assert 1e-3 < effect.change_acceleration < 1e-2
-    assert np.isnan(effect.time_ratio)
+    place, acceleration = series_errors(case(clearance_mm=0.1))
+    assert place == pytest.approx(1.2246, abs=1e-3)  # 0.122 mm over 0.1 mm
+    assert 1e-3 < acceleration < 1e-2
 
 
 def test_the_output_grid_hides_peaks():
-    effect = output_grid(case())
-    assert effect.change_peak_acceleration < -1e-4
-    assert effect.change_peak_contact_force < -1e-4
+    run = simulate(case())
+    read = read_from_grid(run, run)
+    for name in ("peak_acceleration", "peak_contact_force"):
+        assert (read[name] < (1 - 1e-4) * run[name]).all()
+        assert (read[f"{name}_error"] == 0).all()
+    assert read["max_penetration"].isnull().all()
 
 
-def test_variants_of_one_faulty_joint_and_of_two():
-    one, two = variants(case()), variants(case(joint="both"))
-    assert [*one][:4] == ["no friction", "no spring damping", "gravity 9.81 m/s²",
-                          "1 µm in the ideal joint"]  # fmt: skip
-    assert [*one][-1] == "typical load"
-    laws = {"contact law flores", "friction law lugre"}
-    assert laws | {"elastic rod", "friction of ideal joints"} < {*one}
-    assert "friction of ideal joints" not in two  # both are worn
-    assert one["1 µm in the ideal joint"].clearance_mm.small_end == 0.001
-    assert {"ideal big end", "ideal small end"} < {*two}
-    assert two["ideal big end"].joint == "small_end"
+@pytest.mark.parametrize("law", CONTACT_LAWS)
+@pytest.mark.parametrize("other", CONTACT_LAWS)
+def test_each_contact_law_may_stand_in_place_of_each_other(law, other):
+    """With what the case has; what it has not is a default."""
+    plain = case(contact={"stiffness_N_per_mm15": 5e5, "damping_N_s_per_mm": 100})
+    one = with_contact(plain, law) or plain
+    two = with_contact(one, other)
+    assert (two is None) == (law == other)
+    two = two or one
+    assert Case.from_values(two.values()) == two
+    assert two.contact.law == other
+    if {law, other} <= {"impact", "hertz", "flores", "lankarani_nikravesh"}:
+        assert two.contact.stiffness_N_per_mm15 == 5e5
 
 
-def test_a_trade_has_a_row_for_each_change(monkeypatch):
-    few = {
-        "friction", "contact law flores", "friction of ideal joints",
-        "clearance of the big end", "clearance of the small end",
-    }  # fmt: skip
-    kept = tuple(feature for feature in FEATURES if feature.name in few)
-    monkeypatch.setattr("compressor.measure.features.FEATURES", kept)
-    found = trade({"one": case(), "two": case(joint="both")}, repeats=1)
-    assert {GRID, SERIES, "typical load", "ideal big end", "contact law flores"} < {
-        *found["change"].values
-    }
-    row = found.sel(scene="one", change="ideal big end")
-    assert np.isnan(row["change_peak_acceleration"])  # does not apply
-    for scene in ("one", "two"):
-        row = found.sel(scene=scene, change="no friction")
-        assert abs(row["change_peak_contact_force"]) > 1e-3
-        assert row["time_ratio"] > 0
-        assert row["reason"].item() == ""
-    assert found["place_error"].values == pytest.approx(0.6123, abs=1e-3)
+def test_a_law_takes_over_restitution_materials_and_length():
+    given = {"law": "flores", "restitution": 0.7, "materials": ["steel", "copper"]}
+    contact = with_contact(case(contact=given), "liu").contact
+    assert (contact.restitution, contact.materials) == (0.7, ("steel", "copper"))
+    assert contact.length_mm == 20.0  # as long as wide
+    oiled = case(contact=given, lubricant={"bearing_length_mm": 15})
+    assert with_contact(oiled, "liu").contact.length_mm == 15.0
+
+
+def test_a_modulus_alone_gives_other_laws_the_default_stiffness():
+    given = {"law": "johnson", "modulus_GPa": 100, "length_mm": 30}
+    assert with_contact(case(contact=given), "liu").contact.modulus_GPa == 100
+    assert with_contact(case(contact=given), "hertz").contact.stiffness_N_per_mm15 == 3.36e5
+
+
+def test_an_elastic_rod_has_the_section_that_its_mass_needs():
+    assert with_elastic_rod(case()).rod == Rod()
+    heavy = with_elastic_rod(case(machine={"rod_mass_kg": 4 * 4.7, "rod_length_mm": 600})).rod
+    assert (heavy.depth_mm, heavy.width_mm) == (80.0, 50.0)

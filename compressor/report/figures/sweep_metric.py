@@ -31,6 +31,11 @@ class Measure:
     factor: float = 1.0
     joint: str = ""
 
+    @property
+    def is_relative(self) -> bool:
+        """Whether its error bar is a part of it; that of a share or a count is in its own unit."""
+        return METRICS[self.variable].bar.relative
+
     def of(self, data: xr.Dataset) -> xr.DataArray:
         """The metric of a job or of a study's jobs, in the unit; nan for contact in ideal joints.
 
