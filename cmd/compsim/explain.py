@@ -58,7 +58,8 @@ def explain(
     --models it runs that job by other contact and friction laws, twice and half the contact
     stiffness and damping, with an oil film, an elastic rod and play in the guide, or without where
     the case has them. The table says how far each choice moves each metric; it is stored in models/
-    of the folder -o, and the report of that folder shows it. Exit code 3 where such a job fails.
+    of the folder -o, and the report of that folder shows it. --set chooses another job than the
+    first, as in --set clearance_mm=0.3. Exit code 3 where such a job fails.
     """
     if output is not None and not models:
         raise click.UsageError("-o keeps what --models finds: add --models, or leave -o out")
@@ -110,7 +111,7 @@ def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
         table = model_table(data)
         found.append({"study": study.name, "file": str(path), **dataclasses.asdict(table)})
         if not as_json:
-            print_text("\n".join(model_lines(place_text(data), table)))
+            print_text("\n".join(model_lines(place_text(study, data.attrs["key"]), table)))
             say(str(path))
     if as_json:
         print_text(json.dumps(without_nan(found), indent=1, ensure_ascii=False))

@@ -37,7 +37,7 @@ def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterato
     notes = [""] * (depth - 1) + ["assumed", "", *(row.note for row in table.rows), ""]
     yield from aligned([*above, *rows], notes)
     if table.unknown:
-        yield f"  no known number of the case itself: {', '.join(table.unknown)}"
+        yield f"  not known of the case itself: {', '.join(table.unknown)}"
     if not times:
         yield headline(table)
 

@@ -21,7 +21,6 @@ from compressor.cases import (
     Study,
     joint_stiffness,
     law_of,
-    points,
 )
 from compressor.measure.feature_rows import FEATURES, Feature, changed
 from compressor.measure.features import SERIES_ERRORS, read_from_grid, series_errors
@@ -172,15 +171,13 @@ def explain_models(
 ) -> xr.Dataset:
     """Run the first job of a study, and every other model of its machine.
 
-    Returns the Dataset of `tabulate` with the attributes `study`, `jobs`, `point` (of the sweep's
-    axes, in words) and `key` (of the job). If the job itself fails, it is the only row.
+    Returns the Dataset of `tabulate` with the attributes `study` and `key` (of the job). If the job
+    itself fails, it is the only row.
     """
     case = study.cases[0]
     choices = model_choices(case)
     data = tabulate([Choice(ITSELF, case), *choices], run_choices(case, choices, 1, progress))
-    point = ", ".join(f"{key} = {value}" for key, value in next(points(study)).items())
-    told = {"study": study.name, "jobs": len(study.cases), "point": point, "key": case.key}
-    return data.assign_attrs(told)
+    return data.assign_attrs({"study": study.name, "key": case.key})
 
 
 def run_choices(

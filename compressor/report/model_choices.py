@@ -8,10 +8,12 @@ import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import xarray as xr
 
+from compressor.cases import Study, points
 from compressor.digits import by_bar, is_known
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
@@ -195,11 +197,12 @@ def headline(table: ModelTable) -> str:
     return f"{title[0].upper()}{title[1:]}: {number.rstrip()}; numerical error {error} %; {moved}"
 
 
-def place_text(data: xr.Dataset) -> str:
+def place_text(study: Study | StoredStudy, key: str) -> str:
     """Return which job of its study the choices are of, in words."""
-    jobs, point = int(data.attrs["jobs"]), str(data.attrs["point"])
-    which = "the only job" if jobs == 1 else f"the first of {jobs} jobs"
-    return f"{which} of {data.attrs['study']}" + (f" ({point})" if point else "")
+    at = next(islice(points(study), study.keys.index(key), None))
+    point = ", ".join(f"{name} = {value}" for name, value in at.items())
+    which = "the only job" if study.jobs == 1 else f"one of {study.jobs} jobs"
+    return f"{study.name}{f' at {point}' if point else ''}, {which}"
 
 
 # ---- on the page --------------------------------------------------------------------------------
@@ -237,13 +240,16 @@ def read_models(folder: Folder, study: StoredStudy) -> xr.Dataset | None:
     return None
 
 
-def models_section(anchor: str, data: xr.Dataset) -> Section:
+def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section:
     """Return the section with the choices of the model of a study's job."""
     table = model_table(data)
     content = ModelsContent(
-        place_text(data), headline(table), ", ".join(table.unknown), page_table(table)
+        place_text(study, data.attrs["key"]),
+        headline(table),
+        ", ".join(table.unknown),
+        page_table(table),
     )
-    title = f"Choices of the model in study {data.attrs['study']}"
+    title = f"Choices of the model in study {study.name}"
     return Section(anchor, title, "models.html", content)
 
 

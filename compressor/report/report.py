@@ -203,7 +203,7 @@ def models_line(results: Folder, study: StoredStudy) -> tuple[str, Section | Non
     data = read_models(results, study)
     if data is None:
         return "", None
-    return headline(model_table(data)), models_section(models_anchor(study.name), data)
+    return headline(model_table(data)), models_section(models_anchor(study.name), study, data)
 
 
 def drawn_study(

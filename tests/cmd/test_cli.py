@@ -486,7 +486,7 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
     assert cli.main(["explain", "--models", "worn.yaml", "-o", "kept"]) == 0
     out, err = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[0] == "the first of 2 jobs of worn (clearance_mm = 0.2):"
+    assert lines[0] == "worn at clearance_mm = 0.2, one of 2 jobs:"
     assert err.endswith("kept/models/worn.nc\n")
     rows = {line[2:30].split("  ")[0]: line for line in lines}
     scaled = [f"contact {what} {sign} 2" for what in ("stiffness", "damping") for sign in "×÷"]
@@ -506,7 +506,7 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
     page = Path("page/index.html").read_text(encoding="utf-8")
     assert f'<p>{lines[-1]}. <a href="#models-worn">' in page
     assert '<section id="models-worn">' in page
-    assert "the first of 2 jobs of worn (clearance_mm = 0.2)" in page
+    assert "The table is of worn at clearance_mm = 0.2, one of 2 jobs: its metrics" in page
     with open_study("kept", "worn") as study:
         peak = study["peak_acceleration"].sel(clearance_mm=0.2).item()
     itself = next(line for line in lines if line.startswith("  the case itself"))

@@ -142,7 +142,7 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     data = explain_models(load_studies(path)[0], lambda done, total, _: seen.append((done, total)))
     assert data["choice"].values.tolist() == [ITSELF, *sorted(THREE)]
     assert seen == [(n, 4) for n in (0, 1, 2, 3, 4)]
-    assert {"study": "worn", "jobs": 2, "point": "clearance_mm = 0.1"}.items() <= data.attrs.items()
+    assert data.attrs["study"] == "worn"
     by_hand = {
         ITSELF: {},
         "contact stiffness × 2": {"contact": {"stiffness_N_per_mm15": 6.72e5}},

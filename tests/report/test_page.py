@@ -20,6 +20,7 @@ from compressor.report.answer import Answer, Finding, Line
 from compressor.report.assumptions import Assumptions
 from compressor.report.diagnosis_section import DiagnosisContent
 from compressor.report.machines_section import Part
+from compressor.report.model_choices import ModelsContent
 from compressor.report.page import Plate, Running, Section, document, templates
 from compressor.report.paper_sections import MissingFigures
 from compressor.report.provenance import Provenance
@@ -95,13 +96,14 @@ def contents(evil):
         "jobs.html": JobsContent(evil(), 9, table(evil)),
         "machines.html": [Part(evil(), [evil()], plate(evil))],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
+        "models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
         "second_set.html": SecondSetContent(
             evil(), evil(), [evil()], [evil()], [Pair(first, plate(evil))], claims
         ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [plate(evil)],
-                                   evil(), evil()),
+                                   evil(), evil(), evil(), evil()),
     }  # fmt: skip
 
 

@@ -14,14 +14,17 @@ from compressor.report.model_choices import (
     models_section,
     page_table,
     percent,
+    place_text,
     read_models,
 )
 from compressor.report.page import document
 from compressor.store.files import StoreWarning
 from compressor.store.folders import models_file
 from compressor.store.series_file import write_dataset
-from compressor.store.studies import StoredStudy
+from compressor.store.studies import StoredAxis, StoredStudy
 
+AXIS = StoredAxis("clearance_mm", (0.1, 0.2, 0.3), "mm")
+STUDY = StoredStudy("worn", "worn.yaml", (AXIS,), ("0" * 20, "1" * 20, "2" * 20), {}, "", {}, "")
 NAMES = ["the case itself", "softer", "oil", "other law", "broken", "impossible", "no use"]
 PEAK = [100.0, 193.0, 34.0, 500.0, math.nan, math.nan, math.nan]  # m/s2
 PEAK_BAR = [0.01, 1.0, 1.0, math.inf, math.nan, math.nan, math.nan]
@@ -57,7 +60,7 @@ def made(**more):
     variables |= {name: ("choice", np.array(values, object)) for name, values in words.items()}
     variables["seconds"] = "choice", np.array([1, 2, 3, 4, 5, math.nan, math.nan], float)
     coordinates = {"choice": np.array(NAMES, object), "joint": list(JOINTS)}
-    attrs = {"study": "worn", "jobs": 6, "point": "clearance_mm = 0.1", "key": "0" * 20}
+    attrs = {"study": "worn", "key": STUDY.keys[2]}
     return xr.Dataset(variables, coordinates, attrs)
 
 
@@ -116,9 +119,11 @@ def test_relative_changes_in_words(size, text):
 
 def test_the_page_shows_line_table_and_what_is_assumed():
     data = made()
-    text = document([models_section("models-worn", data)] * 2, {})
+    text = document([models_section("models-worn", STUDY, data)] * 2, {})
     assert text.count(f"<p>{headline(model_table(data))}.</p>") == 2
-    assert "the first of 6 jobs of worn (clearance_mm = 0.1)" in text
+    assert "The table is of worn at clearance_mm = 0.3, one of 3 jobs: its" in text
+    alone = replace(STUDY, axes=(), keys=("a",))
+    assert place_text(alone, "a") == "worn, the only job"
     table = page_table(model_table(data))
     assert [row.cells[0].text for row in table.rows] == [*NAMES[:-1], "all of them"]
     assert [cell.text for cell in table.rows[1].cells][-1] == "K 1"
@@ -126,12 +131,12 @@ def test_the_page_shows_line_table_and_what_is_assumed():
 
 
 def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
-    study = StoredStudy("worn", "worn.yaml", (), ("0" * 20,), {}, "", {}, "")
+    study = STUDY
     assert read_models(tmp_path, study) is None
     path = write_dataset(models_file(tmp_path, "worn"), made())
-    assert read_models(tmp_path, study).attrs["jobs"] == 6
+    assert read_models(tmp_path, study).attrs["key"] == study.keys[2]
     with pytest.warns(StoreWarning, match="no longer has: compsim explain --models worn.yaml -o"):
-        assert read_models(tmp_path, replace(study, keys=("1" * 20,))) is None
+        assert read_models(tmp_path, replace(study, keys=("3" * 20,))) is None
     path.write_bytes(path.read_bytes()[:-9])
     with pytest.warns(StoreWarning, match=r"worn\.nc.*compsim explain --models"):
         assert read_models(tmp_path, study) is None
