@@ -33,6 +33,7 @@ ITSELF = "the case itself"
 MOST_SECONDS = 30.0  # of a choice
 GRID = "peaks from the output grid"
 SCALES = {"× 2": 2.0, "÷ 2": 0.5}  # of stiffness and damping
+ALIKE = 1.01  # stiffnesses of two joints
 GROUPS = ("contact", "friction", "lubricant", "guide", "rod")  # that a choice may fill in
 NAMES = ("status", "reason", "seconds", *(n + end for n in METRICS for end in ("", "_error")))
 
@@ -116,7 +117,8 @@ def stiffened(case: Case, name: str, factor: float) -> Choice:
     # one key serves both joints: materials may give each a stiffness of its own
     middle = math.prod(each) ** (1.0 / len(each)) / 1000.0**contact.exponent
     values = {"stiffness_N_per_mm15": factor * middle, "materials": None, "geometry": None}
-    return Choice(name, changed(case, "contact", **values))
+    alike = max(each) <= ALIKE * min(each)
+    return Choice(name, changed(case, "contact", **values), "" if alike else "of both joints")
 
 
 def checked(choice: Choice, case: Case) -> Choice:
@@ -126,7 +128,8 @@ def checked(choice: Choice, case: Case) -> Choice:
     problems = bare(choice.case).problems
     if problems:
         return Choice(choice.name, None, f"cannot be: {problems[0]}")
-    return choice._replace(note=", ".join(assumed(case, choice.case)))
+    notes = [*filter(None, [choice.note]), *assumed(case, choice.case)]
+    return choice._replace(note=", ".join(notes))
 
 
 def assumed(case: Case, other: Case) -> Iterator[str]:

@@ -152,13 +152,12 @@ def span_text(measure: Measure, low: float, high: float) -> str:
     """Return how far choices move a measure, as `-66 to +93 %`."""
     if low == high == 0.0:
         return NONE_SEEN
-    low_text, high_text = (
-        change_text(measure, size) if abs(size) >= FINEST else "0" for size in (low, high)
-    )
-    if high_text == "0":
-        return f"{low_text} to 0"
-    unit = high_text.rpartition(" ")[2]
-    return f"{low_text.removesuffix(f' {unit}')} to {high_text}"
+    unit = "%" if measure.is_relative else "points"
+    texts = [
+        change_text(measure, size).removesuffix(f" {unit}") if abs(size) >= FINEST else "0"
+        for size in (low, high)
+    ]
+    return f"{' to '.join(texts)} {unit}"
 
 
 def note_of(choice: xr.Dataset) -> str:

@@ -1,6 +1,7 @@
 """Choices of the model: which a case has, what they assume, and that they move metrics so far."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +22,8 @@ from compressor.measure.model_choices import (
     tabulate,
     trade,
 )
-from compressor.metrics import METRICS
+from compressor.metrics import JOINTS, METRICS
+from compressor.solve.si_record import stiffness_of
 from compressor.solve.simulate import simulate
 from compressor.store.folders import models_file
 from compressor.store.series_file import write_dataset
@@ -112,6 +114,13 @@ def test_stiffness_and_damping_are_doubled_and_halved_where_the_law_reads_them()
     steel = {"materials": ["steel", "steel"]}
     made = by_name(case(joint="both", clearance_mm=0.1, contact=steel))["contact stiffness ÷ 2"]
     assert made.case.contact.stiffness_N_per_mm15 == pytest.approx(1.68e5, rel=0.01)
+    assert made.note.startswith("stiffness_N_per_mm15 ")
+    apart = {"joint": "both", "clearance_mm": {"big_end": 0.1, "small_end": 0.2}}
+    two = case(**apart, contact=steel | {"geometry": "internal"})
+    each = [stiffness_of(two, joint) / 1000**1.5 for joint in JOINTS]
+    made = by_name(two)["contact stiffness × 2"]
+    assert made.case.contact.stiffness_N_per_mm15 == pytest.approx(2 * math.prod(each) ** 0.5)
+    assert made.note.startswith("of both joints, stiffness_N_per_mm15 ")
 
 
 def test_a_choice_that_cannot_be_says_why():

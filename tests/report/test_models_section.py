@@ -94,6 +94,8 @@ def test_the_line_has_the_numbers_of_the_table():
         "Peak acceleration: 100.00 m/s²; numerical error 0.01 %; choices of the model move this "
         "peak by -66 to +93 %; 3 of 5 choices give no number (chaotic, failed, impossible)"
     )
+    (down,) = model_table(made().isel(choice=[0, 2])).span_texts[:1]
+    assert down == "-66 to 0 %"
     still = replace(table, rows=(), spans=((0.0, 0.0),) * 4)
     assert headline(still).endswith("0.01 %; no choice of the model is seen to move this peak")
     assert headline(replace(still, bars=(1e-7, *table.bars[1:]))).count("below 0.01 %") == 1
