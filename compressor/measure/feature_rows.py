@@ -128,7 +128,7 @@ def bearing_length(case: Case) -> float:
     """Return the length of a case's bearings (mm): of its oil film, or as long as wide."""
     if case.lubricant:
         return case.lubricant.bearing_length_mm
-    return 2.0 * case.machine.pin_radius_mm
+    return 2.0 * min(case.machine.pin_radius(joint) for joint in JOINTS)
 
 
 def friction_feature(law: str) -> Feature:

@@ -104,16 +104,19 @@ def scaled(case: Case) -> Iterator[Choice]:
 
 def stiffened(case: Case, name: str, factor: float) -> Choice:
     """Return a case with its contact stiffness, or the modulus that it follows from, scaled."""
-    contact, pin = case.contact, case.machine.pin_radius_mm
+    contact, machine = case.contact, case.machine
     if contact.law in ("johnson", "liu"):
         modulus = contact.modulus_GPa
         if modulus is None:  # of the materials: from the stiffness pi E* L of johnson
             line = replace(contact, law="johnson")
             length = (contact.length_mm or math.nan) / 1000
-            modulus = joint_stiffness(line, pin, 0.1) / (math.pi * length) / 1e9
+            modulus = joint_stiffness(line, machine.pin_radius_mm, 0.1) / (math.pi * length) / 1e9
         values: dict[str, Any] = {"materials": None, "modulus_GPa": factor * modulus}
         return Choice(name, changed(case, "contact", **values))
-    each = [joint_stiffness(contact, pin, getattr(case.clearance_mm, j)) for j in faulty(case)]
+    each = [
+        joint_stiffness(contact, machine.pin_radius(joint), getattr(case.clearance_mm, joint))
+        for joint in faulty(case)
+    ]
     # one key serves both joints: materials may give each a stiffness of its own
     middle = math.prod(each) ** (1.0 / len(each)) / 1000.0**contact.exponent
     values = {"stiffness_N_per_mm15": factor * middle, "materials": None, "geometry": None}

@@ -1,0 +1,106 @@
+"""Pins of the machine that is there: a radius each, their contact, and what is told of it."""
+
+import json
+
+import pytest
+
+from compressor.cases.case import Case, CaseError
+from compressor.cases.materials import contact_stiffness
+from compressor.measure.explain import contact_words
+from compressor.solve.cautions import remarks
+from compressor.solve.si_record import record
+
+WORN = {"joint": "both", "clearance_mm": 0.2}
+MATERIALS = {"materials": ["steel", "copper"]}
+
+
+def case(**values):
+    return Case.from_values(WORN | values)
+
+
+def test_a_file_gives_one_radius_or_one_for_each_joint():
+    one = case(machine={"pin_radius_mm": 35})
+    both = case(machine={"pin_radius_mm": {"big_end": 35, "small_end": 35}})
+    assert one == both
+    assert one.key == both.key
+    two = case(machine={"pin_radius_mm": {"big_end": 60, "small_end": 35}})
+    assert record(two)["pin_radius"].tolist() == [0.06, 0.035]
+    assert Case.from_values(two.values()) == two
+    assert Case.from_attribute(two.attributes()["case"]).key == two.key
+    assert two.key != one.key
+
+
+def test_keys_of_one_radius_are_those_of_before():
+    """Stored by commit c541348, which knew one radius only."""
+    assert case(machine={"pin_radius_mm": 35}).key == "c5d914d72d3156b5c7fa"
+
+
+@pytest.mark.parametrize(
+    ("pin", "key", "words"),
+    [
+        ({"big_end": 60}, "machine.pin_radius_mm", "needs both, big_end and small_end"),
+        ({"big_end": 60, "small": 5}, "machine.pin_radius_mm", "big_end"),
+        ({"big_end": 60, "small_end": -5}, "machine.small_end_pin_radius_mm", "outside"),
+        ({"big_end": 60, "small_end": 0.1}, "clearance_mm.small_end", "exceeds the pin radius"),
+    ],
+)
+def test_what_is_wrong_with_two_radii_is_told_of_the_one_it_is(pin, key, words):
+    with pytest.raises(CaseError) as error:
+        case(machine={"pin_radius_mm": pin})
+    assert any(one.key == key and words in one.message for one in error.value.problems)
+
+
+def test_a_pin_of_a_file_s_own_lies_in_its_bore():
+    """As of two discs, the paper's, K is a ninth of it."""
+    own, paper = case(contact=MATERIALS, machine={"pin_radius_mm": 35}), case(contact=MATERIALS)
+    assert (own.contact.geometry, paper.contact.geometry) == ("internal", None)
+    bore = contact_stiffness("steel", "copper", 0.035, 0.0352, internal=True)
+    assert record(own)["stiffness"] == pytest.approx(bore, rel=1e-14)
+    discs = case(contact=MATERIALS | {"geometry": "external"}, machine={"pin_radius_mm": 35})
+    assert discs.contact.geometry is None
+    assert record(discs)["stiffness"] < record(own)["stiffness"] / 9
+    for one in (own, paper, discs):
+        assert Case.from_values(one.values()) == one
+
+
+def test_a_stored_case_of_before_keeps_its_discs():
+    values = case(contact=MATERIALS, machine={"pin_radius_mm": 35}).values()
+    del values["contact"]["geometry"]  # which texts of before do not have
+    old = Case.from_attribute(json.dumps(values))
+    discs = case(contact=MATERIALS | {"geometry": "external"}, machine={"pin_radius_mm": 35})
+    assert old.key == discs.key
+
+
+@pytest.mark.parametrize("more", [{"contact": MATERIALS}, {"machine": {"speed_rpm": 400}}])
+def test_the_paper_s_pin_with_the_paper_s_stiffness_is_no_odd_one(more):
+    assert not [one for one in remarks(case(**more)) if one.kind == "default stiffness"]
+
+
+def test_the_paper_s_stiffness_at_another_pin_is_told_with_that_of_the_pin():
+    odd = case(machine={"pin_radius_mm": {"big_end": 10, "small_end": 35}})
+    (found,) = (one for one in remarks(odd) if one.kind == "default stiffness")
+    inside, discs = (
+        contact_stiffness("steel", "steel", 0.035, 0.0352, internal) / 1000**1.5
+        for internal in (True, False)
+    )
+    assert found.key == "contact.stiffness_N_per_mm15"
+    assert f"gives {inside:.3g} for one of 35 mm in its bore ({discs:.3g} as of" in found.message
+    assert "contact.materials" in found.message
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({}, "impact, K = 336000 N/mm^p (Table 3, of a pin of 10 mm radius), p = 1.5, "
+             "C_max = 336 N s/mm from 0.1 mm on (Table 3)"),
+        ({"contact": {"stiffness_N_per_mm15": 5e5, "damping_N_s_per_mm": 9}},
+         "K = 500000 N/mm^p (given), p = 1.5, C_max = 9 N s/mm from 0.1 mm on (given)"),
+        ({"contact": MATERIALS, "machine": {"pin_radius_mm": 35}},
+         "N/mm^p (Eq. 15, pins in their bores: steel on copper)"),
+        ({"contact": {"law": "flores", "restitution": 0.7}}, "restitution 0.7 (given)"),
+        ({"contact": {"law": "johnson", "length_mm": 20, **MATERIALS}},
+         "johnson, steel on copper, 20 mm long, undamped"),
+    ],
+)  # fmt: skip
+def test_explain_says_k_p_and_damping_and_where_each_is_from(values, words):
+    assert words in contact_words(case(**values))
