@@ -17,6 +17,7 @@ from compsim import cli, plan, run
 from compsim.screen import duration
 
 from compressor.analysis.paper_cases import paper_cases
+from compressor.cases import load
 from compressor.cases.load import MAX_JOBS, load_cases
 from compressor.store import reader as store
 from compressor.store.studies import read_studies
@@ -572,24 +573,62 @@ def test_a_reference_that_fails_is_told_in_one_line(case_file, capsys):
 # ---- signals ------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def answering():
+    """Set what this process does at a signal, whatever it inherited: nohup ignores SIGHUP."""
+    before = {}
+
+    def answer(number, what):
+        before.setdefault(number, signal.getsignal(number))
+        signal.signal(number, what)
+
+    yield answer
+    for number, what in before.items():
+        signal.signal(number, what)
+
+
+@pytest.fixture
+def signalled(monkeypatch):
+    """Have a signal arrive while the next command reads its case files."""
+
+    def arrive(number):
+        read = load.load_studies
+
+        def raised(*words, **more):
+            signal.raise_signal(number)  # to this thread: another one may be slow to hand it over
+            return read(*words, **more)
+
+        monkeypatch.setattr("compressor.cases.load_studies", raised)
+
+    return arrive
+
+
 @pytest.mark.parametrize(("number", "code"), [("INT", 130), ("TERM", 143), ("HUP", 129)])
-def test_exit_codes_of_signals(number, code, case_file, capsys, monkeypatch):
+def test_exit_codes_of_signals(number, code, case_file, capsys, answering, signalled):
     number = signal.Signals[f"SIG{number}"]
-    before = signal.getsignal(number)
-    monkeypatch.setattr(  # to this thread: another one may be slow to hand it over
-        "compressor.cases.load_studies", lambda *_, **__: signal.raise_signal(number)
-    )
+    answering(number, signal.SIG_DFL)
+    signalled(number)
     assert cli.main(["run", case_file("one.yaml")]) == code
     assert capsys.readouterr().err == f"interrupted by {number.name}\n"
-    assert signal.getsignal(number) == before
+    assert signal.getsignal(number) == signal.SIG_DFL
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_that_was_ignored_stays_ignored(number, case_file, capsys, answering, signalled):
+    answering(number, signal.SIG_IGN)  # as nohup does, and a shell for what runs behind it
+    signalled(number)
+    assert cli.main(["plan", case_file("one.yaml")]) == 0
+    assert "interrupted" not in capsys.readouterr().err
+    assert signal.getsignal(number) == signal.SIG_IGN
 
 
 JOBS = 400  # more than are done when a run is told to end
 
 
 @pytest.fixture
-def started(tmp_path):
+def started(tmp_path, answering):
     """A real `compsim run` in its own process group, with at least one job done."""
+    answering(signal.SIGINT, signal.SIG_DFL)  # a child inherits what is ignored
     rods = [4 + number / 1000 for number in range(JOBS)]
     values = {"joint": "both", "clearance_mm": 0.1, "machine": {"rod_mass_kg": rods}}
     (tmp_path / "many.yaml").write_text(
