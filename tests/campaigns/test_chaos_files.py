@@ -1,5 +1,6 @@
 """A sample of the campaigns on files: refused calls, damage, hostile files, power cuts."""
 
+import faulthandler
 import json
 
 import measure_chaos
@@ -31,6 +32,7 @@ def test_no_acknowledged_result_is_lost_in_a_power_cut():
 def test_a_crash_a_hang_and_an_exception_are_told_apart():
     assert common.forked(lambda: 1 + 1)[:2] == (2, "")
     assert "ZeroDivisionError" in common.forked(lambda: 1 // 0).death
+    assert common.forked(faulthandler.is_enabled).result is False  # it would print the next death
     assert common.forked(lambda: __import__("os").abort()).death == "SIGABRT"
     assert common.forked(lambda: __import__("time").sleep(60), 0.2).death == "hangs: 0 s"
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import faulthandler
 import json
 import os
 import pickle
@@ -120,6 +121,7 @@ def forked(work: Callable[[], Any], seconds: float = SECONDS) -> Ended:
 def _child(work: Callable[[], Any], writer: int) -> None:
     """The forked process: never returns."""
     code = 1
+    faulthandler.disable()  # of pytest: a death is reported as `Ended.death`
     try:
         os.setpgid(0, 0)
         try:
