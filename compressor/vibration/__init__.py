@@ -10,3 +10,4 @@ from compressor.vibration.indicators import (
 )
 from compressor.vibration.orders import resampled, rms_above
 from compressor.vibration.spectra import line_amplitudes
+from compressor.vibration.tacho import smooth_pulses
