@@ -46,8 +46,9 @@ def export(
     """Write results as netCDF or CSV: a study's metrics, or the time series of a job.
 
     A STUDY becomes one table of its jobs, failed and missing ones included; a JOB, named by its key
-    or the beginning of it, a table of samples. Without either, all studies. Several studies go into
-    one FILE together, or into a FOLDER with a file each.
+    or the beginning of it, a table of samples, in CSV with its sensor's record as identify reads
+    it. Without either, all studies. Several studies go into one FILE together, or into a FOLDER
+    with a file each: a name without suffix, or with a slash at its end.
     """
     folder, names = results_folder(given, folder)
     from compressor.store import ExportOptions, writable_folder

@@ -1,6 +1,6 @@
 """Outcomes on disk, and back."""
 
-from compressor.store.export import Exported, ExportOptions, export
+from compressor.store.export import RECORD_HEADER, Exported, ExportOptions, export
 from compressor.store.files import Folder, StoreError, StoreWarning, publish, writable_folder
 from compressor.store.folders import models_file
 from compressor.store.hdf5 import DamagedJob

@@ -1,8 +1,9 @@
 """Results for other programs: metrics of studies and time series of jobs, as netCDF or as CSV.
 
 A CSV file has one header line, units in brackets where a name does not end in its unit, and
-numbers that read back to the bit; an empty cell is a number that there is not. Rows are written
-block by block, and every file is whole or absent.
+numbers that read back to the bit; an empty cell is a number that there is not. A sensor's record
+has times of its own: its columns are those that `compsim identify` reads, and the shorter columns
+of a job end in empty cells. Rows are written block by block, and every file is whole or absent.
 """
 
 import csv
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SUFFIXES = {"netcdf": ".nc", "csv": ".csv"}
+RECORD_HEADER = ("time_s", "acceleration_m_per_s2", "tacho")  # of a sensor's record in CSV
 BLOCK = 4096  # rows of a CSV file that are text at the same time
 HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
 
@@ -86,7 +88,7 @@ def export(
     """Write what `names` name, studies and jobs by the beginning of their keys, else all studies.
 
     output: a file, .nc or .csv, for the studies together as one table, or for one job; or a folder,
-    in which each gets a file.
+    in which each gets a file: a name without a suffix, with a slash at its end, or of a folder.
 
     Returns what was written, and damage that was met, which costs the jobs in it alone. Raises
     ExportError before anything is written, StoreError where the store or the disk gives way.
@@ -95,7 +97,7 @@ def export(
     studies, keys = _named(folder, names, stored, known)
     target = Path(output)
     options = options or ExportOptions()
-    form, is_file = _form(target, options.form)
+    form, is_file = _form(output, options.form)
     if is_file:
         tasks = [_one_file(target, studies, keys, options.series)]
     else:
@@ -130,11 +132,21 @@ def _named(
     return studies, list(dict.fromkeys(keys))
 
 
-def _form(target: Path, form: str | None) -> tuple[str, bool]:
-    """The form of an export, and whether it goes to one file, which its suffix tells."""
-    told = {suffix: form for form, suffix in SUFFIXES.items()}.get(target.suffix)
-    if told is None or target.is_dir():
+def _form(output: Folder, form: str | None) -> tuple[str, bool]:
+    """Return the form of an export, and whether it goes to one file, which its suffix tells.
+
+    Raises ExportError for a suffix that is none of SUFFIXES, unless the name is that of a folder:
+    one that exists, or ends in a slash.
+    """
+    target = Path(output)
+    if not target.suffix or target.is_dir() or os.fspath(output).endswith(os.sep):
         return form or "netcdf", False
+    told = {suffix: form for form, suffix in SUFFIXES.items()}.get(target.suffix)
+    if told is None:
+        raise ExportError(
+            f"{target}: no files of the type {target.suffix} are written: end the name in "
+            f"{' or '.join(SUFFIXES.values())}, or, for a folder, in {os.sep}"
+        )
     if form not in (None, told):
         raise ExportError(f"{target} is no name for {form}: end it in {SUFFIXES[form or told]}")
     return told, True
@@ -208,7 +220,8 @@ def _series(task: _Task, stored: Stored, form: str) -> Exported:
         remedy = "run its case file with --set output.keep=series, or export its study"
         raise WrongName(stored.folder, f"job {task.key} has no time series", remedy)
     if form == "csv":
-        size = write_csv(task.path, columns(read_series(source), "time"))
+        dataset = read_series(source)
+        size = write_csv(task.path, columns(dataset, "time") | record_columns(dataset))
     else:
         data = read_bytes(source)
         publish(task.path, data)
@@ -233,16 +246,38 @@ def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
     return found
 
 
+def record_columns(run: "xr.Dataset") -> dict[str, np.ndarray]:
+    """Return the sensor's record of a job by `RECORD_HEADER`; nothing where there is none.
+
+    The tacho is a sine of the crank angle that rises through 0 at top dead centre, so that a reader
+    finds the pulses between the samples; it stays low before the first pulse and high after the
+    last. With fewer than two pulses there is no such column.
+    """
+    if "sensor_time" not in run:
+        return {}
+    times, pulses = run["sensor_time"].values, run["tacho_time"].values
+    found = [times, run["sensor_acceleration"].values]
+    if len(pulses) > 1:
+        quarter = np.diff(pulses)[[0, -1]] / 4.0
+        known = [pulses[0] - quarter[0], *pulses, pulses[-1] + quarter[1]]
+        turns = np.interp(times, known, [-0.25, *range(len(pulses)), len(pulses) - 0.75])
+        found.append(np.sin(2.0 * np.pi * turns))
+    return dict(zip(RECORD_HEADER, found, strict=False))
+
+
 def write_csv(path: Path, table: dict[str, np.ndarray]) -> int:
-    """Write columns of equal length as CSV, durably; returns the bytes written."""
-    rows = len(next(iter(table.values())))
+    """Write columns as CSV, durably, and return the bytes written.
+
+    Columns that are shorter than others end in empty cells.
+    """
+    rows = max(map(len, table.values()))
     with publishing(path) as file:
         text = io.TextIOWrapper(file, "utf-8", newline="", write_through=True)
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(table)
         for start in range(0, rows, BLOCK):
             parts = [_cells(values[start : start + BLOCK]) for values in table.values()]
-            writer.writerows(zip(*parts, strict=True))
+            writer.writerows(itertools.zip_longest(*parts, fillvalue=""))
         text.detach()
         return file.tell()
 

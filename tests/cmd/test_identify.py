@@ -62,6 +62,20 @@ def test_a_job_is_explained_by_the_others(folder, capsys):
     assert "rests on 239 of 240 jobs of study worn" in capsys.readouterr().out
 
 
+def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, capsys):
+    key, path = sorted(read_store(folder).keys())[5], str(tmp_path / "job.csv")
+    assert cli.main(["export", key, "-i", folder, "-o", path]) == 0
+    capsys.readouterr()
+    answers = []
+    for record in (key, path):
+        words = ["identify", record, "--study", "worn", "-i", folder, "--quiet", "--json"]
+        assert cli.main(words) == 0
+        found = json.loads(capsys.readouterr().out)
+        answers.append({one["joint"]: one["probability"] for one in found["candidates"]})
+    assert answers[1] == pytest.approx(answers[0], abs=0.05)  # by itself it is left out
+    assert max(answers[1], key=answers[1].get) == max(answers[0], key=answers[0].get)
+
+
 def test_a_steady_speed_stands_in_for_a_tacho(tmp_path, folder, capsys):
     path = written(tmp_path / "bare.csv", *struck("big_end", [0.3], 5002), wave=False)
     steady = ["--rpm", "500", "--tdc", "0.24"]

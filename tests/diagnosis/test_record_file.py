@@ -54,6 +54,36 @@ def test_a_tacho_of_zeros_and_ones_is_known_to_half_a_sample(written):
     assert np.abs(found - PULSES).max() <= 0.5 / RATE
 
 
+@pytest.mark.parametrize("width", [0.001, 0.002, 0.05])  # s: one sample, two, half a revolution
+def test_a_pulse_s_shape_does_not_change_the_speed_of_a_steady_machine(width, written):
+    turn = 0.1003  # the pulses step through the samples
+    since = (TIMES - 0.01234) % turn
+    found = read_record(written([TIMES, VALUES, (since < width).astype(float)])).tacho
+    assert len(found) == 5
+    np.testing.assert_allclose(np.diff(found), turn, atol=0.2 / RATE)  # one sample apart, as read
+    wave = np.sin(2 * np.pi * (TIMES - 0.01234) / turn)
+    np.testing.assert_allclose(
+        np.diff(read_record(written([TIMES, VALUES, wave])).tacho), turn, atol=2e-5
+    )
+
+
+def test_a_record_may_begin_at_top_dead_centre(written):
+    """At the middle of the rise, as a record of ours does, but not far behind it."""
+    for first, count in ((0.0, 5), (0.0003, 5), (0.004, 4)):
+        wave = np.sin(2 * np.pi * (TIMES + first) / TURN - 1e-9 * (first == 0))
+        found = read_record(written([TIMES, VALUES, wave])).tacho
+        assert len(found) == count
+        assert found[0] == pytest.approx(-first if count == 5 else TURN - first, abs=2e-5)
+
+
+def test_lines_at_the_end_without_a_record_are_left_out(written):
+    rest = dict.fromkeys(range(TIMES.size - 8, TIMES.size + 2), ",,")
+    found = read_record(written([TIMES, VALUES, voltage()], change=rest))
+    assert found.times.size == TIMES.size - 10
+    with pytest.raises(RecordError, match=r"record\.csv:9: the cells are empty, and the record"):
+        read_record(written([TIMES, VALUES, voltage()], change={9: ",,"}))
+
+
 def test_a_tacho_that_chatters_at_its_middle_counts_once(written):
     noisy = voltage() + np.random.default_rng(1).normal(0, 0.4, TIMES.size)
     assert len(read_record(written([TIMES, VALUES, noisy])).tacho) == len(PULSES)

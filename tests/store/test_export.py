@@ -14,11 +14,12 @@ from compsim import cli
 from conftest import keep
 
 from compressor.cases.load import load_studies
+from compressor.diagnosis.record_file import read_record
 from compressor.metrics import METRICS, SIZES
 from compressor.solve.simulate import simulate
 from compressor.store.export import ExportError, ExportOptions, export
 from compressor.store.files import StoreError
-from compressor.store.reader import open_study, read_job
+from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import write_study
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
@@ -162,6 +163,41 @@ def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
     assert found.err == ""
     assert {one["path"] for one in json.loads(found.out)} == set(map(str, out.rglob("*.csv")))
     assert len(table(out / "list.csv")) == 2
+
+
+@pytest.mark.parametrize("name", ["k.xlsx", "k.mat", "k.CSV"])
+def test_an_unknown_suffix_is_refused_and_makes_no_folder(results, name, tmp_path, capsys):
+    out = str(tmp_path / name)
+    assert cli.main(["export", "grid", "-i", str(results), "-o", out]) == 2
+    suffix = name.partition(".")[2]
+    problem = f"no files of the type .{suffix} are written: end the name in .nc or .csv, or, for a"
+    assert f"compsim: {out}: {problem} folder, in /\n" == capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["plain", "with.dot/", "is.there"])
+def test_a_folder_is_a_name_without_suffix_with_a_slash_or_of_a_folder(results, name, tmp_path):
+    (tmp_path / "is.there").mkdir()
+    export(results, ["grid"], f"{tmp_path}/{name}")
+    assert (tmp_path / name / "grid.nc").exists()
+
+
+def test_a_record_in_csv_is_what_identify_reads(worn, tmp_path, capsys):
+    """Times, values and pulses as they are stored, whatever the job's own samples are."""
+    stored = read_store(worn)
+    key = next(key for key in sorted(stored.keys()) if "sensor_time" in stored.job(key))
+    job = stored.job(key)
+    path = tmp_path / "job.csv"
+    assert cli.main(["export", key, "-i", str(worn), "-o", str(path)]) == 0
+    rows = table(path)
+    assert [*rows[0]][-3:] == ["time_s", "acceleration_m_per_s2", "tacho"]
+    assert len(rows) == max(job.sizes["time"], job.sizes["sensor_time"])
+    assert sum(row["time [s]"] != "" for row in rows) == job.sizes["time"]
+    assert sum(row["time_s"] != "" for row in rows) == job.sizes["sensor_time"]
+    found = read_record(path)
+    np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-12)
+    np.testing.assert_array_equal(found.values, job.sensor_acceleration)
+    np.testing.assert_allclose(found.tacho, job.tacho_time, atol=2e-7)
 
 
 @pytest.mark.parametrize(
