@@ -54,11 +54,15 @@ def predictability_horizon(
 
 
 class Parting(NamedTuple):
-    """Up to when (s) twins were followed, whether they parted there, or came to the end."""
+    """Up to when (s) twins were followed, whether they parted there, or came to the end.
+
+    `attempts`: of a step, by the first of the two.
+    """
 
     time: float
     parted: bool
     whole: bool
+    attempts: int = 0
 
     @property
     def horizon(self) -> float:
@@ -106,6 +110,6 @@ def followed(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting
             if Status.DONE not in (walker.status, fellow.status):
                 check_march(request, walker, z, float(tally.deepest), deadline)
     except Stop:
-        return Parting(float(walker.t), False, False)
-    parted = fellow.status == Status.DONE
-    return Parting(float(walker.t), parted, not parted)
+        return Parting(float(walker.t), False, False, int(walker.steps + walker.rejected))
+    parted = bool(fellow.status == Status.DONE)
+    return Parting(float(walker.t), parted, not parted, int(walker.steps + walker.rejected))

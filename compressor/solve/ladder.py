@@ -27,9 +27,10 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
     """The first run that balances and keeps its promise, or the last whole one as a failed job.
 
     A first run is compared with one a little tighter, and with a looser one, too, where the motion
-    enlarges errors. Each further one is as much tighter as its
-    errors are expected to need, and is compared with the one before. Where errors are as large as
-    the numbers, it is asked first whether the motion is chaotic; that ends the climb.
+    enlarges errors. Each further one is as much tighter as its errors are expected to need. It is
+    compared with the one before and, where it seems to keep the promise, with one a little tighter
+    as well. Where errors are as large as the numbers, twins tell whether the motion is chaotic;
+    that ends the climb, and so does the budget of the search.
     """
     rtol = case.rtol
     best: Solution | None = None  # the last whole run
@@ -38,9 +39,12 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
     )
     unsound = 0  # runs that did not balance
     while True:
-        now = ahead.get(rtol) or attempt(case, rtol, search.left, case.output.keep == "series")
+        now = ahead.get(rtol) or attempt(
+            search.within_budget(case), rtol, search.left, case.output.keep == "series"
+        )
         if now.reason:
-            return cut_short(case, best, now)
+            return cut_short(case, best, now, search)
+        search.count(now.trajectory)
         best = now
         if not balanced(case, now):
             unsound += 1
@@ -52,12 +56,13 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
             return now
         if before is None:
             other = companion(case, now, search.left, ahead)
+            search.count(other.trajectory)
         else:
             other = before
         estimate_errors(now, other)
-        excess, ratio = over_promise(case, now), other.rtol / rtol
-        if before is None and excess <= 1.0:
-            excess, ratio = attested(case, now, other, excess, search)
+        excess, third = over_promise(case, now), None
+        if excess <= 1.0:
+            excess, third = recheck(case, now, other, before is None, search)
         if excess <= 1.0:
             now.promise = "kept" if promises(case) else "none"
             return now
@@ -65,23 +70,39 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
             return now
         if other.reason or min(rtol, other.rtol) < 1.01 * TIGHTEST:
             return short_of(case, now, other.detail or "no run is tighter")
-        tighter = other.rtol < rtol and balanced(case, other)
-        before = other if tighter else now
-        rtol = max(short(before.rtol / further(excess, ratio)), TIGHTEST)
+        worse = third or other
+        before = tightest(case, now, other, worse)
+        rtol = max(short(before.rtol / further(excess, worse.rtol / now.rtol)), TIGHTEST)
 
 
-def attested(
-    case: Case, now: Solution, other: Solution, excess: float, search: Search
-) -> tuple[float, float]:
-    """The excess of a run that seems to keep its promise, and the ratio of the tolerances that tell
-    it, after a `witness` has been asked where there is need.
+def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
+    """Return the tightest of some runs that balances, and than which one can be tighter."""
+    fit = [one for one in others if one.rtol > 1.01 * TIGHTEST and balanced(case, one)]
+    return min([now, *fit], key=lambda run: run.rtol)
+
+
+def recheck(
+    case: Case, now: Solution, other: Solution, first: bool, search: Search
+) -> tuple[float, Solution | None]:
+    """Compare a run that seems to keep its promise with a third one, too; two may agree by chance.
+
+    first: the run is the case's first, which needs a third one only where the motion enlarges
+    errors. Returns the error over what is promised by the worse of both comparisons, and the third
+    run where it is by that.
     """
-    looser = witness(case, now, other, search.left)
-    if looser is not None:
-        estimate_errors(now, other, looser)
-        if (more := over_promise(case, now)) > excess:
-            return more, looser.rtol / now.rtol
-    return excess, other.rtol / now.rtol
+    if first:
+        third = witness(case, now, other, search.left)
+    else:
+        third = companion(case, now, search.left)
+        if third.reason or third.rtol == other.rtol:
+            third = None
+    excess = over_promise(case, now)
+    if third is None:
+        return excess, None
+    search.count(third.trajectory)
+    estimate_errors(now, other, third)
+    more = over_promise(case, now)
+    return more, third if more > excess else None
 
 
 def promises(case: Case) -> bool:
@@ -125,11 +146,11 @@ def balanced(case: Case, solution: Solution) -> bool:
     )
 
 
-def cut_short(case: Case, best: Solution | None, now: Solution) -> Solution:
+def cut_short(case: Case, best: Solution | None, now: Solution, search: Search) -> Solution:
     """What is left of a case whose present run did not reach its end."""
     if best is None or now.reason not in OUT_OF_BUDGET:
         return now
-    detail = f"the next run: {now.detail}"
+    detail = f"the next run: {search.limit_of(now.trajectory) or now.detail}"
     if not balanced(case, best):
         return unbalanced(case, best, detail, now.reason)
     return short_of(case, best, detail, now.reason)

@@ -7,17 +7,23 @@ step tell a motion that cannot be foretold from one that needs a tighter run.
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 
 from compressor.cases import TIGHTEST, Case
 from compressor.metrics import METRICS
+from compressor.reasons import Reason
 from compressor.solve.error_bars import Metrics, beyond
 from compressor.solve.horizon import Parting, part
+from compressor.solve.request import Trajectory
 from compressor.solve.series import a_turn, distances
 
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
-BUDGET = 3.0  # times what the runs took
+BUDGET = 3.0  # times the evaluations of the runs, for twins
+WORK = 20.0  # times the evaluations of the first run, for tighter runs and twins together
+LEAST_WORK = 20_000_000  # evaluations that they may take at least: about 2 s
+TWO = 2  # motions that march in step
 SHORT = 0.5  # rev: looked at first
 RTOL = 1e-9  # of the twins, at first
 SURE = 10.0  # times tighter: where twins part, these are to part as well
@@ -28,29 +34,63 @@ SAME = 1e-9  # relative distance of revolutions that rounding makes
 
 
 class Search:
-    """A search for the horizon of a case beside its runs, within a budget that grows with them.
+    """A search for the horizon of a case beside its runs, and the budget of both.
 
-    `horizon`: time (s) at which twins part; inf where they do not, nan as long as that is not
-    known.
+    The budget counts evaluations of the equations, so that results do not depend on how busy the
+    machine is. `horizon`: time (s) at which twins part; inf where they do not, nan as long as that
+    is not known; `stopped`: the budget ended the search before that was known.
     """
 
     def __init__(self, case: Case):
         self.case = case
         self.began = time.monotonic()
         self.horizon = math.nan
+        self.stopped = False
         self.rtol = RTOL
         self.seen = 0.0  # s up to which twins stayed together
-        self.spent = 0.0  # s of wall time
-
-    @property
-    def taken(self) -> float:
-        """Wall time (s) since the case's runs began."""
-        return time.monotonic() - self.began
+        self.first = 0  # evaluations of the first run
+        self.of_runs = 0  # evaluations of all runs
+        self.of_twins = 0.0  # evaluations
+        self.per_step = 1.0  # evaluations of an attempt of a step, in the last run
 
     @property
     def left(self) -> float:
         """Wall time (s) that the case may still take."""
-        return self.case.solve.timeout_s - self.taken
+        return self.case.solve.timeout_s - (time.monotonic() - self.began)
+
+    @property
+    def work_left(self) -> float:
+        """Evaluations that tighter runs and twins may still take."""
+        return max(WORK * self.first, LEAST_WORK) - self.of_runs - self.of_twins
+
+    def count(self, run: Trajectory) -> None:
+        """Count the evaluations of a run."""
+        self.first = self.first or run.evaluations
+        self.of_runs += run.evaluations
+        self.per_step = max(run.evaluations / max(run.steps + run.rejected, 1), 1.0)
+
+    def within_budget(self, case: Case, evaluations: float | None = None) -> Case:
+        """Return the case with no more steps than so many evaluations allow, or what is left.
+
+        A first run has the case's own limit of steps.
+        """
+        if not self.first:
+            return case
+        most = self.work_left if evaluations is None else evaluations
+        steps = min(case.solve.max_steps, max(1, int(most / self.per_step)))
+        return replace(case, solve=replace(case.solve, max_steps=steps))
+
+    def limit_of(self, run: Trajectory) -> str:
+        """Return the words for a run that the budget ended, "" for any other."""
+        if (
+            run.reason != Reason.BUDGET_STEPS
+            or run.steps + run.rejected >= self.case.solve.max_steps
+        ):
+            return ""
+        return (
+            f"more than the {WORK:g}-fold work of the first run, to which a job is limited; "
+            "solve.rtol sets a tolerance without this limit"
+        )
 
     def look(self, whole: bool) -> bool:
         """Whether twins part, as far as is known.
@@ -62,22 +102,26 @@ class Search:
         if self.case.solve.horizon != "auto":
             return self.horizon < end
         for span in [min(SHORT * self.case.turn, end), end][: 1 + whole]:
-            left = min(BUDGET * (self.taken - self.spent) - self.spent, self.left)
-            if left > 0.0 and math.isnan(self.horizon) and span > self.seen:
-                self.twins(span, left)
+            work = min(BUDGET * self.of_runs - self.of_twins, self.work_left)
+            if math.isnan(self.horizon) and span > self.seen:
+                may = work > 0.0 and self.left > 0.0
+                self.stopped = not (may and self.twins(span, work))
         return self.horizon < end
 
-    def twins(self, span: float, left: float) -> None:
-        """Look at a span (s) for so long (s), and at where twins part by tighter ones again.
+    def twins(self, span: float, work: float) -> bool:
+        """Look at a span (s) by so many evaluations, and at where twins part by tighter ones again.
 
         Where the tighter ones stay together it was the steps that parted the others; what follows
-        is looked at as tightly.
+        is looked at as tightly. Returns False where evaluations or time ended it.
         """
         self.began += load_twins(self.case)
-        began = time.monotonic()
+        most = self.of_twins + work
 
         def follow(span: float, rtol: float) -> Parting:
-            return part(self.case, span, rtol, CLOSE, began + left - time.monotonic())
+            case = self.within_budget(self.case, (most - self.of_twins) / TWO)
+            found = part(case, span, rtol, CLOSE, self.left)
+            self.of_twins += TWO * found.attempts * self.per_step
+            return found
 
         found = follow(span, self.rtol)
         while found.parted and self.rtol > TIGHTEST * SURE:
@@ -86,13 +130,13 @@ class Search:
             if surely.parted:
                 self.horizon = surely.time
             if not surely.whole:
-                break
+                return surely.parted
             self.rtol /= SURE
             found = follow(span, self.rtol)
         if found.whole:
             self.seen = span
             self.horizon = math.inf if span == self.case.duration else math.nan
-        self.spent += time.monotonic() - began
+        return found.whole or found.parted
 
 
 def load_twins(case: Case) -> float:

@@ -13,7 +13,8 @@ from compressor.solve.settling import with_span
 from compressor.solve.statistics import chaotic_bars, statistics
 from compressor.solve.turns import Cuts, revolutions
 
-EVALUATION = 1e-7  # s, about, of an attempt made alone: what twins may take is a share of it
+EVALUATION = 1e-7  # s, about, of an attempt made alone: it counts against timeout_s
+UNTOLD = "the search for chaos came to its limit"
 CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 
 
@@ -47,6 +48,8 @@ def find_horizon(case: Case, solution: Solution, search: Search) -> None:
         search.horizon = predictability_horizon(case, search.left)
     elif case.wants_bars and in_doubt(case, solution):
         search.look(whole=True)
+        if solution.reason and search.stopped:
+            solution.detail += f"; {UNTOLD}"
     solution.horizon = search.horizon
 
 

@@ -15,7 +15,18 @@ from compressor.outcome import Regime
 from compressor.physics import COLUMNS, Column
 from compressor.solve import regime
 from compressor.solve.horizon import Parting, predictability_horizon
-from compressor.solve.regime import BUDGET, CLOSE, RTOL, SHORT, SURE, Search, repeats
+from compressor.solve.regime import (
+    BUDGET,
+    CLOSE,
+    LEAST_WORK,
+    RTOL,
+    SHORT,
+    SURE,
+    WORK,
+    Search,
+    repeats,
+)
+from compressor.solve.request import Trajectory
 from compressor.solve.series import a_turn, compared_times
 from compressor.solve.simulate import measure
 
@@ -94,46 +105,53 @@ def test_a_tolerance_promises_nothing_and_is_searched_by_its_bars():
     assert found.attributes["regime"] == "periodic"
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """A clock that goes on only as it is told to."""
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    return now
+def run_of(evaluations, **ended):
+    """A run that took so many evaluations, six for a step."""
+    none = np.empty(0)
+    return Trajectory(
+        none, none, none, None, steps=evaluations // 6, evaluations=evaluations, **ended
+    )
 
 
-def followed(clock, monkeypatch, *found, seconds=1.0):
-    """Twins that end as they are told to, and take their time or what they are given."""
+def searched(of, *runs):
+    """A search beside runs of so many evaluations."""
+    search = Search(of)
+    for evaluations in runs:
+        search.count(run_of(evaluations))
+    return search
+
+
+def followed(monkeypatch, *found, needs=1000):
+    """Twins that end as they are told to; they need so many attempts, or stop at their limit."""
     asked, ends = [], itertools.chain(found, itertools.repeat(found[-1]))
 
     def part(of, span, rtol, close, timeout):
         if timeout == math.inf:  # machine code is loaded
-            return None
-        asked.append((span / of.turn, rtol, timeout))
-        clock[0] += min(seconds, timeout)
-        return next(ends) if seconds <= timeout else Parting(0.0, False, False)
+            return Parting(0.0, False, True)
+        asked.append((span / of.turn, rtol, of.solve.max_steps))
+        attempts = min(needs, of.solve.max_steps)
+        end = next(ends) if attempts == needs else Parting(0.0, False, False)
+        return end._replace(attempts=attempts)
 
     monkeypatch.setattr(regime, "part", part)
     return asked
 
 
-def test_a_short_span_is_looked_at_first(clock, monkeypatch):
+def test_a_short_span_is_looked_at_first(monkeypatch):
     of = case()
     parted = Parting(0.1 * of.turn, True, False)
-    asked = followed(clock, monkeypatch, parted)
-    search = Search(of)
-    clock[0] += 10.0
+    asked = followed(monkeypatch, parted)
+    search = searched(of, 600_000)
     assert search.look(whole=True)
     assert search.horizon == parted.time
     assert [row[:2] for row in asked] == [(SHORT, RTOL), (pytest.approx(0.15), RTOL / SURE)]
 
 
-def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(clock, monkeypatch):
+def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
     of = case()
     together = Parting(of.duration, False, True)
-    asked = followed(clock, monkeypatch, Parting(0.1 * of.turn, True, False), together)
-    search = Search(of)
-    clock[0] += 10.0
+    asked = followed(monkeypatch, Parting(0.1 * of.turn, True, False), together)
+    search = searched(of, 600_000)
     assert not search.look(whole=True)
     assert search.horizon == math.inf
     tight = pytest.approx(RTOL / SURE)
@@ -141,41 +159,72 @@ def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(clock, monkeypa
     assert [row[:2] for row in asked] == expected
 
 
-def test_twins_that_part_at_no_two_tolerances_leave_it_open(clock, monkeypatch):
+def test_twins_that_part_at_no_two_tolerances_leave_it_open(monkeypatch):
     of = case()
     parted, together = Parting(0.1 * of.turn, True, False), Parting(of.duration, False, True)
-    asked = followed(clock, monkeypatch, *[parted, together] * 20, seconds=0.1)
-    search = Search(of)
-    clock[0] += 100.0
+    asked = followed(monkeypatch, *[parted, together] * 20)
+    search = searched(of, 600_000)
     assert not search.look(whole=False)
     assert math.isnan(search.horizon)
     assert search.seen == 0.0
+    assert not search.stopped
     assert min(rtol for _, rtol, _ in asked) >= 0.99e-12
 
 
-@pytest.mark.parametrize("seconds", [0.5, 2.0, 100.0])
-def test_the_search_takes_no_more_than_its_share(clock, monkeypatch, seconds):
+@pytest.mark.parametrize("needs", [1000, 12_000, 10**6])
+def test_the_search_takes_no_more_than_its_share(monkeypatch, needs):
+    """Of what the runs have taken, in evaluations: the clock does not count."""
     of = case()
-    asked = followed(clock, monkeypatch, Parting(0.0, False, True), seconds=seconds)
+    asked = followed(monkeypatch, Parting(0.0, False, True), needs=needs)
     search = Search(of)
-    for _ in range(4):  # a run of a second, and a look
-        clock[0] += 1.0
+    for _ in range(4):  # a run, and a look
+        search.count(run_of(60_000))
         search.look(whole=True)
-        assert search.spent <= BUDGET * (search.taken - search.spent) + 1e-9
-        assert search.spent + 1.0 <= search.taken + 1e-9
+        assert search.of_twins <= BUDGET * search.of_runs
     assert asked
-    assert search.horizon == math.inf or seconds > 2.0
+    assert search.horizon == math.inf or needs > 12_000
+    assert search.stopped == (needs > 12_000)
 
 
-def test_a_search_ends_with_the_job_s_time(clock, monkeypatch):
-    asked = followed(clock, monkeypatch, Parting(0.0, False, True), seconds=100.0)
-    search = Search(case(timeout_s=3.0))
-    clock[0] += 2.5
+def test_runs_and_twins_have_twenty_times_the_first_run_s_work(monkeypatch):
+    """Or two seconds' worth, if that is more; a first run has the case's limit alone."""
+    of = case()
+    assert Search(of).within_budget(of) is of
+    assert searched(of, 6000).work_left == LEAST_WORK - 6000
+    asked = followed(monkeypatch, Parting(0.0, False, True), needs=10**7)
+    search = searched(of, 6_000_000, 54_000_000)
+    assert search.within_budget(of).solve.max_steps == 60_000_000 // 6 // 2 == of.solve.max_steps
+    search.count(run_of(48_000_000))
+    left = WORK * 6_000_000 - 108_000_000
+    assert search.work_left == left
+    assert search.within_budget(of).solve.max_steps == left // 6
     search.look(whole=True)
-    assert asked[0][2] == pytest.approx(0.5)
-    assert search.left == pytest.approx(0.0)
+    assert asked == [(SHORT, RTOL, left // 6 // 2)]
+    assert search.stopped
+    assert search.work_left == 0
+    assert search.within_budget(of).solve.max_steps == 1
+
+
+def test_a_run_that_the_budget_ended_says_so():
+    search = searched(case(), 6000)
+    ended = run_of(6_000_000, reason="budget_steps")
+    assert search.limit_of(ended).startswith("more than the 20-fold work of the first run")
+    assert search.limit_of(run_of(6 * 5_000_000, reason="budget_steps")) == ""
+    assert search.limit_of(run_of(6000, reason="budget_seconds")) == ""
+
+
+def test_a_search_ends_with_the_job_s_time(monkeypatch):
+    """The clock counts for timeout_s alone."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    asked = followed(monkeypatch, Parting(0.0, False, True))
+    search = searched(case(timeout_s=3.0), 600_000)
+    now[0] += 2.5
+    assert search.left == pytest.approx(0.5)
+    now[0] += 0.5
     search.look(whole=True)
-    assert len(asked) == 1
+    assert not asked
+    assert search.stopped
 
 
 def test_what_cannot_be_told_in_the_time_is_undecided(monkeypatch):
