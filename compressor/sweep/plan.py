@@ -13,7 +13,7 @@ from typing import Any
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, read_store, series_file
 from compressor.sweep.wanted import Wanted, stored
-from compressor.sweep.warm_up import Needs, load_telling
+from compressor.sweep.warm_up import Needs, compile_once
 
 ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
 MOST_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
@@ -65,7 +65,7 @@ class Ahead:
     def timed(self, workers: int, remark: Callable[[str], None]) -> Forecast:
         """The whole forecast, for so many processes; `remark` is told of compiling."""
         if self.counts.missing:
-            load_telling(Needs.of(self.cases.values()), remark)
+            compile_once(Needs.of(self.cases.values()), remark)
         parts = []
         for part in self.counts.studies:
             keys = self.missing[part.study]

@@ -1,7 +1,9 @@
 """Have the equations compiled once on a machine, and loaded before anything is timed.
 
 Machine code is kept by a hash of the sources of the physics and the versions of the libraries: a
-change of either compiles anew, once.
+change of either compiles anew, once. It has several parts, of which a run compiles those that it
+needs. Within a part numba stores each function as soon as it is compiled, so that what was compiled
+before a Ctrl-C is not compiled again.
 """
 
 import hashlib
@@ -16,7 +18,23 @@ from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
 
 PATIENCE = 2.0  # s of compiling before a remark on it
-COMPILING = "compiling the equations, about a minute: once for each version of the program"
+COMPILING = (
+    "compiling the equations, part {number} of {count}: {what}, about {seconds} s; "
+    "each part once for each version of the program, and a stop loses nothing"
+)
+METHOD = "one method"  # a part of which nothing but a few functions is its own
+WHAT = {
+    "auto": ("dry joints", 60),
+    METHOD: ("solve.method {}", 5),
+    "horizon": ("the horizon of dry joints", 20),
+    "lanes-1": ("jobs side by side, big end", 50),
+    "lanes-2": ("jobs side by side, small end", 50),
+    "lanes-3": ("jobs side by side, both joints", 70),
+    "laws": ("other laws of contact and friction", 60),
+    "laws-horizon": ("the horizon of other laws", 20),
+    "features": ("mechanisms with features, such as oil or an elastic rod", 90),
+    "features-horizon": ("the horizon of mechanisms with features", 20),
+}  # by part: what it is, and the seconds that it takes an idle core
 LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes of which runs march side by side
 FEWEST, MANY = 16, 4000  # jobs of a scene that lanes are loaded for, and compiled for
 SEEN = 1000  # jobs that are looked at for it
@@ -45,13 +63,23 @@ class Needs(NamedTuple):
         return cls(tuple(sorted(methods)), twins, laws=laws, features=features)
 
     @property
-    def parts(self) -> list[str]:
-        """The parts of the equations that are needed, by name."""
-        lanes = [f"lanes-{of}" for of in self.lanes]
-        twins = ["", *["-horizon"] * self.horizon]
-        kinds = [*["laws"] * self.laws, *["features"] * self.features]
-        more = [kind + twin for kind in kinds for twin in twins]
-        return [*self.methods, *["horizon"] * self.horizon, *lanes, *more]
+    def parts(self) -> "dict[str, Needs]":
+        """The parts of the equations that are needed, by name, each as needs of its own."""
+        found = {method: Needs((method,)) for method in self.methods}
+        if self.horizon:
+            found["horizon"] = Needs(horizon=True)
+        found |= {f"lanes-{of}": Needs(lanes=(of,)) for of in self.lanes}
+        alone = {"laws": Needs(self.methods, laws=True)} if self.laws else {}
+        alone |= {"features": Needs(self.methods, features=True)} if self.features else {}
+        found |= alone
+        if self.horizon:
+            found |= {f"{kind}-horizon": one._replace(horizon=True) for kind, one in alone.items()}
+        return found
+
+    @property
+    def uncompiled(self) -> "dict[str, Needs]":
+        """Those of the parts that this machine has not compiled before."""
+        return {part: alone for part, alone in self.parts.items() if not marker(part).exists()}
 
     def with_lanes(self, cases: Sequence[Case]) -> "Needs":
         """With the scenes of which there are jobs enough to march side by side.
@@ -94,9 +122,9 @@ def load(needs: Needs) -> None:
             measure(Case.from_values({**values, **kind, "solve": solve | how}))
 
 
-def load_telling(needs: Needs, remark: Callable[[str], None]) -> None:
-    """`load`; what takes long is told."""
-    timer = threading.Timer(PATIENCE, remark, [COMPILING])
+def load_telling(needs: Needs, told: str, remark: Callable[[str], None]) -> None:
+    """`load`; what takes long is told, in these words."""
+    timer = threading.Timer(PATIENCE, remark, [told])
     timer.daemon = True
     timer.start()
     began = time.monotonic()
@@ -110,6 +138,17 @@ def load_telling(needs: Needs, remark: Callable[[str], None]) -> None:
         remark(f"compiled in {seconds:.0f} s")
 
 
+def named(part: str) -> tuple[str, int]:
+    """What a part of the equations is, in words, and the seconds that compiling it takes."""
+    what, seconds = WHAT.get(part, WHAT[METHOD])
+    return what.format(part), seconds
+
+
+def compile_seconds(needs: Needs) -> int:
+    """Seconds of compiling that are ahead of a run with these needs, on an idle machine."""
+    return sum(named(part)[1] for part in needs.uncompiled)
+
+
 def marker(part: str) -> Path:
     """The file that says that a part of the equations has been compiled on this machine."""
     # numba keeps machine code by the path of its sources: a copied folder brings none of use
@@ -119,10 +158,15 @@ def marker(part: str) -> Path:
 
 
 def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
-    """Compile here what this machine has not compiled before, so that workers need but load it."""
-    compiled = [marker(part) for part in needs.parts]
-    if not all(path.exists() for path in compiled):
-        load_telling(needs, remark)
-        for path in compiled:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch()
+    """Compile here what this machine has not compiled before, so that workers need but load it.
+
+    Part by part: those that are finished when the program is stopped are not compiled again.
+    """
+    ahead = needs.uncompiled
+    for number, (part, alone) in enumerate(ahead.items(), 1):
+        what, seconds = named(part)
+        told = COMPILING.format(number=number, count=len(ahead), what=what, seconds=seconds)
+        load_telling(alone, told, remark)
+        path = marker(part)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()

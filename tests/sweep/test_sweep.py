@@ -5,6 +5,7 @@ import math
 import os
 import re
 import signal
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -259,9 +260,95 @@ def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch)
         monkeypatch.setattr(warm_up, "machine_code_folder", lambda name=name: tmp_path / name)
         sweep(studies(one={}), tmp_path / "out" / str(len(told)), 1, lambda *e: told.append(e[2]))
     remarks = [remark for remark in told if remark]
-    assert remarks[0::2] == [warm_up.COMPILING] * 2
+    assert (
+        remarks[0::2]
+        == [
+            "compiling the equations, part 1 of 1: dry joints, about 60 s; each part once for each "
+            "version of the program, and a stop loses nothing"
+        ]
+        * 2
+    )
     assert all(re.fullmatch(r"compiled in \d+ s", remark) for remark in remarks[1::2])
-    assert "once for each version" in warm_up.COMPILING
+
+
+def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
+    """What was finished before a stop is not compiled again."""
+    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
+    needs = warm_up.Needs(("auto", "Radau"), True, (3,), laws=True)
+    ahead = ["Radau", "auto", "horizon", "lanes-3", "laws", "laws-horizon"]
+    assert sorted(needs.parts) == ahead
+    assert warm_up.compile_seconds(needs) == 60 + 5 + 20 + 70 + 60 + 20
+    loaded, told = [], []
+
+    def load(alone):
+        if alone.lanes and len(loaded) == 3:
+            raise KeyboardInterrupt
+        loaded.append(alone)
+
+    monkeypatch.setattr(warm_up, "load", load)
+    monkeypatch.setattr(
+        warm_up, "load_telling", lambda a, words, say: (load(a), told.append(words))
+    )
+    with pytest.raises(KeyboardInterrupt):
+        warm_up.compile_once(needs, pytest.fail)
+    assert list(needs.uncompiled) == ["lanes-3", "laws", "laws-horizon"]
+    assert warm_up.compile_seconds(needs) == 70 + 60 + 20
+    loaded.clear()
+    warm_up.compile_once(needs, pytest.fail)
+    assert loaded == [needs.parts[part] for part in ("lanes-3", "laws", "laws-horizon")]
+    assert "part 2 of 6: solve.method Radau, about 5 s" in told[1]
+    assert "part 1 of 3: jobs side by side, both joints, about 70 s" in told[3]
+    assert not needs.uncompiled
+    assert warm_up.compile_seconds(needs) == 0
+
+
+def test_every_part_that_can_be_needed_has_words():
+    for kinds in ({"laws": True}, {"features": True}):
+        needs = warm_up.Needs(("auto",), True, tuple(warm_up.LANES), **kinds)
+        assert {*needs.parts} <= {*warm_up.WHAT}
+
+
+STOPPED = """
+import os, signal, sys
+import numba.core.event as event
+from compressor.physics._jit import jit, load_numba
+
+@jit
+def inner(x): return x + 1.0
+
+@jit
+def middle(x): return 2.0 * inner(x)
+
+@jit
+def outer(x): return middle(x) - 3.0
+
+class Ends(event.Listener):
+    compiled = []
+    def on_start(self, what): pass
+    def on_end(self, what):
+        self.compiled.append(what.data["dispatcher"].py_func.__name__)
+        if self.compiled[-1] == sys.argv[1]: os.kill(os.getpid(), signal.SIGINT)
+
+load_numba()
+event.register("numba:compile", Ends())
+try: outer(1.0)
+except KeyboardInterrupt: print("stopped", end=" ")
+print(*Ends.compiled)
+"""
+
+
+def test_a_stop_amid_compiling_loses_no_finished_function(tmp_path):
+    """As the remark on compiling says: numba stores each function as soon as it is compiled."""
+    (tmp_path / "equations.py").write_text(STOPPED)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def compiled(stop_after):
+        run = [sys.executable, tmp_path / "equations.py", stop_after]
+        return subprocess.check_output(run, env=environment, text=True).split()
+
+    assert compiled("middle")[:3] == ["stopped", "inner", "middle"]
+    assert compiled("none") in (["outer"], ["middle", "outer"])  # the last may not be stored yet
+    assert compiled("none") == []
 
 
 def test_jobs_in_lanes_are_stored_with_the_same_bits(studies, tmp_path, monkeypatch):
@@ -292,8 +379,8 @@ def test_lanes_are_compiled_for_many_jobs_alone(studies, tmp_path, monkeypatch):
     assert warm_up.Needs().with_lanes([few[0]]).lanes == ()
     chosen = [replace(case, contact=replace(case.contact, law="hertz")) for case in few]
     assert warm_up.Needs().with_lanes(chosen).lanes == ()  # which do not march in them
-    assert warm_up.Needs.of(chosen).parts == ["auto", "laws"]
-    assert warm_up.Needs.of(few).parts == ["auto"]
+    assert list(warm_up.Needs.of(chosen).parts) == ["auto", "laws"]
+    assert list(warm_up.Needs.of(few).parts) == ["auto"]
 
 
 def test_laws_are_an_axis_of_a_sweep(studies, tmp_path):
