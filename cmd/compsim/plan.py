@@ -2,10 +2,12 @@
 
 import dataclasses
 import json
+import math
 from typing import TYPE_CHECKING
 
 import click
 
+from compsim.explain import without_nan
 from compsim.screen import (
     DONE,
     Reading,
@@ -26,6 +28,7 @@ from compsim.screen import (
 
 if TYPE_CHECKING:
     from compressor.regimes import Standing
+    from compressor.sweep import Forecast
 
 
 @click.command()
@@ -50,8 +53,8 @@ def plan(
 ) -> int:
     """Tell what a run would do: its jobs, those that are stored, time and bytes of the others.
 
-    Times one job of each study and of each set of worn joints; stores nothing. Of a file with
-    `regimes` it tells chains and values alone.
+    Times up to a dozen jobs of each study, drawn over its design, for some seconds; stores
+    nothing. Of a file with `regimes` it tells chains and values alone.
     """
     from compressor.cases import load_studies
     from compressor.sweep import cores
@@ -78,7 +81,8 @@ def plan(
     workers = jobs or cores()
     if as_json:
         more = {"regimes": [one._asdict() for one in ahead]} if ahead else {}
-        print_text(json.dumps(dataclasses.asdict(found.timed(workers, say)) | more, indent=1))
+        whole = without_nan(dataclasses.asdict(found.timed(workers, say)) | more)
+        print_text(json.dumps(whole, indent=1))
         return DONE
     tell_chains(ahead, as_json)
     width = max(len(part.study) for part in found.counts.studies)
@@ -86,13 +90,21 @@ def plan(
         print_text(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
                    f"{part.missing:>4} missing")  # fmt: skip
     if found.counts.missing:
-        whole = found.timed(workers, say)
-        with_workers = plural(whole.workers, "worker")
-        print_text(f"about {duration(whole.seconds)} with {with_workers}, and {size(whole.bytes)}")
+        print_text(cost(found.timed(workers, say)))
     for job in found.counts.first:
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
         print_text(f"next: {job.study}{point}")
     return DONE
+
+
+def cost(whole: "Forecast") -> str:
+    """The line of what a run will take: time with its range, workers, bytes, compiling."""
+    workers, by = plural(whole.workers, "worker"), f"by {plural(whole.timed, 'timed job')}"
+    if whole.timed < whole.missing and not math.isnan(whole.most):
+        by = f"{duration(whole.least)} to {duration(whole.most)} {by}"
+    first = f", after about {duration(whole.compiling)} of compiling" if whole.compiling else ""
+    taken = f"about {duration(whole.seconds)} with {workers} ({by})"
+    return f"{taken}{first}, and {size(whole.bytes)}"
 
 
 def tell_chains(ahead: "list[Standing]", as_json: bool) -> None:

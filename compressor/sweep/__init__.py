@@ -2,7 +2,7 @@
 
 from compressor.sweep.cluster import Cluster
 from compressor.sweep.execution import cores
-from compressor.sweep.plan import forecast
+from compressor.sweep.plan import Forecast, forecast
 from compressor.sweep.sweep import Options, Progress, Summary, run_here, sweep
 from compressor.sweep.warm_up import Needs
 from compressor.sweep.work import Now

@@ -1,22 +1,31 @@
 """What a sweep will do, before it does it: its jobs, those done, and what the others will cost.
 
-Counts come first, at once. One job of each kind, the jobs of one study with the same joints, is run
-and timed; the others are taken to cost the same for every revolution and sample.
+Counts come first, at once. Then a dozen jobs of each study, drawn evenly over its design, are run
+and timed, within some seconds. The others are taken to cost as much for every revolution, in the
+mean; how far the drawn ones differ gives a range. Jobs are drawn alike each time.
 """
 
+import itertools
+import math
 import random
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, read_store, series_file
 from compressor.sweep.wanted import Wanted, stored
-from compressor.sweep.warm_up import Needs, compile_once
+from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
+from compressor.sweep.work import revolutions
 
 ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
 MOST_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
+DRAWN = 12  # jobs of a study that are timed
+TIMING = 4.0  # s of timing, of all studies, after which no further job is begun
+SEARCHED: list[str] = []  # the first job of this process in which chaos was looked for
 
 
 @dataclass(frozen=True)
@@ -30,28 +39,43 @@ class Next:
 
 @dataclass(frozen=True)
 class Part:
-    """One study's share; a job of several studies counts for the first of them."""
+    """One study's share; a job of several studies counts for the first of them.
+
+    `least`, `most`: the range of `seconds`; they are the same where all missing jobs were timed,
+    and nan where one of several was.
+    """
 
     study: str
     jobs: int
     done: int
     missing: int
-    seconds: float  # of one core, to run what is missing
-    bytes: int  # that it will take in the store
+    seconds: float = 0.0  # of one core, to run what is missing
+    least: float = 0.0
+    most: float = 0.0
+    timed: int = 0  # jobs
+    bytes: int = 0  # that it will take in the store
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """What is ahead of some studies; `seconds` are of wall time, with `workers` processes."""
+    """What is ahead of some studies; `seconds` are of wall time, with `workers` processes.
+
+    `least`, `most`: the range of `seconds`, nan where too few jobs were timed; `compiling`: seconds
+    before the first job, where this machine has not compiled all that the run needs.
+    """
 
     jobs: int
     done: int
     missing: int
-    workers: int
-    seconds: float
-    bytes: int
     studies: tuple[Part, ...]
     first: tuple[Next, ...]
+    workers: int = 1
+    seconds: float = 0.0
+    least: float = 0.0
+    most: float = 0.0
+    timed: int = 0
+    compiling: int = 0
+    bytes: int = 0
 
 
 class Ahead:
@@ -64,23 +88,45 @@ class Ahead:
 
     def timed(self, workers: int, remark: Callable[[str], None]) -> Forecast:
         """The whole forecast, for so many processes; `remark` is told of compiling."""
-        if self.counts.missing:
-            compile_once(Needs.of(self.cases.values()), remark)
-        parts = []
-        for part in self.counts.studies:
-            keys = self.missing[part.study]
-            looked_at = [self.cases[key] for key in keys if key in self.cases]
-            seconds, size = cost(looked_at)
-            share = len(keys) / max(len(looked_at), 1)
-            parts.append(replace(part, seconds=share * seconds, bytes=round(share * size)))
-        working = max(1, min(workers, self.counts.missing))
+        if not self.counts.missing:
+            return self.counts
+        looked_at = list(self.cases.values())
+        needs = Needs.of(looked_at)
+        compile_once(needs, remark)
+        drawn = {part.study: drawn_from(self.missing[part.study], self.cases)
+                 for part in self.counts.studies if part.missing}  # fmt: skip
+        costs = timed_in_turn(drawn, TIMING)
+        parts = [
+            self.expected(part, costs[part.study]) if part.missing else part
+            for part in self.counts.studies
+        ]
+        working = min(workers, self.counts.missing)
         return replace(
             self.counts,
+            studies=tuple(parts),
             workers=working,
             seconds=sum(part.seconds for part in parts) / working,
+            least=sum(part.least for part in parts) / working,
+            most=sum(part.most for part in parts) / working,
+            timed=sum(part.timed for part in parts),
+            compiling=compile_seconds(needs.with_lanes(looked_at)),
             bytes=sum(part.bytes for part in parts),
-            studies=tuple(parts),
         )
+
+    def expected(self, part: Part, costs: "Sequence[Cost]") -> Part:
+        """A study's part with what its missing jobs will take, by some of them."""
+        keys = self.missing[part.study]
+        looked_at = [self.cases[key] for key in keys if key in self.cases]
+        share = len(keys) / len(looked_at)
+        turns = share * sum(map(revolutions, looked_at))
+        mean, least, most = mean_with_range([cost.turn for cost in costs], len(keys))
+        samples = [cost.sample for cost in costs if cost.sample]
+        stored = sum(case.steps + 1 for case in looked_at if case.output.keep == "series")
+        size = ROW_BYTES * len(keys) + share * stored * (samples[0] if samples else 0.0)
+        return replace(
+            part, seconds=turns * mean, least=turns * least, most=turns * most,
+            timed=len(costs), bytes=round(size),
+        )  # fmt: skip
 
 
 def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
@@ -103,11 +149,9 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
         missing[study.name] = new
         few = len(new) <= MOST_CASES
         looked_at.update(new if few else random.Random(0).sample(new, MOST_CASES))
-        parts.append(Part(study.name, len(mine), len(mine) - len(new), len(new), 0.0, 0))
+        parts.append(Part(study.name, len(mine), len(mine) - len(new), len(new)))
         ahead += next_of(study, {*new}, first - len(ahead))
-    counts = Forecast(
-        len(told), len(done), len(told) - len(done), 1, 0.0, 0, tuple(parts), tuple(ahead)
-    )
+    counts = Forecast(len(told), len(done), len(told) - len(done), tuple(parts), tuple(ahead))
     return Ahead(counts, missing, dict(Wanted(studies, looked_at)))
 
 
@@ -123,27 +167,75 @@ def next_of(study: Study, keys: set[str], most: int) -> Iterator[Next]:
             yield Next(study.name, point, key)
 
 
-def cost(cases: Sequence[Case]) -> tuple[float, int]:
-    """What cases of one study take: seconds of one core, bytes of the store."""
-    seconds, size = 0.0, 0.0
-    for joint in dict.fromkeys(case.joint for case in cases):
-        alike = [case for case in cases if case.joint == joint]
-        turn, sample = measured(alike[0])
-        seconds += turn * sum(case.duration / case.turn for case in alike)
-        size += ROW_BYTES * len(alike)
-        size += sample * sum(case.steps + 1 for case in alike if case.output.keep == "series")
-    return seconds, round(size)
+class Cost(NamedTuple):
+    """What a job took: seconds of one core for a revolution, bytes of its file for a sample."""
+
+    turn: float
+    sample: float
 
 
-def measured(case: Case) -> tuple[float, float]:
-    """A job's seconds for a revolution, and its file's bytes for a sample."""
+def drawn_from(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
+    """Return up to a dozen of the missing jobs of a study, one at random from each stretch of them.
+
+    Jobs stand in the order of the design, so that stretches spread over its axes. They come in
+    random order: any first few are spread, too.
+    """
+    known, chance = [key for key in keys if key in cases], random.Random(0)
+    count = min(DRAWN, len(known))
+    bounds = [len(known) * i // count for i in range(count + 1)]
+    found = [known[chance.randrange(*pair)] for pair in itertools.pairwise(bounds)]
+    chance.shuffle(found)
+    return [cases[key] for key in found]
+
+
+def timed_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[str, list[Cost]]:
+    """Time jobs of each study in turn, at least one of each, until so many seconds are over."""
+    end = time.perf_counter() + seconds
+    costs: dict[str, list[Cost]] = {study: [] for study in drawn}
+    for number in range(DRAWN):
+        for study, cases in drawn.items():
+            if number < len(cases) and (number == 0 or time.perf_counter() < end):
+                costs[study].append(measured(cases[number]))
+    return costs
+
+
+def mean_with_range(values: Sequence[float], of: int) -> tuple[float, float, float]:
+    """Return the mean of some of so many values, and the least and greatest that all may have.
+
+    By Student's t at 95 %; a part of the whole that is known is in no doubt. All that is not timed
+    costs at least as much as the cheapest one. The bounds are nan by one value of several.
+    """
+    count, mean = len(values), sum(values) / len(values)
+    if count == of:
+        return mean, mean, mean
+    if count == 1:
+        return mean, math.nan, math.nan
+    from compressor.solve import sure  # needs numba: only where jobs are timed
+
+    spread = math.sqrt(sum((value - mean) ** 2 for value in values) / (count - 1))
+    error = float(sure(np.array(spread * math.sqrt((1.0 - count / of) / count)), count))
+    return mean, max(mean - error, min(values)), mean + error
+
+
+def measured(case: Case) -> Cost:
+    """What a job costs. It runs again where its search for chaos had to load machine code first."""
+    took, size, searched = ran(case)
+    if searched and not SEARCHED:
+        SEARCHED.append(case.key)
+        took, size, _ = ran(case)
+    return Cost(took / revolutions(case), size / (case.steps + 1))
+
+
+def ran(case: Case) -> tuple[float, int, bool]:
+    """Run a job: the seconds it took, its file's bytes, and whether chaos was looked for."""
     from compressor.solve import measure, observe  # needs numba: only to simulate
 
-    began = time.perf_counter()
+    began = time.process_time()
     size = 0
     if case.output.keep == "metrics":
-        measure(case)
+        found = measure(case)
     else:
-        size = len(series_file(observe(case)[1], case.output)[1])
-    seconds = time.perf_counter() - began
-    return seconds / (case.duration / case.turn), size / (case.steps + 1)
+        found, table = observe(case)
+        size = len(series_file(table, case.output)[1])
+    seconds = time.process_time() - began
+    return seconds, size, not math.isnan(float(found.numbers["predictability_horizon"]))

@@ -1,14 +1,17 @@
 """What is ahead of a sweep: counts at once, and costs from some of its jobs."""
 
 import json
+import math
+import re
 import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from compsim import cli, screen
 
 from compressor.cases.load import load_studies
-from compressor.sweep import plan
+from compressor.sweep import plan, warm_up
 from compressor.sweep.plan import ROW_BYTES, forecast
 from compressor.sweep.sweep import sweep
 
@@ -79,6 +82,7 @@ def test_a_job_that_is_stored_and_does_not_serve_is_missing(studies):
 
 def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
     (study,) = studies(one=NINE)
+    monkeypatch.setattr(plan, "TIMING", 60.0)
     whole = forecast([study], "results", 0).timed(2, str)
     monkeypatch.setattr(plan, "MOST_CASES", 3)
     study = noted(study)
@@ -89,6 +93,98 @@ def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
     assert (some.workers, some.missing, some.studies[0].missing) == (2, 9, 9)
     assert some.studies[0].seconds == pytest.approx(2 * some.seconds)
     assert some.seconds > 0
+    assert (whole.timed, some.timed) == (9, 3)
+    assert whole.least == whole.seconds == whole.most
+    assert some.least < some.seconds < some.most
+
+
+def timed_as(monkeypatch, seconds):
+    """Jobs that take so long by their rod's mass; the ones that were timed, in turn."""
+    made = []
+
+    def ran(case):
+        made.append(case)
+        return seconds(case), 0, False
+
+    monkeypatch.setattr(plan, "ran", ran)
+    monkeypatch.setattr(plan, "compile_once", lambda *_: None)
+    return made
+
+
+def test_a_dozen_jobs_drawn_over_the_design_tell_the_time(studies, monkeypatch):
+    """A fifth of them twenty times as long as the first one, which alone was timed before."""
+    made = timed_as(monkeypatch, lambda case: 1.0 if case.machine.rod_mass_kg < 4.6 else 20.0)
+    axes = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 100]}}}
+    found = forecast(studies(one=axes), "results", 0).timed(1, str)
+    true = 80 * 1.0 + 20 * 20.0
+    assert found.timed == len(made) == plan.DRAWN
+    assert 0.5 * true < found.seconds < 2.0 * true
+    assert found.least <= true <= found.most
+    masses = sorted(case.machine.rod_mass_kg for case in made)
+    stretches = np.histogram(masses, np.linspace(3, 5.0001, plan.DRAWN + 1))[0]
+    assert (stretches >= 1).sum() >= plan.DRAWN - 2
+    again = timed_as(monkeypatch, lambda case: 1.0)
+    forecast(studies(one=axes), "results", 0).timed(1, str)
+    assert [case.key for case in again] == [case.key for case in made]
+
+
+def test_timing_ends_when_its_seconds_are_over_with_one_job_of_each_study(studies, monkeypatch):
+    monkeypatch.setattr(plan, "TIMING", 0.0)
+    made = timed_as(monkeypatch, lambda case: 1.0)
+    both = studies(one=NINE, two={**NINE, "load": "none"})
+    found = forecast(both, "results", 0).timed(1, str)
+    assert [case.load for case in made] == ["design", "none"]
+    assert [part.timed for part in found.studies] == [1, 1]
+    assert found.seconds == pytest.approx(18.0)
+    assert math.isnan(found.most)
+
+
+def test_the_range_is_student_s_and_knows_what_was_timed():
+    mean, least, most = plan.mean_with_range([1.0, 2.0, 3.0], 10**9)
+    half = 4.302652 / math.sqrt(3.0)
+    assert (mean, least) == (2.0, 1.0)  # nothing is cheaper than the cheapest
+    assert most == pytest.approx(2.0 + half, rel=1e-6)
+    fewer = plan.mean_with_range([1.0, 2.0, 3.0], 6)[2]
+    assert fewer == pytest.approx(2.0 + half * math.sqrt(0.5), rel=1e-6)
+    assert plan.mean_with_range([1.0, 3.0], 2) == (2.0, 2.0, 2.0)
+
+
+def test_loading_the_search_for_chaos_is_no_part_of_a_job_s_time(studies, monkeypatch):
+    took = iter([60.0, 2.0, 3.0])
+    monkeypatch.setattr(plan, "ran", lambda case: (next(took), 0, True))
+    monkeypatch.setattr(plan, "SEARCHED", [])
+    (case,) = studies(one={})[0].cases
+    turns = case.duration / case.turn
+    assert [plan.measured(case).turn * turns for _ in range(2)] == pytest.approx([2.0, 3.0])
+
+
+def test_compiling_that_is_ahead_is_told(studies, monkeypatch, tmp_path, capsys):
+    """Lanes are compiled by `run` alone; the rest is, too, before anything is timed."""
+    timed_as(monkeypatch, lambda case: 0.01)
+    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
+    monkeypatch.setattr(warm_up, "MANY", 5)
+    warm_up.marker("auto").touch()
+    studies(one={**NINE, "joint": "both", "clearance_mm": 0.1})
+    assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "(by 9 timed jobs), after about 70 s of compiling, and " in said
+    warm_up.marker("lanes-3").touch()
+    assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
+    assert "compiling" not in capsys.readouterr().out
+
+
+def test_the_range_is_told_and_json_has_no_nan(studies, monkeypatch, capsys):
+    timed_as(monkeypatch, lambda case: 60.0 * case.machine.rod_mass_kg)
+    studies(one={"machine": {"rod_mass_kg": {"linspace": [3, 5, 40]}}})
+    assert cli.main(["plan", "one.yaml", "-j", "2"]) == 0
+    words = r"about \d+ min with 2 workers \(\d+ min to \d+ min by 12 timed jobs\)"
+    assert re.search(words, capsys.readouterr().out)
+    monkeypatch.setattr(plan, "TIMING", 0.0)
+    assert cli.main(["plan", "one.yaml", "-j", "2"]) == 0
+    assert "with 2 workers (by 1 timed job)" in capsys.readouterr().out
+    assert cli.main(["plan", "one.yaml", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert (found["timed"], found["least"], found["studies"][0]["most"]) == (1, None, None)
 
 
 def test_nothing_ahead_costs_nothing(studies):
@@ -110,7 +206,7 @@ def test_large_files_are_counted_before_they_are_read(command, studies, monkeypa
 def test_counts_are_told_before_anything_is_timed(studies, monkeypatch, capsys):
     studies(one=NINE)
     seen = []
-    monkeypatch.setattr(plan, "load_telling", lambda *_: seen.append(capsys.readouterr().out))
+    monkeypatch.setattr(plan, "compile_once", lambda *_: seen.append(capsys.readouterr().out))
     assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
     assert [" ".join(out.split()) for out in seen] == ["one 9 jobs 0 done 9 missing"]
     assert capsys.readouterr().out.startswith("about ")
