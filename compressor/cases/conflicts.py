@@ -114,13 +114,14 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         )
     for axis in sorted({*body.freedoms[:2]} & {*AXES}):
         yield from _resonance_conflicts(case, axis)
+    # `auto` settles at a whole revolution, and measures whole ones from there on
     span = (case.duration - case.settle) / case.turn
     whole = abs(span) < MANY and abs(span - round(span)) <= 1e-9
-    if body.start == "steady" and (case.settles_itself or not whole):
+    if body.start == "steady" and not whole:
         yield Problem(
             "body.start",
             "steady repeats whole settled revolutions: give duration_rev and settle_rev as whole "
-            "numbers, or set start: rest",
+            "numbers or auto, or set start: rest",
         )
     if sensor is None:
         return

@@ -108,6 +108,20 @@ def test_a_body_from_rest_is_there_from_the_start():
     assert np.isfinite(found["body_displacement"].values).all()
 
 
+@pytest.mark.parametrize("duration", ["auto", 6])
+def test_a_steady_body_repeats_the_revolutions_that_auto_finds(duration):
+    """To the bit what the same revolutions by number give."""
+    more = {"body": True, "sensor": {"noise_m_per_s2": 0}}
+    found = run(**more, solve={**TURN, "settle_rev": "auto", "duration_rev": duration})
+    settled = float(found["settled_rev"])
+    turns = round(float(found["time"][-1]) * 500 / 60)
+    assert turns == (settled + 3 if duration == "auto" else duration)
+    same = run(**more, solve={**TURN, "settle_rev": settled, "duration_rev": turns})
+    for name in (*BODY, *RECORDED):
+        np.testing.assert_array_equal(found[name].values, same[name].values)
+    assert len(found["tacho_time"]) == turns - settled
+
+
 def test_a_finer_grid_says_the_same():
     """The body is sampled as finely as it needs, whatever is stored."""
     sensor = {"noise_m_per_s2": 0}
@@ -178,7 +192,10 @@ def test_a_study_of_bodies_opens(tmp_path, monkeypatch):
         ({"body": {"frequency_x_Hz": 16.5}}, r"order 2 of the speed, 16\.7 Hz, is so near"),
         ({"body": True, "output": {"keep": "metrics"}}, "it needs output.keep: series"),
         ({"body": True, "solve": {"duration_rev": 2.5}}, "whole settled revolutions"),
-        ({"body": True, "solve": {"settle_rev": "auto"}}, "whole settled revolutions"),
+        (
+            {"body": True, "solve": {"settle_rev": "auto", "duration_rev": 5.5}},
+            "whole settled revolutions",
+        ),
         ({"body": {"start": "rest"}, "sensor": {"length_rev": 3}}, "repeats a steady motion"),
         ({"body": {"start": "rest"}, "sensor": {"speed_jitter": 0.01}}, "paces a steady motion"),
         ({"body": True, "sensor": {"low_pass_Hz": 20000}}, "less than half of rate_Hz"),
