@@ -18,6 +18,7 @@ from compressor.cases.groups import (
 )
 from compressor.cases.ideal import with_ideal_joints
 from compressor.cases.json_schema import case_schema
+from compressor.cases.judged import judged_range, outside_judged
 from compressor.cases.laws import CYLINDRICAL, READ_BY, law_of
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.lubricant import Lubricant

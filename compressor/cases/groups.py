@@ -11,6 +11,7 @@ from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.cases.parameter import choice, documented, parameter
 
 COMPILED = ("auto", "DOPRI5", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
+STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
@@ -27,8 +28,12 @@ class PerJoint:
     PerJoint(big_end=0.2, small_end=0.2)
     """
 
-    big_end: float = parameter(0.0, "mm", (0, 1000), "§3.2", "radial clearance of the big end")
-    small_end: float = parameter(0.0, "mm", (0, 1000), "§3.2", "radial clearance of the small end")
+    big_end: float = parameter(
+        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the big end", judged=(1e-3, 1.0)
+    )
+    small_end: float = parameter(
+        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the small end", judged=(1e-3, 1.0)
+    )
 
 
 @documented
@@ -68,9 +73,17 @@ class Machine:
         120.0, "mm", (0, 1e5), "Table 1", "crank radius R", above=True
     )
     rod_length_mm: float = parameter(600.0, "mm", (0, 1e6), "Table 1", "rod length L", above=True)
-    speed_rpm: float = parameter(500.0, "rpm", (0, 1e5), "Table 1", "crank speed", above=True)
+    speed_rpm: float = parameter(
+        500.0, "rpm", (0, 1e5), "Table 1", "crank speed", above=True, judged=(50, 6000)
+    )
     rod_mass_kg: float = parameter(
-        4.7, "kg", (0, 1e6), "assumed: a 600 x 40 x 25 mm steel bar", "rod mass", above=True
+        4.7,
+        "kg",
+        (0, 1e6),
+        "assumed: a 600 x 40 x 25 mm steel bar",
+        "rod mass",
+        above=True,
+        judged=(0.1, 50),
     )
     rod_centre_mm: float | None = parameter(
         None, "mm", (0, 1e6), "assumed: half the rod", "rod's mass centre, from the big end",
@@ -81,7 +94,13 @@ class Machine:
         above=True, optional=True,
     )  # fmt: skip
     reciprocating_mass_kg: float = parameter(
-        14.0, "kg", (0, 1e6), "assumed", "crosshead, piston rod and piston", above=True
+        14.0,
+        "kg",
+        (0, 1e6),
+        "assumed",
+        "crosshead, piston rod and piston",
+        above=True,
+        judged=(0.1, 50),
     )
     pin_radius_mm: float = parameter(
         10.0,
@@ -90,6 +109,7 @@ class Machine:
         "inferred from Eq. 15 and Table 3",
         "journal radius R_j of both joints, or of the big end",
         above=True,
+        judged=(10, 100),
     )
     gravity_m_per_s2: float = parameter(0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y")
     small_end_pin_radius_mm: float | None = parameter(
@@ -182,7 +202,7 @@ class Contact:
     law: str = choice("impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)")
     stiffness_N_per_mm15: float | None = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
-        above=True, optional=True,
+        above=True, optional=True, judged=STIFFNESS,
     )  # fmt: skip
     materials: tuple[str, str] | None = choice(
         None, ("steel", "copper"), "Table 2, Eq. 15", "two materials in place of a stiffness",
@@ -194,27 +214,41 @@ class Contact:
         "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
         optional=True,
     )  # fmt: skip
-    exponent: float = parameter(1.5, "", (1, 3), "Table 3", "force exponent p")
+    exponent: float = parameter(1.5, "", (1, 3), "Table 3", "force exponent p", judged=(1.0, 2.2))
     damping_N_s_per_mm: float = parameter(
-        336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max"
+        336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max", judged=(0, 33600)
     )
     full_damping_mm: float = parameter(
         0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True
     )
     restitution: float | None = parameter(
         None, "", (0, 1), "ours", "coefficient of restitution, of the laws that damp by it",
-        above=True, optional=True,
+        above=True, optional=True, judged=(0.3, 0.95),
     )  # fmt: skip
     least_approach_mm_per_s: float | None = parameter(
         None, "mm/s", (0, 1e6), "ours",
         "speed of meeting below which such a law damps as at this one; 10 by default",
-        above=True, optional=True,
+        above=True, optional=True, judged=(1.0, 100.0),
     )  # fmt: skip
     length_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "ours", "joint length (johnson, liu)", above=True, optional=True
+        None,
+        "mm",
+        (0, 1e4),
+        "ours",
+        "joint length (johnson, liu)",
+        above=True,
+        optional=True,
+        judged=(10.0, 100.0),
     )
     modulus_GPa: float | None = parameter(
-        None, "GPa", (0, 1e6), "ours", "composite modulus (johnson, liu)", above=True, optional=True
+        None,
+        "GPa",
+        (0, 1e6),
+        "ours",
+        "composite modulus (johnson, liu)",
+        above=True,
+        optional=True,
+        judged=(10.0, 250.0),
     )
 
 
@@ -236,10 +270,16 @@ class Friction:
     True
     """
 
-    static: float = parameter(0.23, "", (0, 10), "Table 3", "static coefficient")
-    dynamic: float = parameter(0.15, "", (0, 10), "Table 3", "dynamic coefficient")
+    static: float = parameter(0.23, "", (0, 10), "Table 3", "static coefficient", judged=(0, 0.5))
+    dynamic: float = parameter(0.15, "", (0, 10), "Table 3", "dynamic coefficient", judged=(0, 0.5))
     stiction_velocity_mm_per_s: float = parameter(
-        10.0, "mm/s", (0, 1e6), "Table 3", "stiction transition velocity", above=True
+        10.0,
+        "mm/s",
+        (0, 1e6),
+        "Table 3",
+        "stiction transition velocity",
+        above=True,
+        judged=(0.1, 100),
     )
     friction_velocity_mm_per_s: float = parameter(
         100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True
@@ -249,11 +289,11 @@ class Friction:
     )
     bristle_stiffness_per_mm: float | None = parameter(
         None, "1/mm", (0, 1e9), "ours", "LuGre's sigma_0 over the normal force; 100 by default",
-        above=True, optional=True,
+        above=True, optional=True, judged=(10.0, 1e4),
     )  # fmt: skip
     bristle_damping_s_per_mm: float | None = parameter(
         None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_1 over the normal force; 0.03 by default",
-        optional=True,
+        optional=True, judged=(1e-3, 0.1),
     )  # fmt: skip
     viscous_s_per_mm: float | None = parameter(
         None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_2 over the normal force; 0 by default",

@@ -25,11 +25,16 @@ class Lubricant:
 
     viscosity_mPa_s: float = parameter(
         30.0, "mPa s", (0, 1e6), "ISO VG 100 at about 65 °C (ISO 3448)", "dynamic viscosity",
-        above=True,
+        above=True, judged=(3.0, 300.0),
     )  # fmt: skip
     bearing_length_mm: float = parameter(
         20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bearings", above=True
     )
     last_share: float = parameter(
-        0.02, "", (0.001, 0.5), "ours", "of the clearance, in which the film bears no more"
+        0.02,
+        "",
+        (0.001, 0.5),
+        "ours",
+        "of the clearance, in which the film bears no more",
+        judged=(0.01, 0.1),
     )

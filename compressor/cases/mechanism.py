@@ -23,24 +23,28 @@ class Guide:
     """
 
     clearance_mm: float = parameter(
-        0.0, "mm", (0, 100), OURS, "between crosshead and guide, on each side"
+        0.0, "mm", (0, 100), OURS, "between crosshead and guide, on each side", judged=(0.01, 0.2)
     )
-    friction: float = parameter(0.05, "", (0, 10), OURS, "coefficient of friction, oiled")
+    friction: float = parameter(
+        0.05, "", (0, 10), OURS, "coefficient of friction, oiled", judged=(0.01, 0.2)
+    )
     stiction_velocity_mm_per_s: float = parameter(
         10.0, "mm/s", (0, 1e6), "Table 3, of the joints", "speed at which friction is three "
         "quarters of its greatest", above=True,
     )  # fmt: skip
     crosshead_length_mm: float = parameter(
-        120.0, "mm", (0.001, 1e4), OURS, "the crosshead's length"
+        120.0, "mm", (0.001, 1e4), OURS, "the crosshead's length", judged=(60.0, 250.0)
     )
-    crosshead_height_mm: float = parameter(80.0, "mm", (0.001, 1e4), OURS, "the crosshead's height")
+    crosshead_height_mm: float = parameter(
+        80.0, "mm", (0.001, 1e4), OURS, "the crosshead's height", judged=(40.0, 150.0)
+    )
     crosshead_inertia_kg_m2: float | None = parameter(
         None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
         "the crosshead's inertia about its pin", above=True, optional=True,
     )  # fmt: skip
     stiffness_N_per_mm15: float = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
-        "contact stiffness of a corner, in N/mm^exponent", above=True,
+        "contact stiffness of a corner, in N/mm^exponent", above=True, judged=(3e4, 3e6),
     )  # fmt: skip
     exponent: float | None = parameter(
         None, "", (1, 3), "as the joints'", "force exponent of a corner", optional=True
@@ -75,11 +79,22 @@ class Drive:
     """
 
     flywheel_kg_m2: float = parameter(
-        5.0, "kg m2", (0, 1e9), OURS, "inertia of crank, flywheel and motor", above=True
+        5.0,
+        "kg m2",
+        (0, 1e9),
+        OURS,
+        "inertia of crank, flywheel and motor",
+        above=True,
+        judged=(1.0, 100.0),
     )
     torque_N_m: float = parameter(0.0, "N m", (-1e9, 1e9), OURS, "torque at machine.speed_rpm")
     slope_N_m_s: float = parameter(
-        100.0, "N m s", (0, 1e9), OURS, "by which the torque grows for each rad/s that speed falls"
+        100.0,
+        "N m s",
+        (0, 1e9),
+        OURS,
+        "by which the torque grows for each rad/s that speed falls",
+        judged=(10.0, 1e4),
     )
     unbalance_kg_mm: float = parameter(
         0.0, "kg mm", (0, 1e9), OURS,
@@ -101,17 +116,34 @@ class Rod:
     """
 
     youngs_modulus_GPa: float = parameter(
-        207.0, "GPa", (0, 1e6), "Table 2, steel", "modulus of elasticity", above=True
+        207.0,
+        "GPa",
+        (0, 1e6),
+        "Table 2, steel",
+        "modulus of elasticity",
+        above=True,
+        judged=(70.0, 250.0),
     )
     depth_mm: float = parameter(
         40.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar", "section, in the plane of motion",
-        above=True,
+        above=True, judged=(20.0, 80.0),
     )  # fmt: skip
     width_mm: float = parameter(
-        25.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar", "section, across it", above=True
+        25.0,
+        "mm",
+        (0, 1e4),
+        "assumed: a 600 x 40 x 25 mm bar",
+        "section, across it",
+        above=True,
+        judged=(10.0, 50.0),
     )
     damping_ratio: float = parameter(
-        0.005, "", (0, 1), OURS, "of the first bending mode, in proportion to stiffness"
+        0.005,
+        "",
+        (0, 1),
+        OURS,
+        "of the first bending mode, in proportion to stiffness",
+        judged=(2e-3, 0.1),
     )
 
 

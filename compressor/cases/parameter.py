@@ -128,6 +128,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     optional: bool = False
     identity: bool = True  # whether it is part of a job's identity
+    judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
 
     @property
     def range(self) -> str:
@@ -162,6 +163,11 @@ class Parameter:
         span = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
         number = "a whole number" if self.kind == "integer" else "a number"
         return " or ".join([*self.choices, f"{number} in {span} {self.unit}".strip()])
+
+    @property
+    def judged_on(self) -> str:
+        """The range that the program was judged on, "" without one."""
+        return "{:g} to {:g}".format(*self.judged) if self.judged else ""
 
     def holds(self, value: float) -> bool:
         """Whether a number is in range."""
@@ -254,9 +260,9 @@ def documented(group: type[Group]) -> type[Group]:
         row = Parameter(item.name, default=item.default, **item.metadata)
         default = f"{row.default:g}" if isinstance(row.default, float) else repr(row.default)
         needed = row.needed.replace("true or false", "True or False")
-        lines.append(
-            f"- `{row.key}`: {row.phrase}. Needs {needed}; default {default} ({row.source})."
-        )
+        judged = f" Judged on {row.judged_on}." if row.judged else ""
+        needs = f"Needs {needed}; default {default} ({row.source})."
+        lines.append(f"- `{row.key}`: {row.phrase}. {needs}{judged}")
     text = cleandoc(group.__doc__ or "")
     group.__doc__ = f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
     return group
@@ -264,10 +270,12 @@ def documented(group: type[Group]) -> type[Group]:
 
 def parameter_table(rows: Iterable[Parameter]) -> str:
     """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
-    lines = ["| key | unit | default | range | source | what it is |", "|---|---|---|---|---|---|"]
+    head = ("key", "unit", "default", "range", "judged on", "source", "what it is")
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)
         default = shown(row.default) if row.kind == "boolean" else default.removesuffix(".0")
-        cells = (f"`{row.key}`", row.unit, default, row.range, row.source, row.phrase)
+        key, judged = f"`{row.key}`", row.judged_on
+        cells = (key, row.unit, default, row.range, judged, row.source, row.phrase)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

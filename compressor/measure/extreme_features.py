@@ -6,29 +6,31 @@ Each number is drawn evenly in its logarithm, from the whole range or the suppor
 import random
 from typing import Any
 
+from compressor.cases import judged_range
+
 SHARE = 0.3  # of the scenes that have each feature
 # group -> key -> (whole range, supported range), in the case file's units
 RANGES = {
     "lubricant": {
-        "viscosity_mPa_s": ((0.1, 1e4), (3.0, 300.0)),
-        "last_share": ((0.002, 0.3), (0.01, 0.1)),
+        "viscosity_mPa_s": ((0.1, 1e4), judged_range("lubricant.viscosity_mPa_s")),
+        "last_share": ((0.002, 0.3), judged_range("lubricant.last_share")),
     },
     "guide": {
-        "clearance_mm": ((1e-3, 1.0), (0.01, 0.2)),
-        "friction": ((1e-3, 0.5), (0.01, 0.2)),
-        "crosshead_length_mm": ((20.0, 500.0), (60.0, 250.0)),
-        "crosshead_height_mm": ((20.0, 500.0), (40.0, 150.0)),
-        "stiffness_N_per_mm15": ((1e3, 1e7), (3e4, 3e6)),
+        "clearance_mm": ((1e-3, 1.0), judged_range("guide.clearance_mm")),
+        "friction": ((1e-3, 0.5), judged_range("guide.friction")),
+        "crosshead_length_mm": ((20.0, 500.0), judged_range("guide.crosshead_length_mm")),
+        "crosshead_height_mm": ((20.0, 500.0), judged_range("guide.crosshead_height_mm")),
+        "stiffness_N_per_mm15": ((1e3, 1e7), judged_range("guide.stiffness_N_per_mm15")),
     },
     "drive": {
-        "flywheel_kg_m2": ((0.1, 1e3), (1.0, 100.0)),
-        "slope_N_m_s": ((0.1, 1e5), (10.0, 1e4)),
+        "flywheel_kg_m2": ((0.1, 1e3), judged_range("drive.flywheel_kg_m2")),
+        "slope_N_m_s": ((0.1, 1e5), judged_range("drive.slope_N_m_s")),
     },
     "rod": {
-        "youngs_modulus_GPa": ((10.0, 1e3), (70.0, 250.0)),
-        "depth_mm": ((5.0, 200.0), (20.0, 80.0)),
-        "width_mm": ((5.0, 200.0), (10.0, 50.0)),
-        "damping_ratio": ((1e-4, 0.3), (2e-3, 0.1)),
+        "youngs_modulus_GPa": ((10.0, 1e3), judged_range("rod.youngs_modulus_GPa")),
+        "depth_mm": ((5.0, 200.0), judged_range("rod.depth_mm")),
+        "width_mm": ((5.0, 200.0), judged_range("rod.width_mm")),
+        "damping_ratio": ((1e-4, 0.3), judged_range("rod.damping_ratio")),
     },
 }
 LENGTHS = ((0.15, 0.99), (0.4, 0.99))  # of a bearing over its diameter

@@ -18,25 +18,38 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from compressor.cases import Case, design, table
+from compressor.cases import Case, design, judged_range, table
 from compressor.measure.extreme_features import features
 from compressor.metrics import JOINTS
 
+Span = tuple[float, float]
+
+
+def _judged(key: str, factor: float = 1.0) -> Span:
+    """The supported range of a key: the one that the table of parameters has, times a factor."""
+    low, high = judged_range(key)
+    return low * factor, high * factor
+
+
 # name: (unit, whole range, supported range, log-uniform)
-SPANS: dict[str, tuple[str, tuple[float, float], tuple[float, float] | None, bool]] = {
-    "clearance_big_end": ("m", (1e-9, 3e-3), (1e-6, 1e-3), True),
-    "clearance_small_end": ("m", (1e-9, 3e-3), (1e-6, 1e-3), True),
-    "stiffness": ("N/m^1.5", (1e6, 1e14), (1e8, 1e12), True),
-    "exponent": ("1", (1.0, 2.2), None, False),
+SPANS: dict[str, tuple[str, Span, Span | None, bool]] = {
+    "clearance_big_end": ("m", (1e-9, 3e-3), _judged("clearance_mm.big_end", 1e-3), True),
+    "clearance_small_end": ("m", (1e-9, 3e-3), _judged("clearance_mm.small_end", 1e-3), True),
+    "stiffness": (
+        "N/m^1.5", (1e6, 1e14), _judged("contact.stiffness_N_per_mm15", 1000.0**1.5), True,
+    ),
+    "exponent": ("1", _judged("contact.exponent"), None, False),
     "damping": ("1", (1e-2, 1e2), None, True),  # over the paper's; a tenth of the scenes has none
-    "friction": ("1", (0.0, 1.0), (0.0, 0.5), False),
-    "stiction_velocity": ("m/s", (1e-6, 0.1), (1e-4, 0.1), True),
-    "rod_mass": ("kg", (1e-3, 100.0), (0.1, 50.0), True),
-    "reciprocating_mass": ("kg", (1e-3, 100.0), (0.1, 50.0), True),
-    "speed": ("rpm", (1.0, 20_000.0), (50.0, 6000.0), True),
-    "pin_radius": ("m", (0.01, 0.1), None, True),
+    "friction": ("1", (0.0, 1.0), _judged("friction.static"), False),
+    "stiction_velocity": (
+        "m/s", (1e-6, 0.1), _judged("friction.stiction_velocity_mm_per_s", 1e-3), True,
+    ),
+    "rod_mass": ("kg", (1e-3, 100.0), _judged("machine.rod_mass_kg"), True),
+    "reciprocating_mass": ("kg", (1e-3, 100.0), _judged("machine.reciprocating_mass_kg"), True),
+    "speed": ("rpm", (1.0, 20_000.0), _judged("machine.speed_rpm"), True),
+    "pin_radius": ("m", _judged("machine.pin_radius_mm", 1e-3), None, True),
     "rtol": ("1", (1e-10, 1e-2), None, True),
-}
+}  # fmt: skip
 OTHERS = 3 + 3 * len(JOINTS)  # friction's ratio, load, scene; how each journal starts
 LOADS = ("none", "typical", "design")
 SCENES = ("big_end", "small_end", "both")
@@ -50,12 +63,15 @@ CRANK = 0.12  # m
 SAMPLES = 720  # of the output grid
 # (whole range, supported range) of what chosen laws read, drawn evenly in the logarithm
 OF_LAWS = {
-    "contact.restitution": ((0.05, 1.0), (0.3, 0.95)),
-    "contact.least_approach_mm_per_s": ((0.1, 1000.0), (1.0, 100.0)),
-    "contact.length_mm": ((1.0, 1000.0), (10.0, 100.0)),
-    "contact.modulus_GPa": ((0.1, 1000.0), (10.0, 250.0)),
-    "friction.bristle_stiffness_per_mm": ((1.0, 1e5), (10.0, 1e4)),
-    "friction.bristle_damping_s_per_mm": ((1e-4, 0.3), (1e-3, 0.1)),
+    "contact.restitution": ((0.05, 1.0), _judged("contact.restitution")),
+    "contact.least_approach_mm_per_s": ((0.1, 1000.0), _judged("contact.least_approach_mm_per_s")),
+    "contact.length_mm": ((1.0, 1000.0), _judged("contact.length_mm")),
+    "contact.modulus_GPa": ((0.1, 1000.0), _judged("contact.modulus_GPa")),
+    "friction.bristle_stiffness_per_mm": ((1.0, 1e5), _judged("friction.bristle_stiffness_per_mm")),
+    "friction.bristle_damping_s_per_mm": (
+        (1e-4, 0.3),
+        _judged("friction.bristle_damping_s_per_mm"),
+    ),
     "friction.viscous_s_per_mm": ((1e-6, 1e-2), (1e-5, 1e-3)),
 }
 LAWS, FEATURES = "laws", "features"

@@ -1,4 +1,4 @@
-"""Where a case leaves the domain of its laws, or looks like a slip of units (`unit_slips`).
+"""Where a case leaves the domain of its laws or the judged range, or looks like a slip of units.
 
 Nothing here is refused: a case is spoken of once, before it runs, and grouped over a sweep. What
 cannot be simulated at all is refused by `compressor.cases.conflicts`.
@@ -19,6 +19,7 @@ from compressor.cases import (
     Machine,
     Study,
     joint_stiffness,
+    outside_judged,
     with_ideal_joints,
 )
 from compressor.solve.ideal_scene import closed_form
@@ -33,6 +34,7 @@ from compressor.solve.si_record import record
 from compressor.solve.unit_slips import slips
 
 SHALLOW = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
+LONGEST_CRANK = 0.35  # of the rod's length; 0.15 to 0.3 is usual
 LEAST_STICTION = 0.1  # mm/s: below it, friction all but sticks
 MOST_JOBS = 500  # of a study that are looked at
 SHORT = 4.0  # a budget this many times below what is expected; so far is that to be trusted
@@ -63,6 +65,8 @@ def remarks(case: Case) -> Iterator[Remark]:
     """What is odd about a case by itself; nothing about the defaults."""
     joints = list(contact_scales(case))
     yield from _inertias(case)
+    yield from _proportions(case)
+    yield from _beyond_judged(case)
     for joint in joints:
         yield from _default_stiffness(case, joint.joint)
         yield from _depths(case, joint)
@@ -86,6 +90,24 @@ def _inertias(case: Case) -> Iterator[Remark]:
     if (machine.rod_inertia_kg_m2 or 0.0) > most:
         text = f"{machine.rod_inertia_kg_m2:g} kg m2 is more than all mass a rod apart, {most:.3g}"
         yield Remark("machine.rod_inertia_kg_m2", text, "unit")
+
+
+def _proportions(case: Case) -> Iterator[Remark]:
+    """A crank that is long for its rod, as where the stroke is given as the crank radius."""
+    radius, length = case.machine.crank_radius_mm, case.machine.rod_length_mm
+    if radius > LONGEST_CRANK * length:
+        text = (
+            f"{radius:g} mm is {radius / length:.2g} of the rod's length, more than the usual "
+            f"{LONGEST_CRANK:g}: the crank radius is half the stroke"
+        )
+        yield Remark("machine.crank_radius_mm", text, "proportion")
+
+
+def _beyond_judged(case: Case) -> Iterator[Remark]:
+    """Values outside the range that the program was judged on; both joints' as one key's."""
+    for key, text in outside_judged(case.values()).items():
+        shared = key.startswith("clearance_mm.")
+        yield Remark("clearance_mm" if shared else key, text, "judged")
 
 
 def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
