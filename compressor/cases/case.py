@@ -20,6 +20,7 @@ from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
 from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
 from compressor.cases.unknown import SWEEP, meant
+from compressor.cases.vibration import filled_body
 from compressor.cases.wear import filled_wear
 from compressor.metrics import JOINTS
 
@@ -130,6 +131,7 @@ class Case(Settings):
         resolved: dict[str, Any] = {"machine": machine, "solve": solve, "contact": contact}
         resolved["friction"] = friction
         resolved["guide"] = self.guide and filled_guide(self.guide, machine.reciprocating_mass_kg)
+        resolved["body"] = self.body and filled_body(self.body)
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
             resolved["clearance_mm"] = replace(self.clearance_mm, **unused)

@@ -39,6 +39,7 @@ SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 FILLED_IN = {
     "machine.rod_centre_mm": ("machine.rod_length_mm",),
     "machine.rod_inertia_kg_m2": ("machine.rod_mass_kg", "machine.rod_length_mm"),
+    "body.casing_mass_kg": ("body.mass_kg",),
     **{f"clearance_mm.{joint}": ("joint",) for joint in JOINTS},
 }
 

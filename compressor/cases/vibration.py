@@ -1,10 +1,11 @@
 """The groups of a case file that say what stands on the foundation, and what listens to it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from compressor.cases.parameter import choice, documented, parameter
 
 OURS = "ours"
+BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mode
 
 
 @documented
@@ -44,9 +45,10 @@ class Body:
         True, (), OURS, "a casing mode at the guide and one at the main bearing, heard by sensors",
         kind="boolean",
     )  # fmt: skip
-    casing_mass_kg: float = parameter(
-        20.0, "kg", (0, 1e6), OURS, "modal mass of a casing mode", above=True
-    )
+    casing_mass_kg: float | None = parameter(
+        None, "kg", (0, 1e6), "ours: a 25th of the body's mass", "modal mass of a casing mode",
+        above=True, optional=True,
+    )  # fmt: skip
     casing_frequency_Hz: float = parameter(
         2000.0, "Hz", (0, 1e5), OURS, "natural frequency of a casing mode", above=True
     )
@@ -105,3 +107,10 @@ class Sensor:
         None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
         kind="integer", optional=True,
     )  # fmt: skip
+
+
+def filled_body(body: Body) -> Body:
+    """Return a body with the modal mass of its casing, by default a 25th of the body's mass."""
+    if body.casing_mass_kg is not None:
+        return body
+    return replace(body, casing_mass_kg=body.mass_kg / BODIES_PER_CASING)

@@ -78,4 +78,5 @@ def casing_acceleration(body: Body, force: np.ndarray, step: float) -> np.ndarra
     A mode of some hundred Hz and more forgets its start within a revolution; it starts at rest.
     """
     how = body.casing_frequency_Hz, body.casing_damping_ratio
+    assert body.casing_mass_kg is not None  # as of a Case, which fills it in
     return oscillate(force / body.casing_mass_kg, step, *how).acceleration
