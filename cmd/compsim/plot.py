@@ -3,7 +3,7 @@
 import click
 
 from compressor.program import did_you_mean
-from compsim.results import folders, jobs, of_results, one_word, results_folder
+from compsim.results import ONE_JOB, folders, jobs, of_results, results_folder, some_words
 from compsim.screen import (
     DONE,
     print_text,
@@ -28,7 +28,7 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 
 
 @click.command()
-@of_results("JOB|STUDY", jobs)
+@of_results(ONE_JOB, jobs)
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
     help="Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map; of a study "
@@ -54,7 +54,15 @@ def plot(
     over: str,
     at: tuple[str, ...],
 ) -> int:
-    """Draw one job, named by its key or the beginning of it, or a study; prints files and captions.
+    """Draw one job, or a study; prints files and captions.
+
+    A job is named as in compsim show: by the beginning of its key, or by its study and values of
+    the study's axes. A study's name alone means the study.
+
+    \b
+    compsim plot 3fa9c2
+    compsim plot bearing-wear clearance_mm=0.2 machine.rod_mass_kg=3
+    compsim plot bearing-wear --over clearance_mm --at machine.rod_mass_kg=3
 
     A job's signals over crank angle, spectra, orbits, contact modes and impacts, beside the same
     machine without clearance; a study's order spectra and contact modes over a swept axis; a
@@ -62,7 +70,7 @@ def plot(
     sections, and a map of periods over two parameters. Nothing but what is stored is needed.
     """
     folder, words = results_folder(given, folder)
-    target = one_word(words, "JOB|STUDY")
+    name, *values = some_words(words)
     from compressor.store import writable_folder
 
     writable_folder(output, make=False)
@@ -70,10 +78,13 @@ def plot(
     from compressor.report import PlotChoice, write_plots, write_regime_plots
 
     choice = PlotChoice(what, over, at, KINDS[form])
-    if target in followed_studies(folder):
-        drawn = write_regime_plots(open_regimes(folder, target), output, target, choice)
+    if name in followed_studies(folder):
+        if values:
+            listed = " ".join(f"--at {value}" for value in values)
+            raise click.UsageError(f"{name} is a study of regimes, without jobs: give {listed}")
+        drawn = write_regime_plots(open_regimes(folder, name), output, name, choice)
     else:
-        drawn = write_plots(folder, output, target, choice)
+        drawn = write_plots(folder, output, words, choice)
     for found in drawn:
         print_text(" ".join(map(str, found.paths)))
         print_text(f"  {found.caption}")

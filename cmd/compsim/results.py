@@ -16,6 +16,8 @@ from click.shell_completion import CompletionItem
 
 MOST_BYTES = 5_000_000  # of the files of studies that are read for keys and axes
 HEXADECIMAL = re.compile("[0-9a-f]{2,20}")
+ONE_JOB = "JOB | STUDY [AXIS=VALUE]..."  # what `show` and `plot` take
+STUDY_FILES = ("studies/{}.json", "former/{}.json", "regimes/{}/study.json")
 
 Items = list["CompletionItem[Any]"]  # a generic class from click 8.4.2 on
 Complete = Callable[[click.Context, click.Parameter, str], Items]
@@ -51,8 +53,8 @@ def results_folder(
 
 
 def is_study(name: str, folder: str) -> bool:
-    """Whether a folder of results has a study of this name."""
-    return Path(folder, "studies", f"{name}.json").exists()
+    """Return whether a folder of results has a study of this name, a former one or of regimes."""
+    return any(Path(folder, path.format(name)).exists() for path in STUDY_FILES)
 
 
 def one_word(words: Sequence[str], name: str, context: Any = None) -> str:
@@ -62,6 +64,13 @@ def one_word(words: Sequence[str], name: str, context: Any = None) -> str:
     if len(words) > 1:
         raise click.UsageError(f"takes one {name}, not {len(words)}: {', '.join(words)}", context)
     return words[0]
+
+
+def some_words(words: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the words that name a job, or a study. Raises UsageError where there are none."""
+    if not words:
+        raise click.UsageError(f"Missing argument '{ONE_JOB}'")
+    return words
 
 
 def files(_: click.Context, __: click.Parameter, word: str) -> Items:

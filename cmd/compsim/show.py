@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from compressor.program import printable
-from compsim.results import jobs, of_results, results_folder
+from compsim.results import ONE_JOB, jobs, of_results, results_folder, some_words
 from compsim.screen import (
     DONE,
     as_json,
@@ -36,7 +36,7 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
 
 
 @click.command()
-@of_results("JOB | STUDY [AXIS=VALUE]...", jobs)
+@of_results(ONE_JOB, jobs)
 @click.option("--case", "only_case", is_flag=True,
               help="The case alone, as a case file with all keys.")  # fmt: skip
 @click.option(
@@ -70,11 +70,9 @@ def show(
     degrees and 3 percent, or as a maker does. --json has all numbers in SI.
     """
     folder, words = results_folder(given, folder)
-    if not words:
-        raise click.UsageError("Missing argument 'JOB | STUDY [AXIS=VALUE]...'")
     from compressor.store import report_job
 
-    found = report_job(folder, *words)
+    found = report_job(folder, *some_words(words))
     if as_json:
         print_text(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
     elif only_case:

@@ -16,55 +16,40 @@ from compressor.analysis import (
     shaking,
 )
 from compressor.cases import points
-from compressor.program import did_you_mean
 from compressor.reasons import remedy
 from compressor.report.figures import Drawing
 from compressor.report.figures.contact import draw_impacts, draw_modes, draw_orbits
 from compressor.report.figures.job import draw_signals, draw_spectra
 from compressor.report.figures.study_maps import draw_map, draw_waterfall
 from compressor.report.plot_choice import PlotChoice, PlotError, Plotted, chosen, published
-from compressor.store import Folder, Stored, StoredStudy, read_store, read_studies
+from compressor.store import Folder, Stored, StoredStudy, find_job, read_store, read_studies
 
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
 OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
 MOST_ROWS = 200  # of a map
-MOST_NAMES = 5
 SHORT = 10  # digits of a key in the name of a file
 KEEP = "run it again with --set output.keep=series"
 
 
 def write_plots(
-    results: Folder, output: Folder, target: str, choice: PlotChoice
+    results: Folder, output: Folder, words: Sequence[str], choice: PlotChoice
 ) -> Iterator[Plotted]:
-    """Draw a study by its name or a job by the beginning of its key; yields what was written.
+    """Draw a study by its name, or a job by the words that `show` takes; yields what was written.
 
-    Raises PlotError where there is no such study or job, or it cannot be drawn; StoreError where
+    words: the beginning of a job's key, or a study, and `axis=value` until one job is left. Raises
+    WrongName where they name none or several, PlotError where it cannot be drawn; StoreError where
     the store cannot be read or the files not be written.
     """
     stored, studies = read_store(results).warned(), read_studies(results, former=True)
     named = {study.name: study for study in studies}
-    if target in named:
-        drawn = study_figures(stored, named[target], choice)
-        stem = target
+    if len(words) == 1 and words[0] in named:
+        drawn = study_figures(stored, named[words[0]], choice)
+        stem = words[0]
     else:
-        key = job_key(stored, studies, target)
+        key = find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:SHORT]
     yield from published(drawn, output, stem, choice.kinds)
-
-
-def job_key(stored: Stored, studies: Sequence[StoredStudy], target: str) -> str:
-    """The one job whose key begins so; PlotError with the nearest names where there is none."""
-    keys = stored.keys().union(*(study.keys for study in studies))
-    like = sorted(key for key in keys if target and key.startswith(target))
-    if len(like) == 1:
-        return like[0]
-    some = ", ".join(like[:MOST_NAMES]) + (", …" if len(like) > MOST_NAMES else "")
-    if like:
-        raise PlotError(f"{len(like)} jobs' keys begin with {target!r}: {some}; give more digits")
-    names = [study.name for study in studies]
-    near = did_you_mean(target, names) or f"it has {', '.join(names[:MOST_NAMES])}"
-    raise PlotError(f"{stored.folder} has no study {target!r}, and no job's key begins so; {near}")
 
 
 def job_figures(

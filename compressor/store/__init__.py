@@ -4,7 +4,7 @@ from compressor.store.export import RECORD_HEADER, Exported, ExportOptions, expo
 from compressor.store.files import Folder, StoreError, StoreWarning, publish, writable_folder
 from compressor.store.folders import models_file
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.names import find_study
+from compressor.store.names import find_job, find_study
 from compressor.store.reader import Stored, open_study, read_job, read_store
 from compressor.store.series_file import (
     read_dataset,

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +124,29 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     assert FILM in PLOT_CAPTIONS["study"]["map"](rows, "clearance")
 
 
+def test_a_job_is_named_as_in_show(plot, folder, capsys):
+    words = ["worn", "clearance_mm=0.3", "machine.speed_rpm=500"]
+    assert cli.main(["show", *words, "-i", str(folder), "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["key"]
+    code, found, err = plot(*words, "--what", "orbits")
+    assert (code, [*found], err) == (0, [f"plots/{shown[:10]}-orbits.png"], "")
+    assert shown == key(folder, "worn", 3)
+
+
+def test_a_folder_and_a_study_of_one_name_are_told_apart(plot, folder, tmp_path, capsys):
+    """Whatever kind of study it is: `plot -i worn worn` draws the study in the folder."""
+    shutil.copytree(folder, tmp_path / "worn")
+    for words in (["worn", "worn"], ["-i", "worn", "worn"], ["worn/", "worn"]):
+        assert cli.main(["plot", *words, "--what", "waterfall"]) == 0
+        assert capsys.readouterr().out.startswith("plots/worn-waterfall.png\n")
+    (tmp_path / "reg/regimes/reg").mkdir(parents=True)
+    (tmp_path / "reg/regimes/reg/study.json").touch()
+    for words in (["reg", "reg"], ["-i", "reg", "reg"]):
+        assert cli.main(["plot", *words, "speed_rpm=400"]) == 2
+        problem = "reg is a study of regimes, without jobs: give --at speed_rpm=400"
+        assert problem in capsys.readouterr().err
+
+
 def test_chosen_figures_in_both_formats(plot, folder):
     mine = key(folder, "worn")
     code, found, _ = plot(mine, "--what", "orbits,impacts", "--format", "both", "-o", "some")
@@ -182,7 +206,13 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["wron"], "no study 'wron', and no job's key begins so; did you mean worn"),
+        (["wron"], "no job's key begins with 'wron', and no study is called so; did you mean worn"),
+        (
+            ["worn", "clearance_mm=0.3"],
+            "2 jobs of worn have clearance_mm=0.3; choose one",
+        ),
+        (["worn", "clearance_mm=0.2"], "no job of worn has clearance_mm=0.2; there are 0.1, 0.3"),
+        ([], "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
         (["worn", "--what", "orbits"], "worn is a study: for orbits name a job, such as"),
         (["worn", "--what", "noise"], "there is no figure 'noise'; there are signals"),
         (["worn", "--over", "mass"], "worn has no axis 'mass': its axes are clearance_mm,"),

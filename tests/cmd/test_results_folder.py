@@ -38,10 +38,14 @@ def here(paper_store, tmp_path, monkeypatch):
         (["wear", "big-end"], "wear", True, "wear", ["big-end"]),
         (["both/", "x"], None, True, "both/", ["x"]),
         (["both", "x"], "results", True, "results", ["both", "x"]),
+        (["reg"], "reg", True, "reg", ["reg"]),
+        (["reg"], "./reg", True, "./reg", ["reg"]),
     ],
 )
 def test_the_folder_is_the_first_word_or_an_option(words, option, named, folder, rest, here):
     Path("both").mkdir()  # also a study's name
+    Path("reg/regimes/reg").mkdir(parents=True)
+    Path("reg/regimes/reg/study.json").touch()
     assert results_folder(words, option, named) == (folder, tuple(rest))
 
 
