@@ -22,6 +22,7 @@ from compressor.solve.series import a_turn, distances
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
 BUDGET = 3.0  # times the evaluations of the runs, for twins
 WORK = 20.0  # times the evaluations of the first run, for tighter runs and twins together
+FOR_RUNS = 0.75  # of that, for runs: what they leave shows whether the motion is chaotic
 LEAST_WORK = 20_000_000  # evaluations that they may take at least: about 2 s
 TWO = 2  # motions that march in step
 SHORT = 0.5  # rev: looked at first
@@ -59,9 +60,14 @@ class Search:
         return self.case.solve.timeout_s - (time.monotonic() - self.began)
 
     @property
+    def work(self) -> float:
+        """Evaluations that the job's runs and twins may take together."""
+        return max(WORK * self.first, LEAST_WORK)
+
+    @property
     def work_left(self) -> float:
-        """Evaluations that tighter runs and twins may still take."""
-        return max(WORK * self.first, LEAST_WORK) - self.of_runs - self.of_twins
+        """Evaluations that twins may still take."""
+        return self.work - self.of_runs - self.of_twins
 
     def count(self, run: Trajectory) -> None:
         """Count the evaluations of a run."""
@@ -70,14 +76,15 @@ class Search:
         self.per_step = max(run.evaluations / max(run.steps + run.rejected, 1), 1.0)
 
     def within_budget(self, case: Case, evaluations: float | None = None) -> Case:
-        """Return the case with no more steps than so many evaluations allow, or what is left.
+        """Return the case with no more steps than so many evaluations, or the runs' budget, allow.
 
         A first run has the case's own limit of steps.
         """
         if not self.first:
             return case
-        most = self.work_left if evaluations is None else evaluations
-        steps = min(case.solve.max_steps, max(1, int(most / self.per_step)))
+        if evaluations is None:
+            evaluations = FOR_RUNS * self.work - self.of_runs - self.of_twins
+        steps = min(case.solve.max_steps, max(1, int(evaluations / self.per_step)))
         return replace(case, solve=replace(case.solve, max_steps=steps))
 
     def limit_of(self, run: Trajectory) -> str:
@@ -88,8 +95,8 @@ class Search:
         ):
             return ""
         return (
-            f"more than the {WORK:g}-fold work of the first run, to which a job is limited; "
-            "solve.rtol sets a tolerance without this limit"
+            f"more than {FOR_RUNS * self.work:.3g} evaluations in all, the budget of a job's runs; "
+            "solve.rtol sets a tolerance without it"
         )
 
     def look(self, whole: bool) -> bool:

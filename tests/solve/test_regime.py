@@ -18,6 +18,7 @@ from compressor.solve.horizon import Parting, predictability_horizon
 from compressor.solve.regime import (
     BUDGET,
     CLOSE,
+    FOR_RUNS,
     LEAST_WORK,
     RTOL,
     SHORT,
@@ -192,25 +193,42 @@ def test_runs_and_twins_have_twenty_times_the_first_run_s_work(monkeypatch):
     assert Search(of).within_budget(of) is of
     assert searched(of, 6000).work_left == LEAST_WORK - 6000
     asked = followed(monkeypatch, Parting(0.0, False, True), needs=10**7)
-    search = searched(of, 6_000_000, 54_000_000)
-    assert search.within_budget(of).solve.max_steps == 60_000_000 // 6 // 2 == of.solve.max_steps
-    search.count(run_of(48_000_000))
-    left = WORK * 6_000_000 - 108_000_000
+    search = searched(of, 6_000_000, 42_000_000)
+    left = FOR_RUNS * WORK * 6_000_000 - 48_000_000
+    assert search.within_budget(of).solve.max_steps == min(left // 6, of.solve.max_steps)
+    search.count(run_of(42_000_000))
+    assert search.within_budget(of).solve.max_steps == 1
+    left = WORK * 6_000_000 - 90_000_000
     assert search.work_left == left
-    assert search.within_budget(of).solve.max_steps == left // 6
     search.look(whole=True)
     assert asked == [(SHORT, RTOL, left // 6 // 2)]
     assert search.stopped
     assert search.work_left == 0
-    assert search.within_budget(of).solve.max_steps == 1
 
 
 def test_a_run_that_the_budget_ended_says_so():
     search = searched(case(), 6000)
     ended = run_of(6_000_000, reason="budget_steps")
-    assert search.limit_of(ended).startswith("more than the 20-fold work of the first run")
+    assert search.limit_of(ended).startswith("more than 1.5e+07 evaluations in all, the budget")
     assert search.limit_of(run_of(6 * 5_000_000, reason="budget_steps")) == ""
     assert search.limit_of(run_of(6000, reason="budget_seconds")) == ""
+
+
+def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkeypatch):
+    """However fast the clock runs: the budget counts evaluations."""
+    monkeypatch.setattr(regime, "LEAST_WORK", 0)
+    monkeypatch.setattr(regime, "WORK", 4.0)
+    machine = {"rod_mass_kg": 6.276, "reciprocating_mass_kg": 11.54, "speed_rpm": 190.1}
+    values = {"joint": "big_end", "clearance_mm": 0.06779, "machine": machine}  # ill-conditioned
+    found = measure(case(values, accuracy="fine"))
+    assert (found.status, found.reason) == ("failed", "accuracy_not_reached")
+    assert "evaluations in all, the budget of a job's runs; solve.rtol sets" in found.detail
+    assert found.numbers["acceleration_error"] > 1e-4
+    slow, clock = itertools.count(), time.monotonic
+    monkeypatch.setattr(time, "monotonic", lambda: clock() + 0.1 * next(slow))
+    again = measure(case(values, accuracy="fine"))
+    assert again.detail == found.detail
+    assert again.attributes["regime"] == found.attributes["regime"]
 
 
 def test_a_search_ends_with_the_job_s_time(monkeypatch):

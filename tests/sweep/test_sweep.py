@@ -277,7 +277,7 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     needs = warm_up.Needs(("auto", "Radau"), True, (3,), laws=True)
     ahead = ["Radau", "auto", "horizon", "lanes-3", "laws", "laws-horizon"]
     assert sorted(needs.parts) == ahead
-    assert warm_up.compile_seconds(needs) == 60 + 5 + 20 + 70 + 60 + 20
+    assert warm_up.compile_seconds(needs) == 60 + 5 + 10 + 70 + 60 + 10
     loaded, told = [], []
 
     def load(alone):
@@ -292,7 +292,7 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         warm_up.compile_once(needs, pytest.fail)
     assert list(needs.uncompiled) == ["lanes-3", "laws", "laws-horizon"]
-    assert warm_up.compile_seconds(needs) == 70 + 60 + 20
+    assert warm_up.compile_seconds(needs) == 70 + 60 + 10
     loaded.clear()
     warm_up.compile_once(needs, pytest.fail)
     assert loaded == [needs.parts[part] for part in ("lanes-3", "laws", "laws-horizon")]
