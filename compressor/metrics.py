@@ -205,4 +205,5 @@ SOMETIMES: Rows = dict(STATISTICS)  # absent where no job has them
 for row in ROD_LOAD.values():
     SOMETIMES[row.name] = (row.dims, row.unit, row.phrase)
     SOMETIMES[f"{row.name}_error"] = (row.dims, row.unit, f"error bar of {row.name}")
+SOMETIMES["clipped_fraction"] = ((), "1", "fraction of the sensor's samples beyond its range")
 NUMBERS |= SOMETIMES

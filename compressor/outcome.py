@@ -31,17 +31,26 @@ def row(data: bytes = NOTHING) -> np.void:
 
 
 class Regime(StrEnum):
-    """How far a motion can be foretold; a run that was not asked has none.
-
-    PREDICTABLE: to its end, within its errors. PERIODIC: and it repeats itself. CHAOTIC: close
-    motions part before the end, so that statistics alone have a meaning. UNDECIDED: errors are
-    large, and the search for chaos came to its budget's end.
-    """
+    """How far a motion can be foretold, in `REGIME_WORDS`; a run that was not asked has none."""
 
     PREDICTABLE = "predictable"
     PERIODIC = "periodic"
     CHAOTIC = "chaotic"
     UNDECIDED = "undecided"
+
+
+# the one source of what a regime means, wherever one is shown
+REGIME_WORDS = {
+    Regime.PERIODIC: "repeats itself within its error bars",
+    Regime.PREDICTABLE: "errors do not grow up to the run's end; not seen to repeat",
+    Regime.CHAOTIC: "close motions part: averages hold, single peaks do not",
+    Regime.UNDECIDED: "errors are large, and the search for chaos came to its limit",
+}
+
+
+def regime_words(regime: str) -> str:
+    """Return a regime with what it means, as `periodic (repeats ...)`; another word as it is."""
+    return f"{regime} ({REGIME_WORDS[Regime(regime)]})" if regime in REGIME_WORDS else regime
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ MAY_IMPORT = {
     "cases": {"metrics"},
     "physics": set(),
     "vibration": {"cases"},
-    "diagnosis": {"cases", "store", "vibration"},
+    "diagnosis": {"cases", "outcome", "store", "vibration"},
     "solve": {"cases", "physics", "vibration", "outcome", "metrics", "reasons"},
     "store": {"cases", "outcome", "metrics", "reasons", "digits"},
     "sweep": {"cases", "solve", "store", "outcome", "reasons"},
@@ -38,7 +38,7 @@ MAY_IMPORT = {
                 "reasons"},
     "wear": {"cases", "solve", "store", "sweep", "metrics"},
     "compsim": {"analysis", "cases", "diagnosis", "digits", "machines", "measure", "metrics",
-                "reasons", "regimes", "report", "solve", "store", "sweep", "wear"},
+                "outcome", "reasons", "regimes", "report", "solve", "store", "sweep", "wear"},
 }  # fmt: skip
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "measure",

@@ -33,7 +33,7 @@ def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[
     shown = [name for name, row in metrics.METRICS.items() if row.kind != "count"]
     known = numbers(found, [*shown, *metrics.STATISTICS, *metrics.ROD_LOAD])
     told = aligned([*known, *reversal_verdict(found, *limits)])
-    yield "metrics, with their error bars", [*told, *cautions(found)]
+    yield "metrics, with their error bars", [*told, *cautions(found), *found.caveats]
     yield (
         "relative errors of the time series",
         aligned(series_errors(found, [*metrics.SERIES_ERRORS])),
@@ -208,5 +208,9 @@ def cautions(found: "JobReport") -> list[str]:
 
 def facts(found: "JobReport") -> list[Line]:
     """How a job was run, a line each."""
-    lines = [(name, str(found.attributes[name])) for name in FACTS if name in found.attributes]
+    from compressor.outcome import regime_words
+
+    told = {name: str(found.attributes[name]) for name in FACTS if name in found.attributes}
+    lines = [(name, regime_words(text) if name == "regime" else text)
+             for name, text in told.items()]  # fmt: skip
     return [*lines, ("file", os.path.relpath(found.file))] if found.file else lines

@@ -224,9 +224,20 @@ def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
             say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
     report_failures(summary)
     if not quiet:
+        tell_caveats([count.study for count in summary.counts], folder)
         tell_stale(summary)
         say(f"page: {os.path.join(page, 'index.html')}" if page
             else f"next: compsim report -i {shlex.quote(folder)}")  # fmt: skip
+
+
+def tell_caveats(names: list[str], folder: str) -> None:
+    """Say what only the runs of some studies tell of their numbers, `caution` the rest."""
+    from compressor.store import read_store, read_studies, run_caveats
+
+    rows = read_store(folder).rows
+    for study in read_studies(folder):
+        for text in run_caveats(rows, study) if study.name in names else ():
+            say(f"{study.name}: {text}")
 
 
 def tell_stale(summary: "Summary") -> None:

@@ -16,12 +16,6 @@ from compsim.screen import (
 )
 
 PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
-REGIMES = {
-    "periodic": "periodic",
-    "predictable": "predictable",
-    "chaotic": "chaotic (averages hold, single peaks do not)",
-    "undecided": "perhaps chaotic",
-}
 
 
 @click.command()
@@ -30,10 +24,12 @@ REGIMES = {
 def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     """Tell how many jobs of each stored study are done, failed or missing, and why they failed.
 
-    Of those that are ok, also how many keep what their accuracy promises, and how many move
-    periodically, predictably or chaotically.
+    Of those that are ok, also how many keep what their accuracy promises, how many move
+    periodically, predictably or chaotically, how many were not seen to repeat, whose sensor record
+    is clipped, and which keys are outside the range that the program was judged on.
     """
     folder, _ = results_folder(given, folder, named=False)
+    from compressor.outcome import regime_words
     from compressor.reasons import remedy
     from compressor.store import standings
 
@@ -48,10 +44,13 @@ def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
         if one.former_of:
             print_text(f"{'':<{width}}  {one.former_of} as it was run on {one.written[:10]}, with "
                        "finished jobs that it has no longer; opens by this name")  # fmt: skip
-        for words, known in ((PROMISES, one.promises), (REGIMES, one.regimes)):
-            said = [f"{number} {words[word]}" for word, number in known.items() if words.get(word)]
-            if said:
-                print_text(f"{'':<{width}}  of those ok: {', '.join(said)}")
+        promised = [f"{n} {PROMISES[word]}" for word, n in one.promises.items() if word in PROMISES]
+        said = [", ".join(promised)] if promised else []
+        said += [f"{number} {regime_words(word)}" for word, number in one.regimes.items() if word]
+        for text in said:
+            print_text(f"{'':<{width}}  of those ok: {text}")
+        for text in one.caveats:
+            print_text(f"{'':<{width}}  {text}")
         for reason, number in one.reasons.items():
             print_text(f"{'':<{width}}  {number:>4} {reason}: {remedy(reason)}")
     wanting = [one.again for one in found if one.missing and not one.former_of]

@@ -77,6 +77,9 @@ def spectra(run: xr.Dataset, twin: Twin) -> str:
             f"The sensor's band from {low:.0f} to {high:.0f} Hz has the greatest spectral "
             f"kurtosis, {envelope.kurtosis:.1f}."
         )
+        sensor, clipped = case_of(run).sensor, float(run.get("clipped_fraction", 0.0))
+        text = sensor.report_clipping(clipped) if sensor else ""
+        sentences += [f"{text}."] if text else []
     else:
         sentences.append("No sensor record: a case with body and sensor has one.")
     return " ".join(sentences) + caution(run)

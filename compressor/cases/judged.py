@@ -32,13 +32,14 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of a case whose values are outside the judged range, each with a sentence.
 
     values: nested, of one case (`Case.values`). A sentence continues the key: "62 kg is outside
-    the range that the program was judged on, 0.1 to 50 kg".
+    the range that the program was judged on, 0.1 to 50 kg". Clearances of both joints are one key.
     """
     found = {}
     for key, value, (low, high) in _judged_values(values):
         if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
             unit = f" {table()[key].unit}".replace("^p", "^1.5").rstrip()
-            found[key] = (
+            shared = "clearance_mm" if key.startswith("clearance_mm.") else key
+            found[shared] = (
                 f"{value:g}{unit} is outside the range that the program was judged on, "
                 f"{low:g} to {high:g}{unit}"
             )

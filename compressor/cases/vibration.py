@@ -1,6 +1,7 @@
 """The groups of a case file that say what stands on the foundation, and what listens to it."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from compressor.cases.parameter import choice, documented, parameter
 
@@ -75,6 +76,8 @@ class Sensor:
     (25600.0, 0.05)
     """
 
+    REPORTED: ClassVar[float] = 1e-3  # of a record's samples: clipping is reported from here on
+
     place: str = choice(
         "guide", ("guide", "bearing", "body"), OURS,
         "crosshead guide at mid-stroke, main bearing, or the body's mass centre",
@@ -107,6 +110,16 @@ class Sensor:
         None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
         kind="integer", optional=True,
     )  # fmt: skip
+
+    def report_clipping(self, fraction: float) -> str:
+        """Return a sentence about a record with a fraction clipped; "" below a thousandth."""
+        if not fraction >= self.REPORTED:
+            return ""
+        return (
+            f"{100 * fraction:.3g} % of the sensor's samples are clipped at its range, "
+            f"{self.range_m_per_s2:g} m/s²: levels and spectra are those of the clipped record; "
+            "raise sensor.range_m_per_s2"
+        )
 
 
 def filled_body(body: Body) -> Body:

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compressor.cases import Sensor
 from compressor.diagnosis.data_set import LABELS, MODELS, WORDS
+from compressor.outcome import regime_words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,10 +95,19 @@ def simulated(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
     regimes = Counter(
         dict(zip(dataset["key"].values, dataset["regime"].values, strict=True)).values()
     )
-    told = ", ".join(f"{count:,} {name or 'not told'}" for name, count in regimes.most_common())
+    told = "; ".join(
+        f"{count:,} {regime_words(name) or 'not told'}" for name, count in regimes.most_common()
+    )
     left = json.loads(dataset.attrs["left_out"])
     lines = [f"- {n:,} {reason}{_meaning(reason)}" for reason, n in left.items()]
     out = "\n".join(["Left out, for these reasons:", "", *lines]) if left else "No job is left out."
+    clipped, most = dataset.attrs["clipped_records"], 100 * dataset.attrs["clipped_most"]
+    record = f"No record has {100 * Sensor.REPORTED:g} % or more of its samples clipped."
+    if clipped:
+        record = (
+            f"**Clipped.** {clipped:,} of {jobs:,} records are clipped at `sensor.range_m_per_s2`, "
+            f"at worst {most:.3g} % of their samples: features of these are of the clipped record."
+        )
     others = ", ".join(
         f"`{name}` {value}" for name, value in (fixed.get("solve") or {}).items()
         if name in ("accuracy", "rtol", "duration_rev", "settle_rev", "method")
@@ -104,7 +115,7 @@ def simulated(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
     return "\n\n".join([
         first, swept,
         f"Motions: {told}. Chaotic ones stay, with the label `regime`. Numerics of the first job: "
-        f"{others}.", out,
+        f"{others}.", record, out,
     ])  # fmt: skip
 
 

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compressor.cases import Case
+from compressor.cases import Case, Sensor
 from compressor.diagnosis.features import FEATURES, FEWEST, RecordError, features
+from compressor.outcome import Regime, regime_words
 from compressor.program import PROGRAM, CompsimError
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, find_study, read_store
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 RECORD = ("sensor_time", "sensor_acceleration", "tacho_time")
+CLIPPED = "clipped_share"  # the name that files of all versions have
 NOT_BUILT = ("name", "load", "sensor", "solve", "output", "initial_offset_mm")  # groups of a case
 LABELS = {  # name -> (unit, phrase, key of a case file)
     "clearance_mm_big_end": ("mm", "radial clearance; 0: ideal joint", "clearance_mm.big_end"),
@@ -39,7 +41,7 @@ WORDS = {
     "machine": "hash of what is built: all of a case but load, speed, sensor and numerics",
     "joint": "joints with clearance: the fault",
     "load": "load on the piston",
-    "regime": "predictable, periodic, chaotic or undecided",
+    "regime": "; ".join(map(regime_words, Regime)),
 }
 MODELS = {  # parts of the model whose kind a study chooses: in words
     "contact": "contact law of joints with clearance",
@@ -203,7 +205,10 @@ def make_data_set(
         text = f"study {of.name} has no record to cut windows of: {told}"
         more = f"sensor.length_rev: {options.revolutions + 1} or more"
         raise DataSetError(f"{text}; run what is missing, or with {more}")
+    clipped = [*{row["key"]: row["clipped"] for row in rows}.values()]
     return labelled(rows, options).assign_attrs(
+        clipped_records=sum(share >= Sensor.REPORTED for share in clipped),
+        clipped_most=float(np.nanmax([0.0, *clipped])),
         title=f"compsim: labelled windows of {of.name}", program=PROGRAM, study=of.name,
         case_file=of.case_file, fixed=json.dumps(of.fixed), versions=json.dumps(of.versions),
         axes=json.dumps([[a.key, a.units, *_reach(a.values)] for a in of.axes]),
@@ -220,9 +225,9 @@ def without_sensor(study: StoredStudy) -> DataSetError:
 
 
 def _record(stored: Stored, key: str) -> dict[str, np.ndarray]:
-    """A job's record by the names of `RECORD`; nothing where it has none."""
-    found = stored.values(key, RECORD)
-    return found if len(found) == len(RECORD) else {}
+    """A job's record by the names of `RECORD`, and `CLIPPED`; nothing where it has none."""
+    found = stored.values(key, (*RECORD, CLIPPED))
+    return found if found.keys() >= {*RECORD} else {}
 
 
 def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str, Any]] | str:
@@ -245,6 +250,7 @@ def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str
         "key": key, "machine": machine_of(case), "joint": case.joint, "load": case.load,
         "regime": str(attributes.get("regime", "")), **labels_of(case),
         "models": models_of(case),
+        "clipped": float(record.get(CLIPPED, np.nan)),
     }  # fmt: skip
     rows = []
     hop = options.hop or options.revolutions

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.outcome import Regime
+from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
 from compressor.report.figures.sweep_metric import measures
 from compressor.report.page import Plate, Section
@@ -22,7 +22,7 @@ from compressor.report.tables import (
     measured_cell,
     value_cell,
 )
-from compressor.store import Folder, Stored, StoredStudy
+from compressor.store import Folder, Stored, StoredStudy, study_caveats
 
 MOST_DETAILS = 20
 MOST_ROWS = 500
@@ -53,12 +53,13 @@ class StudyContent:
 
     `second_set`: the id of the section with its own Figures 8 to 16; `models`: a line on how far
     choices of the model move its numbers, and `models_table` the id of their section; empty where
-    it has none.
+    it has none; `caveats`: what to know beside the numbers, a sentence each.
     """
 
     case_file: str
     counts: str
     chaotic: int
+    caveats: Sequence[str]
     failures: Sequence[str]
     remedies: Sequence[str]
     plates: Sequence[Plate]
@@ -70,11 +71,12 @@ class StudyContent:
 
 @dataclass(frozen=True)
 class JobsContent:
-    """The table of a study's jobs, as far as a page can hold them."""
+    """The table of a study's jobs, as far as a page can hold them; `regimes`: what they mean."""
 
     study: str
     jobs: int
     table: Table
+    regimes: Sequence[str]
 
 
 def study_sections(
@@ -95,6 +97,7 @@ def study_sections(
         case_file=study.case_file,
         counts=job_counts(data).text,
         chaotic=int((data["regime"].values == Regime.CHAOTIC).sum()),
+        caveats=study_caveats(stored.rows, study),
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
         plates=plates,
@@ -103,7 +106,10 @@ def study_sections(
         models=models,
         models_table=models_anchor(study.name) if models else "",
     )
-    table = JobsContent(study.name, data["status"].size, jobs_table(data))
+    seen = [name for name in Regime if (data["regime"].values == name).any()]
+    table = JobsContent(
+        study.name, data["status"].size, jobs_table(data), [*map(regime_words, seen)]
+    )
     return (
         Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),
         Section(anchor, f"Jobs of study {study.name}", "jobs.html", table),

@@ -104,10 +104,9 @@ def _proportions(case: Case) -> Iterator[Remark]:
 
 
 def _beyond_judged(case: Case) -> Iterator[Remark]:
-    """Values outside the range that the program was judged on; both joints' as one key's."""
+    """Values outside the range that the program was judged on."""
     for key, text in outside_judged(case.values()).items():
-        shared = key.startswith("clearance_mm.")
-        yield Remark("clearance_mm" if shared else key, text, "judged")
+        yield Remark(key, text, "judged")
 
 
 def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:

@@ -83,7 +83,7 @@ def sensor_variables(record: "Record") -> Variables:
             {"units": "s", "long_name": "times at which the crank passes top dead centre"},
         ),
         "clipped_share": (
-            (), record.clipped, {"units": "1", "long_name": "share of samples beyond the range"}
+            (), record.clipped, {"units": "1", "long_name": "former name of clipped_fraction"}
         ),
     }  # fmt: skip
 

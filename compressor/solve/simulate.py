@@ -103,7 +103,10 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
     """The `Outcome` of a solution and what its Dataset is made of."""
     kept = case.output.keep == "series"
     found = outcome(case, solution)
-    return found, found.table(series(case, solution) if kept else {})
+    more = series(case, solution) if kept else {}
+    if "clipped_share" in more:
+        found.numbers["clipped_fraction"] = more["clipped_share"][1]
+    return found, found.table(more)
 
 
 def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:

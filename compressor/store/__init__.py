@@ -1,5 +1,6 @@
 """Outcomes on disk, and back."""
 
+from compressor.store.caveats import run_caveats, study_caveats
 from compressor.store.export import RECORD_HEADER, Exported, ExportOptions, export
 from compressor.store.files import Folder, StoreError, StoreWarning, publish, writable_folder
 from compressor.store.folders import models_file

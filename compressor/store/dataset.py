@@ -16,7 +16,7 @@ from xarray.core import indexing
 from compressor.cases import points, table, value_in
 from compressor.digits import is_known
 from compressor.metrics import METRICS, NUMBERS, SOMETIMES
-from compressor.outcome import coordinates
+from compressor.outcome import Regime, coordinates, regime_words
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
 from compressor.store.hdf5 import DamagedJob
@@ -144,7 +144,7 @@ def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr
         "status": (words("status", "missing"), "ok, failed or missing"),
         "reason": (words("reason", ""), "why a run failed"),
         "promise": (words("promise", ""), "whether what accuracy promises was kept; none given"),
-        "regime": (words("regime", ""), "predictable, periodic, chaotic or undecided"),
+        "regime": (words("regime", ""), "; ".join(map(regime_words, Regime))),
     }
     return {
         name: xr.Variable(layout.dims, values, {"long_name": phrase})

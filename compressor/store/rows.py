@@ -106,6 +106,11 @@ class Rows:
         return ~np.isnan(self._estimates[HORIZON])
 
     @cached_property
+    def course(self) -> np.ndarray:
+        """When each motion settled (rev) and how much of its record is clipped, (jobs,)."""
+        return self._numbers("settled_rev", "clipped_fraction")
+
+    @cached_property
     def _estimates(self) -> np.ndarray:
         return self._numbers("peak_acceleration_error", HORIZON)
 

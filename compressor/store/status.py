@@ -1,9 +1,12 @@
 """What a store can be asked: how its studies stand, and what is known of one job.
 
-Reads studies and rows only, never a file with time series, so that 100,000 jobs answer at once.
+Reads studies and rows only, so that 100,000 jobs answer at once; of one job that an older version
+has stored perhaps its file.
 Jobs whose row is damaged count as missing, with a StoreWarning.
 """
 
+import contextlib
+import math
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -13,7 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compressor.metrics import NUMBERS
+from compressor.store.caveats import job_caveats, study_caveats
 from compressor.store.files import Folder, final_path
+from compressor.store.hdf5 import DamagedJob
 from compressor.store.names import find_job
 from compressor.store.reader import read_store
 from compressor.store.studies import Again, Change, change_of, owners, read_studies
@@ -22,13 +27,16 @@ if TYPE_CHECKING:
     from compressor.cases import Study
 
 
+FORMER = "clipped_share"  # name of `clipped_fraction` in files of series
+
+
 @dataclass(frozen=True)
 class Standing:
     """How the jobs of one study stand.
 
     `reasons`: failed ones by reason; `promises`, `regimes`: those that are ok by what their
     accuracy promises, and by how far they can be foretold, "" where that is not known; each with
-    the most frequent first.
+    the most frequent first. `caveats`: what to know beside the numbers, a sentence each.
     """
 
     study: str
@@ -40,6 +48,7 @@ class Standing:
     reasons: dict[str, int]
     promises: dict[str, int]
     regimes: dict[str, int]
+    caveats: list[str]
     again: Again
     former_of: str = ""  # the study that has replaced this one; "" where none has
     written: str = ""  # when it was first run (UTC)
@@ -58,6 +67,7 @@ class JobReport:
     again: tuple[Again, ...]  # of the studies
     numbers: dict[str, Any]  # SI; a joint's or an axis's in lists
     attributes: dict[str, Any]
+    caveats: list[str]  # of one that is ok: what to know beside its numbers, a sentence each
 
 
 def standings(folder: Folder) -> list[Standing]:
@@ -88,7 +98,7 @@ def standings(folder: Folder) -> list[Standing]:
             Standing(
                 study.name, study.case_file, study.jobs, ok, failed, missing,
                 counts("reason", stored[~good]), counts("promise", done), counts("regime", done),
-                study.again, study.former_of, study.written,
+                study_caveats(rows, study), study.again, study.former_of, study.written,
             )
         )  # fmt: skip
     return found
@@ -108,17 +118,26 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     present = (study for study in studies if not study.former_of)  # whose case file has the job
     again = tuple(study.again for study in present if study.name in mine)
     if position is None:
-        return JobReport(key, "missing", "", "", "", mine, again, {}, {})
+        return JobReport(key, "missing", "", "", "", mine, again, {}, {}, [])
     end, path = store.status_at(position), store.rows.path(position)
     numbers = {name: np.asarray(end.numbers[name]).tolist() for name in NUMBERS}
     attributes = {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in store.rows.attributes(position).items()
     }
+    if path is not None and _hides_clipping(numbers, attributes):
+        with contextlib.suppress(DamagedJob):
+            numbers["clipped_fraction"] = float(store.values(key, [FORMER])[FORMER])
     file = "" if path is None else os.fspath(final_path(path))
+    caveats = job_caveats(numbers, attributes) if end.status == "ok" else []
     return JobReport(
-        key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes
+        key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes, caveats
     )
+
+
+def _hides_clipping(numbers: dict[str, Any], attributes: dict[str, Any]) -> bool:
+    """Whether an older version kept how much of a sensor's record is clipped in its file alone."""
+    return math.isnan(numbers["clipped_fraction"]) and '"sensor"' in attributes.get("case", "")
 
 
 def changes(folder: Folder, studies: "Sequence[Study]") -> list[Change]:

@@ -93,7 +93,7 @@ def contents(evil):
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
-        "jobs.html": JobsContent(evil(), 9, table(evil)),
+        "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
         "machines.html": [Part(evil(), [evil()], plate(evil))],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         "models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
@@ -102,7 +102,7 @@ def contents(evil):
         "second_set.html": SecondSetContent(
             evil(), evil(), [evil()], [evil()], [Pair(first, plate(evil))], claims
         ),
-        "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [plate(evil)],
+        "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
                                    evil(), evil(), evil(), evil()),
     }  # fmt: skip
 

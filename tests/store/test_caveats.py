@@ -1,0 +1,158 @@
+"""What to know beside stored numbers: said where it is so, and nowhere else."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from compsim import cli
+
+from compressor.cases.case import Case
+from compressor.diagnosis.data_card import data_card
+from compressor.diagnosis.data_set import make_data_set
+from compressor.outcome import REGIME_WORDS, Regime
+from compressor.report.report import write_report
+from compressor.solve.simulate import simulate
+from compressor.store import hdf5
+from compressor.store.caveats import is_late, is_unrepeated, job_caveats
+from compressor.store.reader import open_study, read_job, read_store
+from compressor.store.rows import Rows
+from compressor.store.status import report_job, standings
+
+SOLVE = {"duration_rev": 3, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+STUDY = {
+    "joint": "big_end",
+    "clearance_mm": 0.2,
+    "machine": {"rod_mass_kg": [4.7, 62]},
+    "body": {"mass_kg": 5000, "casing_mass_kg": 20},
+    "sensor": {"range_m_per_s2": 0.05, "length_rev": 11},
+    "solve": SOLVE,
+}
+OUTSIDE = (
+    "machine.rod_mass_kg: 62 kg is outside the range that the program was judged on, 0.1 to 50 kg"
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A study of two jobs from the start on, with a sensor that is far too sensitive."""
+    place = tmp_path_factory.mktemp("caveats")
+    (place / "k1.yaml").write_text(json.dumps(STUDY), encoding="utf-8")
+    assert cli.main(["run", str(place / "k1.yaml"), "-j", "1", "-o", str(place / "k1")]) == 0
+    return place / "k1"
+
+
+def said(capsys, *words):
+    assert cli.main([*map(str, words)]) == 0
+    return capsys.readouterr()
+
+
+def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder, capsys):
+    err = said(capsys, "run", folder.parent / "k1.yaml", "-j", "1", "-o", folder).err
+    out = said(capsys, "status", folder).out
+    numbers = [report_job(folder, key).numbers for key in open_study(folder).key.values]
+    late = sum(numbers_["settled_rev"] > 0 for numbers_ in numbers)
+    unrepeated = sum(math.isnan(numbers_["settled_rev"]) for numbers_ in numbers)
+    assert late + unrepeated == 2
+    counts = f"{unrepeated} of 2 jobs were not seen to repeat" if unrepeated else f"{late} of 2"
+    worst = 100 * max(numbers_["clipped_fraction"] for numbers_ in numbers)
+    clipped = f"2 of 2 sensor records are clipped, at worst {worst:.3g} % of their samples"
+    for text in (out, err):
+        assert counts in text
+        assert "solve: {settle_rev: auto, duration_rev: auto}" in text
+        assert clipped in text
+    assert OUTSIDE in out
+    assert "warning: machine.rod_mass_kg: 62 kg is outside" in err  # before it runs
+    assert standings(folder)[0].caveats[-1] == OUTSIDE
+
+
+def test_show_says_it_of_its_job(folder, capsys):
+    light, heavy = open_study(folder).key.values
+    out = said(capsys, "show", folder, heavy).out
+    share = 100 * report_job(folder, heavy).numbers["clipped_fraction"]
+    assert f"{share:.3g} % of the sensor's samples are clipped at its range, 0.05 m/s²" in out
+    assert OUTSIDE in out
+    assert OUTSIDE not in said(capsys, "show", folder, light).out
+    regime = read_job(folder, heavy).attrs["regime"]
+    assert f"{regime} ({REGIME_WORDS[Regime(regime)]})" in out
+
+
+def test_the_page_says_it(folder, tmp_path):
+    page = write_report(folder, tmp_path).read_text(encoding="utf-8")
+    assert OUTSIDE in page
+    assert "2 of 2 sensor records are clipped" in page
+    seen = {*open_study(folder)["regime"].values.tolist()}
+    assert all(REGIME_WORDS[Regime(name)].split("'")[0] in page for name in seen)
+
+
+def test_plot_says_it(folder, tmp_path, capsys):
+    key = open_study(folder).key.values[0]
+    out = said(capsys, "plot", folder, key, "--what", "spectra", "-o", tmp_path).out
+    assert "of the sensor's samples are clipped at its range, 0.05 m/s²" in out
+
+
+def test_the_clipped_fraction_is_a_value_of_the_study(folder):
+    study = open_study(folder)
+    fractions = study["clipped_fraction"]
+    assert (fractions.dims, fractions.attrs["units"]) == (("rod_mass_kg",), "1")
+    for key, value in zip(study.key.values, fractions.values, strict=True):
+        record = read_job(folder, key)
+        beyond = np.abs(record["sensor_acceleration"].values) >= 0.05
+        assert value == record["clipped_share"] == pytest.approx(beyond.mean())
+        assert value > 0.1
+
+
+def test_a_file_of_an_older_version_has_it_by_its_new_name(folder, monkeypatch):
+    monkeypatch.setattr(hdf5, "variables", without("clipped_fraction", hdf5.variables))
+    key = open_study(folder).key.values[0]
+    old = read_store(folder).job(key)
+    assert old["clipped_fraction"] == old["clipped_share"]
+    monkeypatch.setattr(Rows, "numbers", property(lambda rows: forgotten(rows._numbers())))
+    assert report_job(folder, key).numbers["clipped_fraction"] == old["clipped_share"]
+
+
+def forgotten(numbers):
+    numbers["clipped_fraction"] = math.nan
+    return numbers
+
+
+def test_the_data_card_says_it(folder):
+    found = make_data_set(folder)
+    worst = 100 * open_study(folder)["clipped_fraction"].max().item()
+    told = f"2 of 2 records are clipped at `sensor.range_m_per_s2`, at worst {worst:.3g} %"
+    assert told in data_card(found, False)
+    calm = data_card(found.assign_attrs(clipped_records=0, clipped_most=0.0), False)
+    assert "No record has 0.1 % or more of its samples clipped." in calm
+
+
+def without(name, variables):
+    def read(file):
+        return {n: value for n, value in variables(file).items() if n != name}
+
+    return read
+
+
+def test_what_is_seen_to_repeat_in_time_is_no_caveat():
+    values = {"joint": "big_end", "clearance_mm": 0.2, "solve": SOLVE}
+    run = simulate(Case.from_values(values))
+    calm = {"settled_rev": 0.0, "clipped_fraction": 1e-4}
+    assert job_caveats(calm, run.attrs | {"regime": "periodic"}) == []
+    (late,) = job_caveats(calm | {"settled_rev": 2.0}, run.attrs | {"regime": "periodic"})
+    assert late.startswith("the motion repeats from revolution 2 on, and metrics count from 0 on")
+    (never,) = job_caveats({"settled_rev": math.nan}, run.attrs | {"regime": "predictable"})
+    assert never.startswith("the motion was not seen to repeat within 3 settled revolutions; ")
+    for regime in ("chaotic", "undecided", ""):  # these say so themselves, or are of old stores
+        assert job_caveats({"settled_rev": math.nan}, run.attrs | {"regime": regime}) == []
+
+
+def test_auto_is_no_caveat():
+    """It gives where the metrics agree; then numbers begin there."""
+    assert not is_unrepeated("predictable", 3.0)
+    assert not is_late("periodic", 3.0, math.nan)
+    assert is_late(["periodic", "periodic", "chaotic"], [2.0, 1.0, 2.0], 1.0).tolist() == [
+        True, False, False,
+    ]  # fmt: skip
+
+
+def test_every_regime_is_explained_once():
+    assert REGIME_WORDS.keys() == {*Regime}
