@@ -94,6 +94,10 @@ def check(studies: "list[Study]") -> None:
     """Each case wears, and its motions end where they begin: at top dead centre."""
     for study in studies:
         for case in study.cases:
+            if case.joint == "none":
+                raise click.UsageError(
+                    f"{study.path}: joint: none has no bore that wears: leave none out"
+                )
             if not case.wear:
                 raise click.UsageError(
                     f"{study.path}: has no wear: write wear: true, or keys of it (compsim schema)"

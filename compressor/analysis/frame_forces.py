@@ -73,4 +73,4 @@ def healthy_twin(run: xr.Dataset) -> xr.Dataset:
     values = replace(with_ideal_joints(case_of(run)), body=None, sensor=None).values()
     values["solve"]["error_bars"] = False
     values["output"] = {"keep": "series"}
-    return simulate(Case.from_values(values))
+    return simulate(Case.resolve(values))

@@ -85,7 +85,7 @@ def ideal_revolution(case: Case) -> xr.Dataset:
     values = with_ideal_joints(case).values()
     values["solve"] = {"duration_rev": 1, "settle_rev": 0, "output_step_deg": STEP_DEG}
     values["output"] = {"keep": "series"}
-    return simulate(Case.from_values(values))
+    return simulate(Case.resolve(values))
 
 
 def swing_mass(p: np.record, joint: str) -> float:

@@ -23,7 +23,7 @@ def faulty_joints(fault: str) -> tuple[str, ...]:
 
 def paper_cases(**machine: float) -> dict[str, Case]:
     """The paper's eleven cases by label; `machine` overrides keys such as rod_mass_kg."""
-    return cases_of(Case.from_values({"machine": machine}))
+    return cases_of(Case.resolve({"machine": machine}))
 
 
 def cases_of(machine: Case) -> dict[str, Case]:

@@ -32,6 +32,7 @@ from compressor.cases.shorthands import phrase_of, row_of, value_in
 from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
 from compressor.cases.table import table
+from compressor.cases.unread import reads
 from compressor.cases.vibration import Body, Sensor
 from compressor.cases.wear import Wear
 from compressor.cases.written import to_yaml

@@ -10,7 +10,7 @@ from functools import cache, cached_property
 from typing import Any
 
 from compressor.cases.accuracy import ACCURACY, Targets, first_rung
-from compressor.cases.checked import checked_part, keys_given
+from compressor.cases.checked import checked_part, values_given
 from compressor.cases.conflicts import conflicts
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, with_law
 from compressor.cases.mechanism import filled_guide
@@ -78,9 +78,22 @@ class Case(Settings):
         >>> case.machine.speed_rpm
         700.0
         """
-        parts, given = parts_of(values)
+        return cls._of_values(values)
+
+    @classmethod
+    def resolve(cls, values: Mapping[str, Any]) -> "Case":
+        """Build a case as `from_values`, from values among which may be some that it does not read.
+
+        Such are a job of a sweep over loads or laws, and what an older program has stored. Raises
+        CaseError with everything else that is wrong.
+        """
+        return cls._of_values(values, lenient=True)
+
+    @classmethod
+    def _of_values(cls, values: Mapping[str, Any], lenient: bool = False) -> "Case":
+        parts, given = parts_of(values, lenient)
         case = cls(**parts)
-        problems = [*conflicts(case, given)]
+        problems = [*conflicts(case, given, {} if lenient else values_given(values))]
         if problems:
             raise CaseError(_as_written(values, problems))
         vars(case)["problems"] = ()  # known: see `problems`
@@ -100,13 +113,13 @@ class Case(Settings):
         spring.stroke_mm: 300 mm must be less than the piston's stroke, 240 mm
         """
         try:
-            Case.from_values(self.values())
+            Case.resolve(self.values())
         except CaseError as error:
             return tuple(error.problems)
         return ()
 
     def __post_init__(self) -> None:
-        """Fill in the defaults that depend on other values; unused clearances become 0."""
+        """Fill in the defaults that depend on other values; what needs a clearance goes without."""
         machine, solve, contact = self.machine, self.solve, self.contact
         if machine.rod_centre_mm is None or machine.rod_inertia_kg_m2 is None:
             given = (machine.rod_centre_mm, machine.rod_inertia_kg_m2)
@@ -135,7 +148,9 @@ class Case(Settings):
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
             resolved["clearance_mm"] = replace(self.clearance_mm, **unused)
-        if self.wear:
+        if self.joint == "none":  # which has no bore that oil fills, or that wears
+            resolved |= {"lubricant": None, "wear": None}
+        elif self.wear:
             resolved["wear"] = filled_wear(
                 self.wear, resolved.get("clearance_mm", self.clearance_mm)
             )
@@ -163,7 +178,7 @@ class Case(Settings):
         cylinder = isinstance(contact, dict) and contact.get("law") in CYLINDRICAL
         if isinstance(contact, dict) and contact.get("materials") and not cylinder:
             contact.setdefault("geometry", "external")  # the default when older texts were stored
-        return cls.from_values(values)
+        return cls.resolve(values)
 
     def values(self) -> dict[str, Any]:
         """The case as plain nested values; `from_values` reads them back to an equal case.
@@ -274,10 +289,13 @@ def require_case(value: Any) -> Case:
     raise CaseError([Problem("", f"needs a Case, as of Case.from_values, not {shown(value)}")])
 
 
-def parts_of(values: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
-    """The fields of a case from nested values, each checked alone, and the dotted keys given.
+def parts_of(
+    values: Mapping[str, Any], lenient: bool = True
+) -> tuple[dict[str, Any], frozenset[str]]:
+    """Return the fields of a case, each checked alone, and the dotted keys given.
 
-    Raises CaseError with everything that is wrong, and what does not fit together in the rest.
+    values: nested. lenient: some of them may be unread. Raises CaseError with everything that is
+    wrong, and what does not fit together in the rest.
     """
     problems: list[Problem] = []
     if not isinstance(values, Mapping):
@@ -286,8 +304,9 @@ def parts_of(values: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]
     whole = expanded(values)
     parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
     if problems:
-        raise CaseError(_as_written(values, _everything_wrong(whole, parts, problems)))
-    given = frozenset(keys_given(whole))
+        wrong = _everything_wrong(whole, parts, problems, {} if lenient else values_given(values))
+        raise CaseError(_as_written(values, wrong))
+    given = frozenset(values_given(whole))
     contact, pins = parts.get("contact"), {key for key in given if key.endswith("pin_radius_mm")}
     if contact and contact.materials and pins and "contact.geometry" not in given:
         parts["contact"] = replace(contact, geometry="internal")
@@ -323,7 +342,10 @@ def digest(text: str) -> str:
 
 
 def _everything_wrong(
-    values: Mapping[str, Any], parts: Mapping[str, Any], problems: Sequence[Problem]
+    values: Mapping[str, Any],
+    parts: Mapping[str, Any],
+    problems: Sequence[Problem],
+    to_read: Mapping[str, Any],
 ) -> Iterator[Problem]:
     """What is wrong with values one by one, and what does not fit together in the others.
 
@@ -343,7 +365,7 @@ def _everything_wrong(
         yield problem
     known = {item.name for item in fields(Case)} - wrong
     rest = Case(**{key: part for key, part in parts.items() if key in known})
-    yield from conflicts(rest, frozenset(keys_given(values)), frozenset(wrong))
+    yield from conflicts(rest, frozenset(values_given(values)), to_read, frozenset(wrong))
 
 
 def _value_at(key: str, values: Mapping[str, Any]) -> Any:

@@ -1,7 +1,7 @@
 """Values checked against the table of parameters: one value, one group, or a key at the top."""
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -84,10 +84,12 @@ def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Proble
     return GROUPS[key](**good), problems
 
 
-def keys_given(values: Mapping[str, Any]) -> Iterator[str]:
-    """The dotted keys that are set in nested values."""
+def values_given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that are set in nested values, by dotted key."""
+    found: dict[str, Any] = {}
     for key, value in values.items():
         if isinstance(value, Mapping):
-            yield from (f"{key}.{name}" for name, item in value.items() if item is not None)
+            found |= {f"{key}.{name}": item for name, item in value.items() if item is not None}
         else:
-            yield key
+            found[key] = value
+    return found

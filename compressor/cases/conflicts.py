@@ -1,7 +1,7 @@
 """What does not fit together in a case whose values are each in range."""
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import FunctionType
 from typing import Any, cast
@@ -19,6 +19,7 @@ from compressor.cases.mechanism_conflicts import (
 from compressor.cases.one_way import back_action, moving_mass
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
 from compressor.cases.table import GROUPS, Settings, table
+from compressor.cases.unread import unread_values
 from compressor.metrics import AXES, JOINTS
 
 # One key, and the other whose place it takes; a case gives one of the two.
@@ -45,21 +46,31 @@ FILLED_IN = {
 
 
 def conflicts(
-    case: Settings, given: frozenset[str], wrong: frozenset[str] = frozenset()
+    case: Settings,
+    given: frozenset[str],
+    values: Mapping[str, Any],
+    wrong: frozenset[str] = frozenset(),
 ) -> Iterator[Problem]:
-    """Everything in a case that does not fit together; `given`: the dotted keys set by hand.
+    """Find everything in a case that does not fit together.
 
-    Where some keys, or whole groups, are `wrong`, the case holds defaults in their place, and
-    what does not fit is told of the others alone.
+    given: the dotted keys set by hand. values: those of them that the case has to read. wrong:
+    keys, or whole groups, in whose place the case holds defaults; what does not fit is found among
+    the others alone.
     """
     if not wrong:
         for rule in RULES:
             yield from rule(case, given)
+        yield from unread_values(case, values)
         return
-    known = cast(Settings, _Known(case, _undecided(wrong)))
+    undecided = _undecided(wrong)
+    known = cast(Settings, _Known(case, undecided))
     for rule in RULES:
         with contextlib.suppress(_Unknown):
             yield from rule(known, given)
+    for key, value in values.items():
+        if not undecided & {str(key), str(key).partition(".")[0]}:
+            with contextlib.suppress(_Unknown):
+                yield from unread_values(known, {key: value})
 
 
 def _undecided(wrong: frozenset[str]) -> frozenset[str]:
@@ -89,19 +100,12 @@ class _Known:
         if isinstance(made, FunctionType):
             return partial(made, self)
         value = getattr(self._values, name)
-        return _Known(value, self._wrong, f"{key}.") if name in GROUPS and value else value
-
-
-def _output_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    if case.output.signals and case.output.keep != "series":
-        yield Problem("output.signals", "are time series: they need output.keep: series")
+        return _Known(value, self._wrong, f"{key}.") if key in GROUPS and value else value
 
 
 def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     """What a body and its sensor need; one that would move the machine back is refused."""
     body, sensor = case.body, case.sensor
-    if sensor is not None and body is None:
-        yield Problem("sensor", "stands on a body: write body: true, or give its keys")
     if body is None:
         return
     if case.output.keep != "series":
@@ -126,10 +130,6 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         )
     if sensor is None:
         return
-    if body.start == "rest" and sensor.length_rev is not None:
-        yield Problem("sensor.length_rev", "repeats a steady motion: set body.start: steady")
-    if body.start == "rest" and sensor.speed_jitter:
-        yield Problem("sensor.speed_jitter", "paces a steady motion: set body.start: steady")
     if sensor.low_pass_Hz is not None and sensor.low_pass_Hz >= sensor.rate_Hz / 2:
         yield Problem("sensor.low_pass_Hz", "must be less than half of rate_Hz")
 
@@ -193,11 +193,6 @@ def _missing_clearance(case: Settings, given: frozenset[str], joint: str) -> Ite
     worn = case.joint in (joint, "both")
     if worn and not getattr(case.clearance_mm, joint) and key not in given:
         yield Problem(key, f"is needed with joint: {case.joint}; give it in mm, such as 0.2")
-
-
-def _joint_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    if case.joint == "none" and given & {f"clearance_mm.{joint}" for joint in JOINTS}:
-        yield Problem("clearance_mm", "has no joint to be at; set joint, or leave it out")
 
 
 def _choice_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
@@ -296,10 +291,10 @@ def _time_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
 
 Rule = Callable[[Settings, frozenset[str]], Iterator[Problem]]
 RULES: tuple[Rule, ...] = (
-    _inertia_conflicts, _geometry_conflicts, _joint_conflicts,
+    _inertia_conflicts, _geometry_conflicts,
     *(partial(rule, joint=joint) for joint in JOINTS
       for rule in (_missing_clearance, _clearance_conflicts)),
-    _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts, _output_conflicts,
+    _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts,
     law_conflicts, contact_conflicts, friction_conflicts, lubricant_conflicts, wear_conflicts,
     mechanism_conflicts,
 )  # fmt: skip

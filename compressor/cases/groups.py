@@ -9,9 +9,24 @@ from dataclasses import dataclass
 from compressor.cases.accuracy import ACCURACY
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.cases.parameter import choice, documented, parameter
+from compressor.cases.readers import (
+    BIG_CLEARANCE,
+    BIG_END,
+    CLEARANCE,
+    DAMPED,
+    IDEAL_JOINT,
+    MATERIALS,
+    RUBBING,
+    SERIES,
+    SMALL_CLEARANCE,
+    SMALL_END,
+    SMALL_RUBBING,
+    STIFFNESS,
+    by_law,
+)
 
 COMPILED = ("auto", "DOPRI5", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
-STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
+JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
@@ -29,10 +44,22 @@ class PerJoint:
     """
 
     big_end: float = parameter(
-        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the big end", judged=(1e-3, 1.0)
+        0.0,
+        "mm",
+        (0, 1000),
+        "§3.2",
+        "radial clearance of the big end",
+        read=BIG_END,
+        judged=(1e-3, 1.0),
     )
     small_end: float = parameter(
-        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the small end", judged=(1e-3, 1.0)
+        0.0,
+        "mm",
+        (0, 1000),
+        "§3.2",
+        "radial clearance of the small end",
+        read=SMALL_END,
+        judged=(1e-3, 1.0),
     )
 
 
@@ -49,10 +76,18 @@ class Offset:
     0.1
     """
 
-    big_end_x: float = parameter(0.0, "mm", (-1000, 1000), "ours", "big end's journal, along x")
-    big_end_y: float = parameter(0.0, "mm", (-1000, 1000), "ours", "big end's journal, along y")
-    small_end_x: float = parameter(0.0, "mm", (-1000, 1000), "ours", "small end's journal, along x")
-    small_end_y: float = parameter(0.0, "mm", (-1000, 1000), "ours", "small end's journal, along y")
+    big_end_x: float = parameter(
+        0.0, "mm", (-1000, 1000), "ours", "big end's journal, along x", read=BIG_CLEARANCE
+    )
+    big_end_y: float = parameter(
+        0.0, "mm", (-1000, 1000), "ours", "big end's journal, along y", read=BIG_CLEARANCE
+    )
+    small_end_x: float = parameter(
+        0.0, "mm", (-1000, 1000), "ours", "small end's journal, along x", read=SMALL_CLEARANCE
+    )
+    small_end_y: float = parameter(
+        0.0, "mm", (-1000, 1000), "ours", "small end's journal, along y", read=SMALL_CLEARANCE
+    )
 
 
 @documented
@@ -103,18 +138,14 @@ class Machine:
         judged=(0.1, 50),
     )
     pin_radius_mm: float = parameter(
-        10.0,
-        "mm",
-        (0, 1e4),
-        "inferred from Eq. 15 and Table 3",
-        "journal radius R_j of both joints, or of the big end",
-        above=True,
+        10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",
+        "journal radius R_j of both joints, or of the big end", above=True, read=RUBBING,
         judged=(10, 100),
-    )
+    )  # fmt: skip
     gravity_m_per_s2: float = parameter(0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y")
     small_end_pin_radius_mm: float | None = parameter(
         None, "mm", (0, 1e4), "as the big end's", "journal radius of the small end",
-        above=True, optional=True,
+        above=True, optional=True, read=SMALL_RUBBING,
     )  # fmt: skip
 
     def pin_radius(self, joint: str) -> float:
@@ -188,13 +219,14 @@ class Contact:
     speed at which journal and bore met; the name of one and a coefficient of restitution choose it:
 
     >>> import compressor
-    >>> values = {"contact": {"law": "flores", "restitution": 0.7}}
+    >>> worn = {"joint": "big_end", "clearance_mm": 0.2}
+    >>> values = worn | {"contact": {"law": "flores", "restitution": 0.7}}
     >>> compressor.Case.from_values(values).contact.least_approach_mm_per_s
     10.0
 
     Two materials may stand in place of the stiffness K (Eq. 15, Table 2):
 
-    >>> values = {"contact": {"materials": ["steel", "copper"]}}
+    >>> values = worn | {"contact": {"materials": ["steel", "copper"]}}
     >>> compressor.Case.from_values(values).contact.materials
     ('steel', 'copper')
     """
@@ -202,54 +234,59 @@ class Contact:
     law: str = choice("impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)")
     stiffness_N_per_mm15: float | None = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
-        above=True, optional=True, judged=STIFFNESS,
+        above=True, optional=True, read=STIFFNESS,
+        judged=JUDGED_STIFFNESS,
     )  # fmt: skip
     materials: tuple[str, str] | None = choice(
         None, ("steel", "copper"), "Table 2, Eq. 15", "two materials in place of a stiffness",
-        kind="materials", optional=True,
+        kind="materials", optional=True, read=CLEARANCE,
     )  # fmt: skip
     geometry: str | None = choice(
         None, ("external", "internal"), "Eq. 15",
         "of the materials' stiffness: radii as of two discs (the paper's, and the default for its "
         "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
-        optional=True,
+        optional=True, read=(CLEARANCE, by_law("contact", "geometry"), MATERIALS),
     )  # fmt: skip
-    exponent: float = parameter(1.5, "", (1, 3), "Table 3", "force exponent p", judged=(1.0, 2.2))
+    exponent: float = parameter(
+        1.5,
+        "",
+        (1, 3),
+        "Table 3",
+        "force exponent p",
+        read=by_law("contact", "exponent"),
+        judged=(1.0, 2.2),
+    )
     damping_N_s_per_mm: float = parameter(
-        336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max", judged=(0, 33600)
-    )
+        336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max",
+        read=by_law("contact", "damping_N_s_per_mm"),
+        judged=(0, 33600),
+    )  # fmt: skip
     full_damping_mm: float = parameter(
-        0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True
-    )
+        0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True,
+        read=by_law("contact", "full_damping_mm"),
+    )  # fmt: skip
     restitution: float | None = parameter(
         None, "", (0, 1), "ours", "coefficient of restitution, of the laws that damp by it",
-        above=True, optional=True, judged=(0.3, 0.95),
+        above=True, optional=True, read=by_law("contact", "restitution"),
+        judged=(0.3, 0.95),
     )  # fmt: skip
     least_approach_mm_per_s: float | None = parameter(
         None, "mm/s", (0, 1e6), "ours",
         "speed of meeting below which such a law damps as at this one; 10 by default",
-        above=True, optional=True, judged=(1.0, 100.0),
+        above=True, optional=True,
+        read=(by_law("contact", "least_approach_mm_per_s"), DAMPED),
+        judged=(1.0, 100.0),
     )  # fmt: skip
     length_mm: float | None = parameter(
-        None,
-        "mm",
-        (0, 1e4),
-        "ours",
-        "joint length (johnson, liu)",
-        above=True,
-        optional=True,
+        None, "mm", (0, 1e4), "ours", "joint length (johnson, liu)", above=True, optional=True,
+        read=(CLEARANCE, by_law("contact", "length_mm")),
         judged=(10.0, 100.0),
-    )
+    )  # fmt: skip
     modulus_GPa: float | None = parameter(
-        None,
-        "GPa",
-        (0, 1e6),
-        "ours",
-        "composite modulus (johnson, liu)",
-        above=True,
-        optional=True,
+        None, "GPa", (0, 1e6), "ours", "composite modulus (johnson, liu)", above=True,
+        optional=True, read=(CLEARANCE, by_law("contact", "modulus_GPa")),
         judged=(10.0, 250.0),
-    )
+    )  # fmt: skip
 
 
 @documented
@@ -264,13 +301,22 @@ class Friction:
     `False` leaves it out:
 
     >>> import compressor
-    >>> compressor.Case.from_values({"friction": {"dynamic": 0.1}}).friction.dynamic
+    >>> values = {"joint": "big_end", "clearance_mm": 0.2, "friction": {"dynamic": 0.1}}
+    >>> compressor.Case.from_values(values).friction.dynamic
     0.1
     >>> compressor.Case.from_values({"friction": False}).friction is None
     True
     """
 
-    static: float = parameter(0.23, "", (0, 10), "Table 3", "static coefficient", judged=(0, 0.5))
+    static: float = parameter(
+        0.23,
+        "",
+        (0, 10),
+        "Table 3",
+        "static coefficient",
+        read=by_law("friction", "static"),
+        judged=(0, 0.5),
+    )
     dynamic: float = parameter(0.15, "", (0, 10), "Table 3", "dynamic coefficient", judged=(0, 0.5))
     stiction_velocity_mm_per_s: float = parameter(
         10.0,
@@ -282,26 +328,29 @@ class Friction:
         judged=(0.1, 100),
     )
     friction_velocity_mm_per_s: float = parameter(
-        100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True
-    )
+        100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True,
+        read=by_law("friction", "friction_velocity_mm_per_s"),
+    )  # fmt: skip
     law: str | None = choice(
         None, FRICTION_LAWS, "Eq. 16", "friction law (adams where none is named)", optional=True
     )
     bristle_stiffness_per_mm: float | None = parameter(
         None, "1/mm", (0, 1e9), "ours", "LuGre's sigma_0 over the normal force; 100 by default",
-        above=True, optional=True, judged=(10.0, 1e4),
+        above=True, optional=True, read=by_law("friction", "bristle_stiffness_per_mm"),
+        judged=(10.0, 1e4),
     )  # fmt: skip
     bristle_damping_s_per_mm: float | None = parameter(
         None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_1 over the normal force; 0.03 by default",
-        optional=True, judged=(1e-3, 0.1),
+        optional=True, read=by_law("friction", "bristle_damping_s_per_mm"),
+        judged=(1e-3, 0.1),
     )  # fmt: skip
     viscous_s_per_mm: float | None = parameter(
         None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_2 over the normal force; 0 by default",
-        optional=True,
+        optional=True, read=by_law("friction", "viscous_s_per_mm"),
     )  # fmt: skip
     ideal_joints: bool | None = choice(
         None, (), "ours", "whether joints without clearance rub as well", kind="boolean",
-        optional=True,
+        optional=True, read=IDEAL_JOINT,
     )  # fmt: skip
 
 
@@ -392,12 +441,13 @@ class Output:
         ("double", "single"),
         "ours",
         "of the time series; time and crank angle are double",
-        identity=False,
-    )
+        identity=False, read=SERIES,
+    )  # fmt: skip
     signals: bool = choice(
         False, (), "ours", "forces on frame, bearing and guide, torque and rod load beside the "
-        "time series", kind="boolean", identity=False,
+        "time series", kind="boolean", identity=False, read=SERIES,
     )  # fmt: skip
     compress: bool = choice(
-        False, (), "ours", "time series shuffled and gzipped", kind="boolean", identity=False
-    )
+        False, (), "ours", "time series shuffled and gzipped", kind="boolean", identity=False,
+        read=SERIES,
+    )  # fmt: skip

@@ -3,20 +3,12 @@
 from collections.abc import Iterator
 
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
-from compressor.cases.parameter import Problem, listed
+from compressor.cases.parameter import Problem
 from compressor.cases.table import Settings
 
 
 def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Keys of a law that was not named, and what a law cannot do without."""
-    for name, keys in READ_BY.items():
-        group = getattr(case, name)
-        if not group or f"{name}.law" in given:
-            continue
-        for key, readers in keys.items():
-            if f"{name}.{key}" in given and law_of(group) not in readers:
-                message = f"is read with {name}.law: {listed(readers)}: add the law"
-                yield Problem(f"{name}.{key}", message)
+    """Find what a law of contact cannot do without."""
     law, restitution = case.contact.law, case.contact.restitution
     if law in CYLINDRICAL:
         yield from cylinder_conflicts(case)
@@ -27,11 +19,6 @@ def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
 
 def contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     contact = case.contact
-    if contact.geometry is not None and contact.materials is None:
-        yield Problem(
-            "contact.geometry",
-            "is that of the stiffness that contact.materials give: add materials: [steel, steel]",
-        )
     if contact.materials is not None and contact.exponent != 1.5:
         yield Problem(
             "contact.exponent",

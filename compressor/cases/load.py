@@ -10,7 +10,7 @@ import itertools
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from compressor.cases.combinations import Block, columns
 from compressor.cases.conditions import NoComparison, Test, comparison
 from compressor.cases.file_error import CaseFileError
 from compressor.cases.keys import Leaves, leaves, merged, nested, overridden, read_overrides
+from compressor.cases.keys_read import KeysRead, Variants, itself
 from compressor.cases.parameter import CaseError, Problem, shown
 from compressor.cases.regimes import GROUP, Regimes
 from compressor.cases.study import Axis, Cases, Study, Told, unheard
@@ -73,13 +74,15 @@ def load_studies(
     only: str = "",
     follow: bool = True,
     told: Told = unheard,
+    variants: Variants = itself,
 ) -> list[Study]:
     """The studies of YAML case files; each override, `key=value`, replaces a value in all of them.
 
     A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
     comparison, selects the jobs to be run. A file with `regimes` is refused where the caller cannot
-    `follow` one. `told` hears how many cases have been read. Raises CaseFileError with everything
-    that is wrong in all files, overrides and the comparison.
+    `follow` one. `told` hears how many cases have been read. `variants` gives the cases that the
+    caller runs for one; a key that none of them reads is refused. Raises CaseFileError with
+    everything that is wrong in all files, overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
@@ -88,7 +91,9 @@ def load_studies(
     _refuse_shared_names(drafts)
     if not follow:
         _refuse_regimes(drafts)
-    studies = [_study(draft, max_jobs, test, told) for draft in drafts]
+    keys = KeysRead(variants)
+    studies = [_study(draft, max_jobs, test, told, keys) for draft in drafts]
+    problems += _unread(drafts, keys)
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(Place(f"--only {shortened(only)}"), "", NONE_SELECTED))
@@ -168,16 +173,48 @@ def _refuse_regimes(drafts: Sequence[_Draft]) -> None:
             draft.problems.append(FileProblem(place, GROUP, message))
 
 
-def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told) -> Study:
-    """The study of a draft; without cases if the draft has problems, to which its own are added."""
+def _unread(drafts: Sequence[_Draft], keys: KeysRead) -> Iterator[FileProblem]:
+    """Find the keys of all files that no job reads.
+
+    A key that a file's own jobs read stands there rightly, whatever the command line changes.
+    """
+    for draft in drafts:
+        if draft.changes and any(place.file == draft.path for place, _ in keys.unread):
+            own = replace(draft, changes={}, problems=[])
+            _note_read(own, _cases(own, MAX_JOBS)[1], keys)
+    yield from keys.unread.values()
+
+
+def _note_read(draft: _Draft, cases: Cases | None, keys: KeysRead) -> None:
+    """Note which keys the jobs of a draft read, of a chain those at both ends."""
+    if draft.problems or cases is None:
+        return
+    keys.note(cases)
+    if draft.regimes:
+        last = replace(draft.regimes, first=draft.regimes.last)
+        _, cases = _cases(replace(draft, regimes=last, problems=[]), MAX_JOBS)
+        if cases is not None:
+            keys.note(cases)
+
+
+def _cases(draft: _Draft, max_jobs: int) -> tuple[list[blocks.Draft], Cases | None]:
+    """Return the blocks of a draft, and their cases; None where they are too many to be made."""
     every = _blocks(draft, max_jobs)
     if draft.regimes:
         every = (regimes.at_first(leaves, draft.regimes, draft.problems) for leaves in every)
     drafts = [blocks.draft(leaves, draft.problems) for leaves in every]
     if not _bearable(drafts, draft, max_jobs):
+        return drafts, None
+    return drafts, Cases(draft.name, [one.block() for one in drafts])
+
+
+def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told, read: KeysRead) -> Study:
+    """Return the study of a draft; without cases if the draft has problems, its own among them."""
+    drafts, cases = _cases(draft, max_jobs)
+    if cases is None:
         return Study(draft.name, draft.path, (), ())
-    found = [one.block() for one in drafts]
-    cases = Cases(draft.name, found)
+    found = cases.parts
+    _note_read(draft, cases, read)
     if not draft.problems and not draft.changes:
         _refuse_idle_sample(drafts, draft)
     _refuse_conflicts(draft, cases)

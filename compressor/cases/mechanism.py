@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from compressor.cases.parameter import documented, parameter
+from compressor.cases.readers import CORNER_DAMPED, CORNER_RESTITUTION, GUIDE_FRICTION, PLAY
 
 OURS = "ours"
 
@@ -30,36 +31,49 @@ class Guide:
     )
     stiction_velocity_mm_per_s: float = parameter(
         10.0, "mm/s", (0, 1e6), "Table 3, of the joints", "speed at which friction is three "
-        "quarters of its greatest", above=True,
+        "quarters of its greatest", above=True, read=GUIDE_FRICTION,
     )  # fmt: skip
     crosshead_length_mm: float = parameter(
-        120.0, "mm", (0.001, 1e4), OURS, "the crosshead's length", judged=(60.0, 250.0)
+        120.0,
+        "mm",
+        (0.001, 1e4),
+        OURS,
+        "the crosshead's length",
+        read=PLAY,
+        judged=(60.0, 250.0),
     )
     crosshead_height_mm: float = parameter(
-        80.0, "mm", (0.001, 1e4), OURS, "the crosshead's height", judged=(40.0, 150.0)
+        80.0,
+        "mm",
+        (0.001, 1e4),
+        OURS,
+        "the crosshead's height",
+        read=PLAY,
+        judged=(40.0, 150.0),
     )
     crosshead_inertia_kg_m2: float | None = parameter(
         None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
-        "the crosshead's inertia about its pin", above=True, optional=True,
+        "the crosshead's inertia about its pin", above=True, optional=True, read=PLAY,
     )  # fmt: skip
     stiffness_N_per_mm15: float = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
-        "contact stiffness of a corner, in N/mm^exponent", above=True, judged=(3e4, 3e6),
+        "contact stiffness of a corner, in N/mm^exponent", above=True, read=PLAY,
+        judged=(3e4, 3e6),
     )  # fmt: skip
     exponent: float | None = parameter(
-        None, "", (1, 3), "as the joints'", "force exponent of a corner", optional=True
+        None, "", (1, 3), "as the joints'", "force exponent of a corner", optional=True, read=PLAY
     )
     damping_N_s_per_mm: float | None = parameter(
         None, "N s/mm", (0, 1e9), "as the joints'", "greatest contact damping of a corner",
-        optional=True,
+        optional=True, read=(PLAY, CORNER_DAMPED),
     )  # fmt: skip
     full_damping_mm: float | None = parameter(
         None, "mm", (0, 1e3), "as the joints'", "penetration of full damping of a corner",
-        above=True, optional=True,
+        above=True, optional=True, read=(PLAY, CORNER_DAMPED),
     )  # fmt: skip
     restitution: float | None = parameter(
-        None, "", (0, 1), "as the joints'", "coefficient of restitution of a corner, with a "
-        "contact.law that has one", above=True, optional=True,
+        None, "", (0, 1), "as the joints'", "coefficient of restitution of a corner",
+        above=True, optional=True, read=(PLAY, CORNER_RESTITUTION),
     )  # fmt: skip
 
 

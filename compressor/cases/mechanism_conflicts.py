@@ -11,11 +11,9 @@ SLIM = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at lea
 
 
 def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """A film needs a clearance, and a bearing for which its numbers hold."""
+    """Find a bearing for which the film's numbers do not hold."""
     if not case.lubricant:
         return
-    if case.joint == "none":
-        yield Problem("lubricant", "fills clearances, and joint: none has none: name a joint")
     for joint in JOINTS:
         width = 2.0 * case.machine.pin_radius(joint)
         ratio = case.lubricant.bearing_length_mm / width
@@ -28,11 +26,9 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
 
 
 def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Bores wear where journals touch them, and until a limit that is not yet reached."""
+    """Find what a bore that wears cannot have: oil, and a limit that is reached already."""
     if not case.wear:
         return
-    if case.joint == "none":
-        yield Problem("wear", "needs a clearance, and joint: none has none: name a joint")
     if case.lubricant:
         yield Problem(
             "wear", "of a bore that runs dry is known, and the film's numbers are those of a round "
@@ -70,15 +66,4 @@ def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
         yield Problem(
             "friction.ideal_joints", "have no bristles, as friction.law: lugre needs: choose "
             "another law, or leave the key out",
-        )  # fmt: skip
-    if case.guide and case.guide.restitution is not None and case.contact.restitution is None:
-        yield Problem(
-            "guide.restitution", "is read with a contact.law that has one, and contact.restitution "
-            "for the joints: give both, or leave the key out",
-        )  # fmt: skip
-    rubs = case.guide and case.guide.clearance_mm == 0 and not case.guide.friction
-    if rubs and any(key.startswith("guide.") for key in given):
-        yield Problem(
-            "guide.friction", "is 0 and so is clearance_mm, which leaves an ideal guide: leave "
-            "the group out, or give one of the two",
         )  # fmt: skip

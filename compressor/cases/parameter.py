@@ -15,6 +15,7 @@ from functools import lru_cache
 from inspect import cleandoc
 from typing import Any, TypeVar
 
+from compressor.cases.readers import Reader
 from compressor.program import CompsimError
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
@@ -129,6 +130,7 @@ class Parameter:
     optional: bool = False
     identity: bool = True  # whether it is part of a job's identity
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
+    read: tuple[Reader, ...] = ()  # conditions that all hold where a case reads it
 
     @property
     def range(self) -> str:
@@ -168,6 +170,16 @@ class Parameter:
     def judged_on(self) -> str:
         """The range that the program was judged on, "" without one."""
         return "{:g} to {:g}".format(*self.judged) if self.judged else ""
+
+    @property
+    def readers(self) -> str:
+        """Return what a case file sets so that the key is read; "" where every job reads it.
+
+        Of "a" and "a or b" it is "a".
+        """
+        words = dict.fromkeys(one.words for one in self.read)
+        needed = [one for one in words if not any(o != one and o in one for o in words)]
+        return "; ".join(needed)
 
     def holds(self, value: float) -> bool:
         """Whether a number is in range."""
@@ -243,14 +255,22 @@ def parameter(
     """A dataclass field that is also a row of the table; `more`: other fields of `Parameter`."""
     row = {"unit": unit, "low": span[0], "high": span[1], "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "number"}
-    return field(default=default, metadata=row | more)
+    return _field(default, row | more)
 
 
 def choice(default: Any, choices: tuple[str, ...], source: str, phrase: str, **more: Any) -> Any:
     """A field whose value is one of a few words, or of another `kind` that is given."""
     row = {"unit": "", "low": 0.0, "high": 0.0, "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "choice", "choices": choices}
-    return field(default=default, metadata=row | more)
+    return _field(default, row | more)
+
+
+def _field(default: Any, row: dict[str, Any]) -> Any:
+    """Return a dataclass field with a row; its `read` may be one reader, or several."""
+    read = row.get("read", ())
+    return field(
+        default=default, metadata=row | {"read": (read,) if isinstance(read, Reader) else read}
+    )
 
 
 def documented(group: type[Group]) -> type[Group]:
@@ -260,9 +280,10 @@ def documented(group: type[Group]) -> type[Group]:
         row = Parameter(item.name, default=item.default, **item.metadata)
         default = f"{row.default:g}" if isinstance(row.default, float) else repr(row.default)
         needed = row.needed.replace("true or false", "True or False")
-        judged = f" Judged on {row.judged_on}." if row.judged else ""
+        notes = f" Judged on {row.judged_on}." if row.judged else ""
+        notes += f" Read with {row.readers}." if row.read else ""
         needs = f"Needs {needed}; default {default} ({row.source})."
-        lines.append(f"- `{row.key}`: {row.phrase}. {needs}{judged}")
+        lines.append(f"- `{row.key}`: {row.phrase}. {needs}{notes}")
     text = cleandoc(group.__doc__ or "")
     group.__doc__ = f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
     return group
@@ -270,12 +291,14 @@ def documented(group: type[Group]) -> type[Group]:
 
 def parameter_table(rows: Iterable[Parameter]) -> str:
     """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
-    head = ("key", "unit", "default", "range", "judged on", "source", "what it is")
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    heads = ("key", "unit", "default", "range", "judged on", "source", "what it is", "read with")
+    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)
         default = shown(row.default) if row.kind == "boolean" else default.removesuffix(".0")
-        key, judged = f"`{row.key}`", row.judged_on
-        cells = (key, row.unit, default, row.range, judged, row.source, row.phrase)
+        cells = (
+            f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
+            row.readers,
+        )  # fmt: skip
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

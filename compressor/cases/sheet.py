@@ -97,6 +97,14 @@ class Sheet:
                 found[:] = True
         return found
 
+    def has(self, condition: Callable[[Case], Any]) -> bool:
+        """Return whether a condition holds for any of the jobs."""
+
+        def holds(places: np.ndarray) -> bool:
+            return bool(condition(self._picked(lambda numbers: Column(numbers[places]))))
+
+        return bool(places_where(holds, len(self)).any())
+
     def keys(self) -> list[str]:
         """The keys of the jobs: of all from one text, in which the numbers change."""
         columns: list[Column] = []

@@ -137,6 +137,10 @@ class Cases(Sequence[Case]):
             place[one.numbers] = np.arange(len(one.numbers))
         return sheet, place
 
+    def block_of(self, number: int) -> Block:
+        """Return the block that a case is of."""
+        return self.parts[bisect.bisect_right(self.ends, number)]
+
     def keys(self, told: Told = unheard) -> list[str]:
         """The key of each case; `told` hears how many of how many have been made."""
         if not self._keys:
@@ -168,13 +172,13 @@ class Cases(Sequence[Case]):
             return
         numbers = (sheet.numbers[sheet.doubtful()] for sheet in sheets)
         for number in sorted(itertools.chain.from_iterable(one.tolist() for one in numbers)):
-            at = bisect.bisect_right(self.ends, number)
-            part = self.parts[at]
-            yield part, part.chosen(part.kept[number - self.ends[at] + len(part.kept)])
+            part = self.block_of(number)
+            before = self.ends[bisect.bisect_right(self.ends, number)] - len(part.kept)
+            yield part, part.chosen(part.kept[number - before])
 
     def case(self, chosen: Mapping[str, Node]) -> Case:
         """The case of one combination. Raises CaseError where its values do not fit."""
-        return Case.from_values(nested(chosen) | {"name": self.name})
+        return Case.resolve(nested(chosen) | {"name": self.name})
 
     def combinations(self) -> Iterator[tuple[Block, dict[str, Node]]]:
         """The values of every case by dotted key, and the block that they are of."""

@@ -7,8 +7,9 @@ the fields of the groups.
 import dataclasses
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 from compressor.cases.groups import (
     Contact,
@@ -24,6 +25,17 @@ from compressor.cases.groups import (
 from compressor.cases.lubricant import Lubricant
 from compressor.cases.mechanism import Drive, Guide, Rod
 from compressor.cases.parameter import Parameter, choice
+from compressor.cases.readers import (
+    A_JOINT,
+    BODY,
+    CLEARANCE,
+    CONTACT,
+    GAS,
+    GUIDE,
+    RUBBING,
+    SPRING,
+    Reader,
+)
 from compressor.cases.vibration import Body, Sensor
 from compressor.cases.wear import Wear
 
@@ -56,6 +68,11 @@ WORDS = {
 OF_JOINTS = ("clearance_mm",)
 
 
+def group(default: Any, *read: Reader) -> Any:
+    """Return the field of a group of keys; read: conditions under which a case reads any of it."""
+    return field(default=default, metadata={"read": read})
+
+
 @dataclass(frozen=True)
 class Settings:
     """The values of one simulation in the case file's units, and the times that follow from them.
@@ -70,20 +87,20 @@ class Settings:
     joint: str = choice(
         "none", ("none", "big_end", "small_end", "both"), "§3.2", "joints with clearance"
     )
-    clearance_mm: PerJoint = PerJoint()
+    clearance_mm: PerJoint = group(PerJoint(), A_JOINT)
     initial_offset_mm: Offset = Offset()
     machine: Machine = Machine()
-    gas: Gas = Gas()
-    spring: Spring = Spring()
-    contact: Contact = Contact()
-    friction: Friction | None = Friction()
-    lubricant: Lubricant | None = None
-    guide: Guide | None = None
+    gas: Gas = group(Gas(), GAS)
+    spring: Spring = group(Spring(), SPRING)
+    contact: Contact = group(Contact(), CONTACT)
+    friction: Friction | None = group(Friction(), RUBBING)
+    lubricant: Lubricant | None = group(None, CLEARANCE)
+    guide: Guide | None = group(None, GUIDE)
     drive: Drive | None = None
     rod: Rod | None = None
-    wear: Wear | None = None
+    wear: Wear | None = group(None, CLEARANCE)
     body: Body | None = None
-    sensor: Sensor | None = None
+    sensor: Sensor | None = group(None, BODY)
     solve: Solve = Solve()
     output: Output = Output()
 
@@ -124,14 +141,23 @@ class Settings:
         return self.duration * self.machine.speed_rpm * 6.0 / (self.solve.output_step_deg or 1.0)
 
 
-def parameters(owner: type = Settings, prefix: str = "") -> Iterator[Parameter]:
+def parameters() -> Iterator[Parameter]:
     """The rows of the table, in the order of the case file."""
-    for item in dataclasses.fields(owner):
-        if item.name in GROUPS and owner is Settings:
-            yield from parameters(GROUPS[item.name], item.name + ".")
-        else:
-            row = dict(item.metadata)
-            yield Parameter(key=prefix + item.name, default=item.default, **row)
+    for item in dataclasses.fields(Settings):
+        if item.name not in GROUPS:
+            yield Parameter(key=item.name, default=item.default, **item.metadata)
+            continue
+        for inner in dataclasses.fields(GROUPS[item.name]):
+            key, row = f"{item.name}.{inner.name}", dict(inner.metadata)
+            row["read"] = (*group_readers(item.name), *row["read"])
+            yield Parameter(key=key, default=inner.default, **row)
+
+
+@cache
+def group_readers(name: str) -> tuple[Reader, ...]:
+    """Return the conditions that all hold where a case reads any key of a group."""
+    (item,) = (item for item in dataclasses.fields(Settings) if item.name == name)
+    return tuple(item.metadata.get("read", ()))
 
 
 @cache

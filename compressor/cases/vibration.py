@@ -4,6 +4,15 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from compressor.cases.parameter import choice, documented, parameter
+from compressor.cases.readers import (
+    ALONG_X,
+    ALONG_Y,
+    CASING,
+    CASING_HEARD,
+    RANDOM,
+    ROCKING,
+    STEADY,
+)
 
 OURS = "ours"
 BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mode
@@ -28,33 +37,37 @@ class Body:
     )
     mass_kg: float = parameter(500.0, "kg", (0, 1e7), OURS, "mass of the body", above=True)
     inertia_kg_m2: float = parameter(
-        40.0, "kg m2", (0, 1e9), OURS, "its inertia about its mass centre", above=True
+        40.0, "kg m2", (0, 1e9), OURS, "its inertia about its mass centre", above=True, read=ROCKING
     )
-    centre_x_mm: float = parameter(300.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's")
-    centre_y_mm: float = parameter(-200.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's")
+    centre_x_mm: float = parameter(
+        300.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's", read=ROCKING
+    )
+    centre_y_mm: float = parameter(
+        -200.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's", read=ROCKING
+    )
     frequency_x_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), OURS, "natural frequency along x", above=True
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency along x", above=True, read=ALONG_X
     )
     frequency_y_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), OURS, "natural frequency along y", above=True
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency along y", above=True, read=ALONG_Y
     )
     frequency_rocking_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), OURS, "natural frequency of rocking", above=True
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency of rocking", above=True, read=ROCKING
     )
     damping_ratio: float = parameter(0.03, "", (0, 0.99), OURS, "of the foundation", above=True)
     casing: bool = choice(
         True, (), OURS, "a casing mode at the guide and one at the main bearing, heard by sensors",
-        kind="boolean",
+        kind="boolean", read=CASING_HEARD,
     )  # fmt: skip
     casing_mass_kg: float | None = parameter(
         None, "kg", (0, 1e6), "ours: a 25th of the body's mass", "modal mass of a casing mode",
-        above=True, optional=True,
+        above=True, optional=True, read=CASING,
     )  # fmt: skip
     casing_frequency_Hz: float = parameter(
-        2000.0, "Hz", (0, 1e5), OURS, "natural frequency of a casing mode", above=True
+        2000.0, "Hz", (0, 1e5), OURS, "natural frequency of a casing mode", above=True, read=CASING
     )
     casing_damping_ratio: float = parameter(
-        0.02, "", (0, 0.99), OURS, "damping ratio of a casing mode", above=True
+        0.02, "", (0, 0.99), OURS, "damping ratio of a casing mode", above=True, read=CASING
     )
     start: str = choice(
         "steady", ("steady", "rest"), OURS,
@@ -103,12 +116,14 @@ class Sensor:
     speed_jitter: float = parameter(
         0.0, "", (0, 0.1), OURS,
         "rms of the speed's relative deviation, drawn once a revolution and smooth between: 0.93 "
-        "of it at all times, 0.81 of it in a revolution's mean speed",
+        "of it at all times, 0.81 of it in a revolution's mean speed", read=STEADY,
     )  # fmt: skip
-    seed: int = parameter(1, "", (0, 2**31), OURS, "of noise and jitter", kind="integer")
+    seed: int = parameter(
+        1, "", (0, 2**31), OURS, "of noise and jitter", kind="integer", read=RANDOM
+    )
     length_rev: int | None = parameter(
         None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
-        kind="integer", optional=True,
+        kind="integer", optional=True, read=STEADY,
     )  # fmt: skip
 
     def report_clipping(self, fraction: float) -> str:

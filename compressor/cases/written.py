@@ -8,17 +8,20 @@ from typing import Any
 from compressor.cases.case import Case
 from compressor.cases.parameter import CaseError
 from compressor.cases.table import WORDS
+from compressor.cases.unread import values_read
 from compressor.cases.yaml_reader import resolved
 
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 
 def to_yaml(case: Case, brief: bool = False) -> str:
-    """A resolved case as the text of a case file, which reads back to an equal case.
+    """Return a resolved case as the text of a case file, which reads back to an equal case.
 
-    brief: without the name and all that is so by default; it then reads back to an equal job.
+    Values that the case does not read are left out. A job of a sweep over loads or laws may have
+    some that are not the defaults: its text reads back to a case of the same physics and another
+    key. brief: without the name and all that is so by default; it then reads back to an equal job.
     """
-    values = _needed(case) if brief else case.values()
+    values = _needed(values_read(case)) if brief else values_read(case)
     lines = []
     for key, value in values.items():
         if isinstance(value, Mapping):
@@ -29,10 +32,10 @@ def to_yaml(case: Case, brief: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _needed(case: Case) -> dict[str, Any]:
-    """The values of a case without those that follow from the others."""
-    kept = case.values()
-    for key, value in case.values().items():
+def _needed(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of a case without those that follow from the others."""
+    case, kept = Case.resolve(values), dict(values)
+    for key, value in values.items():
         for name in value if isinstance(value, Mapping) else ():
             rest = {inner: item for inner, item in kept[key].items() if inner != name}
             if _is_same(kept | {key: rest or WORDS.get(key, {})}, case):
@@ -44,9 +47,9 @@ def _needed(case: Case) -> dict[str, Any]:
 
 
 def _is_same(values: Mapping[str, Any], case: Case) -> bool:
-    """Whether values make a case."""
+    """Return whether values make a case."""
     try:
-        return Case.from_values({"name": case.name, **values}) == case
+        return Case.resolve({"name": case.name, **values}) == case
     except CaseError:
         return False
 

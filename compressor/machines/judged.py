@@ -81,5 +81,5 @@ def ideal_text(machine: Case) -> str:
 @lru_cache(maxsize=8)
 def ideal_runs(text: str) -> dict[str, xr.Dataset]:
     """Both ideal machines' runs, which most machines of a study share."""
-    cases = cases_of(Case.from_values(json.loads(text)))
+    cases = cases_of(Case.resolve(json.loads(text)))
     return {name: simulated(cases[name]) for name in IDEAL}

@@ -170,7 +170,7 @@ class Search:
             solve = self.study.cases[0].solve
             key = "duration_rev" if solve.duration_s is None else "duration_s"
             values.setdefault("solve", {})[key] = self.longer * getattr(solve, key)
-        return Case.from_values(values)
+        return Case.resolve(values)
 
 
 def cost(verdict: Judged, distance: float, sure: bool = False) -> float:

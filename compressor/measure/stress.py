@@ -72,7 +72,7 @@ def run_scene(task: tuple[int, int, Budget]) -> Row:
     values = extremes.values(*task)
     row: Row = {"scene": number, "load": values["load"], "joint": values["joint"]}
     try:
-        case = Case.from_values(values)
+        case = Case.resolve(values)
     except CaseError as error:
         return row | {
             "verdict": "failed",

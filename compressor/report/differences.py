@@ -58,7 +58,7 @@ def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
     if group:
         rest[group] = {n: item for n, item in values[group].items() if n != name}
     try:
-        return Case.from_values(rest).physics_key == case.physics_key
+        return Case.resolve(rest).physics_key == case.physics_key
     except CaseError:
         return False  # what is left fits no more
 

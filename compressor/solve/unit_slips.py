@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from compressor.cases import Case, row_of
+from compressor.cases import Case, reads, row_of
 from compressor.metrics import JOINTS
 
 METRES, MICROMETRES = {"m": 1e3}, {"µm": 1e-3}
@@ -54,8 +54,6 @@ USUAL = {
     "friction.stiction_velocity_mm_per_s": Usual(0.1, 1e4, {"m/s": 1e3}),
     "friction.friction_velocity_mm_per_s": Usual(1.0, 1e5, {"m/s": 1e3}),
 }
-UNREAD = {"typical": {"spring"}, "design": {"gas"}, "none": {"spring", "gas"}}  # groups by load
-OF_CONTACTS = {"contact", "friction", "clearance_mm"}
 
 
 class Slip(NamedTuple):
@@ -81,7 +79,7 @@ def slips(cases: Sequence[Case]) -> list[Slip]:
 def values_of(case: Case, key: str) -> list[float]:
     """The values of a key that a case's simulation reads; of clearances, those of worn joints."""
     group, _, name = key.partition(".")
-    if group in UNREAD[case.load] or (case.joint == "none" and group in OF_CONTACTS):
+    if not reads(case, key):
         return []
     if not name:  # what both joints share
         worn = (getattr(getattr(case, group), joint) for joint in JOINTS)

@@ -18,6 +18,7 @@ from joblib import Parallel, delayed
 from measure_accuracy import provenance
 
 from compressor.analysis.claim_rules import RULES
+from compressor.analysis.paper_cases import cases_of
 from compressor.cases.case import Case
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
@@ -67,7 +68,7 @@ def main(target):
         "margin": default.margin, "error": default.error,
         "shares": dict(zip(SHARES, default.share_margin, strict=True)),
     }  # fmt: skip
-    (drawn,) = load_studies(example("assumptions"))
+    (drawn,) = load_studies(example("assumptions"), variants=lambda m: cases_of(m).values())
     judged = judge_machines(drawn, FOLDER, 2)
     table = sensitivity(judged)
     found["assumptions"] = {

@@ -79,8 +79,13 @@ SHARED = [
     ({"contact": {"materials": ["steel", "steel"], "exponent": 2}},
      "contact.exponent: is 2, but Eq. 15's stiffness from materials needs exponent 1.5: leave it "
      "out, or give stiffness_N_per_mm15 in place of materials"),
-    ({"joint": "small_end", "clearance_mm": {"big_end": 0.2}},
-     "clearance_mm.small_end: is needed with joint: small_end; give it in mm, such as 0.2"),
+    ({"joint": "both", "clearance_mm": {"big_end": 0.2}},
+     "clearance_mm.small_end: is needed with joint: both; give it in mm, such as 0.2"),
+    ({"gas": {"piston_radius_mm": 110, "suction_MPa": 0.2}},
+     "gas: nothing reads this group: it needs load: typical; set that, or leave the group out"),
+    ({"contact": {"law": "hertz", "damping_N_s_per_mm": 9}},
+     "contact.damping_N_s_per_mm: nothing reads this key: it needs contact.law: impact; set that, "
+     "or leave the key out"),
 ]  # fmt: skip
 
 
@@ -153,8 +158,6 @@ def test_twelve_mistakes_are_told_at_once():
         "body: needs true or a mapping of keys, such as {freedoms: xy}, not 3",
         "clearance_mm.small_end: is needed with joint: both; give it in mm, such as 0.2",
         "solve.duration_s: stands in place of solve.duration_rev: give one of the two",
-        "contact.geometry: is that of the stiffness that contact.materials give: add materials: "
-        "[steel, steel]",
         "friction.friction_velocity_mm_per_s: 1 mm/s must exceed the stiction_velocity_mm_per_s, "
         "10 mm/s",
     ]  # fmt: skip

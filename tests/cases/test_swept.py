@@ -403,7 +403,8 @@ def test_only_some_jobs_are_selected_and_all_are_in_the_study(plan):
 
 
 def test_a_study_that_is_no_grid_has_a_job_dimension(plan, tmp_path):
-    second = "{contact: {materials: [steel, copper]}, machine: {rod_centre_mm: 200}}"
+    second = "{joint: big_end, clearance_mm: 0.1, contact: {materials: [steel, copper]}, "
+    second += "machine: {rod_centre_mm: 200}}"
     study = plan(SHORT + f"blocks:\n  - {{load: [none, design]}}\n  - {second}\n")
     write_study(tmp_path, study, "by hand")
     keep(tmp_path, *(simulate(case) for case in study.cases[:2]))

@@ -8,7 +8,7 @@ from compressor.cases.written import to_yaml
 
 
 def test_what_is_written_stays_readable():
-    assert to_yaml(Case()).startswith("name: case\nload: design\njoint: none\ninitial_offset_mm:\n")
+    assert to_yaml(Case()).startswith("name: case\nload: design\njoint: none\nmachine:\n")
 
 
 @pytest.mark.parametrize(

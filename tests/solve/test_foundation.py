@@ -200,7 +200,7 @@ def test_a_study_of_bodies_opens(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"sensor": True}, "sensor: stands on a body: write body: true"),
+        ({"sensor": True}, "sensor: nothing reads this group: it needs body: true"),
         ({"body": {"mass_kg": 100}}, "moving parts have 19 % of the body's mass"),
         ({"body": {"frequency_x_Hz": 16.5}}, r"order 2 of the speed, 16\.7 Hz, is so near"),
         ({"body": True, "output": {"keep": "metrics"}}, "it needs output.keep: series"),
@@ -209,8 +209,14 @@ def test_a_study_of_bodies_opens(tmp_path, monkeypatch):
             {"body": True, "solve": {"settle_rev": "auto", "duration_rev": 5.5}},
             "whole settled revolutions",
         ),
-        ({"body": {"start": "rest"}, "sensor": {"length_rev": 3}}, "repeats a steady motion"),
-        ({"body": {"start": "rest"}, "sensor": {"speed_jitter": 0.01}}, "paces a steady motion"),
+        (
+            {"body": {"start": "rest"}, "sensor": {"length_rev": 3}},
+            "it needs body.start: steady",
+        ),
+        (
+            {"body": {"start": "rest"}, "sensor": {"speed_jitter": 0.01}},
+            "it needs body.start: steady",
+        ),
         ({"body": True, "sensor": {"low_pass_Hz": 20000}}, "less than half of rate_Hz"),
         ({"body": {"mass_kg": -1}}, r"body.mass_kg: -1 is outside"),
     ],

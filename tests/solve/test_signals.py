@@ -160,7 +160,7 @@ def test_signals_are_absent_unless_asked_for_and_change_nothing():
 
 
 def test_signals_need_time_series():
-    with pytest.raises(CaseError, match=r"they need output\.keep: series"):
+    with pytest.raises(CaseError, match=r"it needs output\.keep: series"):
         Case.from_values({"output": {"signals": True, "keep": "metrics"}})
 
 

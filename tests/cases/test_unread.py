@@ -1,0 +1,298 @@
+"""Each key of the table: where it is read it changes what is stored, elsewhere it is refused."""
+
+import copy
+import json
+from functools import cache
+from typing import NamedTuple
+
+import pytest
+
+from compressor.cases.case import Case
+from compressor.cases.load import CaseFileError, load_cases, load_studies
+from compressor.cases.parameter import CaseError
+from compressor.cases.table import table
+from compressor.solve import simulate
+from compressor.store.series_file import series_image
+from compressor.wear.life import life
+from compressor.wear.stages import Worn, dataset, first, following
+
+SHORT = {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 5,
+         "error_bars": False, "horizon": False}  # fmt: skip
+IDEAL = {"solve": SHORT, "output": {"signals": True}}
+WORN = IDEAL | {"joint": "both", "clearance_mm": {"big_end": 0.2, "small_end": 0.2}}
+BIG = WORN | {"joint": "big_end", "clearance_mm": {"big_end": 0.2}}
+SMALL = WORN | {"joint": "small_end", "clearance_mm": {"small_end": 0.2}}
+FREE = WORN | {"load": "none"}
+GAS = WORN | {"load": "typical", "gas": {"switching": "exact"}}
+HERTZ = WORN | {"contact": {"law": "hertz"}}
+DAMPED = WORN | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
+PIN = {"law": "johnson", "length_mm": 20, "modulus_GPa": 100}
+JOHNSON = WORN | {"contact": PIN}
+COPPER = WORN | {"contact": {"materials": ["steel", "copper"]}}
+TANH = WORN | {"friction": {"law": "coulomb_tanh"}}
+LUGRE = WORN | {"friction": {"law": "lugre"}}
+OIL = WORN | {"lubricant": True}
+SLIDING = IDEAL | {"guide": True}
+PLAYING = IDEAL | {"guide": {"clearance_mm": 0.1}}
+SMOOTH = IDEAL | {"guide": {"clearance_mm": 0.1, "friction": 0}}
+DRIVEN = IDEAL | {"drive": {"torque_N_m": 10}, "machine": {"gravity_m_per_s2": 9.81}}
+ELASTIC = IDEAL | {"rod": True}
+WEARING = BIG | {"wear": {"limit_mm": 0.205}}
+HEARD = IDEAL | {"body": {"freedoms": "xy_rocking"}, "sensor": True}
+FLAT = HEARD | {"body": {"freedoms": "xy"}}
+STARTED = HEARD | {"body": {"start": "rest"}}
+CENTRAL = HEARD | {"sensor": {"place": "body"}}
+BARE = HEARD | {"body": {"casing": False}}
+QUIET = HEARD | {"sensor": {"noise_m_per_s2": 0}}
+SMALL_FILES = IDEAL | {"output": {"keep": "metrics"}}
+
+
+class Entry(NamedTuple):
+    """A key's value, a machine that reads it, and some that do not."""
+
+    value: object
+    where: dict
+    unread: tuple[dict, ...] = ()
+
+
+def entries(where: dict, *unread: dict, **values) -> dict[str, Entry]:
+    """Return an entry for each key of a group, which the same machines read."""
+    return {name.replace("__", "."): Entry(value, where, unread) for name, value in values.items()}
+
+
+ENTRIES = {
+    "name": Entry("other", IDEAL),
+    "load": Entry("none", IDEAL),
+    "joint": Entry("both", BIG | {"clearance_mm": 0.2}),
+    "clearance_mm.big_end": Entry(0.25, WORN, (SMALL, IDEAL)),
+    "clearance_mm.small_end": Entry(0.25, WORN, (BIG, IDEAL)),
+    **entries(BIG, SMALL, IDEAL, initial_offset_mm__big_end_x=0.1,
+              initial_offset_mm__big_end_y=0.1),
+    **entries(SMALL, BIG, IDEAL, initial_offset_mm__small_end_x=0.1,
+              initial_offset_mm__small_end_y=0.1),
+    **entries(
+        WORN, machine__crank_radius_mm=100, machine__rod_length_mm=550, machine__speed_rpm=550,
+        machine__rod_mass_kg=5, machine__rod_centre_mm=280, machine__rod_inertia_kg_m2=0.2,
+        machine__reciprocating_mass_kg=15, machine__gravity_m_per_s2=9.81,
+    ),
+    "machine.pin_radius_mm": Entry(12, WORN, (IDEAL,)),
+    **entries(
+        GAS, WORN, FREE, gas__piston_radius_mm=60, gas__head_clearance_mm=25,
+        gas__suction_MPa=0.11, gas__discharge_MPa=0.5, gas__exponent=1.3,
+        gas__back_pressure_MPa=0.1,
+    ),
+    "gas.switching": Entry("exact", WORN | {"load": "typical"}, (WORN, FREE)),
+    **entries(
+        WORN, GAS, FREE, spring__stiffness_N_per_mm=30, spring__damping_N_s_per_mm=0.1,
+        spring__preload_N=700, spring__stroke_mm=110,
+    ),
+    "contact.law": Entry("hertz", WORN, (IDEAL,)),
+    "contact.stiffness_N_per_mm15": Entry(4e5, WORN, (IDEAL, JOHNSON)),
+    "contact.materials": Entry(["steel", "copper"], WORN, (IDEAL,)),
+    "contact.geometry": Entry("internal", COPPER, (WORN, JOHNSON)),
+    "contact.exponent": Entry(1.4, WORN, (IDEAL, JOHNSON)),
+    **entries(WORN, IDEAL, HERTZ, contact__damping_N_s_per_mm=300, contact__full_damping_mm=0.01),
+    "contact.restitution": Entry(0.8, DAMPED, (WORN, HERTZ)),
+    "contact.least_approach_mm_per_s": Entry(500, DAMPED, (WORN, HERTZ, JOHNSON)),
+    **entries(JOHNSON, WORN, IDEAL, contact__length_mm=30, contact__modulus_GPa=90),
+    "friction.static": Entry(0.3, WORN, (IDEAL, TANH)),
+    **entries(WORN, IDEAL, friction__dynamic=0.1, friction__stiction_velocity_mm_per_s=20),
+    "friction.friction_velocity_mm_per_s": Entry(200, WORN, (IDEAL, TANH, LUGRE)),
+    "friction.law": Entry("threlfall", WORN, (IDEAL,)),
+    **entries(
+        LUGRE, WORN, friction__bristle_stiffness_per_mm=50, friction__bristle_damping_s_per_mm=0.1,
+        friction__viscous_s_per_mm=1e-3,
+    ),
+    "friction.ideal_joints": Entry(True, BIG, (WORN,)),
+    **entries(
+        OIL, IDEAL, lubricant__viscosity_mPa_s=50, lubricant__bearing_length_mm=15,
+        lubricant__last_share=0.1,
+    ),
+    "guide.clearance_mm": Entry(0.1, SLIDING),
+    "guide.friction": Entry(0.1, SLIDING),
+    "guide.stiction_velocity_mm_per_s": Entry(50, SLIDING, (SMOOTH,)),
+    **entries(
+        PLAYING, SLIDING, guide__crosshead_length_mm=100, guide__crosshead_height_mm=70,
+        guide__crosshead_inertia_kg_m2=0.05, guide__stiffness_N_per_mm15=2e5,
+    ),
+    **entries(
+        DRIVEN, drive__flywheel_kg_m2=2, drive__torque_N_m=50, drive__slope_N_m_s=50,
+        drive__unbalance_kg_mm=800,
+    ),
+    **entries(
+        ELASTIC, rod__youngs_modulus_GPa=150, rod__depth_mm=50, rod__width_mm=30,
+        rod__damping_ratio=0.05,
+    ),
+    **entries(
+        WEARING, IDEAL, wear__coefficient_mm3_per_N_m=1e-7, wear__coefficient_factor=3,
+        wear__limit_mm=0.206, wear__hours=1, wear__step_mm=0.02, wear__bore_length_mm=15,
+        wear__sectors=36,
+    ),
+    **entries(
+        HEARD, body__freedoms="xy", body__mass_kg=600, body__damping_ratio=0.1, body__start="rest",
+        body__frequency_x_Hz=30, body__frequency_y_Hz=30,
+    ),
+    **entries(
+        HEARD, FLAT, body__inertia_kg_m2=50, body__centre_x_mm=200, body__centre_y_mm=-100,
+        body__frequency_rocking_Hz=30,
+    ),
+    "body.frequency_x_Hz": Entry(30, HEARD, (IDEAL | {"body": {"freedoms": "y"}},)),
+    "body.frequency_y_Hz": Entry(30, HEARD, (IDEAL | {"body": {"freedoms": "x"}},)),
+    "body.casing": Entry(False, HEARD, (CENTRAL, IDEAL | {"body": True})),
+    **entries(
+        HEARD, CENTRAL, BARE, body__casing_mass_kg=30, body__casing_frequency_Hz=1500,
+        body__casing_damping_ratio=0.05,
+    ),
+    **entries(
+        HEARD, IDEAL, sensor__place="bearing", sensor__direction="x", sensor__rate_Hz=20000,
+        sensor__low_pass_Hz=5000, sensor__mounting_Hz=20000, sensor__mounting_damping_ratio=0.1,
+        sensor__range_m_per_s2=1, sensor__noise_m_per_s2=0.1,
+    ),
+    "sensor.seed": Entry(2, HEARD, (QUIET, IDEAL)),
+    **entries(HEARD, STARTED, IDEAL, sensor__speed_jitter=0.01, sensor__length_rev=3),
+    **entries(
+        WORN, solve__duration_rev=2, solve__duration_s=0.24, solve__settle_rev=0.5,
+        solve__output_step_deg=10, solve__output_step_s=0.001, solve__accuracy="fine",
+        solve__rtol=1e-7, solve__error_bars=True, solve__horizon=True, solve__method="RODAS",
+        solve__max_steps=5, solve__timeout_s=1e-9,
+    ),
+    "output.keep": Entry("metrics", IDEAL | {"output": {}}),
+    **entries(IDEAL, SMALL_FILES, output__precision="single", output__compress=True),
+    "output.signals": Entry(True, IDEAL | {"output": {"keep": "series"}}, (SMALL_FILES,)),
+}  # fmt: skip
+RIVALS = {"solve.duration_s": "duration_rev", "solve.output_step_s": "output_step_deg",
+          "solve.rtol": "accuracy"}  # fmt: skip
+UNREAD = [(key, where) for key, entry in ENTRIES.items() for where in entry.unread]
+
+
+def with_value(where: dict, key: str, value: object) -> dict:
+    """Return nested values with one more."""
+    values = copy.deepcopy(where)
+    group, _, name = key.rpartition(".")
+    within = values if not group else values.setdefault(group, {})
+    if within is True:
+        within = values[group] = {}
+    within[name] = value
+    if key in RIVALS:
+        del within[RIVALS[key]]
+    return values
+
+
+@cache
+def stored(text: str) -> dict[str, str]:
+    """Return what is stored of a case by name; of one with wear, of its first two stages too."""
+    case = Case.from_values(json.loads(text))
+    run = simulate(case)
+    found = {name: repr(item.values.tolist()) for name, item in run.variables.items()}
+    del found["seconds"]
+    found["name"] = run.attrs["name"]
+    if case.output.keep == "metrics":
+        return {name: text for name, text in found.items() if name != "time"}
+    found["file"] = str(len(series_image(run, case.output)) // 1000)
+    if case.wear:
+        worn = Worn(case)
+        begun = first(worn)
+        stages = dataset(worn, [begun, following(worn, begun)])
+        found |= {name: repr(item.values.tolist()) for name, item in stages.variables.items()}
+        found["life"] = repr((life(worn, stages), worn.limit))
+    return found
+
+
+def test_every_key_of_the_table_has_an_entry():
+    assert sorted(ENTRIES) == sorted(table())
+
+
+def test_every_key_with_a_reader_is_refused_somewhere():
+    rows = [row.key for row in table().values() if row.read]
+    assert [key for key in rows if not ENTRIES[key].unread] == [
+        "guide.clearance_mm",
+        "guide.friction",
+    ]
+
+
+def test_two_runs_of_one_case_store_the_same():
+    text = json.dumps(HEARD | WORN)
+    assert stored(text) == stored.__wrapped__(text)
+
+
+@pytest.mark.parametrize("key", ENTRIES)
+def test_a_key_changes_what_is_stored(key):
+    value, where, _ = ENTRIES[key]
+    assert stored(json.dumps(with_value(where, key, value))) != stored(json.dumps(where))
+
+
+@pytest.mark.parametrize(
+    ("key", "where"), UNREAD, ids=lambda part: part if isinstance(part, str) else ""
+)
+def test_a_key_that_nothing_reads_is_refused(key, where, tmp_path):
+    values = with_value(where, key, ENTRIES[key].value)
+    Case.from_values(where)
+    with pytest.raises(CaseError) as caught:
+        Case.from_values(values)
+    (problem,) = caught.value.problems
+    assert problem.key in (key, key.partition(".")[0])
+    assert "nothing reads this" in problem.message
+    path = tmp_path / "case.yaml"
+    path.write_text(json.dumps(values))
+    with pytest.raises(CaseFileError) as told:
+        load_cases(path)
+    (in_file,) = told.value.problems
+    assert (in_file.key, in_file.message) == (problem.key, problem.message)
+
+
+GONE = "set that, or leave the {} out"
+IN_GAS = "nothing reads this group: it needs load: typical; " + GONE.format("group")
+
+
+@pytest.mark.parametrize(
+    ("text", "overrides", "expected"),
+    [
+        ("gas: {discharge_MPa: 0.5}", [], [f"case.yaml:1:1: gas: {IN_GAS}"]),
+        ("gas:\n  exponent: 1.4\nload: [none, design]", [], [f"case.yaml:1:1: gas: {IN_GAS}"]),
+        ("load: [typical, design]\ngas: {back_pressure_MPa: 0.1}", [], []),
+        ("gas: {back_pressure_MPa: 0.1}\nblocks: [{load: typical}, {load: none}]", [], []),
+        ("blocks: [{load: typical}, {load: none, gas: {back_pressure_MPa: 0.1}}]", [],
+         [f"case.yaml:1:40: gas: {IN_GAS}"]),
+        ("lubricant: true\njoint: [none, big_end]\nclearance_mm: 0.1", [], []),
+        ("joint: both\nclearance_mm: 0.1\nguide: {friction: [0, 0.1]}", [], []),
+        ("clearance_mm: {big_end: 0.1, small_end: 0.2}\njoint: big_end", [],
+         ["case.yaml:1:30: clearance_mm.small_end: nothing reads this key: it needs joint: "
+          "small_end or both; " + GONE.format("key")]),
+        ("{}", ["gas.exponent=1.3"], [f"--set gas.exponent=1.3: gas: {IN_GAS}"]),
+        # what the command line takes the reader from is the file's, and no mistake of it
+        ("load: typical\ngas: {back_pressure_MPa: 0.1}", ["load=none"], []),
+        ("gas: {back_pressure_MPa: 0.1}", ["machine.speed_rpm=400"],
+         [f"case.yaml:1:1: gas: {IN_GAS}"]),
+        ("joint: big_end\nclearance_mm: 0.1", ["clearance_mm.big_end=0.2"], []),
+        # a chain reads at its last value what it does not read at its first
+        ("joint: both\nclearance_mm: 0.1\nguide: {crosshead_length_mm: 90}\n"
+         "regimes: {over: guide.clearance_mm, from: 0, to: 0.1, n: 3}", [], []),
+        ("joint: both\nclearance_mm: 0.1\n"
+         "regimes: {over: gas.back_pressure_MPa, from: 0, to: 0.1, n: 3}", [],
+         [f"case.yaml:3:11: gas: {IN_GAS}"]),
+    ],
+)  # fmt: skip
+def test_one_job_that_reads_a_key_is_enough(text, overrides, expected, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.yaml").write_text(text)
+    found = []
+    try:
+        load_studies("case.yaml", overrides=overrides)
+    except CaseFileError as error:
+        found = [str(problem) for problem in error.problems]
+    assert found == expected
+
+
+def test_one_file_that_reads_an_override_is_enough(tmp_path):
+    paths = [tmp_path / "gas.yaml", tmp_path / "spring.yaml"]
+    paths[0].write_text("load: typical")
+    paths[1].write_text("load: design")
+    assert len(load_studies(*paths, overrides=["gas.back_pressure_MPa=0.1"])) == 2
+
+
+def test_a_job_has_one_key_beside_oil_that_it_has_no_room_for(tmp_path):
+    (tmp_path / "oil.yaml").write_text("lubricant: true\njoint: [none, big_end]\nclearance_mm: 0.1")
+    dry, oiled = load_cases(tmp_path / "oil.yaml")
+    assert dry.lubricant is None
+    assert dry.key == Case().key
+    assert oiled.lubricant is not None
