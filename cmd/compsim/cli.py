@@ -43,10 +43,12 @@ from compsim import (
 from compsim.screen import DONE, INTERNAL, STORE, discard_output, open_streams, say
 from compsim.usage import Commands, one_line
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = [signal.SIGINT, signal.SIGTERM]
+if hasattr(signal, "SIGHUP"):  # not on Windows
+    SIGNALS.append(signal.SIGHUP)
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
 NO_ROOM = ("failed to map segment", "Cannot allocate memory")  # as a library that is loaded says
-UNREAD = 128 + signal.SIGPIPE  # exit code, as of a program that SIGPIPE ends
+UNREAD = 141  # exit code, as of a program that SIGPIPE ends, which Windows does not have
 COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click prints and exits
 AGAIN = 0.02  # s until a dropped signal is sent again
 

@@ -6,7 +6,6 @@ dimension scene.
 """
 
 import math
-import resource
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -63,6 +62,8 @@ NUMBERS = {
 
 def run_scene(task: tuple[int, int, Budget]) -> Row:
     """Draw, run and judge scene (number, seed, budget): a row of the campaign."""
+    import resource  # not on Windows, where nothing is run
+
     from compressor.measure.judge import (  # needs numba: only where something is simulated
         PARTS,
         judge,

@@ -5,7 +5,6 @@ What the file system refuses is a StoreError, which says where and what to do ab
 
 import contextlib
 import errno
-import fcntl
 import os
 import re
 import time
@@ -177,6 +176,10 @@ def name_pending(paths: Iterable[Path]) -> None:
 def is_locked(place: Path) -> bool:
     """Whether a `Writer` is at work in a place; what one that was killed left is no lock."""
     try:
+        import fcntl
+    except ImportError:  # Windows: nothing is run there
+        return False
+    try:
         with open(place / LOCK_NAME, "rb") as file:
             if not file.read(1):  # given back: nobody is disturbed by our look
                 return False
@@ -223,7 +226,9 @@ def _make_folder(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder durable, where its file system can."""
+    """Make the names in a folder durable, where the system and its file system can."""
+    if os.name == "nt":  # which opens no folder
+        return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -6,7 +6,6 @@ replaces are removed after.
 """
 
 import contextlib
-import fcntl
 import math
 import os
 import re
@@ -239,6 +238,8 @@ def _holder(descriptor: int) -> str:
 
 def _locked(path: Path, wait: bool, command: str) -> int:
     """Take a lock for this process, for as long as the descriptor stays open."""
+    import fcntl  # not on Windows, where nothing is run
+
     make_folder(path.parent)
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)

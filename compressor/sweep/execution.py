@@ -10,6 +10,7 @@ import math
 import mmap
 import multiprocessing
 import os
+import platform
 import signal
 import sys
 import tempfile
@@ -48,6 +49,23 @@ MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limi
 
 class WorkersFailed(CompsimError):
     """Worker processes cannot be started, or die before they begin a job."""
+
+
+class UnsupportedSystem(CompsimError):
+    """A system on which no jobs are run, such as Windows."""
+
+    exit_code = 2
+
+
+def require_posix() -> None:
+    """Raise UnsupportedSystem where workers and store lack limits and locks: on Windows."""
+    try:
+        import fcntl  # noqa: F401
+        import resource  # noqa: F401
+    except ImportError as error:
+        problem = f"{platform.system()} has no {error.name}, which a run needs"
+        remedy = "run it under Linux, macOS or WSL, and open the folder of results here"
+        raise UnsupportedSystem(f"{problem}: {remedy}") from error
 
 
 def run_batches(

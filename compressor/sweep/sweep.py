@@ -17,7 +17,7 @@ from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.batches import Input
-from compressor.sweep.execution import rest, run_batches
+from compressor.sweep.execution import require_posix, rest, run_batches
 from compressor.sweep.run_job import run_ahead, run_job
 from compressor.sweep.wanted import End, Missing, Wanted, stored
 from compressor.sweep.warm_up import Needs, compile_once, load
@@ -118,8 +118,9 @@ def sweep(
     """Run what is missing of some studies and store it in a folder; failed jobs only on request.
 
     workers: processes of this machine. Raises StoreError, and WorkersFailed; whatever ends a sweep
-    early, finished jobs are stored and the same call goes on.
+    early, finished jobs are stored and the same call goes on. Raises UnsupportedSystem on Windows.
     """
+    require_posix()
     options = options or Options()
     began = time.monotonic()
     folder = Path(folder).absolute()
@@ -237,6 +238,7 @@ def run_here(
 
     Where the needs name scenes for lanes, jobs are cases, and `work` takes what `run_ahead` gives.
     """
+    require_posix()
     if jobs:
         compile_once(needs, remark)
     ahead = partial(run_ahead, needs.lanes) if needs.lanes else None

@@ -6,7 +6,6 @@ import gc
 import mmap
 import os
 import pickle
-import resource
 import signal
 import struct
 import sys
@@ -21,7 +20,9 @@ from compressor.reasons import Reason
 
 OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
 MOST_TEXT = 20_000  # characters of a traceback
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ENDING = [signal.SIGINT, signal.SIGTERM]
+if hasattr(signal, "SIGHUP"):  # not on Windows
+    ENDING.append(signal.SIGHUP)
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 NOTE = struct.Struct("ddd")  # process; job of the batch; since when it runs, or minus its end (s)
 
@@ -101,6 +102,8 @@ def settle(work: Callable[[Any], Any], rules: Workers, notes: str, parent: int) 
 
 def limit(memory: int) -> None:
     """Have allocations fail once a job has added `memory` bytes, and no crash write a core file."""
+    import resource  # not on Windows, where nothing is run
+
     _, most = resource.getrlimit(resource.RLIMIT_CORE)
     resource.setrlimit(resource.RLIMIT_CORE, (0, most))
     if sys.platform != "linux":

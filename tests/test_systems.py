@@ -1,0 +1,81 @@
+"""On Windows results are read, planned and drawn; only a run needs what that system lacks."""
+
+import json
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+# modules and signals that Python does not have on Windows, taken away before ours are imported
+WITHOUT = """
+import importlib.abc, signal, sys
+
+class Absent(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name in ("fcntl", "resource"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+for name in ("fcntl", "resource"):
+    sys.modules.pop(name, None)
+sys.meta_path.insert(0, Absent())
+del signal.SIGHUP, signal.SIGPIPE
+"""
+CASE = {
+    "joint": "big_end", "clearance_mm": [0.1, 0.2],
+    "solve": {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9},
+}  # fmt: skip
+
+
+@pytest.fixture
+def elsewhere(tmp_path):
+    """Runs Python code without these modules; returns what it printed, as stdout and stderr."""
+    (tmp_path / "two.yaml").write_text(json.dumps(CASE))
+
+    def run(code, *, code_expected=0):
+        script = WITHOUT + textwrap.dedent(code)
+        done = subprocess.run(
+            [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"COMPSIM_DEBUG": "1"},
+            capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == code_expected, done.stderr
+        return done.stdout, done.stderr
+
+    return run
+
+
+def command(*words):
+    return f"from compsim import cli\nsys.exit(cli.main({list(words)!r}))"
+
+
+def test_the_library_reads_and_simulates(elsewhere, paper_store):
+    out, _ = elsewhere(f"""
+        import compressor
+        study = compressor.open_study({str(paper_store)!r}, "big-end")
+        run = compressor.simulate(compressor.load_cases("two.yaml")[0])
+        print(study.sizes["clearance_mm"], run.status.item())
+    """)
+    assert out == "3 ok\n"
+
+
+def test_commands_that_run_nothing_work(elsewhere, paper_store, tmp_path):
+    results = str(paper_store)
+    elsewhere(command("init", "wear", "-o", "mine.yaml"))
+    assert (tmp_path / "mine.yaml").exists()
+    assert "2 jobs" in elsewhere(command("plan", "two.yaml"))[0]
+    assert "big-end" in elsewhere(command("status", results))[0]
+    elsewhere(command("export", "big-end", "-i", results, "-o", "x.csv"))
+    elsewhere(command("plot", "big-end", "clearance_mm=0.2", "--what", "orbits", "-i", results))
+    elsewhere(command("report", results, "-o", "page"))
+    assert (tmp_path / "page/index.html").exists()
+
+
+@pytest.mark.parametrize("words", [["run", "two.yaml"], ["stress", "--scenes", "1"]])
+def test_a_run_ends_with_one_clear_line(words, elsewhere):
+    out, err = elsewhere(command(*words), code_expected=2)
+    last = err.splitlines()[-1]
+    assert "has no fcntl, which a run needs: run it under Linux, macOS or WSL" in last
+    assert "Traceback" not in err
+    assert "compiling" not in err
+    assert out == ""
