@@ -35,6 +35,9 @@ FEWEST_IN_ALL = 200  # jobs: with fewer, no record can lie as far off as LIMIT a
 LIMIT = 0.01  # share of the study's own jobs that lie as far off as what does not fit
 SHARES = {"none": (), "big_end": (0,), "small_end": (1,), "both": (0, 1)}  # columns of clearances
 ODD = 4  # features that are named where nothing fits
+# least spread that a feature counts with: of one that the study does not vary, such as the speed, a
+# record's timing moves the last digits alone (a thousandth is 0.2 % of the speed)
+LEAST_SPREAD = 1e-3
 FARTHEST = 8.0  # standard deviations at which regressions see a feature that lies beyond
 
 
@@ -106,7 +109,7 @@ class Identifier:
             raise StudyError(f"{problem}; draw at least {least}")
         middle = np.nan_to_num(np.nanmedian(library.features, axis=0))
         filled = np.where(np.isnan(library.features), middle, library.features)
-        scale = np.maximum(filled.std(axis=0), 1e-9)
+        scale = np.maximum(filled.std(axis=0), LEAST_SPREAD)
         points = np.clip((filled - middle) / scale, -FARTHEST, FARTHEST)
         labels = np.array([joints.index(joint) for joint in library.joints])
         scores = KernelRidge.fit(points, np.eye(len(joints))[labels])
