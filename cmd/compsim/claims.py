@@ -62,17 +62,15 @@ def claims(
     Exit code 3 if a machine has no verdict.
     """
     one_thread_each()  # before numpy loads
-    from compressor.analysis import cases_of
     from compressor.cases import load_studies, templates
-    from compressor.machines import judge_machines, least_change
+    from compressor.machines import cases_judged, judge_machines, least_change
     from compressor.store import writable_folder
     from compressor.sweep import cores
 
     paths = configs or tuple(str(templates()[name].path) for name in EXAMPLES)
     studies = load_studies(
-        *paths, overrides=overrides, max_jobs=max_jobs, follow=False,
-        variants=lambda machine: cases_of(machine).values(),
-    )  # fmt: skip
+        *paths, overrides=overrides, max_jobs=max_jobs, follow=False, variants=cases_judged
+    )
     drawn = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
     if generations and not drawn:
         raise click.UsageError(

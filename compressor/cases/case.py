@@ -18,6 +18,7 @@ from compressor.cases.parameter import CaseError, Problem, shown
 from compressor.cases.revisions import MODEL_VERSION
 from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
 from compressor.cases.swept import FORMS
+from compressor.cases.synonyms import written_out
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
 from compressor.cases.unknown import SWEEP, meant
 from compressor.cases.vibration import filled_body
@@ -301,7 +302,7 @@ def parts_of(
     if not isinstance(values, Mapping):
         message = f"needs a mapping of keys, such as {EXAMPLE}, not {shown(values)}"
         raise CaseError([Problem("", message)])
-    whole = expanded(values)
+    whole = expanded(written_out(values, problems))
     parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
     if problems:
         wrong = _everything_wrong(whole, parts, problems, {} if lenient else values_given(values))

@@ -57,7 +57,8 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
         problems += wrong
         return found
     if key not in table() or "." in key:
-        problems.append(Problem(str(key), unknown(str(key), "", file=False)))
+        message = unknown(str(key), "", file=False, value=value)
+        problems.append(Problem(str(key), message))
         return None
     return checked(key, value, problems)
 
@@ -80,7 +81,7 @@ def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Proble
         if name in fields:
             good[name] = checked(f"{key}.{name}", value, problems)
         else:
-            problems.append(Problem(f"{key}.{name}", unknown(str(name), key)))
+            problems.append(Problem(f"{key}.{name}", unknown(str(name), key, value=value)))
     return GROUPS[key](**good), problems
 
 

@@ -5,6 +5,7 @@ reading the file does (`compressor.cases.load`).
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from compressor.cases.accuracy import TARGET
@@ -14,6 +15,7 @@ from compressor.cases.parameter import NAME, Parameter
 from compressor.cases.regimes import ROWS, followable
 from compressor.cases.shorthands import SHORTHANDS, row_of
 from compressor.cases.swept import FORMS, SAMPLED, is_number
+from compressor.cases.synonyms import DOUBLES
 from compressor.cases.table import GROUPS, WORDS, outside_identity, table
 from compressor.metrics import METRICS
 
@@ -47,8 +49,10 @@ def _mapping(properties: Schema) -> Schema:
 def _group(name: str) -> Schema:
     """The schema of a group of keys."""
     rows = [row for row in table().values() if row.key.startswith(f"{name}.")]
+    rows += [_doubled(word, key) for word, key in DOUBLES.items() if word.startswith(f"{name}.")]
     mapping = _mapping({row.key.removeprefix(f"{name}."): _value(row) for row in rows})
-    rivals = [pair for pair in IN_PLACE_OF if pair[0].startswith(f"{name}.")]
+    pairs = (*IN_PLACE_OF, *DOUBLES.items())
+    rivals = [pair for pair in pairs if pair[0].startswith(f"{name}.")]
     if rivals:
         inner = ([key.removeprefix(f"{name}.") for key in pair] for pair in rivals)
         mapping["allOf"] = [{"not": {"required": pair}} for pair in inner]
@@ -60,6 +64,13 @@ def _group(name: str) -> Schema:
         short = _value(row)["anyOf"]
         return {"description": SHORTHANDS[name].phrase, "anyOf": [*short, mapping]}
     return {"description": about, **mapping}
+
+
+def _doubled(word: str, key: str) -> Parameter:
+    """Return the row of a word of the trade, whose values are twice those of a key."""
+    row = table()[key]
+    span = {"default": 2 * row.default, "low": 2 * row.low, "high": 2 * row.high}
+    return replace(row, key=word, phrase=f"twice {key}, in its place", **span)
 
 
 def _value(row: Parameter) -> Schema:

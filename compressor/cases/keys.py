@@ -11,8 +11,9 @@ from typing import Any
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.shorthands import SHORTHANDS, stands_for
 from compressor.cases.swept import FORMS
+from compressor.cases.synonyms import DOUBLES, TWICE, halved
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
-from compressor.cases.unknown import MAPPINGS, known, no_mapping, unknown
+from compressor.cases.unknown import MAPPINGS, accepted, no_mapping, unknown
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shortened
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
@@ -32,15 +33,14 @@ class Leaves:
 def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
     """The leaves of a tree; keys that are unknown, or no group where one is due, are problems."""
     found = Leaves({}, {})
-    for name, node in _known("", root, problems):
+    for name, node in _known("", root, problems, root):
         found.places[name] = node.key_place
         mapping = isinstance(node.value, dict)
         if mapping and not node.value and WORDS.get(name):
             found.values[name] = replace(node, value=True)  # all of its defaults
         elif (name in GROUPS or name in MAPPINGS) and mapping and not _is_sweep(name, node):
-            for inner, item in _known(name, node, problems):
-                found.values[f"{name}.{inner}"] = item
-                found.places[f"{name}.{inner}"] = item.key_place
+            for inner, item in _known(name, node, problems, root):
+                _add_leaf(found, f"{name}.{inner}", item, problems)
         elif name in SHORTHANDS or (name in WORDS and node.value is WORDS[name]):
             found.values[name] = node
         elif name in GROUPS or name in MAPPINGS:
@@ -50,17 +50,47 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
     return found
 
 
+def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) -> None:
+    """Add a leaf of a group; a word of the trade as the key that it is the double of."""
+    own = DOUBLES.get(key, key)
+    doubled = next((word for word, half in DOUBLES.items() if half == own), own)
+    if own in found.values and own != doubled:
+        problems.append(FileProblem(node.key_place, doubled, TWICE.format(own)))
+    found.values[own] = node if own == key else _halved(node)
+    found.places[own] = node.key_place
+
+
+def _halved(node: Node, first: int | None = None) -> Node:
+    """Return a node with its numbers halved, of a list the `first` ones; None: all.
+
+    A form such as `{linspace: [160, 200, 5]}` has two ends and a count, a range a step.
+    """
+    if isinstance(node.value, dict):
+        inner = {
+            word: _halved(item, None if word == "range" else 2) for word, item in node.value.items()
+        }
+        return replace(node, value=inner)
+    if isinstance(node.value, list):
+        items = node.value[:first]
+        return replace(node, value=[*map(_halved, items), *node.value[len(items) :]])
+    return replace(node, value=halved(node.value))
+
+
 def _is_sweep(name: str, node: Node) -> bool:
     """Whether a group's mapping sweeps a value that stands for the whole group."""
     few = name in SHORTHANDS and len(node.value) <= 2  # a word of FORMS, and `log`
     return few and any(get_close_matches(word, FORMS, n=1) for word in node.value)
 
 
-def _known(group: str, node: Node, problems: list[FileProblem]) -> Iterable[tuple[str, Node]]:
+def _known(
+    group: str, node: Node, problems: list[FileProblem], root: Node
+) -> Iterable[tuple[str, Node]]:
     """The entries of a group (or, for "", of a file) that it may hold and that have a value."""
     for name, item in node.value.items():
-        if name not in known(group):
-            message = unknown(name, group) if len(problems) < MAX_SUGGESTIONS else "unknown key"
+        if name not in accepted(group):
+            message = "unknown key"
+            if len(problems) < MAX_SUGGESTIONS:
+                message = unknown(name, group, value=item.plain(), values=root.plain())
             key = f"{group}.{name}" if group else name
             problems.append(FileProblem(item.key_place, key, message))
         elif item.value is not None:
@@ -72,16 +102,17 @@ def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[st
     found: dict[str, Leaves] = {}
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
-        place = Place(f"--set {shortened(text)}")
+        place, own = Place(f"--set {shortened(text)}"), DOUBLES.get(key, key)
         if not key or not equals:
             message = "needs the form key=value, such as joint=both"
             problems.append(FileProblem(place, "", message))
-        elif any(covers(key, other) or covers(other, key) for other in found):
+        elif any(covers(own, other) or covers(other, own) for other in found):
             problems.append(FileProblem(place, key, "is set twice"))
         elif node := read_text(value, place, problems):
             group, dot, inner = key.partition(".")
             node = Node({inner: node}, place, place) if dot else node
-            found[key] = leaves(Node({group: node}, place, place), problems)
+            whole = leaves(Node({group: node}, place, place), problems)
+            found[own] = whole
     return found
 
 

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from compressor.cases.parameter import shown
+from compressor.cases.synonyms import DOUBLES, in_our_unit, of_percent, stroke_in, synonyms_of
 from compressor.cases.table import GROUPS, WORDS, Settings, table
 
 # keys of a case file that are no part of a case: how values are swept together
@@ -31,10 +32,23 @@ def known(group: str, file: bool = True) -> list[str]:
     return [*names, *SWEEP] if file and not group else names
 
 
-def unknown(name: str, group: str, file: bool = True) -> str:
-    """What is told of a key that a group does not have."""
+def accepted(group: str, file: bool = True) -> list[str]:
+    """Return the keys that a group may hold, words of the trade among them."""
+    return [*known(group, file), *synonyms_of(group)]
+
+
+def unknown(name: str, group: str, file: bool = True, value: Any = None, values: Any = None) -> str:
+    """Return what is said of a key that a group does not have.
+
+    value: the key's. values: the whole case's, nested, as far as they are known.
+    """
     whole = group or ("a case file" if file else "a case")
-    hint = suggestion(name, group) or f"; {whole} has {', '.join(known(group, file))}"
+    hint = (
+        in_our_unit(name, value, accepted(group))
+        or of_percent(name, group, value, stroke_in(values))
+        or suggestion(name, group)
+        or f"; {whole} has {', '.join(known(group, file))}"
+    )
     return f"unknown key{hint}"
 
 
@@ -56,25 +70,32 @@ def _example(group: str) -> str:
 
 def suggestion(name: str, group: str) -> str:
     """The end of an error about an unknown key: what was probably meant, if anything."""
-    if name in table():
+    if name in table() and "." in name:
         outer, _, inner = name.partition(".")
         return f"; write {inner} inside {outer}"
+    if group and name in known(""):
+        return f"; write {name} at the top, outside {group}"
     if name.partition(":")[0] in known(group):
         return "; put a space after the colon"
+    if name in DOUBLES:
+        return f"; write {DOUBLES[name]}, which is half of it"
     keys = meant(name, group)
     return f"; did you mean {' or '.join(keys)}?" if keys else ""
 
 
 def meant(name: str, group: str) -> list[str]:
-    """The dotted keys that an unknown one probably stands for."""
-    if name in table():
+    """Return the dotted keys that an unknown one probably stands for, in a group of that group."""
+    if name in table() and not group:
         return [name]
-    if near := _nearest(name, known(group), cutoff=0.6):
+    if group and name in map(_leaf, DOUBLES):
+        return []  # a word of another group, which is like none of this one
+    if near := _nearest(name, known(group), 0.6) or _nearest(name, synonyms_of(group), 0.8):
         return [f"{group}.{near}" if group else near]
-    if own := _holding(name, f"{group}."):
-        return own
-    near = _nearest(name, [_leaf(key) for key in table()], cutoff=0.8)
-    return [key for key in table() if _leaf(key) == near] or _holding(name)
+    if group:
+        return _holding(name, f"{group}.")
+    every = [*table(), *DOUBLES]
+    near = _nearest(name, [_leaf(key) for key in every], cutoff=0.8)
+    return [key for key in every if _leaf(key) == near] or _holding(name)
 
 
 def _holding(name: str, within: str = "") -> list[str]:
@@ -105,6 +126,10 @@ def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
 
 def _stem(name: str) -> str:
     """A key's name without its unit."""
+    if name in map(_leaf, DOUBLES):
+        return name.removesuffix("_mm")
+    if name in map(_leaf, DOUBLES):
+        return name.removesuffix("_mm")
     for row in table().values():
         if _leaf(row.key) == name and row.unit:
             unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")

@@ -10,6 +10,7 @@ from compressor.machines.findings import (
     spoken,
     summary,
 )
+from compressor.machines.judged import cases_judged
 from compressor.machines.search import least_change
 from compressor.machines.sensitivity import sensitivity
 from compressor.machines.study import judge_machines, read_machines

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -59,6 +60,11 @@ def judge(machine: Case) -> Judged:
         tuple(margin.error for margin in shares),
         chaotic,
     )
+
+
+def cases_judged(machine: Case) -> Iterable[Case]:
+    """Return the cases that a machine is judged by, which read its keys."""
+    return cases_of(machine).values()
 
 
 def simulated(case: Case) -> xr.Dataset:

@@ -18,7 +18,6 @@ from joblib import Parallel, delayed
 from measure_accuracy import provenance
 
 from compressor.analysis.claim_rules import RULES
-from compressor.analysis.paper_cases import cases_of
 from compressor.cases.case import Case
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
@@ -33,7 +32,7 @@ from compressor.machines.findings import (
     spoken,
     summary,
 )
-from compressor.machines.judged import CLAIMS, SHARES, judge
+from compressor.machines.judged import CLAIMS, SHARES, cases_judged, judge
 from compressor.machines.search import least_change
 from compressor.machines.sensitivity import sensitivity
 from compressor.machines.study import judge_machines, machines
@@ -68,7 +67,7 @@ def main(target):
         "margin": default.margin, "error": default.error,
         "shares": dict(zip(SHARES, default.share_margin, strict=True)),
     }  # fmt: skip
-    (drawn,) = load_studies(example("assumptions"), variants=lambda m: cases_of(m).values())
+    (drawn,) = load_studies(example("assumptions"), variants=cases_judged)
     judged = judge_machines(drawn, FOLDER, 2)
     table = sensitivity(judged)
     found["assumptions"] = {

@@ -13,6 +13,7 @@ from compressor.cases.case import Case
 from compressor.cases.examples import FOLDER, STARTS, example, templates
 from compressor.cases.keys_read import itself
 from compressor.cases.load import load_studies
+from compressor.machines.judged import cases_judged
 from compressor.solve.cautions import cautions
 from compressor.solve.simulate import simulate
 
@@ -20,14 +21,9 @@ ROOT = Path(__file__).parent.parent.parent
 NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 
 
-def variants_of(name):
-    """Return what an example's cases are run as: those of claims are judged by the paper's."""
-    return (lambda case: cases_of(case).values()) if name in EXAMPLES else itself
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_examples_can_be_run(name):
-    (study,) = load_studies(example(name), variants=variants_of(name))
+    (study,) = load_studies(example(name), variants=cases_judged if name in EXAMPLES else itself)
     assert study.name == name
     (said,) = re.findall(r"^(\d+) (?:jobs|machines|chain)\b", templates()[name].jobs)
     assert study.jobs == int(said)

@@ -13,7 +13,6 @@ from compsim.claims import EXAMPLES
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compressor.analysis.paper_cases import cases_of
 from compressor.cases.case import Case, parts_of
 from compressor.cases.checked import values_given
 from compressor.cases.columns import Column, Mixed, alike, places_where
@@ -23,6 +22,7 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.shorthands import value_of
 from compressor.cases.table import GROUPS, outside_identity, table
 from compressor.cases.unread import reads
+from compressor.machines.judged import cases_judged
 
 ROOT = Path(__file__).parents[2]
 FILES = [*(ROOT / "configs").glob("*.yaml"), *(ROOT / "compressor/cases/examples").glob("*.yaml")]
@@ -51,7 +51,7 @@ def assert_same(study):
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_jobs_of_our_files_are_those_made_one_by_one(path):
     claims = path.stem in EXAMPLES
-    (study,) = load_studies(path, variants=(lambda m: cases_of(m).values()) if claims else itself)
+    (study,) = load_studies(path, variants=cases_judged if claims else itself)
     if len(study.cases) > 300:  # making them one by one takes a tenth of a millisecond each
         numbers = random.Random(1).sample(range(len(study.cases)), 300)
         every = list(study.cases.combinations())

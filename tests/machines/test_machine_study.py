@@ -6,7 +6,7 @@ import xarray as xr
 
 from compressor.cases.load import load_studies
 from compressor.machines import study as machine_study
-from compressor.machines.judged import Judged
+from compressor.machines.judged import Judged, cases_judged
 from compressor.machines.study import (
     ClaimsError,
     dataset,
@@ -28,7 +28,7 @@ GRID = QUICK + "machine: {rod_mass_kg: [3, 4.7], reciprocating_mass_kg: [10, 14,
 def plan(tmp_path):
     def plan(text):
         (tmp_path / "some.yaml").write_text(text)
-        (study,) = load_studies(tmp_path / "some.yaml")
+        (study,) = load_studies(tmp_path / "some.yaml", variants=cases_judged)
         return study
 
     return plan

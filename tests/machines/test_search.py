@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from compressor.cases.load import load_cases, load_studies
+from compressor.cases.load import load_studies
 from compressor.machines import search as searching
 from compressor.machines.findings import change
-from compressor.machines.judged import Judged
+from compressor.machines.judged import Judged, cases_judged
 from compressor.machines.search import POPULATION, Span, cost, least_change
 from compressor.machines.study import ClaimsError, dataset, machine_key
 from compressor.store import StoreError
@@ -25,7 +25,7 @@ def judge(monkeypatch, tmp_path):
 
     def judge(least, text=TEXT, generations=8, error=0.0):
         (tmp_path / "some.yaml").write_text(text)
-        (study,) = load_studies(tmp_path / "some.yaml")
+        (study,) = load_studies(tmp_path / "some.yaml", variants=cases_judged)
 
         def judge_machines(study, folder, workers, progress):
             keys = [machine_key(case) for case in study.cases]
@@ -123,7 +123,7 @@ def test_a_search_begins_at_the_study_s_best_machine(judge, tmp_path):
         return -abs(case.machine.rod_mass_kg - 7.3) / 10.0 - abs(case.friction.dynamic - 0.15)
 
     (tmp_path / "some.yaml").write_text(TEXT.replace("n: 2", "n: 64"))
-    (study,) = load_studies(tmp_path / "some.yaml")
+    (study,) = load_studies(tmp_path / "some.yaml", variants=cases_judged)
     keys = [machine_key(case) for case in study.cases]
     rows = {
         key: Judged((1.0,) * 7 + (least(case),), (0.0,) * 8, (0.0,) * 4, (0.0,) * 4)
@@ -181,7 +181,8 @@ def test_what_follows_from_an_assumption_follows_in_a_search(judge, tmp_path):
         f"reciprocating_mass_kg: {last.machine.reciprocating_mass_kg}}}\n"
         f"friction: {{friction_velocity_mm_per_s: {last.friction.friction_velocity_mm_per_s}}}\n"
     )
-    assert load_cases(tmp_path / "one" / "some.yaml") == [last]
+    (study,) = load_studies(tmp_path / "one" / "some.yaml", variants=cases_judged)
+    assert [*study.cases] == [last]
 
 
 def test_a_search_needs_ranges(judge):

@@ -115,10 +115,7 @@ def test_scales_follow_the_contact():
 
 def test_scales_are_those_of_the_machine_without_features():
     values = {"joint": "both", "clearance_mm": 0.2}
-    more = {
-        "guide": {"clearance_mm": 0.1}, "drive": True, "rod": True, "lubricant": True,
-        "friction": {"ideal_joints": True},
-    }  # fmt: skip
+    more = {"guide": {"clearance_mm": 0.1}, "drive": True, "rod": True, "lubricant": True}
     plain, full = Case.from_values(values), Case.from_values(values | more)
     assert [*ideal_scales(full)] == [*ideal_scales(plain)]
     names = unknowns(full)

@@ -142,7 +142,7 @@ def test_the_eleven_cases_keep_the_other_assumptions_of_one():
      ({"machine": {"rod_mass_kg": 4.7, "rod_inertia_kg_m2": 4.7 * 0.6**2 / 12}}, False)],
 )  # fmt: skip
 def test_what_makes_another_machine(values, other):
-    case = Case.from_values({**values, "joint": "both", "clearance_mm": 0.1})
+    case = Case.resolve({**values, "joint": "both", "clearance_mm": 0.1})
     assert is_other(case) is other
 
 
@@ -197,7 +197,7 @@ LENT = PaperRuns({}, {load: xr.Dataset() for load in ("design", "typical")}, {})
      ({"machine": HEAVY, "solve": {"settle_rev": 2}}, 0, 0)],
 )  # fmt: skip
 def test_the_default_machine_lends_the_same_motion_and_no_other(values, drawn, judged):
-    case = Case.from_values({**values, "joint": "both", "clearance_mm": 0.1})
+    case = Case.resolve({**values, "joint": "both", "clearance_mm": 0.1})
     assert len(borrowed(case, LENT, loads=False)) == drawn
     assert len(borrowed(case, LENT, loads=True)) == judged
 

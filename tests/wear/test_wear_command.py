@@ -152,7 +152,8 @@ def whole(worn, folder):
         (TEXT.replace("duration_rev: 2", "duration_rev: 2.5"), "2.5 must be whole revolutions"),
         (TEXT + "lubricant: true\n", "leave out lubricant or wear"),
         (TEXT.replace("0.23", "0.1"), "0.1 mm must be more than the clearance, 0.2 mm"),
-        ("joint: none\nwear: true\n", "wear: needs a clearance"),
+        ("joint: [none, big_end]\nclearance_mm: 0.1\nwear: true\n", "none has no bore that wears"),
+        ("joint: none\nwear: true\n", "wear: nothing reads this group: it needs clearance_mm"),
     ],
 )
 def test_what_cannot_wear_is_refused(text, message, tmp_path, capsys):
