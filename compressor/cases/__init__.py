@@ -28,7 +28,7 @@ from compressor.cases.one_way import back_action
 from compressor.cases.parameter import IMPLAUSIBLE, CaseError, to_si
 from compressor.cases.regimes import Regimes
 from compressor.cases.revisions import MODEL, MODEL_VERSION, SUSPECT, changes_since, model_of
-from compressor.cases.shorthands import phrase_of, row_of, value_in
+from compressor.cases.shorthands import phrase_of, row_of, stands_for, value_in
 from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
 from compressor.cases.table import table

@@ -11,7 +11,7 @@ from typing import Any
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.shorthands import SHORTHANDS, stands_for
 from compressor.cases.swept import FORMS
-from compressor.cases.synonyms import DOUBLES, TWICE, halved
+from compressor.cases.synonyms import DOUBLES, TWICE, by_joint, halved, lacking_joint
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
 from compressor.cases.unknown import MAPPINGS, accepted, no_mapping, unknown
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shortened
@@ -51,7 +51,18 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
 
 
 def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) -> None:
-    """Add a leaf of a group; a word of the trade as the key that it is the double of."""
+    """Add a leaf of a group; a word of the trade as the key that it is the double of.
+
+    A value for each joint is a leaf for each.
+    """
+    if keys := by_joint(key, node.value):
+        if message := lacking_joint(key, node.value):
+            problems.append(FileProblem(node.place, key, message))
+        for joint, one in keys.items():
+            if joint in node.value:
+                found.values[one] = node.value[joint]
+                found.places[one] = node.value[joint].key_place
+        return
     own = DOUBLES.get(key, key)
     doubled = next((word for word, half in DOUBLES.items() if half == own), own)
     if own in found.values and own != doubled:

@@ -1,6 +1,7 @@
 """Words of the trade: keys that are twice one of ours, and other units that are answered.
 
-A synonym is written out as its key when values are read, so that nothing else knows it.
+A synonym is written out as its key when values are read, so that nothing else knows it; so is a
+value that a key has for each joint, such as `pin_radius_mm: {big_end: 60, small_end: 35}`.
 """
 
 import math
@@ -16,6 +17,12 @@ DOUBLES = {
     "machine.stroke_mm": "machine.crank_radius_mm",
     "gas.bore_mm": "gas.piston_radius_mm",
 }
+# key that may have a value for each joint -> the keys that these are of
+PER_JOINT = {
+    "machine.pin_radius_mm": {
+        "big_end": "machine.pin_radius_mm", "small_end": "machine.small_end_pin_radius_mm",
+    },
+}  # fmt: skip
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {
     "bar": ("MPa", 0.1), "kPa": ("MPa", 1e-3), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3),
@@ -31,6 +38,21 @@ def halved(value: Any) -> Any:
     return value / 2 if is_number else value
 
 
+def by_joint(key: str, value: Any) -> Mapping[str, str]:
+    """Return the keys that a value for each joint is of, by joint; none of any other value."""
+    keys = PER_JOINT.get(key, {})
+    return keys if isinstance(value, Mapping) and {*value} & {*keys} else {}
+
+
+def lacking_joint(key: str, value: Mapping[str, Any]) -> str:
+    """Return what is wrong with the joints of a value for each; "" if nothing is."""
+    joints = [*PER_JOINT[key]]
+    if {*value} == {*joints}:
+        return ""
+    given = ", ".join(map(str, value))
+    return f"needs both, {' and '.join(joints)}, not {given}; or one number for both joints"
+
+
 def written_out(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
     """Return nested values with each synonym as its key; both at once are a problem."""
     found = dict(values)
@@ -43,6 +65,18 @@ def written_out(values: Mapping[str, Any], problems: list[Problem]) -> dict[str,
             problems.append(Problem(synonym, TWICE.format(key)))
         rest = {inner: value for inner, value in within.items() if inner != name}
         found[group] = {own: halved(within[name])} | rest
+    for key in PER_JOINT:
+        group, _, name = key.partition(".")
+        within = found.get(group)
+        value: Any = within.get(name) if isinstance(within, Mapping) else None
+        keys = by_joint(key, value)
+        if not keys or not isinstance(within, Mapping):
+            continue
+        if message := lacking_joint(key, value):
+            problems.append(Problem(key, message))
+        rest = {inner: one for inner, one in within.items() if inner != name}
+        each = {keys[joint].rpartition(".")[2]: value[joint] for joint in keys if joint in value}
+        found[group] = each | rest
     return found
 
 

@@ -12,7 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, CaseError, Sensor, outside_judged, points, value_in
+from compressor.cases import (
+    Case,
+    CaseError,
+    Sensor,
+    outside_judged,
+    points,
+    stands_for,
+    value_in,
+)
 from compressor.outcome import Regime
 from compressor.store.rows import Rows
 from compressor.store.studies import StoredStudy
@@ -129,10 +137,9 @@ def _outside_of_study(study: StoredStudy) -> dict[str, str]:
             base["joint"] = next((v for v in axis.values if v != "none"), "none")
     found = outside_judged(base)
     for key, value in sorted(ends):
-        group, _, name = key.rpartition(".")
-        names = (name,) if group else ("big_end", "small_end")
-        within = base.get(group or key)
-        changed = {group or key: (within or {}) | dict.fromkeys(names, value)}
-        if group or key == "clearance_mm":
-            found |= outside_judged(base | changed)
+        for part in stands_for(key) or (key,):
+            group, _, name = part.rpartition(".")
+            if group:
+                changed = {group: (base.get(group) or {}) | {name: value}}
+                found |= outside_judged(base | changed)
     return found

@@ -416,6 +416,8 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "sensor.low_pass_Hz": 5000.0,
     "sensor.length_rev": 7,
     "sensor.seed": 2,
+    "guide.exponent": 1.4,
+    "machine.small_end_pin_radius_mm": 12.0,
 }
 CLEARANCES = {"big_end": 0.1, "small_end": 0.1}
 OF_PINS = {"length_mm": 20, "modulus_GPa": 110}
@@ -447,7 +449,9 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= BIG_END
     if group in ("lubricant", "guide", "drive", "rod", "wear"):
         base |= {group: {"clearance_mm": 0.1} if group == "guide" else True}
-    if name in OF_LAWS:
+    if key == "guide.restitution":
+        base |= {"contact": {"law": "flores", "restitution": 0.5}}
+    elif name in OF_LAWS:
         law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}
         law = {"law": "johnson", **OF_PINS} if name in OF_PINS else law
         base |= {group: law}

@@ -44,7 +44,7 @@ def test_the_ends_are_inside():
 
 def test_what_is_not_read_is_not_outside():
     ideal = {"contact": {"damping_N_s_per_mm": 1e5}, "friction": {"static": 0.9}}
-    assert outside_judged(Case.from_values(ideal).values()) == {}
+    assert outside_judged(Case.resolve(ideal).values()) == {}
     assert {*outside(**ideal)} == {"contact.damping_N_s_per_mm", "friction.static"}
     other = {"contact": {"exponent": 1.1, "stiffness_N_per_mm15": 100.0}}  # in another unit
     assert outside(**other) == {}

@@ -41,7 +41,7 @@ def test_keys_of_one_radius_are_those_of_before():
         ({"big_end": 60}, "machine.pin_radius_mm", "needs both, big_end and small_end"),
         ({"big_end": 60, "small": 5}, "machine.pin_radius_mm", "big_end"),
         ({"big_end": 60, "small_end": -5}, "machine.small_end_pin_radius_mm", "outside"),
-        ({"big_end": 60, "small_end": 0.1}, "clearance_mm.small_end", "exceeds the pin radius"),
+        ({"big_end": 60, "small_end": 0.1}, "clearance_mm", "exceeds the pin radius"),
     ],
 )
 def test_what_is_wrong_with_two_radii_is_told_of_the_one_it_is(pin, key, words):
@@ -58,7 +58,7 @@ def test_a_pin_of_a_file_s_own_lies_in_its_bore():
     assert record(own)["stiffness"] == pytest.approx(bore, rel=1e-14)
     discs = case(contact=MATERIALS | {"geometry": "external"}, machine={"pin_radius_mm": 35})
     assert discs.contact.geometry is None
-    assert record(discs)["stiffness"] < record(own)["stiffness"] / 9
+    assert (record(discs)["stiffness"] < record(own)["stiffness"] / 9).all()
     for one in (own, paper, discs):
         assert Case.from_values(one.values()) == one
 

@@ -76,7 +76,7 @@ def drawn(row, draw):
     spans = [draw.choice([0.5, 1, 1, 2, 100]) * draw.uniform(0.7, 1.4) for _ in range(3)]
     values = {float(f"{min(max(middle * span, row.low), row.high):.3g}") for span in spans}
     if row.kind == "integer":
-        return sorted({10 + int(span * 1000) for span in spans})
+        return sorted({int(min(10 + int(span * 1000), row.high)) for span in spans})
     return sorted(values - {row.low}) + [word for word in row.choices if draw.random() < 0.2]
 
 

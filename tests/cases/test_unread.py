@@ -35,6 +35,7 @@ OIL = WORN | {"lubricant": True}
 SLIDING = IDEAL | {"guide": True}
 PLAYING = IDEAL | {"guide": {"clearance_mm": 0.1}}
 SMOOTH = IDEAL | {"guide": {"clearance_mm": 0.1, "friction": 0}}
+STRUCK = PLAYING | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
 DRIVEN = IDEAL | {"drive": {"torque_N_m": 10}, "machine": {"gravity_m_per_s2": 9.81}}
 ELASTIC = IDEAL | {"rod": True}
 WEARING = BIG | {"wear": {"limit_mm": 0.205}}
@@ -76,6 +77,7 @@ ENTRIES = {
         machine__reciprocating_mass_kg=15, machine__gravity_m_per_s2=9.81,
     ),
     "machine.pin_radius_mm": Entry(12, WORN, (IDEAL,)),
+    "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG)),
     **entries(
         GAS, WORN, FREE, gas__piston_radius_mm=60, gas__head_clearance_mm=25,
         gas__suction_MPa=0.11, gas__discharge_MPa=0.5, gas__exponent=1.3,
@@ -114,7 +116,12 @@ ENTRIES = {
     **entries(
         PLAYING, SLIDING, guide__crosshead_length_mm=100, guide__crosshead_height_mm=70,
         guide__crosshead_inertia_kg_m2=0.05, guide__stiffness_N_per_mm15=2e5,
+        guide__exponent=1.4,
     ),
+    **entries(
+        PLAYING, SLIDING, STRUCK, guide__damping_N_s_per_mm=9, guide__full_damping_mm=0.01,
+    ),
+    "guide.restitution": Entry(0.9, STRUCK, (PLAYING, SLIDING)),
     **entries(
         DRIVEN, drive__flywheel_kg_m2=2, drive__torque_N_m=50, drive__slope_N_m_s=50,
         drive__unbalance_kg_mm=800,
