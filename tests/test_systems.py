@@ -65,6 +65,7 @@ def test_commands_that_run_nothing_work(elsewhere, paper_store, tmp_path):
     assert (tmp_path / "mine.yaml").exists()
     assert "2 jobs" in elsewhere(command("plan", "two.yaml"))[0]
     assert "big-end" in elsewhere(command("status", results))[0]
+    elsewhere(command("show", "big-end", "clearance_mm=0.2", "-i", results))
     elsewhere(command("export", "big-end", "-i", results, "-o", "x.csv"))
     elsewhere(command("plot", "big-end", "clearance_mm=0.2", "--what", "orbits", "-i", results))
     elsewhere(command("report", results, "-o", "page"))
