@@ -105,7 +105,7 @@ MISTAKES = [
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
     ("export wear -o x.csv --format netcdf", "x.csv is no name for netcdf: end it in .nc"),
-    ("plot waer", "no study 'waer'", "did you mean wear?"),
+    ("plot waer", "and no study is called so", "did you mean wear?"),
     ("plot wear --what orbit", "there is no figure 'orbit'; did you mean orbits?"),
     ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm': its axes are clearance_mm, "),
     ("dataset waer -o faults", "holds no study 'waer'; did you mean wear?"),
