@@ -44,7 +44,7 @@ def drop(joint, speed, method="auto", mass=5.0, rtol=1e-8, **contact):
         "solve": {"duration_s": span, "settle_rev": 0, "rtol": rtol, "method": method,
                   "output_step_s": span / 400, "error_bars": False},
     }  # fmt: skip
-    case = Case.from_values(values)
+    case = Case.resolve(values)
     p = record(case)
     state = np.zeros(len(state_names(p)))
     state[p["freedoms"]] = speed if joint == "small_end" else -speed
@@ -107,7 +107,7 @@ GUIDED = {
 
 def guided(**solve):
     how = {"duration_s": 2.8e-3, "output_step_s": 2e-6, "settle_rev": 0, **solve}
-    run = simulate(Case.from_values({**GUIDED, "solve": how}))
+    run = simulate(Case.resolve({**GUIDED, "solve": how}))
     assert run.status == "ok"
     return run
 
@@ -194,7 +194,7 @@ def rod_apart():
     From the published start, with the shapes' own masses: SciPy's DOP853 with multipliers.
     """
     solve = {"rtol": 1e-11, "duration_s": 0.008, "output_step_s": 1e-4, "settle_rev": 0}
-    case = Case.from_values({**SLIDER_CRANK, "solve": solve})
+    case = Case.resolve({**SLIDER_CRANK, "solve": solve})
     state = np.zeros(len(state_names(record(case))))
     state[:8] = np.concatenate((POSITION[2:], RATE[2:]))
     run = with_series(case, attempt(case, case.rtol, math.inf, True, None, state))[1].variables
@@ -235,7 +235,7 @@ def uneven(joint):
         "law": "coulomb_tanh", "static": COEFFICIENT, "dynamic": COEFFICIENT,
         "stiction_velocity_mm_per_s": 0.01, "friction_velocity_mm_per_s": 0.01,
     }  # fmt: skip
-    case = Case.from_values({
+    case = Case.resolve({
         "joint": joint, "clearance_mm": 0.2, "wear": True, "load": "none", "friction": friction,
         "solve": {"duration_rev": 1, "settle_rev": 0, "rtol": 1e-9},
     })  # fmt: skip

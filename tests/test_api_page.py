@@ -53,11 +53,16 @@ def test_a_function_tells_its_parameters_and_what_it_raises(name):
 def test_a_group_tells_each_field_with_unit_range_default_and_source(name):
     for field in inspect.signature(getattr(compressor, name)).parameters:
         (line,) = re.findall(rf"^- `{field}`: .*$", TEXTS[f"compressor.{name}"], re.M)
-        assert re.search(r"\. Needs .+; default .+ \(.+\)\.( Read with .+\.)?$", line), line
+        assert re.search(
+            r"\. Needs .+; default .+ \(.+\)\.( Judged on .+\.)?( Read with .+\.)?$", line
+        ), line
 
 
 def test_a_field_is_told_as_it_is_checked():
-    line = "- `speed_rpm`: crank speed. Needs a number in (0, 100000] rpm; default 500 (Table 1)."
+    line = (
+        "- `speed_rpm`: crank speed. Needs a number in (0, 100000] rpm; default 500 (Table 1). "
+        "Judged on 50 to 6000."
+    )
     assert line in TEXTS["compressor.Machine"].splitlines()
 
 

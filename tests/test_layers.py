@@ -73,7 +73,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "pyarrow": {"compressor.diagnosis"},
     "sklearn": set(),  # of campaigns alone
 }
-MOST_NAMES = 23  # that cross a wall between two rooms, a package
+MOST_NAMES = 26  # that cross a wall between two rooms, a package
 MOST_LINES, MOST_FUNCTION, MOST_PARAMETERS = 600, 60, 6
 
 Sources = dict[str, str]  # module -> text; a package's door has the package's name

@@ -14,7 +14,8 @@ PROGRAM = [name for name in SOURCES if name.startswith("compressor") and "reason
 STORED = {  # names that stores hold: never renamed
     "invalid_input", "non_finite", "penetration_implausible", "step_underflow", "crank_stalled",
     "budget_steps", "budget_seconds", "contact_underresolved", "energy_audit_failed",
-    "accuracy_not_reached", "not_settled", "worker_died", "out_of_memory", "internal_error",
+    "accuracy_not_reached", "not_settled", "guide_implausible", "rod_implausible", "worker_died",
+    "out_of_memory", "internal_error",
 }  # fmt: skip
 
 

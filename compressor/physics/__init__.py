@@ -15,7 +15,7 @@ from compressor.physics.loads import (
     static_load,
 )
 from compressor.physics.march import march
-from compressor.physics.mechanism_rows import IMPLAUSIBLE, STALLED, wear_all
+from compressor.physics.mechanism_rows import STALLED, wear_all
 from compressor.physics.observe import (
     COLUMNS,
     WIDE,

@@ -267,6 +267,17 @@ def advance(w, z, work, reached, fresh, at_edge, segments):
             w.status = DONE
 
 
+@merged
+def stop_beyond(w, z, tally, p):
+    """Stop a walker whose motion has left what the model describes."""
+    if tally.deepest > w.deepest:
+        w.status = PENETRATION_IMPLAUSIBLE
+    elif not finite(z):
+        w.status = NON_FINITE
+    elif beyond_model(z, p):
+        w.status = BEYOND_MODEL
+
+
 @jit
 def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit):
     """Advance by at most `limit` step attempts; w.status tells how the walker stands then.
@@ -324,9 +335,4 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         advance(w, z, work, reached, was_stiff or met, at_edge, phases.size)
         if met:  # what is seen at t is not what the step saw at its end
             w.observed = 0
-        if tally.deepest > w.deepest:
-            w.status = PENETRATION_IMPLAUSIBLE
-        elif not finite(z):
-            w.status = NON_FINITE
-        elif beyond_model(z, p):
-            w.status = BEYOND_MODEL
+        stop_beyond(w, z, tally, p)

@@ -127,7 +127,7 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     }
     if path is not None and _hides_clipping(numbers, attributes):
         with contextlib.suppress(DamagedJob):
-            numbers["clipped_fraction"] = float(store.values(key, [FORMER])[FORMER])
+            numbers["clipped_fraction"] = float(store.values(key, [FORMER]).get(FORMER, np.nan))
     file = "" if path is None else os.fspath(final_path(path))
     caveats = job_caveats(numbers, attributes) if end.status == "ok" else []
     return JobReport(

@@ -52,7 +52,7 @@ MISTAKES = [
     ("run nospace.yaml", "nospace.yaml:1:1: needs keys", "a space after the colon"),
     ("run twice.yaml", "load: is given twice; first at line 1"),
     ("run typo.yaml", "machine.sped_rpm: unknown key; did you mean machine.speed_rpm?"),
-    ("run other-unit.yaml", "clearance_m: unknown key; did you mean clearance_mm?"),
+    ("run other-unit.yaml", "clearance_m: unknown key; write clearance_mm: 200"),
     ("run bare.yaml", "bare.yaml:1:1: clearance_mm", "big_end"),
     ("run negative.yaml", "clearance_mm", "-0.2", "[0, 1000]", "mm"),
     ("run word.yaml", "joint", "bigend", "big_end"),

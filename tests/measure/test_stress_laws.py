@@ -44,7 +44,7 @@ def test_scenes_have_every_law_and_else_the_numbers_of_old():
                 assert 0.999 * low <= value <= 1.001 * high or (group, value) == ("guide", 0.0)
         assert made == plain
         friction |= {"ideal_joints": True} if rubbing else {}
-        Case.from_values({**made, **had, "contact": contact, "friction": friction})
+        Case.resolve({**made, **had, "contact": contact, "friction": friction})
     assert {*seen} == {*CONTACT_LAWS, *FRICTION_LAWS, *RANGES, "ideal_joints"}
     assert min(seen.values()) > 20
     assert {law for law, count in elastic.items() if count} == {*ELASTIC}
@@ -56,9 +56,9 @@ def test_scipy_judges_laws_that_remember_a_meeting():
     how = {"duration_rev": 0.1, "settle_rev": 0, "rtol": 1e-6, "horizon": False}
     law = {"law": "flores", "restitution": 0.6}
     values = {"joint": "small_end", "clearance_mm": 0.2, "contact": law, "solve": how}
-    found = judge(Case.from_values(values))
+    found = judge(Case.resolve(values))
     assert (found.verdict, found.by[0]) == ("ok", "DOP853")
-    run = solve(Case.from_values(values))
+    run = solve(Case.resolve(values))
     run.trajectory.evaluations = 20 * run.trajectory.steps  # as of the stiff partner
     assert judges(run) == ("DOPRI5", "LSODA", "Radau")
 

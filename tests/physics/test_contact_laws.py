@@ -37,7 +37,7 @@ def contact(law, exponent=1.5, **more):
     if law in CYLINDRICAL:
         values |= {"length_mm": 20, "modulus_GPa": 110}
     p = record(
-        Case.from_values({"joint": "big_end", "clearance_mm": 1000 * CLEARANCE, "contact": values})
+        Case.resolve({"joint": "big_end", "clearance_mm": 1000 * CLEARANCE, "contact": values})
     )
     return p, float(p["stiffness"][0])
 

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -88,16 +87,11 @@ def test_a_restitution_of_the_guide_needs_a_law_that_has_one():
         Case.from_values({"guide": {"clearance_mm": 0.1, "restitution": 0.5}})
 
 
-@pytest.mark.parametrize("law", ["impact", "hertz", "flores"])
+@pytest.mark.parametrize("law", ["impact", "hertz"])
 def test_damping_of_the_guide_moves_the_crosshead_whatever_the_law(law):
     """9, 336 and 5000 N s/mm gave one motion where the joints' law was not ADAMS's."""
     found = []
     for damping in (9, 5000):
-        p = record_of(
-            {"damping_N_s_per_mm": damping},
-            law=law,
-            **({"restitution": 0.5} if law == "flores" else {}),
-        )
+        p = record_of({"damping_N_s_per_mm": damping}, law=law)
         found.append(corner_force(2e-5, 0.05, LEVER, p)[0])
-    assert (found[0] == found[1]) == (law == "flores")  # which damps by its restitution
-    assert np.isfinite(found).all()
+    assert found[0] < found[1]

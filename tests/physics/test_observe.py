@@ -15,7 +15,7 @@ JOINTS = ("big_end", "small_end", "both")
 
 def case(joint, **values):
     clearance = {} if joint == "none" else {"joint": joint, "clearance_mm": 0.2}
-    return Case.from_values({**clearance, **values})
+    return Case.resolve({**clearance, **values})
 
 
 def row_at(p, t, y, phase=1):

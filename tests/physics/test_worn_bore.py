@@ -30,7 +30,7 @@ def made(worn=0.0, sectors=72, **values):
     """A record whose bores are worn by numbers (m) or by functions of the angle."""
     angles = 2 * math.pi / sectors * np.arange(sectors)
     depth = worn(angles) if callable(worn) else np.full(sectors, worn)
-    case = Case.from_values(WEAR | values)
+    case = Case.resolve(WEAR | values)
     return case, record(case, np.array([depth, depth]))
 
 

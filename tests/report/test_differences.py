@@ -39,7 +39,10 @@ WORN_SAYS = told(WORN)
         ({"solve": {"accuracy": "fine", "method": "BDF"}}, {}),  # how, not what
         (
             WORN | {"contact": {"materials": ["steel", "copper"]}},
-            {"contact.materials": ("steel, copper", "none")},
+            {
+                "contact.materials": ("steel, copper", "none"),
+                "contact.geometry": ("external", "none"),
+            },
         ),
     ],
 )

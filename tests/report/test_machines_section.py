@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.machines.judged import Judged
+from compressor.machines.judged import Judged, cases_judged
 from compressor.machines.study import dataset
 from compressor.report.machines_section import (
     machine_drawings,
@@ -31,7 +31,7 @@ def verdict(case):
 
 def judged(tmp_path, path, overrides=()):
     """A file of a study whose verdicts are made up."""
-    (study,) = load_studies(path, overrides=overrides)
+    (study,) = load_studies(path, overrides=overrides, variants=cases_judged)
     rows = {str(n): verdict(case) for n, case in enumerate(study.cases)}
     found = dataset(study, [*rows], rows)
     write_dataset(tmp_path / f"{study.name}.nc", found)

@@ -73,7 +73,7 @@ def test_a_change_is_what_lies_beyond_both_bars():
     table = model_table(made())
     found = cells(table)
     peak, rms = "peak acceleration", "rms acceleration"
-    depth, loss = "greatest penetration, big end", "time without contact, big end"
+    depth, loss = "greatest penetration, big end", "time without dry contact, big end"
     assert [*found["softer"]] == [peak, rms, depth, loss]
     assert found["softer"] == {peak: "+93 %", rms: "none seen", depth: "+50 %",
                                loss: "+4 points"}  # fmt: skip

@@ -66,7 +66,7 @@ def test_commands_say_what_is_outside_the_judged_range(tmp_path, monkeypatch, ca
     assert cli.main([command, "k1.yaml", "-j", "1"]) == 0
     expected = (
         "k1.yaml: warning: machine.rod_mass_kg: 62 kg is outside the range that the program was "
-        "judged on, 0.1 to 50 kg (1 of 2 jobs looked at)"
+        "judged on, 0.1 to 50 kg (1 of 2 jobs)"
     )
     assert expected in capsys.readouterr().err
 
@@ -126,9 +126,9 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
     assert len(told) == 6
     assert told[0] == (
         f"{path}: warning: machine.crank_radius_mm: 1 mm is unusual (5 to 1000 is usual); read as "
-        "m, it is 1000 mm (2 of 2 jobs looked at)"
+        "m, it is 1000 mm (2 of 2 jobs)"
     )
-    assert told[-1] == f"{path}: and 2 more warnings"
+    assert told[-1] == f"{path}: and 3 more warnings"
 
 
 def test_the_pages_examples_that_are_plain_are_told_nothing(tmp_path):

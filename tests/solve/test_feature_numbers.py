@@ -12,7 +12,7 @@ FRICTION = {"ideal_joints": True}
 
 def run(**values):
     values.setdefault("solve", SHORT)
-    return simulate(Case.from_values(values))
+    return simulate(Case.resolve(values))
 
 
 @pytest.mark.parametrize(

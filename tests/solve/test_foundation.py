@@ -125,13 +125,13 @@ def test_a_steady_body_repeats_the_revolutions_that_auto_finds(duration):
 
 def test_the_casing_s_mass_follows_the_body_s(tmp_path):
     """The default body's is what it was, so that keys of its jobs stay."""
-    plain = Case.from_values({**LOOSE, "body": True})
+    plain = Case.resolve({**LOOSE, "body": True})
     assert plain.body.casing_mass_kg == 20.0
-    assert plain.key == Case.from_values({**LOOSE, "body": {"casing_mass_kg": 20}}).key
+    assert plain.key == Case.resolve({**LOOSE, "body": {"casing_mass_kg": 20}}).key
     (tmp_path / "s.yaml").write_text("body: {mass_kg: [500, 3500]}\n", encoding="utf-8")
     (study,) = load_studies(tmp_path / "s.yaml")
     assert [case.body.casing_mass_kg for case in study.cases] == [20.0, 140.0]
-    given = Case.from_values({**LOOSE, "body": {"mass_kg": 3500, "casing_mass_kg": 20}})
+    given = Case.resolve({**LOOSE, "body": {"mass_kg": 3500, "casing_mass_kg": 20}})
     assert given.body.casing_mass_kg == 20.0
 
 

@@ -64,15 +64,15 @@ def test_contact_time_of_any_exponent(exponent):
 @pytest.mark.parametrize("speed", [200, 2000])
 def test_the_greatest_force_bounds_the_ideal_machine_s(load, speed):
     values = {"load": load, "machine": {"speed_rpm": speed, "gravity_m_per_s2": 9.81}}
-    case = Case.from_values(values | {"spring": {"damping_N_s_per_mm": 0.5}})
+    case = Case.resolve(values | {"spring": {"damping_N_s_per_mm": 0.5}})
     found = simulate(case)["peak_contact_force"].values
     for joint, force in zip(JOINTS, found, strict=True):
         assert force <= greatest_force(record(case), joint) <= 3 * force
 
 
 def test_stiffness_is_given_or_of_the_materials():
-    squared = Case.from_values({**BOTH, "contact": {"exponent": 2}})
-    mixed = Case.from_values({**BOTH, "contact": {"materials": ["steel", "copper"]}})
+    squared = Case.resolve({**BOTH, "contact": {"exponent": 2}})
+    mixed = Case.resolve({**BOTH, "contact": {"materials": ["steel", "copper"]}})
     pin = 0.01
     bores = [pin + getattr(mixed.clearance_mm, joint) / 1e3 for joint in JOINTS]
     expected = [contact_stiffness("steel", "copper", pin, bore) for bore in bores]
@@ -82,7 +82,7 @@ def test_stiffness_is_given_or_of_the_materials():
 
 
 def test_the_ideal_machine_has_no_scales_and_no_cost():
-    case = Case.from_values({"joint": "both", "clearance_mm": 0})
+    case = Case.resolve({"joint": "both", "clearance_mm": 0})
     assert list(contact_scales(case)) == []
     assert expected_seconds(case, expected_steps(case, [])) == 0
 
@@ -94,7 +94,7 @@ def runs():
     for values in random_cases(30):
         for rtol in (1e-4, 1e-7):
             solve = {"rtol": rtol, "duration_rev": 2, "settle_rev": 0}
-            case = Case.from_values({**values, "solve": solve})
+            case = Case.resolve({**values, "solve": solve})
             found.append((case, attempt(case, case.rtol, 600, False).trajectory))
     return found
 
@@ -117,8 +117,8 @@ def test_penetration_of_random_cases(runs):
 
 
 def test_limits_follow_what_is_stiff():
-    (calm,) = contact_scales(Case.from_values({"joint": "big_end", "clearance_mm": 0.2}))
-    stuck = Case.from_values(
+    (calm,) = contact_scales(Case.resolve({"joint": "big_end", "clearance_mm": 0.2}))
+    stuck = Case.resolve(
         {"joint": "big_end", "clearance_mm": 0.2,
          "friction": {"stiction_velocity_mm_per_s": 0.001}}
     )  # fmt: skip
@@ -134,7 +134,7 @@ def test_a_pendulum_in_the_bore():
 
     The other end is held, and the end rolls on a circle of radius e about the bore's centre.
     """
-    of = Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
+    of = Case.resolve({"joint": "big_end", "clearance_mm": 0.2})
     (scales,) = contact_scales(of)
     p = record(of)
     radius = scales.clearance + scales.penetration
@@ -155,10 +155,10 @@ def test_a_pendulum_in_the_bore():
 def test_the_damping_ratio_is_that_of_the_linearised_contact():
     """Of the paper's contact, 3.5 to 7: a journal that is held does not ring along the force."""
     for clearance in (0.1, 0.2, 0.3):
-        (scales,) = contact_scales(Case.from_values(
+        (scales,) = contact_scales(Case.resolve(
             {"joint": "big_end", "clearance_mm": clearance}
         ))  # fmt: skip
         assert 3.5 < scales.damping_ratio < 7
     undamped = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0}}
-    (scales,) = contact_scales(Case.from_values(undamped))
+    (scales,) = contact_scales(Case.resolve(undamped))
     assert scales.damping_ratio == 0

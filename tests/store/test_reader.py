@@ -220,9 +220,7 @@ SERVING = [  # output of what is stored, its reason, output of the case, serves
 def stored_as(row, ideal, folder, key):
     """Store a job under a key as a row of SERVING says."""
     keeps, precision, reason, *_ = row
-    text = json.dumps(
-        Case.from_values({"output": {"keep": keeps, "precision": precision}}).values()
-    )
+    text = json.dumps(Case.resolve({"output": {"keep": keeps, "precision": precision}}).values())
     dataset = ideal if keeps == "series" else ideal.drop_dims("time")
     dataset = dataset.assign(status="failed" if reason else "ok", reason=reason)
     keep(folder, dataset.assign_attrs(case=text, key=key))
@@ -232,7 +230,7 @@ def stored_as(row, ideal, folder, key):
 def test_what_a_stored_job_serves(row, ideal, tmp_path):
     *_, asks, exact, serves = row
     stored_as(row, ideal, tmp_path, ideal.attrs["key"])
-    case = Case.from_values({"output": {"keep": asks, "precision": exact}})
+    case = Case.resolve({"output": {"keep": asks, "precision": exact}})
     assert store.job_status(tmp_path, ideal.attrs["key"]).serves(case) == serves
 
 
@@ -248,7 +246,7 @@ def test_many_jobs_serve_as_each_does(ideal, tmp_path):
         ("series", "metrics"), ("double", "single"), (True, False)
     ):
         output = {"keep": keeps, "precision": precision}
-        case = Case.from_values({"output": output, "solve": {"error_bars": bars}})
+        case = Case.resolve({"output": output, "solve": {"error_bars": bars}})
         each = [stored.status_at(position).serves(case) for position in positions]
         assert stored.serving(positions, case).tolist() == each
         told |= {*each}
@@ -452,12 +450,13 @@ def test_a_study_is_stored_and_found(tmp_path):
 
 def test_storing_a_study_again_leaves_its_file_alone(tmp_path):
     pairs = [["steel", "steel"], ["steel", "copper"]]
-    one = study("pairs", contact={"materials": pairs})
+    worn = {"joint": "big_end", "clearance_mm": 0.2}
+    one = study("pairs", **worn, contact={"materials": pairs})
     write_study(tmp_path, one, "first")
     before = (tmp_path / "studies/pairs.json").stat().st_mtime_ns
     write_study(tmp_path, one, "second")
     assert (tmp_path / "studies/pairs.json").stat().st_mtime_ns == before
-    write_study(tmp_path, study("pairs", contact={"materials": pairs[:1]}), "third")
+    write_study(tmp_path, study("pairs", **worn, contact={"materials": pairs[:1]}), "third")
     assert read_studies(tmp_path)[0].command == "third"
 
 
