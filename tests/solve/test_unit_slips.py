@@ -37,7 +37,7 @@ SLIPS = [
     ("spring.stroke_mm", 0.12, SPRING, "m", "120 mm"),
     ("clearance_mm", 0.0002, {"joint": "both"}, "m", "0.2 mm"),
     ("clearance_mm", 5, {"joint": "both"}, "µm", "0.005 mm"),
-    ("machine.pin_radius_mm", 0.01, WORN, "m", "10 mm"),
+    ("machine.pin_radius_mm", 0.01, {"friction": {"ideal_joints": True}}, "m", "10 mm"),
     ("machine.rod_mass_kg", 4700, {}, "g", "4.7 kg"),
     ("machine.reciprocating_mass_kg", 14000, {}, "g", "14 kg"),
     ("gas.piston_radius_mm", 0.05, GAS, "m", "50 mm"),
