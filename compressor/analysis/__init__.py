@@ -15,7 +15,15 @@ from compressor.analysis.frame_forces import (
     last_revolution,
 )
 from compressor.analysis.impacts import impacts
-from compressor.analysis.paper_cases import CLEARANCES, FAULTS, SPOKEN, cases_of, label, paper_cases
+from compressor.analysis.paper_cases import (
+    CLEARANCES,
+    FAULTS,
+    LOADS,
+    SPOKEN,
+    cases_of,
+    label,
+    paper_cases,
+)
 from compressor.analysis.plot_captions import PLOT_CAPTIONS
 from compressor.analysis.runs import (
     case_of,

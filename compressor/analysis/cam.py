@@ -1,4 +1,4 @@
-"""The cam and spring of the design load (Eq. 8-12, Figure 4): what is printed, and what follows.
+"""The cam and spring of the spring load (Eq. 8-12, Figure 4): what is printed, and what follows.
 
 As printed, with the ideal gas's corner angles, the cam does not close: it rises by 208.7 mm and
 falls by 81.3 mm. Here the follower dwells for the spring's stroke of piston travel each way.
@@ -71,7 +71,7 @@ def contour(p, angles, base_radius):
 
 @dataclass(frozen=True)
 class Cam:
-    """The cam of a run's design load, in m over cam angles (rad, any shape)."""
+    """The cam of a run's spring load, in m over cam angles (rad, any shape)."""
 
     run: xr.Dataset
     base_radius: float = BASE_RADIUS
@@ -147,7 +147,7 @@ class Comparison:
 def comparisons(p=None):
     """What the paper prints of spring and cam beside what follows (Eq. 8-12, Table 1).
 
-    `p` is a record of the design load with the paper's pressures, by default the paper's; returns a
+    `p` is a record of the spring load with the paper's pressures, by default the paper's; returns a
     list of Comparison.
     """
     p = record(Case()) if p is None else p

@@ -77,7 +77,7 @@ def same_motion(runs: Runs) -> Verdict:
 
 
 def design_force(runs: Runs) -> Verdict:
-    """Claim 2: the design load peaks higher, and its corners lie elsewhere."""
+    """Claim 2: the spring load peaks higher, and its corners lie elsewhere."""
     peaks = {load: float(runs[load]["piston_force"].max()) for load in ("design", "typical")}
     corners = {load: np.degrees(load_corners(runs[load])) for load in peaks}
     apart = np.abs(corners["design"] - corners["typical"])[[0, 2]]

@@ -8,6 +8,7 @@ from compressor.metrics import JOINTS
 
 CLEARANCES = (0.1, 0.2, 0.3)
 FAULTS = ("big_end", "small_end", "both")
+LOADS = {"typical": "gas", "design": "spring"}  # the paper's models, without clearance
 SPOKEN = {"big_end": "big end", "small_end": "small end", "both": "both joints"}
 
 
@@ -29,11 +30,11 @@ def paper_cases(**machine: float) -> dict[str, Case]:
 def cases_of(machine: Case) -> dict[str, Case]:
     """The paper's eleven cases by label, alike in all other assumptions of a case.
 
-    Its own load, joints and clearances are left aside. The typical load may not fit a machine of
+    Its own load, joints and clearances are left aside. The gas load may not fit a machine of
     other lengths: such a case has `problems`, and no run of it is ok.
     """
     ideal = with_ideal_joints(machine)
-    cases = {load: replace(ideal, load=load) for load in ("typical", "design")}
+    cases = {name: replace(ideal, load=load) for name, load in LOADS.items()}
     for fault, c in itertools.product(FAULTS, CLEARANCES):
         sizes = replace(machine.clearance_mm, big_end=c, small_end=c)
         cases[label(fault, c)] = replace(cases["design"], joint=fault, clearance_mm=sizes)

@@ -29,6 +29,7 @@ from compressor.metrics import JOINTS
 # Results of one key agree within the sum of their error bars, whichever version of the program made
 # them, unless a revision has changed them (`revisions`); to the bit they are equal only for one
 # version of program and libraries on one kind of processor
+LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 NO_SWEEP = (
     "would be swept, and a case has one value of each key: build a case for each, or write a case "
@@ -40,7 +41,7 @@ NO_SWEEP = (
 class Case(Settings):
     """One fully resolved simulation: every value of a case file, in the case file's units.
 
-    `Case.from_values` makes a valid one. `name` (of the study), `load` (design, typical or none)
+    `Case.from_values` makes a valid one. `name` (of the study), `load` (spring, gas or none)
     and `joint` (none, big_end, small_end or both) are words. The groups are `clearance_mm`
     (PerJoint), `initial_offset_mm` (Offset), `machine`, `gas`, `spring`, `contact`, `friction`,
     `lubricant`, `guide`, `drive`, `rod`, `wear`, `body`, `sensor`, `solve` and `output`, each of
@@ -122,6 +123,7 @@ class Case(Settings):
     def __post_init__(self) -> None:
         """Fill in the defaults that depend on other values; what needs a clearance goes without."""
         machine, solve, contact = self.machine, self.solve, self.contact
+        object.__setattr__(self, "load", table()["load"].choice_of(self.load))
         if machine.rod_centre_mm is None or machine.rod_inertia_kg_m2 is None:
             given = (machine.rod_centre_mm, machine.rod_inertia_kg_m2)
             length, mass = machine.rod_length_mm, machine.rod_mass_kg
@@ -319,6 +321,7 @@ def identity(case: Case, with_solver: bool) -> dict[str, Any]:
     values, solve = case.values(), case.solve
     if values["contact"].get("geometry") == "external":  # as no key was, once
         del values["contact"]["geometry"]
+    values["load"] = LOADS_IN_KEYS[values["load"]]
     for unread in (*_groups_outside_identity(), "solve"):
         values.pop(unread, None)
     values["model"] = MODEL_VERSION

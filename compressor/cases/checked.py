@@ -31,7 +31,7 @@ def checked(key: str, value: Any, problems: list[Problem]) -> Any:
         return float(value) + 0.0  # no -0.0: equal cases have one key
     if row.kind == "integer":
         return int(value)
-    return tuple(value) if row.kind == "materials" else value
+    return tuple(value) if row.kind == "materials" else row.choice_of(value)
 
 
 def _scalar(value: Any) -> Any:

@@ -135,7 +135,7 @@ class _Reader:
         if not numeric and sign not in ("==", "!="):
             self.refuse(after, f"{key} is a word: compare it by == or !=")
         right = node.comparators[0]
-        wanted = self.value(right)
+        wanted = row.choice_of(self.value(right))
         word = wanted in row.choices and sign in ("==", "!=")
         if not (word or (type(wanted) in (int, float) if numeric else not row.check(wanted))):
             self.refuse(right.col_offset, f"{key} needs {'a number' if numeric else row.range}")

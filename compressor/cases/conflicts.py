@@ -203,13 +203,13 @@ def _choice_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem
 
 def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     machine, gas = case.machine, case.gas
-    if case.load == "design" and case.spring.stroke_mm >= 2 * machine.crank_radius_mm:
+    if case.load == "spring" and case.spring.stroke_mm >= 2 * machine.crank_radius_mm:
         yield Problem(
             "spring.stroke_mm",
             f"{case.spring.stroke_mm:g} mm must be less than the piston's stroke, "
             f"{2 * machine.crank_radius_mm:g} mm",
         )
-    if case.load != "typical":
+    if case.load != "gas":
         return
     play = _play(case)
     if gas.head_clearance_mm <= play:

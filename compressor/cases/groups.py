@@ -157,13 +157,13 @@ class Machine:
 @documented
 @dataclass(frozen=True)
 class Gas:
-    """The typical load, an ideal gas cycle (Eq. 13); a case's `gas`, read with `load: typical`.
+    """The gas load, an ideal cycle (Eq. 13); a case's `gas`, read with `load: gas`.
 
     The corners of the cycle are printed for the paper's pressures; `exact` follows from any:
 
     >>> import compressor
     >>> gas = {"discharge_MPa": 0.5, "switching": "exact"}
-    >>> compressor.Case.from_values({"load": "typical", "gas": gas}).gas.discharge_MPa
+    >>> compressor.Case.from_values({"load": "gas", "gas": gas}).gas.discharge_MPa
     0.5
     """
 
@@ -191,9 +191,9 @@ class Gas:
 @documented
 @dataclass(frozen=True)
 class Spring:
-    """The design load, a spring between piston and cam follower (§2.2); a case's `spring`.
+    """The spring load, a spring between piston and cam follower (§2.2); a case's `spring`.
 
-    Read with `load: design`, the default:
+    Read with `load: spring`, the default:
 
     >>> import compressor
     >>> compressor.Case.from_values({"spring": {"preload_N": 600}}).spring.preload_N

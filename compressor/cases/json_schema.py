@@ -89,7 +89,7 @@ def _value(row: Parameter) -> Schema:
 
 def _one(row: Parameter) -> Schema:
     """The schema of one value of a parameter, as `Parameter.check` has it."""
-    words = {"enum": list(row.choices)}
+    words = {"enum": [*row.choices, *(alias for alias, _ in row.aliases)]}
     if row.kind in ("number", "integer"):
         lower = {"exclusiveMinimum" if row.above else "minimum": row.low}
         number = {"type": row.kind, **lower, "maximum": row.high}

@@ -129,6 +129,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     optional: bool = False
     identity: bool = True  # whether it is part of a job's identity
+    aliases: tuple[tuple[str, str], ...] = ()  # other words, each with the choice it stands for
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
     read: tuple[Reader, ...] = ()  # conditions that all hold where a case reads it
 
@@ -181,6 +182,10 @@ class Parameter:
         needed = [one for one in words if not any(o != one and o in one for o in words)]
         return "; ".join(needed)
 
+    def choice_of(self, value: Any) -> Any:
+        """Return the choice that an alias stands for, and any other value as it is."""
+        return next((choice for alias, choice in self.aliases if alias == value), value)
+
     def holds(self, value: float) -> bool:
         """Whether a number is in range."""
         return (value > self.low if self.above else value >= self.low) and value <= self.high
@@ -195,7 +200,7 @@ class Parameter:
             good = isinstance(value, tuple | list) and len(value) == 2
             bad = [name for name in value if name not in self.choices] if good else []
             return self._refused(value, bad[0] if bad else None) if bad or not good else None
-        if isinstance(value, str) and value in self.choices:
+        if isinstance(value, str) and self.choice_of(value) in self.choices:
             return None
         if self.kind in ("choice", "accuracy"):
             return self._refused(value, value)
@@ -218,7 +223,8 @@ class Parameter:
         message = f"needs {self.needed}, not {shown(value)}"
         if not isinstance(word, str):
             return message
-        lower = {choice.lower(): choice for choice in (*self.choices, "true", "false")}
+        lower = dict(self.aliases)
+        lower |= {choice.lower(): choice for choice in (*self.choices, "true", "false")}
         near = get_close_matches(word[:MOST_WORD].lower(), lower, n=1)
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"

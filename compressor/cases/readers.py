@@ -44,8 +44,8 @@ def hears_casing(case: Any) -> bool:
     return bool(case.body and case.sensor and case.sensor.place != "body")
 
 
-GAS = Reader("load: typical", lambda case: case.load == "typical")
-SPRING = Reader("load: design", lambda case: case.load == "design")
+GAS = Reader("load: gas", lambda case: case.load == "gas")
+SPRING = Reader("load: spring", lambda case: case.load == "spring")
 A_JOINT = Reader("joint: big_end, small_end or both", lambda case: case.joint != "none")
 BIG_END = Reader("joint: big_end or both", lambda case: case.joint in ("big_end", "both"))
 SMALL_END = Reader("joint: small_end or both", lambda case: case.joint in ("small_end", "both"))

@@ -83,7 +83,10 @@ class Settings:
     name: str = choice(
         "case", (), "ours", "name of the study; default: the file's", kind="text", identity=False
     )
-    load: str = choice("design", ("design", "typical", "none"), "§2.2-2.4", "load on the piston")
+    load: str = choice(
+        "spring", ("spring", "gas", "none"), "§2.2-2.4", "load on the piston",
+        aliases=(("design", "spring"), ("typical", "gas")),
+    )  # fmt: skip
     joint: str = choice(
         "none", ("none", "big_end", "small_end", "both"), "§3.2", "joints with clearance"
     )

@@ -51,14 +51,14 @@ SPANS: dict[str, tuple[str, Span, Span | None, bool]] = {
     "rtol": ("1", (1e-10, 1e-2), None, True),
 }  # fmt: skip
 OTHERS = 3 + 3 * len(JOINTS)  # friction's ratio, load, scene; how each journal starts
-LOADS = ("none", "typical", "design")
+LOADS = ("none", "gas", "spring")
 SCENES = ("big_end", "small_end", "both")
 UNDAMPED = 0.1  # share of the scenes
 MASS_RATIO = 1e4  # at most
 PAPER_DAMPING = 336.0  # N s/mm
 FULL_DAMPING = 1e-4  # m
 DEEPEST_START = 0.03  # of the pin radius
-FORCES = {"none": 0.0, "typical": 3087.0, "design": 3347.0}  # N, greatest of each load
+FORCES = {"none": 0.0, "gas": 3087.0, "spring": 3347.0}  # N, greatest of each load
 CRANK = 0.12  # m
 SAMPLES = 720  # of the output grid
 # (whole range, supported range) of what chosen laws read, drawn evenly in the logarithm

@@ -238,9 +238,9 @@ FEATURES = (
     Feature(
         "spring damping",
         "spring.damping_N_s_per_mm",
-        lambda case: case.load == "design" and case.spring.damping_N_s_per_mm > 0,
+        lambda case: case.load == "spring" and case.spring.damping_N_s_per_mm > 0,
         lambda case: changed(case, "spring", damping_N_s_per_mm=0.0),
-        lambda case: None if case.load != "design" else changed(
+        lambda case: None if case.load != "spring" else changed(
             case, "spring", damping_N_s_per_mm=type(case.spring)().damping_N_s_per_mm
         ),
         "no spring damping",
@@ -260,7 +260,7 @@ FEATURES = (
     Feature(
         "back pressure",
         "gas.back_pressure_MPa",
-        lambda case: case.load == "typical" and case.gas.back_pressure_MPa > 0,
+        lambda case: case.load == "gas" and case.gas.back_pressure_MPa > 0,
         lambda case: changed(case, "gas", back_pressure_MPa=0.0),
         lambda case: None,
         "no back pressure",

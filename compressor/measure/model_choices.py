@@ -65,7 +65,7 @@ def model_variants(case: Case) -> list[Choice]:
     others = [row for row in FEATURES if not row.is_choice and row.key != "load"]
     names = {choice.name for choice in chosen}
     found = [one for one in toggled(case, others) if one.name not in names]
-    other = {"design": "typical", "typical": "design"}.get(case.load)
+    other = {"spring": "gas", "gas": "spring"}.get(case.load)
     if other:
         found.append(Choice(f"{other} load", replace(case, load=other)))
     return [*found, *chosen]

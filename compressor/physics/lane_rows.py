@@ -20,7 +20,7 @@ SEEN_COUNT = 18  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potent
 PEAKED = 7  # of these the first ones, of which the greatest size is kept
 NODE_COUNT = 5
 
-DESIGN = int(Load.DESIGN)
+SPRING = int(Load.SPRING)
 
 NAMES = RECORD.names or ()
 # a record whose choices are constants; its fields are those of RECORD

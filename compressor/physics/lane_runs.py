@@ -32,7 +32,7 @@ class Run(NamedTuple):
 def fits(p: np.record) -> bool:
     """Whether runs of a record can march in lanes: default laws and powers of 1.5."""
     default = p["laws"].size == 1
-    return bool(default and p["load"] != Load.TYPICAL and p["exponent"] == 1.5)
+    return bool(default and p["load"] != Load.GAS and p["exponent"] == 1.5)
 
 
 def march_side_by_side(runs: Sequence[Run], most: int) -> list[Run | None]:

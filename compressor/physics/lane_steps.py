@@ -8,7 +8,6 @@ from compressor.physics.kinematics import ideal_after
 from compressor.physics.lane_rows import (
     ATOL,
     COS,
-    DESIGN,
     ERROR,
     FIRST_FIELD,
     LANES,
@@ -20,6 +19,7 @@ from compressor.physics.lane_rows import (
     SEEN,
     SEEN_COUNT,
     SIN,
+    SPRING,
     STATE,
     H,
     K,
@@ -54,7 +54,7 @@ def record_of(scene, W, j):
     clearance = W[b + 10 * LANES], W[b + 11 * LANES]
     stiffness = W[b + 12 * LANES], W[b + 13 * LANES]
     return LaneRecord(  # type: ignore[call-arg]
-        number, DESIGN, IMPACT, 1, freedoms, 0,
+        number, SPRING, IMPACT, 1, freedoms, 0,
         W[b], W[b + LANES], W[b + 2 * LANES], W[b + 3 * LANES], W[b + 4 * LANES], W[b + 5 * LANES],
         W[b + 6 * LANES], W[b + 7 * LANES], pins, clearance, stiffness, 1.5,
         W[b + 14 * LANES], W[b + 15 * LANES], W[b + 16 * LANES], W[b + 17 * LANES],

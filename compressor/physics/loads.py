@@ -1,4 +1,4 @@
-"""Piston force: the ideal gas cycle (typical) and the spring on a cam (design).
+"""Piston force: the ideal gas cycle, and the spring on a cam (the paper's "design model").
 
 physics/README.md, Loads.
 
@@ -14,13 +14,13 @@ from compressor.physics._jit import merged
 from compressor.physics.kinematics import angle_at
 from compressor.physics.record import Load, derive
 
-TYPICAL = int(Load.TYPICAL)
-DESIGN = int(Load.DESIGN)
+GAS = int(Load.GAS)
+SPRING = int(Load.SPRING)
 EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
 
 
 @merged
-def typical_force(phase, x, p):
+def gas_force(phase, x, p):
     """Gas force (N) with the crosshead at x (m): Eq. 6, isentropic, less the back pressure."""
     if phase == 1:
         return p.suction_force - p.back_force
@@ -37,7 +37,7 @@ def typical_force(phase, x, p):
 
 
 @merged
-def design_force(phase, x, v, deviation, deviation_rate, p):
+def spring_force(phase, x, v, deviation, deviation_rate, p):
     """Spring force (N) between piston and cam follower: Eq. 8-10, with the cam closed.
 
     x (m), v (m/s) of the crosshead and their deviations from the ideal motion. While the follower
@@ -58,27 +58,27 @@ def design_force(phase, x, v, deviation, deviation_rate, p):
 @merged
 def piston_force(phase, x, v, deviation, deviation_rate, p):
     """Piston force (N), positive towards the crank, of the record's load."""
-    if p.load == DESIGN:
-        return design_force(phase, x, v, deviation, deviation_rate, p)
-    if p.load == TYPICAL:
-        return typical_force(phase, x, p)
+    if p.load == SPRING:
+        return spring_force(phase, x, v, deviation, deviation_rate, p)
+    if p.load == GAS:
+        return gas_force(phase, x, p)
     return 0.0
 
 
 def static_load(p):
     """Greatest force (N) of the record's load on a piston that stands still."""
-    if p["load"] == Load.DESIGN:
+    if p["load"] == Load.SPRING:
         return p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
-    if p["load"] == Load.TYPICAL:
+    if p["load"] == Load.GAS:
         return p["discharge_force"]
     return 0.0
 
 
 def greatest_load(p):
     """The load's greatest value in the ideal machine (N), at most."""
-    if p["load"] == Load.DESIGN:
+    if p["load"] == Load.SPRING:
         return static_load(p) + p["spring_damping"] * p["omega"] * p["crank_radius"]
-    if p["load"] == Load.TYPICAL:
+    if p["load"] == Load.GAS:
         return max(static_load(p), p["back_force"])
     return 0.0
 
@@ -120,7 +120,7 @@ def load_corners(p, pressure_ratio, printed):
     """Corners (rad) of the record's load, (3,): Eq. 13's if `printed`, where it is the gas's."""
     if p["load"] == Load.NONE:
         return 0.0, 0.0, 0.0
-    if p["load"] == Load.DESIGN:
+    if p["load"] == Load.SPRING:
         return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
     return printed_corners() if printed else gas_corners(p, pressure_ratio)
 

@@ -25,8 +25,8 @@ class Load(IntEnum):
     """What presses on the piston (physics/README.md, Loads)."""
 
     NONE = 0
-    TYPICAL = 1
-    DESIGN = 2
+    GAS = 1
+    SPRING = 2
 
 
 # the state of each scene: deviations from the ideal motion, then their rates

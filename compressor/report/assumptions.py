@@ -19,7 +19,7 @@ class Assumptions:
 
     masses: Sequence[str]  # that a study leaves to the defaults, in words
     worn: bool
-    design: bool
+    spring: bool
     claims: bool
 
 
@@ -39,7 +39,7 @@ def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: 
     content = Assumptions(
         ours,
         any(case.joint != "none" for _, case in cases),
-        any(case.load == "design" for _, case in cases),
+        any(case.load == "spring" for _, case in cases),
         claims,
     )
     return Section("assumptions", "What to keep in mind", "assumptions.html", content)

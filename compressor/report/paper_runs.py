@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import CLEARANCES, FAULTS, label, paper_cases
+from compressor.analysis import CLEARANCES, FAULTS, LOADS, label, paper_cases
 from compressor.cases import Case
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, StoreWarning
 
@@ -84,7 +84,7 @@ def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
 
 def case_files(labels: Collection[str]) -> dict[str, str]:
     """Case files that give some of the paper's cases: the text of each by its name."""
-    files = {f"{load}.yaml": f"load: {load}" for load in ("typical", "design") if load in labels}
+    files = {f"{name}.yaml": f"load: {load}" for name, load in LOADS.items() if name in labels}
     for fault in FAULTS:
         sizes = [f"{c:g}" for c in CLEARANCES if label(fault, c) in labels]
         if sizes:

@@ -87,7 +87,7 @@ def spoken(name: str) -> str:
 
 
 def printed_table() -> Table:
-    """The paper's numbers of the design load beside those that follow from its equations."""
+    """The paper's numbers of the spring load beside those that follow from its equations."""
     rows = [
         Row([
             Cell(f"{c.quantity} ({c.unit})"),

@@ -30,7 +30,7 @@ from compressor.store import Stored, StoredStudy
 
 WORN = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
 LOADS = ("design", "typical")
-# what the motion of a worn machine depends on; the gas does not push with the design load
+# what the motion of a worn machine depends on; the gas does not push with the spring load
 MACHINE = ("machine", "spring", "contact", "friction")
 WHOLE = 1e-6  # revolutions: rounding of a whole one
 SET = tuple(figure for figure in FIGURES if {*WORN} & {*figure.needs})

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from compressor.cases import points
+from compressor.cases import points, row_of
 from compressor.program import did_you_mean
 from compressor.store.files import Folder, WrongName
 from compressor.store.folders import listed
@@ -129,6 +129,8 @@ def _value_at(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
         near = did_you_mean(name, [*short, *short.values()])
         raise WrongName(folder, f"{study.name} {problem}", near or _axes(study))
     (axis,) = found
+    row = row_of(axis.key)
+    text = row.choice_of(text) if row else text
     for value in axis.values:
         if text == in_words(value) or _equal(text, value):
             return axis.key, value

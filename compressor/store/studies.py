@@ -284,6 +284,7 @@ def read_study(path: Path) -> StoredStudy:
             raise ValueError
         if encode(study) != data or not _is_sound(study, path):
             raise ValueError
+        study = _in_present_words(study)
     except FileNotFoundError:
         raise
     except OSError as error:
@@ -292,6 +293,21 @@ def read_study(path: Path) -> StoredStudy:
         problem = "is damaged, or of another version of compsim"
         raise StoreError(path, problem, "delete it and run its case file again") from error
     return study
+
+
+def _in_present_words(study: StoredStudy) -> StoredStudy:
+    """Return a study whose words are today's; of older versions a choice may have another."""
+    axes = [
+        replace(axis, values=tuple(map(row.choice_of, axis.values)))
+        if (row := row_of(axis.key)) and row.aliases
+        else axis
+        for axis in study.axes
+    ]
+    fixed = {
+        key: row.choice_of(value) if (row := row_of(key)) else value
+        for key, value in study.fixed.items()
+    }
+    return replace(study, axes=tuple(axes), fixed=fixed)
 
 
 def _is_sound(study: StoredStudy, path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""The cam of the design load: closed as used, open as printed, and its design checks."""
+"""The cam of the spring load: closed as used, open as printed, and its design checks."""
 
 import math
 

@@ -72,7 +72,7 @@ def test_saltelli_s_designs_have_indices():
 def test_other_designs_have_correlations_of_ranks():
     rng = np.random.default_rng(1)
     x, idle = rng.random((2, 200))
-    load = np.array(["design", "typical"])[rng.integers(2, size=200)]
+    load = np.array(["spring", "gas"])[rng.integers(2, size=200)]
     values = np.exp(-5 * x)
     found = sampled_effects([x, idle, load], values)
     assert found.kind == "rank"

@@ -10,7 +10,7 @@ these take less time than the record, and without them no regime is told.
 import json
 
 JOINTS = ("none", "big_end", "small_end", "both")
-LOADS = ("design", "typical")
+LOADS = ("spring", "gas")
 CLEARANCE_MM = (0.05, 0.5)
 MACHINE = {
     "rod_mass_kg": {"random": [2, 8]},

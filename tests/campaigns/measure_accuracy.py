@@ -33,7 +33,7 @@ from compressor.solve.horizon import predictability_horizon
 from compressor.solve.regime import CLOSE
 from compressor.solve.simulate import simulate
 
-SEEDS = (701, 702, 703)
+SEEDS = (911, 912, 913)
 RTOLS = [10.0**-k for k in range(3, 10)]
 NINE = [(joint, c) for joint in ("big_end", "small_end", "both") for c in (0.1, 0.2, 0.3)]
 TRUTH = 1e-12
@@ -88,7 +88,7 @@ def paper_case(joint, clearance):
     load_equations()
     values = {"joint": joint, "clearance_mm": clearance}
     rows = {}
-    params = reference.paper_params("design", joint, clearance * 1e-3)
+    params = reference.paper_params("spring", joint, clearance * 1e-3)
     truth = None
     for word in ACCURACY:
         found = simulate(Case.from_values({**values, "solve": {"accuracy": word}}))

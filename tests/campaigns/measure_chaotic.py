@@ -39,7 +39,7 @@ WITHIN, TIGHT = 0.8, 1e-12  # of the horizon, and the tolerance that points are 
 LIGHT = {"rod_mass_kg": 1, "reciprocating_mass_kg": 4, "speed_rpm": 1500}
 SCENES = {
     "big end, light and fast": {
-        "joint": "big_end", "clearance_mm": 0.3, "load": "typical", "machine": LIGHT,
+        "joint": "big_end", "clearance_mm": 0.3, "load": "gas", "machine": LIGHT,
         "contact": {"damping_N_s_per_mm": 0.336},
     },
     "both, the paper's but for damping": {

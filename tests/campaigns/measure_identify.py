@@ -31,7 +31,7 @@ from compressor.solve.simulate import simulate
 STUDY, SEED, JUDGE = 3000, 2101, 2102  # machines of the study; seeds of it and of the judged
 JUDGED = 200
 CLEARANCE, ROD, MASS, SPEED = (0.05, 0.5), (2, 8), (4, 25), (300, 700)  # mm, log-uniform; kg; rpm
-LOADS, JOINTS = ("design", "typical"), ("none", "big_end", "small_end", "both")
+LOADS, JOINTS = ("spring", "gas"), ("none", "big_end", "small_end", "both")
 FIXED = {
     "body": {"mass_kg": 500, "frequency_x_Hz": 30, "frequency_y_Hz": 30},
     "sensor": {

@@ -164,7 +164,7 @@ def write(path, source):
 def load_reference():
     """Let sympy derive, and numba compile, what tests ask of the independent reference."""
     for joint in ("big_end", "small_end", "both"):
-        params = reference.paper_params("typical", joint, 2e-4)
+        params = reference.paper_params("gas", joint, 2e-4)
         y = np.zeros(len(reference.COORDINATES[joint]))
         reference.joint_forces(joint, y, y, 0.0, 0, params)
         reference.reference_solution(params, joint, np.array([0.0, 1e-5]), rtol=1e-3)

@@ -76,7 +76,7 @@ def strangers(seed, count):
     for _ in range(count):
         yield {
             "joint": draw.choice(["big_end", "small_end", "both"]),
-            "load": draw.choice(["design", "typical"]),
+            "load": draw.choice(["spring", "gas"]),
             "clearance_mm": between(0.05, 0.3),
             "machine": {"speed_rpm": between(200.0, 900.0), "rod_mass_kg": between(2.0, 12.0),
                         "reciprocating_mass_kg": between(5.0, 40.0)},

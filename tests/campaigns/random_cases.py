@@ -14,7 +14,7 @@ from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
 SEED = 2021
-LOADS = ("design", "typical", "none")
+LOADS = ("spring", "gas", "none")
 JOINTS = ("big_end", "small_end", "both")
 
 

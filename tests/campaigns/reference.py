@@ -24,7 +24,7 @@ from scipy.integrate import solve_ivp
 
 DIGITS = 40
 JOINTS = ("big_end", "small_end")
-LOADS = ("none", "typical", "design")
+LOADS = ("none", "gas", "spring")
 COORDINATES = {"big_end": ("x", "phi"), "small_end": ("x", "phi"), "both": ("x", "X", "Y", "phi")}
 
 MACHINE = "crank_radius rod_length omega rod_mass rod_centre rod_inertia reciprocating_mass gravity"
@@ -41,7 +41,7 @@ Record = namedtuple(
 # ---------------------------------------------------------------- parameters
 
 
-def paper_params(load="design", joint="both", clearance=1e-4, exact=False, **changes) -> dict:
+def paper_params(load="spring", joint="both", clearance=1e-4, exact=False, **changes) -> dict:
     """The default parameters as a dict in SI units; `changes` replaces any key.
 
     clearance [m] goes to the joints of the scene `joint`, the others get 0; a dict is taken as it
@@ -71,12 +71,12 @@ def paper_params(load="design", joint="both", clearance=1e-4, exact=False, **cha
 def corners(params, exact=False) -> tuple:
     """The crank angles [rad] at which phases 1, 2 and 3 begin; phase 0 begins at top dead centre.
 
-    The typical load has the paper's printed angles unless `exact`; the design cam's are exact.
+    The gas load has the paper's printed angles unless `exact`; the design cam's are exact.
     """
     R, L, s0 = (params[k] for k in ("crank_radius", "rod_length", "head_clearance"))
-    if params["load"] == "typical" and not exact:
+    if params["load"] == "gas" and not exact:
         return math.radians(38.95), math.pi, math.radians(294.2)
-    if params["load"] == "typical":
+    if params["load"] == "gas":
         ratio = (params["discharge"] / params["suction"]) ** (1 / params["exponent"])
         first, third = L + R + s0 - s0 * ratio, L + R + s0 - (2 * R + s0) / ratio
     else:

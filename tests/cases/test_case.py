@@ -41,7 +41,7 @@ def problems_of(values) -> list[tuple[str, str]]:
         {"solve": {"duration_s": 0.48, "output_step_s": 1e-4}},
         {"solve": {"error_bars": False}},
         {"machine": {"rod_centre_mm": 300, "gravity_m_per_s2": -0.0}},
-        {"load": "design", "joint": "none"},
+        {"load": "spring", "joint": "none"},
     ],
 )
 def test_what_computes_the_same_has_one_key(values):
@@ -145,7 +145,7 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
          "machine.crank_radius_mm", "120 mm and 10 mm of clearance, must be shorter than the rod"),
         ({**BIG_END, "initial_offset_mm": {"big_end_x": 0.9, "big_end_y": 0.9}},
          "initial_offset_mm.big_end_x", "by 1.27279 mm, 1.17 mm into its bearing"),
-        ({"load": "typical", "joint": "both", "clearance_mm": 0.3,
+        ({"load": "gas", "joint": "both", "clearance_mm": 0.3,
           "gas": {"head_clearance_mm": 0.6, **EXACT_GAS}},
          "gas.head_clearance_mm", "0.6 mm does not exceed the clearances, 0.6 mm in all"),
         ({"machine": {"rod_centre_mm": 601}}, "machine.rod_centre_mm", "beyond"),
@@ -175,11 +175,11 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
         ({**BIG_END, "contact": {"law": "johnson", "length_mm": 20, "modulus_GPa": 110,
                       "materials": ["steel", "steel"]}}, "contact.materials", "give one of the"),
         ({"spring": {"stroke_mm": 240}}, "spring.stroke_mm", "less than the piston's stroke"),
-        ({"load": "typical", "gas": {"discharge_MPa": 0.1}}, "gas.discharge_MPa", "must exceed"),
-        ({"load": "typical", "gas": {"exponent": 1.3}}, "gas.switching", "set switching: exact"),
-        ({"load": "typical", "gas": {"discharge_MPa": 10, **EXACT_GAS}},
+        ({"load": "gas", "gas": {"discharge_MPa": 0.1}}, "gas.discharge_MPa", "must exceed"),
+        ({"load": "gas", "gas": {"exponent": 1.3}}, "gas.switching", "set switching: exact"),
+        ({"load": "gas", "gas": {"discharge_MPa": 10, **EXACT_GAS}},
          "gas.head_clearance_mm", "never expands"),
-        ({"load": "typical", "gas": {"suction_MPa": 1e-300, **EXACT_GAS}},
+        ({"load": "gas", "gas": {"suction_MPa": 1e-300, **EXACT_GAS}},
          "gas.head_clearance_mm", "never expands"),
         ({"solve": {"output_step_deg": 0.7}}, "solve.output_step_deg", "2057.14 output steps"),
         ({"solve": {"output_step_s": 1}}, "solve.output_step_s", "longer than the duration"),
@@ -205,8 +205,8 @@ def test_values_that_do_not_fit_each_other(values, key, message):
 @pytest.mark.parametrize(
     "values",
     [
-        {"load": "typical", "gas": {"exponent": 1.3, **EXACT_GAS}},
-        {"load": "typical", "gas": {"piston_radius_mm": 60, "back_pressure_MPa": 0.1}},
+        {"load": "gas", "gas": {"exponent": 1.3, **EXACT_GAS}},
+        {"load": "gas", "gas": {"piston_radius_mm": 60, "back_pressure_MPa": 0.1}},
         {"friction": False},
         {**BIG_END, "friction": {"law": "threlfall", "stiction_velocity_mm_per_s": 100}},
         {**BIG_END, "contact": {"law": "hertz"}, "solve": {"method": "BDF"}},
@@ -223,7 +223,7 @@ def test_values_that_fit(values):
     "values",
     [
         {"load": "none", "spring": {"stroke_mm": 240}},
-        {"load": "design", "gas": {"discharge_MPa": 0.1}},
+        {"load": "spring", "gas": {"discharge_MPa": 0.1}},
         {**BIG_END, "initial_offset_mm": {"small_end_x": 5}},
         {"lubricant": {"bearing_length_mm": 40}, "wear": True},
     ],
@@ -367,7 +367,7 @@ EVERYTHING = {
     "clearance_mm": {"big_end": 0.1, "small_end": 0.2},
     "friction": False,
     "contact": {"materials": ["steel", "copper"]},
-    "load": "typical",
+    "load": "gas",
     "solve": {"duration_s": 0.12, "settle_rev": 0, "rtol": 1e-6},
 }
 
@@ -442,7 +442,7 @@ def test_the_table_says_which_values_make_another_job(key):
     if key == "joint":
         base |= {"clearance_mm": 0.1}
     if group == "gas":
-        base |= {"load": "typical", "gas": EXACT_GAS}
+        base |= {"load": "gas", "gas": EXACT_GAS}
     if group in ("body", "sensor"):
         base |= {"body": {"freedoms": "xy_rocking"}, "sensor": True}
     if key == "friction.ideal_joints":
@@ -496,7 +496,7 @@ NUMBERS = [key for key, row in table().items() if row.kind in ("number", "intege
     st.dictionaries(st.sampled_from(NUMBERS), st.floats() | st.integers(), max_size=4),
 )
 def test_any_number_is_either_refused_or_reads_back(joint, numbers):
-    values: dict = {"load": "typical", "joint": joint, "gas": dict(EXACT_GAS)}
+    values: dict = {"load": "gas", "joint": joint, "gas": dict(EXACT_GAS)}
     if joint != "none":
         values["clearance_mm"] = {"big_end": 0.1, "small_end": 0.1}
     for key, number in numbers.items():

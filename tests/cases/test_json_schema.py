@@ -22,7 +22,7 @@ OTHERS = [
     "solve: {max_steps: {range: [10, 30, 10]}, error_bars: false}",
     "joint: both\nclearance_mm: {big_end: 0.1, small_end: [0.1, 0.2]}",
     "joint: both\nclearance_mm: {random: [0.01, 1], log: true}\nsample: {n: 2, seed: 3}",
-    "load: [none, design]\nexclude: [load == none]\nfriction: false",
+    "load: [none, spring]\nexclude: [load == none]\nfriction: false",
     "joint: big_end\nregimes: {over: clearance_mm, from: 0.1, to: 1, n: 3, section_deg: 30.5}",
 ]
 WRONG = [
@@ -54,7 +54,7 @@ WRONG = [
     "solve: {max_steps: 1.5}",
     "joint: big_end\nclearance_mm: {sobol: [0.1, 0.2]}\nsample: {n: 0}",
     "joint: big_end\nclearance_mm: [0.1, 0.2]\nzip: [[clearance_mm]]",
-    "load: [none, design]\nexclude: 5",
+    "load: [none, spring]\nexclude: 5",
     "joint: big_end\nregimes: {over: clearance_mm, from: 0.1, to: 1}",
     "joint: big_end\nregimes: {over: joint, from: 0.1, to: 1, n: 3}",
     "joint: big_end\nregimes: {over: clearance_mm, from: 0.1, to: 1, n: 1}",

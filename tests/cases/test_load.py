@@ -183,8 +183,8 @@ def test_jobs_beyond_counting_are_refused_at_once(write):
 def test_cases_that_fit_are_not_looked_at_one_by_one(write, monkeypatch):
     built, build = [], Case.from_values
     monkeypatch.setattr(Case, "from_values", lambda values: built.append(values) or build(values))
-    (study,) = load_studies(write("load: [none, design]\n"))
-    assert [case.load for case in [*study.cases, *study.cases]] == ["none", "design"] * 2
+    (study,) = load_studies(write("load: [none, spring]\n"))
+    assert [case.load for case in [*study.cases, *study.cases]] == ["none", "spring"] * 2
     assert [case.key for case in study.cases] == [*study.keys]
     assert not built
 
@@ -195,7 +195,7 @@ def test_cases_that_fit_are_not_looked_at_one_by_one(write, monkeypatch):
 def test_ten_mistakes_are_ten_messages(write):
     text = """\
 name: two words
-load: desing
+load: sprnig
 joint: [none, big_end, big_end]
 clearance_mm: [0.1, 1001]
 machine:
@@ -208,7 +208,7 @@ qqq: wet
     assert mistakes(write(text)) == [
         "case.yaml:1:7: name: 'two words' is no name: "
         "use [A-Za-z0-9._-], at most 64, no leading dot",
-        "case.yaml:2:7: load: needs design, typical or none, not 'desing'; did you mean design?",
+        "case.yaml:2:7: load: needs spring, gas or none, not 'sprnig'; did you mean spring?",
         "case.yaml:3:24: joint: 'big_end' is in the list twice",
         "case.yaml:4:21: clearance_mm: 1001 is outside [0, 1000] mm",
         "case.yaml:6:3: machine.rod_mass: unknown key; did you mean machine.rod_mass_kg?",
@@ -226,7 +226,7 @@ def test_mistakes_of_all_files_are_told_at_once(write):
     assert mistakes(*paths, overrides=["joint=y"]) == [
         "--set joint=y: joint: needs none, big_end, small_end or both, not 'y'",
         "a.yaml:2:1: needs keys at the top, such as `joint: big_end`, with a space after the colon",
-        "b.yaml:1:7: load: needs design, typical or none, not 'x'",
+        "b.yaml:1:7: load: needs spring, gas or none, not 'x'",
         "missing.yaml: cannot be read: No such file or directory; there are a.yaml, b.yaml",
     ]
 
@@ -261,7 +261,7 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         ("load: {linspace: [1, 2, 3]}\n", "1:7: load: is no number, so that linspace cannot "
          "sweep it: give a list"),
         ("load: []\n", "1:7: load: is an empty list"),
-        ("load: [none, [none]]\n", "1:14: load: needs design, typical or none, not ['none']"),
+        ("load: [none, [none]]\n", "1:14: load: needs spring, gas or none, not ['none']"),
         ("name: [a, b]\n", "1:7: name: cannot be swept: it does not change what a job computes"),
         ("machine: 5\n", "1:10: machine: needs a mapping of keys, such as "
          "{crank_radius_mm: 120}, not 5"),
@@ -333,7 +333,7 @@ def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):
         ("spring:\n  stroke_mm: [100, 250]\nsolve: {rtol: 1e-5, accuracy: [fine, draft]}\n",
          ["2:20: spring.stroke_mm: 250 mm must be less than the piston's stroke, 240 mm",
           "3:15: solve.rtol: stands in place of solve.accuracy: give one of the two"]),
-        ("load: typical\ngas: {exponent: 1.3}\n",
+        ("load: gas\ngas: {exponent: 1.3}\n",
          ["2:1: gas.switching: the printed corners hold for the paper's geometry and pressures "
           "only; set switching: exact"]),
     ],
@@ -368,8 +368,8 @@ def test_names_decide_where_a_study_is_stored(write):
         ("machine: {rod_mass_kg: [3, 4], speed_rpm: 400}", ["machine.rod_mass_kg = 5"],
          "machine: {rod_mass_kg: 5, speed_rpm: 400}"),
         ("machine: {rod_mass_kg: 4}", ["machine={speed_rpm: 400}"], "machine: {speed_rpm: 400}"),
-        ("load: [design, none]\nspring: {preload_N: [700, 800]}", ["load=[none, design]"],
-         "load: [none, design]\nspring: {preload_N: [700, 800]}"),
+        ("load: [spring, none]\nspring: {preload_N: [700, 800]}", ["load=[none, spring]"],
+         "load: [none, spring]\nspring: {preload_N: [700, 800]}"),
         (BIG_END, ["clearance_mm=[0.2, 0.3]"], "joint: big_end\nclearance_mm: [0.2, 0.3]"),
         ("joint: both\nclearance_mm: [1, 2]", ["clearance_mm.big_end=3"],
          "joint: both\nclearance_mm: {big_end: 3, small_end: [1, 2]}"),
@@ -419,7 +419,7 @@ def test_a_wrong_override_is_told_once(write, overrides, expected):
 
 
 def test_what_an_override_breaks_is_told_where_the_file_could_mend_it(write):
-    path = write("load: typical\ngas: {piston_radius_mm: 60}\n")
+    path = write("load: gas\ngas: {piston_radius_mm: 60}\n")
     (message,) = mistakes(path, overrides=["gas.exponent=1.3"])
     assert message.startswith("case.yaml:2:1: gas.switching: the printed corners hold for")
 
@@ -578,7 +578,7 @@ SOLVES = [{"accuracy": "draft"}, {"rtol": 1e-7}, {"method": "BDF", "max_steps": 
 CASES = st.fixed_dictionaries(
     {"name": st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", fullmatch=True)},
     optional={
-        "load": st.sampled_from(["design", "typical", "none"]),
+        "load": st.sampled_from(["spring", "gas", "none"]),
         # together less than the tenth of a pin radius that a journal may be shifted at most
         "initial_offset_mm": group("initial_offset_mm").map(
             lambda offsets: {key: 0.6 * mm for key, mm in offsets.items()}
@@ -611,7 +611,7 @@ JOINTS = st.just({}) | st.fixed_dictionaries(
 @one_file
 @given(CASES, JOINTS)
 def test_a_case_reads_back_from_its_yaml(write, values, joints):
-    if values.get("load") == "typical":
+    if values.get("load") == "gas":
         values.setdefault("gas", {"switching": "exact"})
     case = Case.resolve(values | joints)
     read = Case.from_values(values_read(case))

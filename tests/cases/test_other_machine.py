@@ -43,15 +43,15 @@ def refused(read, text):
 
 def test_its_gas_without_the_load_is_refused_with_the_remedy(read):
     assert refused(read, MACHINE) == [
-        "nl.yaml:11:1: gas: nothing reads this group: it needs load: typical; set that, or leave "
+        "nl.yaml:11:1: gas: nothing reads this group: it needs load: gas; set that, or leave "
         "the group out"
     ]
 
 
 def test_with_the_load_it_is_the_machine_that_was_meant(read):
-    (case,) = read("load: typical" + MACHINE)
+    (case,) = read("load: gas" + MACHINE)
     assert case == Case.from_values({
-        "name": "nl", "load": "typical", "joint": "small_end", "clearance_mm": 0.2,
+        "name": "nl", "load": "gas", "joint": "small_end", "clearance_mm": 0.2,
         "machine": {"crank_radius_mm": 90, "rod_length_mm": 450, "speed_rpm": 740,
                     "reciprocating_mass_kg": 85, "rod_mass_kg": 62, "pin_radius_mm": 35},
         "gas": {"piston_radius_mm": 110, "suction_MPa": 0.2, "discharge_MPa": 0.7,
@@ -62,7 +62,7 @@ def test_with_the_load_it_is_the_machine_that_was_meant(read):
 def test_other_units_of_it_are_answered_with_the_numbers(read):
     text = MACHINE.replace("suction_MPa: 0.2", "suction_bar: 2").replace("_mm: 0.2", "_um: 200")
     text = text.replace("discharge_MPa: 0.7", "discharge_bar: 7")
-    assert refused(read, "load: typical" + text) == [
+    assert refused(read, "load: gas" + text) == [
         "nl.yaml:3:1: clearance_um: unknown key; write clearance_mm: 0.2",
         "nl.yaml:13:3: gas.suction_bar: unknown key; write suction_MPa: 0.2",
         "nl.yaml:14:3: gas.discharge_bar: unknown key; write discharge_MPa: 0.7",

@@ -192,7 +192,7 @@ exclude: [machine.speed_rpm > 700 and clearance_mm < 0.2, clearance_mm.small_end
 BLOCKS = """
 blocks:
 - {joint: big_end, clearance_mm: [0.1, 0.2], friction: false}
-- {joint: both, clearance_mm: {big_end: [0.1, 0.2], small_end: 0.1}, load: [none, typical]}
+- {joint: both, clearance_mm: {big_end: [0.1, 0.2], small_end: 0.1}, load: [none, gas]}
 - {joint: none, machine: {speed_rpm: {range: [300, 600, 100]}}}
 """
 

@@ -140,7 +140,7 @@ def test_a_wrong_axis_is_told(plan, axis, message):
          "{linspace: [1, 2, 100]}}", "2:15: clearance_mm: ", 10_100),
         (ONE + "clearance_mm: {sobol: [1, 2]}\nsample: {n: 1000000000000}", "2:15: clearance_mm: ",
          10**12),
-        ("load: [none, design]\nblocks: [{joint: none}, {machine: {speed_rpm: "
+        ("load: [none, spring]\nblocks: [{joint: none}, {machine: {speed_rpm: "
          "{range: [1, 10000, 1]}}}]", "2:47: machine.speed_rpm: ", 20_002),
     ],
 )  # fmt: skip
@@ -185,12 +185,12 @@ def test_cases_are_built_when_they_are_asked_for(plan):
 
 
 def test_zipped_keys_advance_together(plan):
-    study = plan(ONE + "load: [none, design]\nclearance_mm: [0.1, 0.2, 0.1]\n"
+    study = plan(ONE + "load: [none, spring]\nclearance_mm: [0.1, 0.2, 0.1]\n"
                  "machine: {speed_rpm: {range: [300, 500, 100]}}\n"
                  "zip: [[machine.speed_rpm, clearance_mm]]\n")  # fmt: skip
     assert [axis.key for axis in study.axes] == ["load", "clearance_mm", "machine.speed_rpm"]
     pairs = [(0.1, 300.0), (0.2, 400.0), (0.1, 500.0)]
-    assert rows(study) == [(load, *pair) for load in ("none", "design") for pair in pairs]
+    assert rows(study) == [(load, *pair) for load in ("none", "spring") for pair in pairs]
     assert not study.is_grid
 
 
@@ -210,7 +210,7 @@ def test_zipped_keys_advance_together(plan):
     ],
 )  # fmt: skip
 def test_a_wrong_zip_is_told(plan, groups, message):
-    text = f"zip: {groups}\nload: [none, design]\njoint: both\nclearance_mm: [1, 2, 3]\n"
+    text = f"zip: {groups}\nload: [none, spring]\njoint: both\nclearance_mm: [1, 2, 3]\n"
     found = refused(plan, text + "gas: {exponent: [1.3, 1.4]}\n")
     assert {line.split(": ", 1)[1] for line in found} == {message}
 
@@ -219,7 +219,7 @@ SAMPLED = """\
 joint: big_end
 clearance_mm: {%s: [0.01, 1], log: true}
 machine: {speed_rpm: {%s: [300, 900]}}
-load: [none, design]
+load: [none, spring]
 sample: {n: 8, seed: 5}
 """
 
@@ -295,10 +295,10 @@ def test_a_wrong_design_is_told(plan, text, message):
 
 
 def test_excluded_combinations_are_no_jobs(plan):
-    text = ONE + "clearance_mm: [0.1, 0.2, 0.3]\nload: [none, design]\n"
+    text = ONE + "clearance_mm: [0.1, 0.2, 0.3]\nload: [none, spring]\n"
     study = plan(text + "exclude: [clearance_mm > 0.2 and load == none, clearance_mm == 0.1]\n")
-    assert rows(study) == [(0.2, "none"), (0.2, "design"), (0.3, "design")]
-    assert [case.load for case in study.cases] == ["none", "design", "design"]
+    assert rows(study) == [(0.2, "none"), (0.2, "spring"), (0.3, "spring")]
+    assert [case.load for case in study.cases] == ["none", "spring", "spring"]
 
 
 def test_what_does_not_fit_may_be_excluded(plan):
@@ -312,8 +312,8 @@ def test_what_does_not_fit_may_be_excluded(plan):
     ("exclude", "message"),
     [
         ("1", "needs comparisons, such as clearance_mm > 0.2"),
-        ("[load == x]", "load needs design | typical | none (at character 9, 'x')"),
-        ("load != both", "load needs design | typical | none (at character 9, 'both')"),
+        ("[load == x]", "load needs spring | gas | none (at character 9, 'x')"),
+        ("load != both", "load needs spring | gas | none (at character 9, 'both')"),
         ("clearance_mm > 0", "leaves no job"),
         (f"[{', '.join(['load == none'] * 21)}]", "has more than 20 comparisons: join by `or`"),
     ],
@@ -324,7 +324,7 @@ def test_a_wrong_exclusion_is_told(plan, exclude, message):
 
 
 def test_a_comparison_knows_what_is_not_swept(plan):
-    text = ONE + "clearance_mm: {big_end: 0.2}\nload: [none, design]\n"
+    text = ONE + "clearance_mm: {big_end: 0.2}\nload: [none, spring]\n"
     for exclude, left in [
         ("clearance_mm == 0.2 and load == none", 1),
         ("clearance_mm.small_end > 0", 2),
@@ -340,7 +340,7 @@ load: none
 blocks:
   - {joint: big_end, clearance_mm: [0.1, 0.2]}
   - {joint: both, clearance_mm: {big_end: 0.1, small_end: 0.3}, friction: false}
-  - {load: [design, typical]}
+  - {load: [spring, gas]}
 """)
     assert [axis.key for axis in study.axes] == [
         "clearance_mm", "load", "joint", "clearance_mm.big_end", "clearance_mm.small_end",
@@ -350,18 +350,18 @@ blocks:
         (0.1, "none", "big_end", 0.1, 0.0, True),
         (0.2, "none", "big_end", 0.2, 0.0, True),
         ("none", "both", 0.1, 0.3, False),
-        ("design", "none", 0.0, 0.0, True),
-        ("typical", "none", 0.0, 0.0, True),
+        ("spring", "none", 0.0, 0.0, True),
+        ("gas", "none", 0.0, 0.0, True),
     ]
     assert [case.friction is None for case in study.cases] == [False, False, True, False, False]
 
 
 def test_a_block_takes_the_place_of_the_files_keys_and_an_override_of_both(plan):
     text = ONE + "clearance_mm: [0.1, 0.2]\nblocks: [{clearance_mm: 0.3}, {load: none}]\n"
-    assert rows(plan(text)) == [(0.3, "design"), (0.1, "none"), (0.2, "none")]
-    assert rows(plan(text, overrides=["load=typical"])) == [(0.3,), (0.1,), (0.2,)]
+    assert rows(plan(text)) == [(0.3, "spring"), (0.1, "none"), (0.2, "none")]
+    assert rows(plan(text, overrides=["load=gas"])) == [(0.3,), (0.1,), (0.2,)]
     assert rows(plan(text, overrides=["blocks=[{load: none}]"])) == [(0.1,), (0.2,)]
-    assert rows(plan(text, overrides=["clearance_mm=0.4"])) == [("design",), ("none",)]
+    assert rows(plan(text, overrides=["clearance_mm=0.4"])) == [("spring",), ("none",)]
 
 
 @pytest.mark.parametrize(
@@ -373,7 +373,7 @@ def test_a_block_takes_the_place_of_the_files_keys_and_an_override_of_both(plan)
         ("[{name: x}]", "1:11: name: cannot stand in a block: it belongs to the whole file"),
         ("[{laod: none}]", "1:11: laod: unknown key; did you mean load?"),
         ("[{load: none}, {joint: both}]", "1:24: clearance_mm.big_end: is needed with joint: both"),
-        ("[{load: none}, {load: [x]}]", "1:32: load: needs design, typical or none, not 'x'"),
+        ("[{load: none}, {load: [x]}]", "1:32: load: needs spring, gas or none, not 'x'"),
     ],
 )  # fmt: skip
 def test_a_wrong_block_is_told(plan, blocks, message):
@@ -384,7 +384,7 @@ def test_a_wrong_block_is_told(plan, blocks, message):
 
 
 def test_only_some_jobs_are_selected_and_all_are_in_the_study(plan):
-    text = ONE + "clearance_mm: {linspace: [0.1, 0.5, 5]}\nload: [none, design]\n"
+    text = ONE + "clearance_mm: {linspace: [0.1, 0.5, 5]}\nload: [none, spring]\n"
     study = plan(text, only="clearance_mm >= 0.4 and load == none")
     assert (len(study.cases), [*study.selected]) == (10, [6, 8])
     assert [*plan(text).selected] == [*range(10)]
@@ -405,7 +405,7 @@ def test_only_some_jobs_are_selected_and_all_are_in_the_study(plan):
 def test_a_study_that_is_no_grid_has_a_job_dimension(plan, tmp_path):
     second = "{joint: big_end, clearance_mm: 0.1, contact: {materials: [steel, copper]}, "
     second += "machine: {rod_centre_mm: 200}}"
-    study = plan(SHORT + f"blocks:\n  - {{load: [none, design]}}\n  - {second}\n")
+    study = plan(SHORT + f"blocks:\n  - {{load: [none, spring]}}\n  - {second}\n")
     write_study(tmp_path, study, "by hand")
     keep(tmp_path, *(simulate(case) for case in study.cases[:2]))
     (stored,) = read_studies(tmp_path)
@@ -413,7 +413,7 @@ def test_a_study_that_is_no_grid_has_a_job_dimension(plan, tmp_path):
     found = store.open_study(tmp_path, "case")
     assert found.status.dims == ("job",)
     assert found.status.values.tolist() == ["ok", "ok", "missing"]
-    assert found["load"].values.tolist() == ["none", "design", "design"]
+    assert found["load"].values.tolist() == ["none", "spring", "spring"]
     assert found.materials.values.tolist() == ["", "", "steel, copper"]
     assert found.rod_centre_mm.values.tolist() == [300, 300, 200]
     assert found.rod_centre_mm.attrs["units"] == "mm"
@@ -423,8 +423,8 @@ def test_a_study_that_is_no_grid_has_a_job_dimension(plan, tmp_path):
 
 
 def test_only_a_grid_is_stored_as_one(plan, tmp_path):
-    for text, is_grid in [("load: [none, design]\n", True), ("load: [none]\nexclude: []\n", True),
-                          ("load: [none, design]\nexclude: load == none\n", False)]:  # fmt: skip
+    for text, is_grid in [("load: [none, spring]\n", True), ("load: [none]\nexclude: []\n", True),
+                          ("load: [none, spring]\nexclude: load == none\n", False)]:  # fmt: skip
         study = plan(text)
         write_study(tmp_path, study)
         (stored,) = read_studies(tmp_path)
@@ -462,11 +462,9 @@ def test_any_sweep_is_planned_or_refused(plan, text):
 
 
 def test_blocks_and_axes_multiply_as_products_do(plan):
-    text = (
-        "blocks:\n- {load: [none, design], machine: {rod_mass_kg: [3, 4, 5]}}\n- {load: typical}\n"
-    )
-    product = itertools.product(("none", "design"), (3.0, 4.0, 5.0))
-    assert rows(plan(text)) == [*product, ("typical", 4.7)]
+    text = "blocks:\n- {load: [none, spring], machine: {rod_mass_kg: [3, 4, 5]}}\n- {load: gas}\n"
+    product = itertools.product(("none", "spring"), (3.0, 4.0, 5.0))
+    assert rows(plan(text)) == [*product, ("gas", 4.7)]
 
 
 def test_the_largest_sweep_is_planned_soon(plan):

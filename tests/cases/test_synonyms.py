@@ -1,5 +1,7 @@
 """Words of the trade: doubles of our keys are read, other units are answered with the number."""
 
+from dataclasses import replace
+
 import pytest
 
 from compressor.cases.case import Case
@@ -32,7 +34,7 @@ def refused(read, text, *overrides):
 def test_a_word_of_the_trade_is_twice_a_key(word):
     group, _, name = word.partition(".")
     own = DOUBLES[word].partition(".")[2]
-    more = {"load": "typical"} if group == "gas" else {}
+    more = {"load": "gas"} if group == "gas" else {}
     one = Case.from_values(more | {group: {name: 250}})
     assert one == Case.from_values(more | {group: {own: 125}})
     assert getattr(getattr(one, group), own) == 125.0
@@ -87,7 +89,7 @@ def test_a_file_gives_one_of_the_two(read):
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
-        ("gas: {load: typical}", "gas.load: unknown key; write load at the top, outside gas"),
+        ("gas: {load: gas}", "gas.load: unknown key; write load at the top, outside gas"),
         ("gas: {suction_bar: 2}", "gas.suction_bar: unknown key; write suction_MPa: 0.2"),
         ("gas: {suction_kPa: [200, 300]}", "unknown key; write suction_MPa: [0.2, 0.3]"),
         ("gas: {suction_bar: {lhs: [1, 2]}}", "; write suction_MPa: 1 bar is 0.1 MPa"),
@@ -118,3 +120,21 @@ def test_no_hint_points_to_another_group(group):
     for word in [*words, *stems, "bore", "stroke", "mass"]:
         assert all(key.startswith(f"{group}.") for key in meant(word, group)), word
     assert meant("stroke_mm", "contact") == meant("bore_mm", "wear") == []
+
+
+@pytest.mark.parametrize(
+    ("older", "word", "key"),
+    [("design", "spring", "8bbc95bccbcc3f57f065"), ("typical", "gas", "8a707f01658aa5209519")],
+)
+def test_a_load_has_an_older_word_and_its_key(read, older, word, key):
+    values = {"joint": "both", "clearance_mm": 0.2}
+    one, other = (Case.from_values({**values, "load": load}) for load in (older, word))
+    assert one == other == replace(Case.from_values(values), load=older)
+    assert (one.load, one.key) == (word, key)  # the key that older versions gave it
+    text = one.attributes()["case"].replace(f'"load": "{word}"', f'"load": "{older}"')
+    assert older in text
+    assert Case.from_attribute(text) == one
+    study = read(f"load: [none, {older}]")
+    assert study.axes[0].values == ("none", word)
+    assert read(f"load: [none, {older}]\nexclude: load == {older}").jobs == 1
+    assert "twice" in refused(read, f"load: [{older}, {word}]")[0]

@@ -23,7 +23,7 @@ WORN = IDEAL | {"joint": "both", "clearance_mm": {"big_end": 0.2, "small_end": 0
 BIG = WORN | {"joint": "big_end", "clearance_mm": {"big_end": 0.2}}
 SMALL = WORN | {"joint": "small_end", "clearance_mm": {"small_end": 0.2}}
 FREE = WORN | {"load": "none"}
-GAS = WORN | {"load": "typical", "gas": {"switching": "exact"}}
+GAS = WORN | {"load": "gas", "gas": {"switching": "exact"}}
 HERTZ = WORN | {"contact": {"law": "hertz"}}
 DAMPED = WORN | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
 PIN = {"law": "johnson", "length_mm": 20, "modulus_GPa": 100}
@@ -83,7 +83,7 @@ ENTRIES = {
         gas__suction_MPa=0.11, gas__discharge_MPa=0.5, gas__exponent=1.3,
         gas__back_pressure_MPa=0.1,
     ),
-    "gas.switching": Entry("exact", WORN | {"load": "typical"}, (WORN, FREE)),
+    "gas.switching": Entry("exact", WORN | {"load": "gas"}, (WORN, FREE)),
     **entries(
         WORN, GAS, FREE, spring__stiffness_N_per_mm=30, spring__damping_N_s_per_mm=0.1,
         spring__preload_N=700, spring__stroke_mm=110,
@@ -248,18 +248,18 @@ def test_a_key_that_nothing_reads_is_refused(key, where, tmp_path):
 
 
 GONE = "set that, or leave the {} out"
-IN_GAS = "nothing reads this group: it needs load: typical; " + GONE.format("group")
+IN_GAS = "nothing reads this group: it needs load: gas; " + GONE.format("group")
 
 
 @pytest.mark.parametrize(
     ("text", "overrides", "expected"),
     [
         ("gas: {discharge_MPa: 0.5}", [], [f"case.yaml:1:1: gas: {IN_GAS}"]),
-        ("gas:\n  exponent: 1.4\nload: [none, design]", [], [f"case.yaml:1:1: gas: {IN_GAS}"]),
-        ("load: [typical, design]\ngas: {back_pressure_MPa: 0.1}", [], []),
-        ("gas: {back_pressure_MPa: 0.1}\nblocks: [{load: typical}, {load: none}]", [], []),
-        ("blocks: [{load: typical}, {load: none, gas: {back_pressure_MPa: 0.1}}]", [],
-         [f"case.yaml:1:40: gas: {IN_GAS}"]),
+        ("gas:\n  exponent: 1.4\nload: [none, spring]", [], [f"case.yaml:1:1: gas: {IN_GAS}"]),
+        ("load: [gas, spring]\ngas: {back_pressure_MPa: 0.1}", [], []),
+        ("gas: {back_pressure_MPa: 0.1}\nblocks: [{load: gas}, {load: none}]", [], []),
+        ("blocks: [{load: gas}, {load: none, gas: {back_pressure_MPa: 0.1}}]", [],
+         [f"case.yaml:1:36: gas: {IN_GAS}"]),
         ("lubricant: true\njoint: [none, big_end]\nclearance_mm: 0.1", [], []),
         ("joint: both\nclearance_mm: 0.1\nguide: {friction: [0, 0.1]}", [], []),
         ("clearance_mm: {big_end: 0.1, small_end: 0.2}\njoint: big_end", [],
@@ -267,7 +267,7 @@ IN_GAS = "nothing reads this group: it needs load: typical; " + GONE.format("gro
           "small_end or both; " + GONE.format("key")]),
         ("{}", ["gas.exponent=1.3"], [f"--set gas.exponent=1.3: gas: {IN_GAS}"]),
         # what the command line takes the reader from is the file's, and no mistake of it
-        ("load: typical\ngas: {back_pressure_MPa: 0.1}", ["load=none"], []),
+        ("load: gas\ngas: {back_pressure_MPa: 0.1}", ["load=none"], []),
         ("gas: {back_pressure_MPa: 0.1}", ["machine.speed_rpm=400"],
          [f"case.yaml:1:1: gas: {IN_GAS}"]),
         ("joint: big_end\nclearance_mm: 0.1", ["clearance_mm.big_end=0.2"], []),
@@ -292,8 +292,8 @@ def test_one_job_that_reads_a_key_is_enough(text, overrides, expected, tmp_path,
 
 def test_one_file_that_reads_an_override_is_enough(tmp_path):
     paths = [tmp_path / "gas.yaml", tmp_path / "spring.yaml"]
-    paths[0].write_text("load: typical")
-    paths[1].write_text("load: design")
+    paths[0].write_text("load: gas")
+    paths[1].write_text("load: spring")
     assert len(load_studies(*paths, overrides=["gas.back_pressure_MPa=0.1"])) == 2
 
 

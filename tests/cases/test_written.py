@@ -8,19 +8,19 @@ from compressor.cases.written import to_yaml
 
 
 def test_what_is_written_stays_readable():
-    assert to_yaml(Case()).startswith("name: case\nload: design\njoint: none\nmachine:\n")
+    assert to_yaml(Case()).startswith("name: case\nload: spring\njoint: none\nmachine:\n")
 
 
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ({}, "load: design\n"),
-        ({"load": "typical", "joint": "none"}, "load: typical\n"),
+        ({}, "load: spring\n"),
+        ({"load": "gas", "joint": "none"}, "load: gas\n"),
         (
             {"joint": "big_end", "clearance_mm": 0.2, "machine": {"rod_length_mm": 500}},
             "joint: big_end\nclearance_mm:\n  big_end: 0.2\nmachine:\n  rod_length_mm: 500.0\n",
         ),
-        ({"machine": {"rod_centre_mm": 300, "speed_rpm": 500}}, "load: design\n"),  # by default
+        ({"machine": {"rod_centre_mm": 300, "speed_rpm": 500}}, "load: spring\n"),  # by default
         ({"friction": False, "solve": {"rtol": 1e-7}}, "friction: false\nsolve:\n  rtol: 1e-07\n"),
         ({"body": True, "sensor": {"seed": 7}}, "body: true\nsensor:\n  seed: 7\n"),
         ({"solve": {"duration_s": 0.36, "settle_rev": 0}},

@@ -69,8 +69,8 @@ def test_help_is_on_stdout(arguments, capsys):
         (["run", "good.yaml", "--set", "jiont=both"], "--set jiont=both: jiont: unknown key"),
         (["run", "good.yaml", "--only", "load"], "--only load: needs one of == != < <= > >= after"),
         (["run", "good.yaml", "--only", "load == none"], "--only load == none: selects no job"),
-        (["run", "good.yaml", "--set", "load=[none, design]", "--max-jobs", "1"],
-         "--set load=[none, design]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
+        (["run", "good.yaml", "--set", "load=[none, spring]", "--max-jobs", "1"],
+         "--set load=[none, spring]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
     ],
 )  # fmt: skip
 def test_usage_errors(arguments, told, case_file, capsys):
@@ -109,8 +109,8 @@ def test_all_mistakes_are_told_at_once(tmp_path, capsys):
 
 
 def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
-    case_file("two.yaml", load=["none", "design"])
-    case_file("one.yaml", load="typical")
+    case_file("two.yaml", load=["none", "spring"])
+    case_file("one.yaml", load="gas")
     assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1", "-o", "out dir"]) == 0
     out, err = capsys.readouterr()
     assert [line.split() for line in out.splitlines()] == [
@@ -125,7 +125,7 @@ def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
 
 
 def test_a_second_run_does_nothing_and_says_so(case_file, capsys):
-    case_file("two.yaml", load=["none", "design"])
+    case_file("two.yaml", load=["none", "spring"])
     assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
     first = capsys.readouterr().out
     assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
@@ -142,9 +142,9 @@ def test_configs_are_the_paper_s_cases_and_nothing_else():
 
 def test_set_changes_every_case_file(case_file):
     case_file("a.yaml", load="none")
-    case_file("b.yaml", load="design")
-    assert cli.main(["run", "a.yaml", "b.yaml", "-j", "1", "--set", "load=[none, typical]"]) == 0
-    assert [study.axes[0].values for study in read_studies("results")] == [("none", "typical")] * 2
+    case_file("b.yaml", load="spring")
+    assert cli.main(["run", "a.yaml", "b.yaml", "-j", "1", "--set", "load=[none, gas]"]) == 0
+    assert [study.axes[0].values for study in read_studies("results")] == [("none", "gas")] * 2
     assert len(store.finished_keys("results")) == 2
 
 
@@ -163,8 +163,8 @@ def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, capsys):
 
 
 def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, capsys):
-    case_file("two.yaml", load=["none", "design"])
-    case_file("one.yaml", load="typical")
+    case_file("two.yaml", load=["none", "spring"])
+    case_file("one.yaml", load="gas")
     some = ["run", "two.yaml", "one.yaml", "-j", "1", "--only", "load == none"]
     assert cli.main(some) == 0
     out, err = capsys.readouterr()
@@ -178,14 +178,14 @@ def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, capsys):
 
 
 def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
-    case_file("two.yaml", load=["none", "design"])
+    case_file("two.yaml", load=["none", "spring"])
     case_file("many.yaml", joint="big_end", clearance_mm={"linspace": [0.1, 0.4, 4]},
               blocks=[{}, {"joint": "none", "output": {"keep": "metrics"}}])  # fmt: skip
     both = ["two.yaml", "many.yaml", "-j", "1"]
     assert cli.main(["plan", *both, "--json", "--first", "1"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert not Path("results").exists()
-    # the ideal machine with the design load is a job of both studies
+    # the ideal machine with the spring load is a job of both studies
     assert [(s["study"], s["jobs"], s["missing"]) for s in found["studies"]] == [
         ("two", 2, 2), ("many", 4, 4)
     ]  # fmt: skip
@@ -198,7 +198,7 @@ def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
     size = sum(path.stat().st_size for path in Path("results/jobs").iterdir())
     assert 1 < found["bytes"] / size < 1.02  # rows, too
     capsys.readouterr()
-    assert cli.main(["plan", "many.yaml", "--set", "load=[design, none]", "-j", "1"]) == 0
+    assert cli.main(["plan", "many.yaml", "--set", "load=[spring, none]", "-j", "1"]) == 0
     out = capsys.readouterr().out.splitlines()
     assert out[0].split() == ["many", "10", "jobs", "6", "done", "4", "missing"]
     assert out[1].startswith("about ")
@@ -235,7 +235,7 @@ def test_failed_jobs_run_again_on_request(case_file, capsys):
 
 
 def test_shards(case_file, capsys):
-    case_file("two.yaml", load=["none", "design", "typical"])
+    case_file("two.yaml", load=["none", "spring", "gas"])
     ran = 0
     for part in ("1/2", "2/2"):
         assert cli.main(["run", "two.yaml", "-j", "1", "--shard", part, "--wait", "--quiet"]) == 0
@@ -253,7 +253,7 @@ def test_what_is_no_shard_is_a_usage_error(part, case_file, capsys):
 
 
 def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
-    case_file("two.yaml", load=["none", "design"])
+    case_file("two.yaml", load=["none", "spring"])
     assert cli.main(["run", "two.yaml", "-j", "1", "--quiet"]) == 0
     capsys.readouterr()
     assert cli.main(["verify"]) == 0
@@ -279,7 +279,7 @@ def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
 
 
 def test_verify_tells_how_a_damaged_study_is_mended(case_file, capsys):
-    case_file("two.yaml", load=["none", "design"])
+    case_file("two.yaml", load=["none", "spring"])
     assert cli.main(["run", "two.yaml", "-j", "1", "--quiet"]) == 0
     Path("results/studies/two.json").write_text("{}")
     capsys.readouterr()

@@ -152,7 +152,7 @@ FIRST = ["--first", "peak_acceleration > 1"]
         (["--over", "solve.max_steps=10:20", *FIRST], "solve.max_steps cannot be searched over"),
         (["--over", "machine.speed_rpm=-5:20", *FIRST], "-5 is outside (0, 100000] rpm"),
         (["--over", "solve.timeout_s=10:20", *FIRST], "solve.timeout_s changes nothing"),
-        ([*OVER, *FIRST, "--set", "load=[none, design]"], "makes 2 jobs for one clearance_mm"),
+        ([*OVER, *FIRST, "--set", "load=[none, spring]"], "makes 2 jobs for one clearance_mm"),
         ([*OVER, *FIRST, "--set", "joint=knee"], "joint: needs none, big_end, small_end"),
     ],
 )  # fmt: skip

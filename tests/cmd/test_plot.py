@@ -29,7 +29,7 @@ CASES = {
     "listed": {"joint": "big_end", "clearance_mm": [0.2, 0.25],
                "machine": {"speed_rpm": [450, 500]},
                "zip": [["clearance_mm", "machine.speed_rpm"]]},
-    "ideal": {"load": "typical"},
+    "ideal": {"load": "gas"},
     "halted": {"joint": "big_end", "clearance_mm": 0.1, "solve": {"max_steps": 100}},
     "bare": {"joint": "big_end", "clearance_mm": 0.1, "output": {"keep": "metrics"}},
     "short": {"joint": "big_end", "clearance_mm": 0.15,

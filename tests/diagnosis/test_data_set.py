@@ -147,7 +147,7 @@ def test_a_machine_is_what_is_built():
     solve = {"duration_rev": 4, "settle_rev": 1}
     one = Case.from_values({**values, "solve": solve})
     for other in (
-        {"load": "typical"}, {"machine": {"speed_rpm": 300}}, {"sensor": {"seed": 5}},
+        {"load": "gas"}, {"machine": {"speed_rpm": 300}}, {"sensor": {"seed": 5}},
         {"solve": {**solve, "accuracy": "draft"}}, {"name": "other"},
     ):  # fmt: skip
         assert machine_of(Case.from_values({**values, "solve": solve, **other})) == machine_of(one)

@@ -82,7 +82,7 @@ def test_a_machine_that_took_its_worker_with_it_has_a_reason():
     ("text", "key"),
     [
         ("joint: both\nclearance_mm: 0.2\n", "joint"),
-        ("load: [none, typical]\n", "load"),
+        ("load: [none, gas]\n", "load"),
         ("body: true\n", "body"),
     ],
 )

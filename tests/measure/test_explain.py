@@ -74,9 +74,9 @@ def test_a_job_costs_more_than_its_solution(explained):
 
 
 def test_a_sweep_is_explained_by_its_first_job(explained):
-    told = explained(clearance_mm=[0.1, 0.2, 0.3], load=["typical", "design"])
+    told = explained(clearance_mm=[0.1, 0.2, 0.3], load=["gas", "spring"])
     assert told.jobs == 6
-    assert told.point == {"clearance_mm": 0.1, "load": "typical"}
+    assert told.point == {"clearance_mm": 0.1, "load": "gas"}
     assert told.sweep_seconds == pytest.approx(3 * told.seconds)
     assert told.steps > 0
     assert "0.1 mm at the big end" in told.active["clearance"]
@@ -128,7 +128,7 @@ def test_freedoms_and_terms():
     both = Case.from_values({"joint": "both", "clearance_mm": {"big_end": 0.1, "small_end": 0.2}})
     active, absent = terms(both)
     assert active["clearance"] == "0.1 mm at the big end, 0.2 mm at the small end"
-    assert active["load"] == "load = design"
+    assert active["load"] == "load = spring"
     assert absent == (
         "gravity", "back pressure", "play of the guide", "friction of ideal joints",
         "oil film", "friction of the guide", "speed that gives way", "elastic rod",

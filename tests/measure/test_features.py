@@ -32,8 +32,8 @@ def case(**values):
         ({}, ["friction", "spring damping", "load"]),
         ({"friction": False, "load": "none"}, []),
         ({"friction": {"static": 0, "dynamic": 0}, "load": "none"}, []),
-        ({"load": "typical", "friction": False}, ["load"]),
-        ({"load": "typical", "gas": {"back_pressure_MPa": 0.1}, "friction": False},
+        ({"load": "gas", "friction": False}, ["load"]),
+        ({"load": "gas", "gas": {"back_pressure_MPa": 0.1}, "friction": False},
          ["back pressure", "load"]),
         ({"machine": {"gravity_m_per_s2": 9.81}, "load": "none"}, ["friction", "gravity"]),
         ({"joint": "both", "load": "none", "friction": False},
@@ -49,7 +49,7 @@ def test_a_feature_that_is_removed_is_no_longer_paid_for(feature):
     rich = case(
         joint="big_end" if feature.key == "friction.ideal_joints" else "both",
         machine={"gravity_m_per_s2": 9.81},
-        load="typical" if feature.key.startswith("gas") else "design",
+        load="gas" if feature.key.startswith("gas") else "spring",
         gas={"back_pressure_MPa": 0.1} if feature.key.startswith("gas") else {},
     )  # fmt: skip
     rich = rich if feature.paid(rich) else feature.add(rich)

@@ -208,7 +208,7 @@ def test_variants_of_one_faulty_joint_and_of_two():
     assert [*one][:4] == ["no friction", "no spring damping", "gravity 9.81 m/s²",
                           "1 µm in the ideal joint"]  # fmt: skip
     assert {choice.name for choice in model_choices(case())} < {*one}
-    assert {"typical load", "friction of ideal joints"} < {*one}
+    assert {"gas load", "friction of ideal joints"} < {*one}
     assert "friction of ideal joints" not in two  # both are worn
     assert one["1 µm in the ideal joint"].case.clearance_mm.small_end == 0.001
     assert two["ideal big end"].case.joint == "small_end"
@@ -227,9 +227,7 @@ def test_a_trade_has_a_row_for_each_change_of_each_scene(few, monkeypatch):
     monkeypatch.setattr(module, "FEATURES", rows)
     found = trade({"one": case(), "two": case(joint="both")}, repeats=1)
     assert found["peak_acceleration"].dims == ("scene", "choice")
-    assert {GRID, "typical load", "ideal big end", "contact law: Flores"} < {
-        *found["choice"].values
-    }
+    assert {GRID, "gas load", "ideal big end", "contact law: Flores"} < {*found["choice"].values}
     lacking = found.sel(scene="one", choice="ideal big end")
     assert lacking["status"] == "missing"
     assert np.isnan(lacking["peak_acceleration"])

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.compiled
 FEW = settings(max_examples=40, deadline=None, derandomize=True,
                suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
 JOINTS = st.sampled_from(["big_end", "small_end", "both"])
-LOADS = st.sampled_from(["design", "typical", "none"])
+LOADS = st.sampled_from(["spring", "gas", "none"])
 QUARTER = 0.25  # revolutions
 # Runs that take other steps: an error of acceleration is a hundred tolerances as a rule, but was a
 # hundred thousand in scenes whose light pieces part and meet again and again
@@ -229,7 +229,7 @@ def test_a_run_goes_on_as_one_that_begins_a_turn_earlier(values):
 # ---- workers, order and resuming
 
 SWEPT = {
-    "joint": ["both", "big_end"], "clearance_mm": [0.1, 0.2], "load": ["design", "none"],
+    "joint": ["both", "big_end"], "clearance_mm": [0.1, 0.2], "load": ["spring", "none"],
     "solve": {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft"},
 }  # fmt: skip
 
@@ -296,7 +296,7 @@ def test_friction_that_is_off_is_no_friction(values):
 
 
 @FEW
-@given(scenes(loads=st.just("design"), friction=False))
+@given(scenes(loads=st.just("spring"), friction=False))
 def test_a_load_that_is_off_is_one_of_no_force(values):
     """Within the errors of both, since only one has corners to land on; with fewer evaluations."""
     spring = {"stiffness_N_per_mm": 0, "damping_N_s_per_mm": 0, "preload_N": 0}
@@ -348,8 +348,8 @@ LADDER = [10.0**-k for k in range(3, 11)]
 
 @pytest.mark.parametrize(
     "more",
-    [{}, *({"load": load, "friction": False} for load in ("design", "typical", "none"))],
-    ids=["paper", "design", "typical", "none"],
+    [{}, *({"load": load, "friction": False} for load in ("spring", "gas", "none"))],
+    ids=["paper", "spring", "gas", "none"],
 )
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_errors_are_proportional_to_the_tolerance(joint, more):

@@ -16,8 +16,8 @@ from compressor.physics.loads import (
 )
 from compressor.solve.si_record import record
 
-EXACT = {"load": "typical", "gas": {"switching": "exact"}}
-GAS, SPRING = {"load": "typical"}, {"load": "design"}
+EXACT = {"load": "gas", "gas": {"switching": "exact"}}
+GAS, SPRING = {"load": "gas"}, {"load": "spring"}
 
 
 def ideal_force(p, degrees, phase):
@@ -77,7 +77,7 @@ def test_gas_is_continuous_at_exact_corners_only():
 
 
 def test_back_pressure_acts_on_the_other_face():
-    p = record(Case.from_values({"load": "typical", "gas": {"back_pressure_MPa": 0.105}}))
+    p = record(Case.from_values({"load": "gas", "gas": {"back_pressure_MPa": 0.105}}))
     assert ideal_force(p, 100, 1) == pytest.approx(0, abs=1e-9)
 
 
@@ -125,7 +125,7 @@ def test_a_sample_on_a_corner_takes_the_phase_that_begins():
     ("values", "at_rest", "greatest"),
     [
         (GAS, 3086.61, 3086.61),
-        ({"load": "typical", "gas": {"back_pressure_MPa": 1.0}}, 3086.61, 7853.98),
+        ({"load": "gas", "gas": {"back_pressure_MPa": 1.0}}, 3086.61, 7853.98),
         (SPRING, 3200, 3200 + 0.023 * 6283.19),
         ({"load": "none"}, 0, 0),
     ],

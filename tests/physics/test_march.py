@@ -22,7 +22,7 @@ from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.sizes import natural_sizes
 
-PULSES = {"load": "typical", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
+PULSES = {"load": "gas", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
 
 
 def request(rtol, duration=None, **values):
@@ -72,7 +72,7 @@ def test_a_corner_costs_no_step_that_is_refused():
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("load", ["typical", "design"])
+@pytest.mark.parametrize("load", ["gas", "spring"])
 def test_a_peak_after_settling_is_the_dense_solutions(load):
     """Steps are looked at closely where a peak may be beaten; else it is found 2e-3 too low."""
     asked = request(1e-5, joint="small_end", load=load)
@@ -103,7 +103,7 @@ def test_known_pulses_are_found(clearance, begin, end, rtol):
 @pytest.mark.parametrize("clearance", [0.2, 0.3])
 def test_pulses_decide_the_accuracy(clearance):
     params = reference.paper_params(
-        "typical", "big_end", clearance * 1e-3, rod_mass=3.0, rod_inertia=3 * 0.36 / 12,
+        "gas", "big_end", clearance * 1e-3, rod_mass=3.0, rod_inertia=3 * 0.36 / 12,
         reciprocating_mass=6.0,
     )  # fmt: skip
     asked = request(1e-7, 0.012, clearance_mm=clearance, **PULSES)

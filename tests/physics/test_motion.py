@@ -14,7 +14,7 @@ from compressor.solve.si_record import record
 
 STATES = 1000
 SCENES = ("big_end", "small_end", "both")
-LOADS = ("design", "typical", "none")
+LOADS = ("spring", "gas", "none")
 
 
 def random_case(scene, rng):
@@ -151,7 +151,7 @@ def test_ideal_joint_forces_agree_with_newton_and_euler(load):
 
 def test_a_nanometre_of_clearance_keeps_its_digits():
     case = Case.from_values({"joint": "big_end", "clearance_mm": 1e-6})
-    p, params = record(case), reference.paper_params("design", "big_end", 1e-9)
+    p, params = record(case), reference.paper_params("spring", "big_end", 1e-9)
     y = np.array([-0.7e-9, 1.1e-9, 3e-7, -2e-7])
     with mpmath.workdps(40):
         q, _qd = absolute("big_end", 0.013, y, params)

@@ -309,7 +309,7 @@ def construct(rng, length, clamped):
     """One `Pulse`; None where the draw does not make one, or makes two."""
     joint = int(rng.integers(2))
     where = rng.choice([("big_end", "small_end")[joint], "both"])
-    p = parameters(where, rng.choice(["none", "typical", "design"]))
+    p = parameters(where, rng.choice(["none", "gas", "spring"]))
     p.clearance[p.clearance > 0] = FAR
     n = FREEDOMS[int(p.scene)]
     t = rng.uniform(0.002, 0.1)

@@ -13,7 +13,7 @@ from compressor.solve.attempts import attempt
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 
-FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))
+FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "gas"}))
 BEGIN, SPAN, PHASE = 0.09, 0.008, 3
 SIZE = np.full(8, 1e-3)
 

@@ -25,7 +25,7 @@ from compressor.physics.walker import NODE_WEIGHTS, NODES
 from compressor.solve.si_record import record
 
 # a wide clearance and a short flight: a smooth motion without contact
-FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "typical"}))
+FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "gas"}))
 BEGIN, SPAN = 0.09, 0.008
 ROW = np.zeros(COLUMNS)
 

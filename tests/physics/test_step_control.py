@@ -72,7 +72,7 @@ def test_a_refused_step_is_taken_again_shorter(stiff, order):
 
 def moving(t, phase, clearance_mm=9, speed=1.0):
     """Both ends displaced, and their rates: in flight, or in contact where clearances are small."""
-    p = record(Case.from_values({"joint": "both", "clearance_mm": clearance_mm, "load": "typical"}))
+    p = record(Case.from_values({"joint": "both", "clearance_mm": clearance_mm, "load": "gas"}))
     z = np.zeros(8 + FLOWS)
     z[:4] = 1e-3, -2e-3, 5e-4, 1e-3
     z[4:8] = np.array([0.1, -0.2, 0.3, 0.5]) * speed

@@ -201,7 +201,7 @@ def test_every_claim_has_a_verdict(full):
 
 
 @pytest.mark.parametrize(
-    "words", ["rod 4.7 kg", "14 kg", "clearance is radial", "cam of the design load is a "
+    "words", ["rod 4.7 kg", "14 kg", "clearance is radial", "cam of the spring load is a "
               "reconstruction", "Claim (1) holds by construction", "numpy ", "model ", "Python ",
               "big-end.yaml", f"compsim report {EVIL}"],
 )  # fmt: skip
@@ -319,7 +319,7 @@ def test_metrics_without_series_have_tables_but_no_figures(paper_store, tmp_path
 
 def test_the_most_exact_run_is_shown(paper_store, tmp_path):
     part = part_of(paper_store, tmp_path, "typical")
-    (tmp_path / "exact.yaml").write_text("load: typical\nsolve: {rtol: [1e-3, 1e-9]}\n")
+    (tmp_path / "exact.yaml").write_text("load: gas\nsolve: {rtol: [1e-3, 1e-9]}\n")
     store(part, tmp_path / "exact.yaml")
     assert (
         find_paper_runs(read_store(part), read_studies(part)).usable["typical"].attrs["rtol"]

@@ -14,11 +14,11 @@ RMS = next(m for m in MEASURES if m.variable == "rms_acceleration")
 
 
 def test_numbers_of_a_grid_are_sorted_and_words_are_not():
-    axes = {"clearance_mm": [0.3, 0.1, 0.2], "load": ["typical", "design"], "rod_mass_kg": [4.0]}
+    axes = {"clearance_mm": [0.3, 0.1, 0.2], "load": ["gas", "spring"], "rod_mass_kg": [4.0]}
     sweep = sweep_of(grid(axes, lambda c, load, m: 100 * c + load))
     assert [axis.name for axis in sweep.axes] == ["clearance_mm", "load"]  # what has two values
     assert sweep.axes[0].values.tolist() == [0.1, 0.2, 0.3]
-    assert sweep.axes[1].words == ["typical", "design"]
+    assert sweep.axes[1].words == ["gas", "spring"]
     assert sweep.values(PEAK) == pytest.approx(np.array([[10, 11], [20, 21], [30, 31]]))
     assert sweep.keys.tolist() == [["k2", "k3"], ["k4", "k5"], ["k0", "k1"]]
     assert sweep.axes[0].title == "clearance (mm)"
@@ -38,7 +38,7 @@ def test_a_list_that_fills_a_grid_is_one():
 
 def test_what_advances_together_is_one_axis():
     columns = {"clearance_mm": [0.1, 0.1, 0.2, 0.2], "speed_rpm": [400.0, 400.0, 500.0, 500.0],
-               "load": ["design", "typical"] * 2}  # fmt: skip
+               "load": ["spring", "gas"] * 2}  # fmt: skip
     sweep = sweep_of(listed(columns, range(4)))
     assert [axis.phrase for axis in sweep.axes] == ["clearance, with speed", "load"]
     assert sweep.place.tolist() == [[0, 1], [2, 3]]

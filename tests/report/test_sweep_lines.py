@@ -45,9 +45,9 @@ def test_failed_missing_and_chaotic_jobs_are_marked():
 
 
 def test_words_are_points_above_their_ticks():
-    (drawn,) = draw_sweep(grid({"load": ["design", "typical"]}, lambda load: 5 + load))
+    (drawn,) = draw_sweep(grid({"load": ["spring", "gas"]}, lambda load: 5 + load))
     panel = extract(drawn.figure).panels[0]
-    assert panel.x.words == {0.0: "design", 1.0: "typical"}
+    assert panel.x.words == {0.0: "spring", 1.0: "gas"}
     assert panel.traces[0].kind == "points"
 
 

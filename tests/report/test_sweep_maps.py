@@ -65,7 +65,7 @@ def test_values_and_axes_over_decades_are_logarithmic():
 
 
 def test_words_have_no_lines_between_them():
-    axes = {"fault": ["big_end", "small_end", "both"], "load": ["design", "typical", "none"]}
+    axes = {"fault": ["big_end", "small_end", "both"], "load": ["spring", "gas", "none"]}
     _, panel, found = traces(grid(axes, lambda joint, load: joint + load))
     assert [*found] == ["map:peak acceleration"]
     assert panel.x.words == {0.0: "big end", 1.0: "small end", 2.0: "both joints"}

@@ -105,7 +105,7 @@ def test_four_axes_are_few_lines_in_few_panels(sizes, limit):
 
 
 def test_a_study_of_words_alone_is_points():
-    axes = {"fault": ["big_end", "both"], "load": ["design", "typical"], "law": ["one", "two"]}
+    axes = {"fault": ["big_end", "both"], "load": ["spring", "gas"], "law": ["one", "two"]}
     drawn = plan(grid(axes, lambda a, b, c: 1 + 4 * a + 2 * b + c))["panels"]
     panel = extract(drawn.figure).panels[0]
     assert panel.x.words == {0.0: "big end", 1.0: "both joints"}

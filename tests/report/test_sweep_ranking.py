@@ -12,7 +12,7 @@ from compressor.report.figures.sweep_metric import measures
 from compressor.report.figures.sweep_ranking import leading, ranking
 
 AXES = {"clearance_mm": [1.0, 2.0, 3.0], "speed_rpm": [1.0, 2.0, 3.0, 4.0],
-        "load": ["design", "typical"]}  # fmt: skip
+        "load": ["spring", "gas"]}  # fmt: skip
 
 
 def plan(data):

@@ -45,14 +45,14 @@ def test_each_key_has_a_column_and_each_metric_a_row():
 
 
 def test_words_are_colours_with_trends_of_their_own():
-    load = np.array(["design", "typical"] * 30)
-    values = np.where(load == "design", SPEED, 5 - SPEED)
+    load = np.array(["spring", "gas"] * 30)
+    values = np.where(load == "spring", SPEED, 5 - SPEED)
     panel = extract(plan(listed(COLUMNS | {"load": load}, values))["points"].figure).panels[0]
     one = traces(panel)
-    assert one["load design"].y == pytest.approx(values[::2])
-    assert one["trend, load design"].color == one["load design"].color
-    assert one["trend, load typical"].color != one["load design"].color
-    assert "95 % interval of the trend, load typical" in one
+    assert one["load spring"].y == pytest.approx(values[::2])
+    assert one["trend, load spring"].color == one["load spring"].color
+    assert one["trend, load gas"].color != one["load spring"].color
+    assert "95 % interval of the trend, load gas" in one
 
 
 def test_what_is_not_known_is_drawn_but_not_fitted():

@@ -17,7 +17,7 @@ def odd(**values):
     return [(one.key, one.kind) for one in remarks(Case.from_values(values))]
 
 
-@pytest.mark.parametrize("load", ["design", "typical", "none"])
+@pytest.mark.parametrize("load", ["spring", "gas", "none"])
 @pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
 def test_nothing_is_odd_about_the_defaults(load, joint):
     assert odd(load=load, joint=joint, **({} if joint == "none" else {"clearance_mm": 0.1})) == []

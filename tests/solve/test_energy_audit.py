@@ -108,7 +108,7 @@ def test_a_promise_does_not_outweigh_the_audit(accuracy, unbalance):
     assert np.isnan(found.numbers["acceleration_error"])
 
 
-@pytest.mark.parametrize("load", ["design", "typical", "none"])
+@pytest.mark.parametrize("load", ["spring", "gas", "none"])
 def test_the_ideal_machine_balances(load):
     assert measure(Case.from_values({"load": load})).status == "ok"
 

@@ -246,7 +246,7 @@ def test_a_failed_run_has_no_bars():
         assert np.isnan(found[name]).all()
 
 
-@pytest.mark.parametrize("load", ["design", "typical", "none"])
+@pytest.mark.parametrize("load", ["spring", "gas", "none"])
 def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
     found = measure(Case.from_values({"load": load, "solve": SHORT}))
     truth = attempts.attempt(

@@ -29,7 +29,7 @@ def run(**values):
 def test_over_a_revolution_the_crank_s_torque_leaves_by_the_guide(case):
     """Without friction's couple on the crosshead pin, 42.645 for 44.579 N m in the first case."""
     solve = {"duration_rev": 9, "settle_rev": 8}
-    found = run(**case, load="typical", solve=solve, output={"signals": True})
+    found = run(**case, load="gas", solve=solve, output={"signals": True})
     torque, moment = (found[f"mean_{name}"] for name in ("crank_torque", "guide_moment"))
     bars = found["mean_crank_torque_error"] + found["mean_guide_moment_error"]
     assert abs(torque - moment) <= bars + 1e-4 * abs(torque)
@@ -92,7 +92,7 @@ def test_what_a_rod_s_material_takes_is_no_loss_of_a_contact():
 
 def test_a_drive_s_times_are_those_that_pass():
     drive = {"flywheel_kg_m2": 0.5, "slope_N_m_s": 0, "torque_N_m": 20}
-    found = run(load="typical", drive=drive, solve={"duration_rev": 8, "settle_rev": 1})
+    found = run(load="gas", drive=drive, solve={"duration_rev": 8, "settle_rev": 1})
     assert found["reason"] == "crank_stalled"
     time, angle = found["time"].values, found["crank_angle"].values
     assert 0.0 <= found.attrs["stop_time"] - np.nanmax(time) < 0.05
@@ -103,7 +103,7 @@ def test_a_drive_s_times_are_those_that_pass():
 
 def test_shares_and_means_of_a_drive_are_of_the_time():
     """By the samples of a machine that slows by a third within each revolution."""
-    values = {"drive": {"flywheel_kg_m2": 0.5, "slope_N_m_s": 20}, "load": "typical"}
+    values = {"drive": {"flywheel_kg_m2": 0.5, "slope_N_m_s": 20}, "load": "gas"}
     found = run(**values, joint="both", clearance_mm=0.2, solve=SHORT | {"output_step_deg": 0.05})
     assert (found["impacts_per_rev"] == found["impact_count"] / 0.5).all()
     kept = found.isel(time=found["time"].values >= found.attrs["settle"] * (1 - 1e-12))

@@ -13,7 +13,7 @@ BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
 GUIDE, RUBBING = {"guide": {"clearance_mm": 0.1}}, {"friction": {"ideal_joints": True}}
 COMBINATIONS = {
     "play": {**GUIDE, **RUBBING},
-    "speed": {**BIG_END, "drive": True, "load": "typical", **RUBBING},
+    "speed": {**BIG_END, "drive": True, "load": "gas", **RUBBING},
     "elastic": {"joint": "small_end", "clearance_mm": 0.2, "rod": {"damping_ratio": 0.05}},
     "all": {
         "joint": "both", "clearance_mm": 0.2, "drive": {"flywheel_kg_m2": 1}, **GUIDE,
@@ -113,7 +113,7 @@ def test_the_time_of_a_speed_that_gives_way_is_its_own():
 
 
 def test_a_crank_that_stops_ends_its_run_and_says_so():
-    values = {"load": "typical", "drive": {"flywheel_kg_m2": 0.1, "slope_N_m_s": 0}}
+    values = {"load": "gas", "drive": {"flywheel_kg_m2": 0.1, "slope_N_m_s": 0}}
     solve = {"duration_rev": 4, "settle_rev": 0}
     found = simulate(Case.from_values({**values, "solve": solve}))
     assert found.status == "failed"

@@ -58,7 +58,7 @@ SCENES = [
 
 def damped(joint, damping, **solve):
     contact = {"damping_N_s_per_mm": damping}
-    return case({**REGULAR, "joint": joint, "load": "typical", "contact": contact}, **solve)
+    return case({**REGULAR, "joint": joint, "load": "gas", "contact": contact}, **solve)
 
 
 def alike(joint, method, damping):

@@ -39,7 +39,7 @@ def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance)
 
     With one joint at 0.2 mm SciPy's methods are judged, too. `make accuracy` draws 1,000 cases.
     """
-    params = reference.paper_params("design", joint, clearance * 1e-3)
+    params = reference.paper_params("spring", joint, clearance * 1e-3)
     words = {word: run(joint, clearance, accuracy=word) for word in ("draft", "standard", "fine")}
     times = words["fine"]["time"].values
     truth = reference.reference_solution(params, joint, times, rtol=1e-12, method="LSODA")["a"]
@@ -59,7 +59,7 @@ def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance)
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("load", ["typical", "none"])
+@pytest.mark.parametrize("load", ["gas", "none"])
 def test_other_loads_against_the_reference(load):
     params = reference.paper_params(load, "both", 2e-4)
     solve = {"duration_rev": 0.5, "settle_rev": 0, "accuracy": "fine"}

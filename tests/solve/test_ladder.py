@@ -28,7 +28,7 @@ ILL = {
 }  # fmt: skip
 # two runs at rtol 1e-11 and 1e-12 differ by 40 %
 CHAOTIC = {
-    "joint": "both", "clearance_mm": 0.1919, "load": "typical",
+    "joint": "both", "clearance_mm": 0.1919, "load": "gas",
     "machine": {"rod_mass_kg": 4.171, "reciprocating_mass_kg": 23.75, "speed_rpm": 111.7},
 }  # fmt: skip
 
@@ -145,8 +145,8 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
 # their first runs keep no promise, and two later ones agree by chance: errors of 60 % and 3 % at
 # `draft`, of 0.55 % at `standard`, were within the promise by both
 BY_CHANCE = (
-    ("draft", "typical", "both", 0.295, 4.594, 5.484, 120.5),
-    ("draft", "typical", "both", 0.04266, 2.568, 12.78, 134.1),
+    ("draft", "gas", "both", 0.295, 4.594, 5.484, 120.5),
+    ("draft", "gas", "both", 0.04266, 2.568, 12.78, 134.1),
     ("standard", "none", "big_end", 0.03945, 2.003, 23.39, 103.1),
 )
 
@@ -243,7 +243,7 @@ def test_a_failed_companion_leaves_errors_unknown(monkeypatch):
         assert np.isinf(found.numbers[name]).all()
 
 
-@pytest.mark.parametrize("load", ["design", "typical", "none"])
+@pytest.mark.parametrize("load", ["spring", "gas", "none"])
 def test_the_ideal_machine_keeps_every_word(load):
     found = measure(Case.from_values({"load": load, "solve": {"accuracy": "reference"}}))
     assert (found.status, found.attributes["promise"]) == ("ok", "kept")

@@ -87,7 +87,7 @@ def simulate_request(max_steps):
 def test_what_is_not_finite_is_named():
     gas = {"head_clearance_mm": 0.601, "switching": "exact"}
     solve = {"duration_rev": 1.25, "accuracy": "draft"}
-    found = simulate(Case.from_values({**BOTH, "load": "typical", "gas": gas, "solve": solve}))
+    found = simulate(Case.from_values({**BOTH, "load": "gas", "gas": gas, "solve": solve}))
     assert found.attrs["stop_dominant"] in STATE_NAMES[Scene.BOTH]
     assert words(found.attrs)[-1].endswith("refused")
     assert not np.isfinite(found.attrs["stop_history_error"][-1])
@@ -135,7 +135,7 @@ def test_steps_of_scipy_s_methods_are_told_without_errors(method):
 
 def test_a_contact_that_lies_within_one_step_is_named(monkeypatch):
     """RK45 at a loose tolerance steps over a pulse (physics/README.md, Reference numbers)."""
-    values = {"load": "typical", "joint": "big_end", "clearance_mm": 0.2,
+    values = {"load": "gas", "joint": "big_end", "clearance_mm": 0.2,
               "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}  # fmt: skip
     solve = {"duration_rev": 0.25, "settle_rev": 0, "rtol": 1e-5}
     case = Case.from_values({**values, "solve": solve | {"method": "RK45"}})

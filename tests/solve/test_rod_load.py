@@ -44,7 +44,7 @@ def test_of_a_load_that_keeps_its_side():
 
 
 @pytest.mark.parametrize(
-    ("load", "degrees", "share"), [("design", 108.6, 0.49), ("typical", 117.3, 0.73)]
+    ("load", "degrees", "share"), [("spring", 108.6, 0.49), ("gas", 117.3, 0.73)]
 )
 def test_of_the_ideal_machine(load, degrees, share):
     numbers = measure(Case.from_values({"load": load, "solve": TURN, **SIGNALLED})).numbers
@@ -53,7 +53,7 @@ def test_of_the_ideal_machine(load, degrees, share):
 
 
 @pytest.mark.parametrize("joint", ["big_end", "small_end"])
-@pytest.mark.parametrize("load", ["design", "typical"])
+@pytest.mark.parametrize("load", ["spring", "gas"])
 def test_bars_hold_the_error(joint, load):
     """Against a run at rtol 1e-11, whose own samples are as dense."""
     values = {"joint": joint, "clearance_mm": 0.2, "load": load, **SIGNALLED}

@@ -60,7 +60,7 @@ def test_contact_time_of_any_exponent(exponent):
     assert found.t[-1] == pytest.approx(contact.impact_time(depth, speed), rel=1e-6)
 
 
-@pytest.mark.parametrize("load", ["design", "typical", "none"])
+@pytest.mark.parametrize("load", ["spring", "gas", "none"])
 @pytest.mark.parametrize("speed", [200, 2000])
 def test_the_greatest_force_bounds_the_ideal_machine_s(load, speed):
     values = {"load": load, "machine": {"speed_rpm": speed, "gravity_m_per_s2": 9.81}}

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.compiled
 def cases(joint, count=20, **more):
     """As a stranger would draw them, with a load that lanes take."""
     values = [one for one in strangers(1515, 40 * count) if one["joint"] == joint]
-    loads = ("design", "none", "design", "design")
+    loads = ("spring", "none", "spring", "spring")
     solve = {"duration_rev": 2, "timeout_s": 60, **more}
     return [
         Case.from_values({**one, "load": loads[i % 4], "solve": solve})
@@ -85,7 +85,7 @@ def test_a_run_that_fails_touches_no_neighbour():
 @pytest.mark.parametrize(
     "values",
     [
-        {"load": "typical"},
+        {"load": "gas"},
         {"contact": {"exponent": 1.4}},
         {"clearance_mm": 0.0},
         {"solve": {"method": "DOPRI5"}},
@@ -110,7 +110,7 @@ def test_lanes_know_every_field_of_the_record():
     W = np.arange(rows.TOTAL * rows.LANES, dtype=float)
     made = lane_steps.record_of.__wrapped__((0, 0), W, 3)
     places = {field: rows.FIRST_FIELD + i * rows.LANES + 3 for i, field in enumerate(rows.FIELDS)}
-    choices = {"scene": 2, "load": rows.DESIGN, "law": 0, "friction": 1, "freedoms": 2, "wide": 0,
+    choices = {"scene": 2, "load": rows.SPRING, "law": 0, "friction": 1, "freedoms": 2, "wide": 0,
                "exponent": 1.5, "corners": (0.0, 0.0, 0.0), "hysteresis": 0.0,
                "least_approach": 0.0, "bristle_stiffness": 0.0, "bristle_damping": 0.0,
                "viscous": 0.0, "laws": (0.0,)}  # fmt: skip

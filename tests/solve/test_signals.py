@@ -72,7 +72,7 @@ def test_the_frame_takes_the_momentum_that_the_parts_lose(joint, gravity):
 
 def test_orders_of_the_ideal_machine():
     """Order 1 of X 6152.1 N, order 2 1086.7 N, whatever the load is."""
-    for load in ("none", "design", "typical"):
+    for load in ("none", "spring", "gas"):
         found = run(load=load, solve=TURN)
         force = found["shaking_force"].sel(axis="x").values[1200:2400]
         orders = 2 / force.size * np.abs(np.fft.rfft(force))
@@ -80,7 +80,7 @@ def test_orders_of_the_ideal_machine():
         assert orders[2] == pytest.approx(1086.7, rel=1e-4)
 
 
-@pytest.mark.parametrize("load", ["design", "typical"])
+@pytest.mark.parametrize("load", ["spring", "gas"])
 def test_rod_load_of_the_ideal_machine(load):
     """Greatest in compression and tension, degrees of the smaller side, and its share."""
     found = run(load=load, solve={**TURN, "output_step_deg": 0.01})
@@ -88,7 +88,7 @@ def test_rod_load_of_the_ideal_machine(load):
     tension, compression = force.max(), -force.min()
     smaller = min(tension, compression) / max(tension, compression)
     degrees = 0.01 * min((force > 0).sum(), (force < 0).sum())
-    expected = {"design": (4725, 2330, 108.6, 0.49), "typical": (None, None, 117.3, 0.73)}[load]
+    expected = {"spring": (4725, 2330, 108.6, 0.49), "gas": (None, None, 117.3, 0.73)}[load]
     if expected[0]:
         sides = sorted([tension, compression], reverse=True)
         assert sides == pytest.approx(expected[:2], abs=1.0)

@@ -29,13 +29,13 @@ def faulty():
     return run(joint="both", clearance_mm={"big_end": 0.1, "small_end": 0.2})
 
 
-@pytest.mark.parametrize("load", ["design", "typical", "none"])
+@pytest.mark.parametrize("load", ["spring", "gas", "none"])
 def test_ideal_machine(load):
     found = simulate(Case.from_values({"load": load}))
     assert float(found.peak_acceleration) == pytest.approx(394.784, abs=5e-4)
     assert float(found.energy_residual) < 1e-10
     assert int(found.steps) == int(found.evaluations) == 0
-    peak = {"design": 3346.7, "typical": 3086.6, "none": 0}[load]
+    peak = {"spring": 3346.7, "gas": 3086.6, "none": 0}[load]
     assert float(found.piston_force.max()) == pytest.approx(peak, abs=2)
 
 
@@ -127,7 +127,7 @@ def test_zero_clearance_is_the_ideal_joint():
         ({"contact": {"stiffness_N_per_mm15": 300}}, "penetration_implausible"),
         (
             {  # at the second top dead centre the piston is flung past the cylinder head
-                "load": "typical",
+                "load": "gas",
                 "gas": {"head_clearance_mm": 0.601, "switching": "exact"},
                 "solve": {"duration_rev": 1.25},
             },

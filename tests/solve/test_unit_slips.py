@@ -11,8 +11,8 @@ from compressor.solve.unit_slips import USUAL, slips
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
 SPEED, STIFFNESS = "machine.speed_rpm", "contact.stiffness_N_per_mm15"
-SPRING, GAS = {"load": "design"}, {"load": "typical", "gas": {"switching": "exact"}}
-BAR = {"load": "typical", "gas": {"switching": "exact", "suction_MPa": 1.05}}
+SPRING, GAS = {"load": "spring"}, {"load": "gas", "gas": {"switching": "exact"}}
+BAR = {"load": "gas", "gas": {"switching": "exact", "suction_MPa": 1.05}}
 
 
 def values(key, value, **others):

@@ -21,7 +21,7 @@ def run(tmp_path, in_process):
 
     def run(folder, name="small", speed=500):
         path = tmp_path / f"{name}.yaml"
-        values = {"load": ["none", "design"], "machine": {"speed_rpm": speed}, "solve": SOLVE}
+        values = {"load": ["none", "spring"], "machine": {"speed_rpm": speed}, "solve": SOLVE}
         path.write_text(json.dumps(values), encoding="utf-8")
         remarks = []
         sweep(load_studies(path), folder, 1, lambda done, total, remark: remarks.append(remark))

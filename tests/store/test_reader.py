@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -27,6 +28,7 @@ from compressor.store import hdf5
 from compressor.store import reader as store
 from compressor.store.files import StoreError, discard_leftovers
 from compressor.store.hdf5 import DamagedJob
+from compressor.store.names import find_job
 from compressor.store.series_file import (
     read_series,
     read_values,
@@ -34,7 +36,7 @@ from compressor.store.series_file import (
     series_path,
     write_series,
 )
-from compressor.store.studies import read_studies, write_study
+from compressor.store.studies import encode, read_studies, write_study
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 
@@ -436,16 +438,30 @@ def test_a_file_where_a_folder_is_needed(ideal, tmp_path):
 
 
 def test_a_study_is_stored_and_found(tmp_path):
-    one = study("speeds", machine={"speed_rpm": [300, 500]}, load=["design", "none"])
+    one = study("speeds", machine={"speed_rpm": [300, 500]}, load=["spring", "none"])
     write_study(tmp_path, one, "compsim run speeds.yaml")
     (found,) = read_studies(tmp_path)
     assert (found.name, found.command) == ("speeds", "compsim run speeds.yaml")
     assert found.keys == tuple(case.key for case in one.cases)
     assert [(axis.key, axis.values, axis.units) for axis in found.axes] == [
         ("machine.speed_rpm", (300, 500), "rpm"),
-        ("load", ("design", "none"), ""),
+        ("load", ("spring", "none"), ""),
     ]
     assert list(points(found))[1] == {"machine.speed_rpm": 300, "load": "none"}
+
+
+def test_a_study_that_was_stored_with_older_words_has_today_s(tmp_path):
+    one = study("loads", load=["spring", "none", "gas"], machine={"gravity_m_per_s2": 9.81})
+    write_study(tmp_path, one, "first")
+    path, (new,) = tmp_path / "studies/loads.json", read_studies(tmp_path)
+    older = replace(new.axes[0], values=("design", "none", "typical"))
+    path.write_bytes(encode(replace(new, axes=(older,), fixed={**new.fixed, "load": "design"})))
+    before = path.read_bytes()
+    assert read_studies(tmp_path) == [new]
+    assert find_job(tmp_path, ["loads", "load=typical"], [new], set()) == one.cases[2].key
+    assert find_job(tmp_path, ["loads", "load=gas"], [new], set()) == one.cases[2].key
+    write_study(tmp_path, one, "second")
+    assert path.read_bytes() == before != encode(new)  # the same study
 
 
 def test_storing_a_study_again_leaves_its_file_alone(tmp_path):
@@ -522,7 +538,7 @@ def test_no_coordinate_hides_what_a_job_holds(ideal):
 def grid(tmp_path_factory):
     """A 2 x 2 study of ideal joints; the last job is missing."""
     folder = tmp_path_factory.mktemp("grid")
-    one = study("grid", load=["design", "none"], machine={"rod_mass_kg": [4, 5]})
+    one = study("grid", load=["spring", "none"], machine={"rod_mass_kg": [4, 5]})
     fill(folder, one, skip=(3,))
     return folder, one
 
@@ -560,7 +576,7 @@ def test_only_the_job_asked_for_is_read(grid, monkeypatch):
     assert found.acceleration.sizes["time"] == 101
     assert repr(found)
     assert read == []
-    float(found.acceleration.sel(load="design", rod_mass_kg=5).max())
+    float(found.acceleration.sel(load="spring", rod_mass_kg=5).max())
     assert read == [one.cases[1].key]
 
 
@@ -601,7 +617,7 @@ def test_several_studies_have_jobs_with_coordinates(grid, tmp_path):
     found = store.open_study(tmp_path)
     assert found.study.values.tolist() == ["faults"] * 2 + ["grid"] * 4
     assert found.fault.values.tolist() == ["none", "both"] + ["none"] * 4
-    assert found["load"].values.tolist()[1:5] == ["design", "design", "design", "none"]
+    assert found["load"].values.tolist()[1:5] == ["spring", "spring", "spring", "none"]
     assert found.rod_mass_kg.values.tolist() == [4.7, 4.7, 4, 5, 4, 5]
     assert found.clearance_mm.values[:2].tolist() == [0.1, 0.1]
     assert found.acceleration.dims == ("job", "time")

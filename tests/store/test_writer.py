@@ -225,8 +225,8 @@ def short_cases():
     from compressor.cases.case import Case
 
     solve = {"duration_rev": 0.1, "settle_rev": 0, "output_step_deg": 1}
-    return [Case.from_values({"load": load, "solve": solve}) for load in ("none", "design")] + [
-        Case.from_values({"load": "typical", "solve": solve})
+    return [Case.from_values({"load": load, "solve": solve}) for load in ("none", "spring")] + [
+        Case.from_values({"load": "gas", "solve": solve})
     ]
 
 

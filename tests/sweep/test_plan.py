@@ -133,7 +133,7 @@ def test_timing_ends_when_its_seconds_are_over_with_one_job_of_each_study(studie
     made = timed_as(monkeypatch, lambda case: 1.0)
     both = studies(one=NINE, two={**NINE, "load": "none"})
     found = forecast(both, "results", 0).timed(1, str)
-    assert [case.load for case in made] == ["design", "none"]
+    assert [case.load for case in made] == ["spring", "none"]
     assert [part.timed for part in found.studies] == [1, 1]
     assert found.seconds == pytest.approx(18.0)
     assert math.isnan(found.most)

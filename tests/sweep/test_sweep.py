@@ -51,7 +51,7 @@ def statuses(folder, study):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_failed_job_leaves_the_others_be(workers, studies, tmp_path):
-    made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}, "load": ["none", "design"]})
+    made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}, "load": ["none", "spring"]})
     summary = sweep(made, tmp_path / "out", workers)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "failed", "ok", "ok"]
     assert (summary.total, summary.done_before, summary.run_now) == (4, 0, 4)
@@ -118,7 +118,7 @@ def flipped(data):
 @pytest.mark.parametrize("damage", [lambda _: b"", lambda _: b"not a job", flipped])
 @pytest.mark.parametrize("kind", ["jobs", "rows", "studies"])
 def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path, in_process):
-    made = studies(one={"load": ["none", "design"]})
+    made = studies(one={"load": ["none", "spring"]})
     sweep(made, tmp_path / "out", 1)
     keys = {case.key for case in made[0].cases}
     victims = sorted((tmp_path / "out" / kind).glob("*"))
@@ -145,7 +145,7 @@ def test_failed_jobs_run_again_on_request(studies, tmp_path, in_process):
 
 
 def test_shards_are_one_study_together(studies, tmp_path, in_process):
-    axes = {"load": ["none", "design"], "machine": {"rod_mass_kg": [3, 4, 5, 6]}}
+    axes = {"load": ["none", "spring"], "machine": {"rod_mass_kg": [3, 4, 5, 6]}}
     made = studies(one=axes, same={"load": "none"})
     parts = [
         sweep(made, tmp_path / "out", 1, options=Options(part=(number, 3))) for number in (1, 2, 3)
@@ -206,7 +206,7 @@ def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monk
         return real(place, case) if case.load != "none" else {}["the bug"]
 
     monkeypatch.setattr(SWEEP, "run_job", breaking)
-    made = studies(one={"load": ["none", "design"]})
+    made = studies(one={"load": ["none", "spring"]})
     summary = sweep(made, tmp_path / "out", 1)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]
     (failure,) = summary.failed
@@ -236,7 +236,7 @@ def test_a_poison_job_is_a_failed_job(end, reason, detail, again, studies, tmp_p
 
     monkeypatch.setattr(SWEEP, "run_job", poisoned)
     monkeypatch.setattr(SWEEP, "GRACE", 0.5)
-    made = studies(one={"load": ["design", "none", "typical"], "solve": {"timeout_s": 0.5}})
+    made = studies(one={"load": ["spring", "none", "gas"], "solve": {"timeout_s": 0.5}})
     summary = sweep(made, tmp_path / "out", 2)
     assert statuses(tmp_path / "out", made[0]) == ["ok", "failed", "ok"]
     (failure,) = summary.failed
@@ -411,7 +411,7 @@ def test_a_job_that_cannot_be_stored_ends_the_sweep(workers, studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/jobs").symlink_to("nowhere")
     with pytest.raises(store.StoreError, match=r"out/jobs: is a link that leads nowhere"):
-        sweep(studies(one={"load": ["none", "design"]}), tmp_path / "out", workers)
+        sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", workers)
 
 
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
@@ -422,7 +422,7 @@ def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
 
 
 def test_progress_counts_every_job_once(studies, tmp_path):
-    made = studies(one={"load": ["none", "design", "typical"]})
+    made = studies(one={"load": ["none", "spring", "gas"]})
     told = []
     sweep(made, tmp_path / "out", 2, lambda *event: told.append(event))
     counts = [event[0] for event in told if not event[2]]

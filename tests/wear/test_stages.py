@@ -129,7 +129,7 @@ def test_a_motion_that_fails_ends_its_machine():
 
 
 def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
-    soft = {"drive": {"slope_N_m_s": 10.0, "flywheel_kg_m2": 5.0}, "load": "typical"}
+    soft = {"drive": {"slope_N_m_s": 10.0, "flywheel_kg_m2": 5.0}, "load": "gas"}
     case = Case.from_values({**VALUES, **soft, "wear": True})
     found = rub(case, np.zeros((2, 72)), None)
     assert not found.reason

@@ -34,7 +34,7 @@ def sizes(fault: str) -> tuple[str, ...]:
 
 FIGURES = (
     Figure(3, "The ideal p–V diagram", ("typical",), draw_pressure_volume),
-    Figure(4, "The cam of the design load", ("design",), draw_cam),
+    Figure(4, "The cam of the spring load", ("design",), draw_cam),
     Figure(
         6,
         "Response of the design and the typical model",

@@ -1,4 +1,4 @@
-"""Figures 3 and 4: the ideal gas cycle of the typical load, and the cam of the design load."""
+"""Figures 3 and 4: the ideal gas cycle of the gas load, and the cam of the spring load."""
 
 import math
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ def draw_pressure_volume(runs: Runs) -> Figure:
 
 
 def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Volume (litres) and absolute pressure (MPa) of a run of the typical load."""
+    """Volume (litres) and absolute pressure (MPa) of a run of the gas load."""
     case = case_of(run)
     machine, gas = case.machine, case.gas
     area = math.pi * gas.piston_radius_mm**2  # mm^2

@@ -1,6 +1,6 @@
 """The one problem of the comparison with other tools, and its equations as a notebook has them.
 
-Rod 3 kg, reciprocating mass 6 kg, typical load, clearance 0.2 mm, four revolutions at 500 rpm, all
+Rod 3 kg, reciprocating mass 6 kg, gas load, clearance 0.2 mm, four revolutions at 500 rpm, all
 else as in physics/README.md. The equations are Newton's and Lagrange's for absolute coordinates,
 worked out by hand with scalars; nothing comes from the product, and the numbers come from
 reference.py.
@@ -22,13 +22,13 @@ OUTPUT_STEP = 1e-4  # s
 
 def params(scene):
     """The scene's parameters for reference.py."""
-    return reference.paper_params("typical", scene, CLEARANCE, **MASSES)
+    return reference.paper_params("gas", scene, CLEARANCE, **MASSES)
 
 
 def case_values(scene, duration=DURATION, **solve):
     """The same problem as values of a case file."""
     return {
-        "load": "typical",
+        "load": "gas",
         "joint": scene,
         "clearance_mm": CLEARANCE * 1e3,
         "machine": {
