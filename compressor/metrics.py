@@ -49,6 +49,11 @@ class Metric(NamedTuple):
     kind: Literal["greatest", "root", "share", "count", "rate"] = "share"
 
     @property
+    def is_pure_number(self) -> bool:
+        """Return whether it has no unit: a share or a count, which may be 0."""
+        return self.unit in ("1", "1/rev")
+
+    @property
     def counted(self) -> bool:
         """Whether it counts events: contact that grazes begins any number of times."""
         return self.kind in ("count", "rate")
@@ -93,12 +98,12 @@ METRICS = {
         ),
         Metric(
             "mean_crank_torque", (), "N m", "mean torque that drives the crank against the rod",
-            "acceleration", Bar(relative=False, least=1e-12),
+            "acceleration", Bar(4.0, 0.02, False, 1e-12),
         ),
         Metric(
             "mean_guide_moment", (), "N m",
             "mean moment of the crosshead on its guide about the crank centre", "acceleration",
-            Bar(relative=False, least=1e-12),
+            Bar(4.0, 0.15, False, 1e-12),
         ),
         Metric(
             "impact_count", ("joint",), "1", "contacts that began after flight", "penetration",

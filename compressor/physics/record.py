@@ -30,7 +30,10 @@ class Load(IntEnum):
 
 
 # the state of each scene: deviations from the ideal motion, then their rates
-ROD_AND_CROSSHEAD = ("x deviation, m", "phi deviation, rad", "its rate, m/s", "its rate, rad/s")
+ROD_AND_CROSSHEAD = (
+    "x deviation, m", "phi deviation, rad",
+    "rate of x deviation, m/s", "rate of phi deviation, rad/s",
+)  # fmt: skip
 STATE_NAMES = {
     Scene.IDEAL: (),
     Scene.BIG_END: ROD_AND_CROSSHEAD,
@@ -70,16 +73,16 @@ class Coordinate(IntEnum):
 
 
 COORDINATE_NAMES = {
-    Coordinate.BIG_X: ("big end eccentricity x, m", "its rate, m/s"),
-    Coordinate.BIG_Y: ("big end eccentricity y, m", "its rate, m/s"),
-    Coordinate.SMALL_X: ("small end eccentricity x, m", "its rate, m/s"),
-    Coordinate.SMALL_Y: ("small end eccentricity y, m", "its rate, m/s"),
-    Coordinate.GUIDE: ("height in the guide, m", "its rate, m/s"),
-    Coordinate.TILT: ("tilt in the guide, rad", "its rate, rad/s"),
-    Coordinate.BEND_1: ("rod's first bending mode, m", "its rate, m/s"),
-    Coordinate.BEND_2: ("rod's second bending mode, m", "its rate, m/s"),
-    Coordinate.STRETCH_MIDDLE: ("rod's stretch to its middle, m", "its rate, m/s"),
-    Coordinate.STRETCH: ("rod's stretch, m", "its rate, m/s"),
+    Coordinate.BIG_X: ("big end eccentricity x", "m"),
+    Coordinate.BIG_Y: ("big end eccentricity y", "m"),
+    Coordinate.SMALL_X: ("small end eccentricity x", "m"),
+    Coordinate.SMALL_Y: ("small end eccentricity y", "m"),
+    Coordinate.GUIDE: ("height in the guide", "m"),
+    Coordinate.TILT: ("tilt in the guide", "rad"),
+    Coordinate.BEND_1: ("rod's first bending mode", "m"),
+    Coordinate.BEND_2: ("rod's second bending mode", "m"),
+    Coordinate.STRETCH_MIDDLE: ("rod's stretch to its middle", "m"),
+    Coordinate.STRETCH: ("rod's stretch", "m"),
 }
 # of a crank whose speed gives way: behind a steady one's time, and speed over the steady one's
 CRANK = ("crank's lag, s", "crank's slip")
@@ -248,8 +251,9 @@ def state_names(p: np.record) -> tuple[str, ...]:
         names = STATE_NAMES[Scene(int(p["scene"]))]
         return names + CARRIED if names and p["laws"].size > 1 else names
     found = present(p)
-    names = tuple(COORDINATE_NAMES[one][0] for one in found)
-    names += tuple(COORDINATE_NAMES[one][1] for one in found) + CARRIED
+    coordinates = [COORDINATE_NAMES[one] for one in found]
+    names = tuple(f"{name}, {unit}" for name, unit in coordinates)
+    names += tuple(f"rate of {name}, {unit}/s" for name, unit in coordinates) + CARRIED
     names += (CRANK if p["driven"] else ()) + (ROD_LOSS if p["elastic"] else ())
     return names + ("unused",) * (-len(names) % 4) if found or p["driven"] else ()
 

@@ -73,12 +73,12 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
         return {name: np.full(np.shape(value), np.inf) for name, value in metrics.items()}
     found = {}
     for name, value in metrics.items():
-        bar, own_unit = METRICS[name].bar, METRICS[name].unit.startswith("1")
-        size = np.ones(np.shape(value)) if own_unit else np.abs(value)
+        row = METRICS[name]
+        bar, size = row.bar, np.ones(np.shape(value)) if row.is_pure_number else np.abs(value)
         own = bar.own * np.abs(np.asarray(value) - other.metrics[name])
-        path = bar.path * spread(other.apart[METRICS[name].series], np.ndim(value)) * size
+        path = bar.path * spread(other.apart[row.series], np.ndim(value)) * size
         found[name] = other.closeness * np.hypot(own, path)
-        if not own_unit:
+        if not row.is_pure_number:
             found[name] = np.maximum(found[name], max(FLOOR * residual, bar.least) * size)
     return found
 

@@ -206,19 +206,10 @@ def stop_time(p: np.record, run: Trajectory) -> float:
     return float(passed(p, np.array([at]), last_state(run)[np.newaxis])[0])
 
 
-def names_with_rates(p: np.record) -> tuple[str, ...]:
-    """Return the names of the numbers of a state; each rate is named after its coordinate."""
-    names, n = [*state_names(p)], int(p["freedoms"])
-    for number, name in enumerate(names[n : 2 * n]):
-        coordinate = names[number].rpartition(",")[0]
-        names[n + number] = name.replace("its rate", f"rate of {coordinate}")
-    return tuple(names)
-
-
 def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:
     """Where a run stopped, in which state, and how its last steps went."""
     trajectory = solution.trajectory
-    history, names = trajectory.history, names_with_rates(solution.p)
+    history, names = trajectory.history, state_names(solution.p)
     flows = ("energy flow, J",) * FLOWS
     return {
         "stop_time": stop_time(solution.p, trajectory),

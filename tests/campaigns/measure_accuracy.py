@@ -40,7 +40,7 @@ TRUTH = 1e-12
 PERCENTILES = (50, 90, 95, 100)
 CONFIRMED = 4  # random cases that DOP853 runs again
 CONFIRMED_RTOL = 1e-10
-CONTACT = ("max_penetration", "contact_loss_fraction", "impact_count", "release_count")
+CONTACT = tuple(name for name, row in METRICS.items() if row.contact)
 EXACT = 1e-12  # of a metric: an error below it is rounding
 TRADED = 5  # one of so many cases is run at a ladder of tolerances, too
 

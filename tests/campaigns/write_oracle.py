@@ -1,0 +1,123 @@
+"""Write what the program computes of many cases, to the last bit (make oracle), and compare two.
+
+A change of the source that is to change no number is judged by it: `write_oracle.py NEW.json`
+before and after, then `write_oracle.py NEW.json --against OLD.json`, which prints what differs and
+ends with 1 if anything does. Of each case: its keys, every number and word of its row (numbers as
+hex, times that the machine took left out) and a digest of its series; of the report over
+configs/, a digest of the CSV of each figure. The results are of one machine and its libraries.
+"""
+
+import argparse
+import hashlib
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from compsim import cli
+from joblib import Parallel, delayed
+from random_cases import strangers
+
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.measure.extremes import FEATURES, LAWS, Budget, values
+from compressor.program import ignore_warnings
+from compressor.solve.simulate import simulate
+
+ROOT = Path(__file__).parents[2]
+SEED = 33
+SCIPY_METHODS = ("DOP853", "RK45", "Radau", "LSODA")
+TIMINGS = ("seconds", "written", "versions", "host")  # parts of names of what differs by the run
+JOBS_OF_A_STUDY = 12  # the first ones of an example
+
+
+def cases_by_name():
+    """Return the cases whose numbers are compared, by name."""
+    found = {}
+    paths = [*ROOT.glob("configs/*.yaml"), *ROOT.glob("compressor/cases/examples/*.yaml")]
+    for path in sorted(paths):
+        for study in load_studies(path):
+            for number in range(min(study.jobs, JOBS_OF_A_STUDY)):
+                found[f"{path.name} {number}"] = study.cases[number]
+    for number, drawn in enumerate(strangers(SEED, 300)):
+        found[f"plain {number}"] = Case.from_values(drawn)
+    for kind in (LAWS, FEATURES):
+        for number in range(60):
+            scene = values(number, SEED, Budget(drawn=kind))
+            found[f"{kind} {number}"] = Case.resolve(scene)
+    for number, drawn in enumerate(strangers(SEED + 1, 20)):
+        solve = {"method": SCIPY_METHODS[number % len(SCIPY_METHODS)], "duration_rev": 1,
+                 "settle_rev": 0, "accuracy": "draft"}  # fmt: skip
+        found[f"scipy {number}"] = Case.from_values({**drawn, "solve": solve})
+    return found
+
+
+def exact(value):
+    """Return a value as JSON holds it without loss: numbers as hex, arrays by shape and digest."""
+    array = np.asarray(value)
+    if array.dtype.kind in "fiub":
+        if array.size > 16:
+            data = np.ascontiguousarray(array)
+            return [*map(str, array.shape), hashlib.sha256(data.tobytes()).hexdigest()[:16]]
+        return [one.hex() if isinstance(one, float) else one for one in array.ravel().tolist()]
+    return [str(one) for one in array.ravel().tolist()]
+
+
+def outcome(case):
+    """Return everything that a run of a case gives, by name, but what differs from run to run."""
+    with ignore_warnings():
+        run = simulate(case)
+    found = {name: exact(variable.values) for name, variable in run.variables.items()}
+    found |= {f"attribute {name}": exact(value) for name, value in run.attrs.items()}
+    return {
+        name: value for name, value in found.items() if not any(word in name for word in TIMINGS)
+    }
+
+
+def figures():
+    """Return a digest of each CSV that the report over configs/ writes."""
+    with tempfile.TemporaryDirectory() as place:
+        results, report = f"{place}/results", f"{place}/report"
+        configs = [str(path) for path in sorted(ROOT.glob("configs/*.yaml"))]
+        for words in (["run", *configs, "-o", results], ["report", results, "-o", report]):
+            if code := cli.main(words):
+                sys.exit(code)
+        return {
+            str(path.relative_to(report)): hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+            for path in sorted(Path(report).rglob("*.csv"))
+        }
+
+
+def differences(new, old):
+    """Return a line for each thing that differs between two files of this script."""
+    lines = []
+    for name in sorted(new.keys() | old.keys()):
+        one, other = new.get(name), old.get(name)
+        if one is None or other is None:
+            lines.append(f"{name}: only in the {'new' if other is None else 'old'} file")
+        elif isinstance(one, dict):
+            lines += [f"{name}: {line}" for line in differences(one, other)]
+        elif one != other:
+            lines.append(f"{name}: {other} was, {one} is")
+    return lines
+
+
+def main(target, jobs, against):
+    cases = cases_by_name()
+    found = Parallel(n_jobs=jobs, verbose=1)(delayed(outcome)(case) for case in cases.values())
+    made = dict(zip(cases, found, strict=True)) | {"figures": figures()}
+    Path(target).write_text(json.dumps(made, indent=0) + "\n", encoding="utf-8")
+    if against:
+        lines = differences(made, json.loads(Path(against).read_text(encoding="utf-8")))
+        print("\n".join(lines) or f"{len(made)} entries are equal")
+        sys.exit(bool(lines))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("target", help="file to write")
+    parser.add_argument("--jobs", type=int, default=2, help="worker processes")
+    parser.add_argument("--against", default="", help="an older file to compare with")
+    asked = parser.parse_args()
+    main(asked.target, asked.jobs, asked.against)
