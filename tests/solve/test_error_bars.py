@@ -85,6 +85,16 @@ def test_runs_that_agree_by_chance_have_bars_by_their_series():
     np.testing.assert_allclose(found["peak_contact_force_axis"], [[axis] * 2, [0, 0]], atol=1e-12)
 
 
+@pytest.mark.parametrize(("apart", "known"), [(0.33, True), (0.34, False)])
+def test_of_a_series_that_may_be_all_wrong_no_metric_is_known(apart, known):
+    metrics = {"rms_acceleration": 1.0, "max_penetration": np.ones(2), "impact_count": np.ones(2)}
+    distances = APART | {"acceleration": apart, "penetration": np.array([0.0, apart])}
+    found = bars(metrics, Companion(metrics, 0.5, distances), 0.0)
+    assert np.isfinite(found["rms_acceleration"]) == known
+    assert np.isfinite(found["max_penetration"]).tolist() == [True, known]
+    assert np.isfinite(found["impact_count"]).all()  # a count has no unit: a bar of its own
+
+
 def test_a_peak_is_known_no_closer_than_it_is_found():
     """Between the nodes of a step; the parabola's error does not fall with the tolerance."""
     metrics = {"peak_acceleration": 100.0, "rms_acceleration": 100.0}
