@@ -690,7 +690,7 @@ def fresh_scenes(what, found, ends=False):
     if not found:
         return ""
     scenes, wrong = sum(one["scenes"] for one in found), silent(found)
-    seeds = " and ".join(str(one["seed"]) for one in found)
+    seeds = ", ".join(str(one["seed"]) for one in found)
     plural = "s" if len(found) > 1 else ""
     commands = ", ".join(
         f"`{row['command']}` ({row['worst_metric']} {amiss(row)})"

@@ -5,8 +5,8 @@ that; of the difference from a looser run, which is mostly the looser one's erro
 (`closeness`). A metric's own difference may be small by chance: the distance of the time series
 that it is taken from stands beside it. The energy residual is a floor. Where a motion enlarges the
 errors of its steps (`enlarged`), two runs may agree by chance in all numbers; there a third one is
-asked, and the longest bars count. Of a series that may be wrong by all of itself, no metric with a
-unit is known.
+asked, and the longest bars count. Where a series or the acceleration may be wrong by all of itself,
+no metric with a unit that is taken from it is known.
 
 Shares stand in `compressor.metrics`; those and the ones below were chosen on random cases that
 judge nothing (tests/results/README.md, "Calibration").
@@ -69,7 +69,8 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
     """Return the error bar of each metric of a run, in its unit and shape.
 
     residual: energy imbalance relative to what the contacts lose. Bars are inf without another run,
-    and those of metrics with a unit also where their series may be wrong by all of itself.
+    and those of metrics with a unit also where their series, or the acceleration, may be wrong by
+    all of itself.
     """
     if other is None:
         return {name: np.full(np.shape(value), np.inf) for name, value in metrics.items()}
@@ -82,7 +83,8 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
         found[name] = other.closeness * np.hypot(own, path)
         if not row.is_pure_number:
             found[name] = np.maximum(found[name], max(FLOOR * residual, bar.least) * size)
-            lost = WHOLE * other.closeness * np.asarray(other.apart[row.series]) >= 1.0
+            farthest = np.maximum(other.apart[row.series], other.apart["acceleration"])
+            lost = WHOLE * other.closeness * farthest >= 1.0
             found[name] = np.where(spread(lost, np.ndim(value)), np.inf, found[name])
     return found
 

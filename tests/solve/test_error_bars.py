@@ -87,12 +87,18 @@ def test_runs_that_agree_by_chance_have_bars_by_their_series():
 
 @pytest.mark.parametrize(("apart", "known"), [(0.33, True), (0.34, False)])
 def test_of_a_series_that_may_be_all_wrong_no_metric_is_known(apart, known):
-    metrics = {"rms_acceleration": 1.0, "max_penetration": np.ones(2), "impact_count": np.ones(2)}
-    distances = APART | {"acceleration": apart, "penetration": np.array([0.0, apart])}
+    metrics = {"max_penetration": np.ones(2), "impact_count": np.ones(2)}
+    distances = APART | {"penetration": np.array([0.0, apart])}
     found = bars(metrics, Companion(metrics, 0.5, distances), 0.0)
-    assert np.isfinite(found["rms_acceleration"]) == known
     assert np.isfinite(found["max_penetration"]).tolist() == [True, known]
     assert np.isfinite(found["impact_count"]).all()  # a count has no unit: a bar of its own
+
+
+def test_where_the_acceleration_is_all_wrong_no_metric_with_a_unit_is_known():
+    metrics = {"peak_contact_force": np.ones(2), "impact_count": np.ones(2)}
+    found = bars(metrics, Companion(metrics, 0.5, APART | {"acceleration": 0.34}), 0.0)
+    assert np.isinf(found["peak_contact_force"]).all()
+    assert np.isfinite(found["impact_count"]).all()
 
 
 def test_a_peak_is_known_no_closer_than_it_is_found():
