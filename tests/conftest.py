@@ -48,9 +48,9 @@ TOGETHER = {
     "tests/physics/test_friction_laws.py": "laws",
     "tests/physics/test_restitution.py": "laws",
     "tests/solve/test_chosen_laws.py": "laws",
-    "tests/measure/test_stress_laws.py": "laws",
+    "tests/studies/stress/test_stress_laws.py": "laws",
     "tests/campaigns/test_validation.py": "features",
-    "tests/measure/test_features.py": "features",
+    "tests/studies/tradeoff/test_features.py": "features",
     "tests/physics/test_general_mechanism.py": "features",
     "tests/solve/test_feature_runs.py": "features",
     "tests/physics/test_film.py": "features",
@@ -58,11 +58,11 @@ TOGETHER = {
     "tests/solve/test_model_version.py": "features",
     "tests/solve/test_references.py": "features",
     "tests/physics/test_worn_bore.py": "features",
-    "tests/wear/test_stages.py": "features",
-    "tests/wear/test_wear_command.py": "features",
+    "tests/studies/wear/test_stages.py": "features",
+    "tests/studies/wear/test_wear_command.py": "features",
     "tests/campaigns/test_wear_campaign.py": "features",
     "tests/campaigns/test_chaotic.py": "twins",
-    "tests/measure/test_stress.py": "twins",
+    "tests/studies/stress/test_stress.py": "twins",
     "tests/solve/test_horizon.py": "twins",
     "tests/solve/test_lyapunov.py": "twins",
 }
@@ -70,7 +70,7 @@ TOGETHER = {
 LONG = (
     "campaigns/test_chaos_processes",  # compiles the march; the three after it do without
     "sweep/test_execution", "campaigns/test_chaos_files", "cases/test_load",
-    "measure/test_stress", "solve/test_integrate", "test_pages", "test_tutorial",
+    "studies/stress/test_stress", "solve/test_integrate", "test_pages", "test_tutorial",
     "sweep/test_cluster",
     "sweep/test_sweep", "report/test_report", "cmd/test_cli",
 )  # fmt: skip

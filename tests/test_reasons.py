@@ -49,7 +49,7 @@ def test_no_module_spells_a_reason_itself(module):
     tree = ast.parse(SOURCES[module])
     words = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
     assert words & STORED <= (
-        {"budget_seconds"} if module == "compressor.measure.work_precision" else set()
+        {"budget_seconds"} if module == "compressor.studies.tradeoff.work_precision" else set()
     )
 
 

@@ -19,14 +19,10 @@ from typing import Any
 import click
 
 from compressor.program import PROGRAM, CompsimError, CompsimWarning, library_versions
+from compressor.studies import verbs
 from compsim import (
-    claims,
     completion,
-    dataset,
-    explain,
     export,
-    find,
-    identify,
     init,
     plan,
     plot,
@@ -35,10 +31,7 @@ from compsim import (
     schema,
     show,
     status,
-    stress,
-    tradeoff,
     verify,
-    wear,
 )
 from compsim.screen import DONE, INTERNAL, STORE, discard_output, open_streams, say
 from compsim.usage import Commands, one_line
@@ -92,17 +85,10 @@ for verb in (
     status.status,
     show.show,
     export.export,
-    dataset.dataset,
     verify.verify,
     schema.schema,
-    explain.explain,
-    tradeoff.tradeoff,
-    stress.stress,
-    wear.wear,
-    identify.identify,
-    find.find,
-    claims.claims,
     completion.completion,
+    *verbs(),
 ):
     cli.add_command(verb)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.explain import without_nan
+from compressor.studies import by_kind
 from compsim.screen import (
     DONE,
     Reading,
@@ -24,10 +24,10 @@ from compsim.screen import (
     setting,
     size,
     tell_changes,
+    without_nan,
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from compressor.regimes import Standing
     from compressor.sweep import Forecast
 
 
@@ -64,15 +64,16 @@ def plan(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
         )
     caution(studies)
-    chained = [study for study in studies if study.regimes]
-    studies = [study for study in studies if not study.regimes]
-    ahead: list[Standing] = []
-    if chained:
-        from compressor.regimes import standing
-
-        ahead = standing(chained, output)
+    kinds = by_kind(studies)
+    studies = kinds.pop(None, [])
+    ahead = {kind: kind.module("command").ahead(its, output) for kind, its in kinds.items() if kind}
+    more = {kind.group: [one._asdict() for one in found] for kind, found in ahead.items()}
+    if as_json and not studies:
+        print_text(json.dumps(more, indent=1))
+    if not as_json:
+        for kind, standings in ahead.items():
+            print_text("\n".join(kind.module("command").ahead_lines(standings)))
     if not studies:
-        tell_chains(ahead, as_json)
         return DONE
     tell_changes(studies, output)
     from compressor.sweep import forecast
@@ -80,11 +81,9 @@ def plan(
     found = forecast(studies, output, first)
     workers = jobs or cores()
     if as_json:
-        more = {"regimes": [one._asdict() for one in ahead]} if ahead else {}
         whole = without_nan(dataclasses.asdict(found.timed(workers, say)) | more)
         print_text(json.dumps(whole, indent=1))
         return DONE
-    tell_chains(ahead, as_json)
     width = max(len(part.study) for part in found.counts.studies)
     for part in found.counts.studies:
         print_text(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
@@ -105,14 +104,3 @@ def cost(whole: "Forecast") -> str:
     first = f", after about {duration(whole.compiling)} of compiling" if whole.compiling else ""
     taken = f"about {duration(whole.seconds)} with {workers} ({by})"
     return f"{taken}{first}, and {size(whole.bytes)}"
-
-
-def tell_chains(ahead: "list[Standing]", as_json: bool) -> None:
-    """Say how many values the chains of regimes have, and how many of them are stored."""
-    if as_json:
-        print_text(json.dumps({"regimes": [one._asdict() for one in ahead]}, indent=1))
-        return
-    for one in ahead:
-        missing = one.chains * one.values - one.done
-        chains = f"{plural(one.chains, 'chain')} x {plural(one.values, 'value')}"
-        print_text(f"{one.study}  {chains}  {one.done:>4} done  {missing:>4} missing")

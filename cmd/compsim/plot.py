@@ -3,6 +3,7 @@
 import click
 
 from compressor.program import did_you_mean
+from compressor.studies import STUDIES, kind_of_stored
 from compsim.results import ONE_JOB, folders, jobs, of_results, results_folder, some_words
 from compsim.screen import (
     DONE,
@@ -11,7 +12,7 @@ from compsim.screen import (
 
 FIGURES = (
     "signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map",
-    "bifurcation", "sections", "periods",
+    *(name for kind in STUDIES for name in kind.figures),
 )  # fmt: skip
 KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
 
@@ -74,15 +75,15 @@ def plot(
     from compressor.store import writable_folder
 
     writable_folder(output, make=False)
-    from compressor.regimes import followed_studies, open_regimes
-    from compressor.report import PlotChoice, write_plots, write_regime_plots
+    from compressor.report import PlotChoice, write_plots
 
     choice = PlotChoice(what, over, at, KINDS[form])
-    if name in followed_studies(folder):
+    kind = kind_of_stored(folder, name)
+    if kind:
         if values:
             listed = " ".join(f"--at {value}" for value in values)
-            raise click.UsageError(f"{name} is a study of regimes, without jobs: give {listed}")
-        drawn = write_regime_plots(open_regimes(folder, name), output, name, choice)
+            raise click.UsageError(f"{name} is a study of {kind.name}, without jobs: give {listed}")
+        drawn = kind.module("plots").write(folder, name, output, choice)
     else:
         drawn = write_plots(folder, output, words, choice)
     for found in drawn:

@@ -1,7 +1,11 @@
 """`compsim report`: the page, figures and tables of a folder of results."""
 
+from collections.abc import Callable
+from typing import Any
+
 import click
 
+from compressor.studies import STUDIES, page_additions
 from compsim.results import folders, of_results, results_folder
 from compsim.screen import (
     DONE,
@@ -9,15 +13,30 @@ from compsim.screen import (
 )
 
 
+def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command an option for each study that adds to the page from a folder of its own."""
+    for kind in STUDIES:
+        if kind.page_folder:
+            text = f"Folder of what `compsim {kind.name}` wrote, if there is one."
+            command = click.option(
+                f"--{kind.page_folder}", default=kind.page_folder, show_default=True,
+                shell_complete=folders, help=text,
+            )(command)  # fmt: skip
+    return command
+
+
 @click.command()
 @of_results()
 @click.option("-o", "--output", default="report", show_default=True, shell_complete=folders,
               help="Folder of the report.")  # fmt: skip
-@click.option("--claims", default="claims", show_default=True, shell_complete=folders,
-              help="Folder of what `compsim claims` judged, if there is one.")  # fmt: skip
+@page_folders
 @click.pass_context
 def report(
-    context: click.Context, given: tuple[str, ...], folder: str | None, output: str, claims: str
+    context: click.Context,
+    given: tuple[str, ...],
+    folder: str | None,
+    output: str,
+    **places: str,
 ) -> int:
     """Draw figures and tables of stored studies; prints the path of the page."""
     folder, _ = results_folder(given, folder, named=False)
@@ -27,5 +46,5 @@ def report(
     writable_folder(output, make=False)
     from compressor.report import write_report
 
-    print_text(str(write_report(folder, output, context.obj, claims)))
+    print_text(str(write_report(folder, output, context.obj, page_additions(places))))
     return DONE

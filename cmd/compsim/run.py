@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from compressor.program import printable
+from compressor.studies import by_kind
 from compsim.screen import (
     DONE,
     SOME_FAILED,
@@ -114,18 +115,19 @@ def run(
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     caution(studies)
-    chained = [study for study in studies if study.regimes]
-    if chained:
-        check_chains(len(chained) == len(studies), scheduler, rerun, watch)
+    kinds = by_kind(studies)
+    of_jobs = kinds.pop(None, [])
+    others = [(kind.module("command"), its) for kind, its in kinds.items() if kind]
+    for command, _ in others:
+        command.check_options(not of_jobs, scheduler, rerun, watch)
     code = DONE
-    if len(chained) < len(studies):
-        code = run_jobs(context, [s for s in studies if not s.regimes], output, jobs or cores(),
+    if of_jobs:
+        code = run_jobs(context, of_jobs, output, jobs or cores(),
                         (rerun, part, wait, scheduler, report if watch else "", quiet))  # fmt: skip
-    if chained:
-        from compsim.regimes import run_chains
-
-        shards = [study.shard(*part) if part else study for study in chained]
-        code = max(code, run_chains(shards, output, jobs or cores(), "failed" in rerun, quiet))
+    for command, its in others:
+        shards = [study.shard(*part) if part else study for study in its]
+        ended = command.run_studies(shards, output, jobs or cores(), "failed" in rerun, quiet)
+        code = max(code, ended)
     return code
 
 
@@ -184,16 +186,6 @@ def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None
         raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
     if backend == "local" and scheduler:
         raise click.UsageError("--scheduler goes with --backend dask")
-
-
-def check_chains(alone: bool, scheduler: str | None, rerun: tuple[str, ...], watch: bool) -> None:
-    """Usage errors of options that chains of regimes, `alone` or beside jobs, do not know."""
-    if scheduler:
-        raise click.UsageError("regimes run in processes here: leave --backend dask out")
-    if alone and "stale" in rerun:
-        raise click.UsageError("--rerun stale is for jobs, and regimes have none: leave it out")
-    if alone and watch:
-        raise click.UsageError("--watch shows jobs, and regimes have none: compsim plot draws them")
 
 
 def cluster(scheduler: str | None) -> contextlib.AbstractContextManager[Any]:

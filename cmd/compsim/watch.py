@@ -18,6 +18,7 @@ import time
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
+from compressor.studies import page_additions
 from compsim.screen import say
 
 if TYPE_CHECKING:
@@ -203,8 +204,9 @@ class Writer:
                 restate(self.told["report"], self.shown, now)
             else:
                 write_report(
-                    self.told["results"], self.told["report"], self.told["command"], "claims", now
-                )
+                    self.told["results"], self.told["report"], self.told["command"],
+                    page_additions({}), now,
+                )  # fmt: skip
             self.shown = now
         except Left:
             answer["left"] = True

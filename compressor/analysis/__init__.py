@@ -41,3 +41,4 @@ from compressor.analysis.shaking import (
 )
 from compressor.analysis.sobol import saltelli_design
 from compressor.analysis.swept_rows import SweptRow, rows_modes
+from compressor.analysis.words import plural

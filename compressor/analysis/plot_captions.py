@@ -11,7 +11,6 @@ from compressor.analysis.frame_forces import frame_forces, last_revolution, whol
 from compressor.analysis.impacts import impacts
 from compressor.analysis.orbit import orbit
 from compressor.analysis.paper_cases import SPOKEN
-from compressor.analysis.regime_captions import REGIME_CAPTIONS
 from compressor.analysis.runs import case_of, settled_revolutions
 from compressor.analysis.shaking import ORDER, deviation_spectrum, sensor_envelope, shaking
 from compressor.analysis.swept_rows import SweptRow, rows_modes
@@ -196,8 +195,7 @@ def newtons(force: float) -> str:
     return f"{force:.0f} N" if force >= 9.95 else f"{force:.1f} N"
 
 
-# of a job: functions of its run and its twin; of a study: of its rows and its axis; of regimes: as
-# `regime_captions` tells
+# of a job: functions of its run and its twin; of a study: of its rows and its axis
 PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
     "job": {
         "signals": signals,
@@ -207,5 +205,4 @@ PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
         "impacts": struck,
     },
     "study": {"waterfall": waterfall, "map": mode_rows},
-    "regimes": REGIME_CAPTIONS,
 }

@@ -1,6 +1,6 @@
 """Where a case leaves the range that the program was judged on.
 
-Extreme scenes are drawn from it (`compressor.measure.extremes`); it stands in the table of
+Extreme scenes are drawn from it (`compressor.studies.stress.extremes`); it stands in the table of
 parameters as `judged`.
 """
 

@@ -1,6 +1,6 @@
 """The `regimes` of a case file: one machine followed along a parameter, value after value.
 
-Each value's run starts from the end of the last one's (`compressor.regimes`). What a file says is
+Each value's run starts from the end of the last one's (`compressor.studies.regimes`). What a file says is
 read and checked here; the key that is followed stands in the file's own cases at its first value.
 """
 

@@ -1,12 +1,32 @@
-"""A store -> figures and a page."""
+"""A store -> figures and a page; the tools by which studies draw and add to the page."""
 
-from compressor.report.figures.outcomes import draw_outcomes
-from compressor.report.figures.style import render
-from compressor.report.figures.wear import draw_wear
-from compressor.report.figures.work_precision import draw_work_precision
-from compressor.report.model_choices import ModelTable, headline, model_table, place_text
-from compressor.report.page import Running
-from compressor.report.plot_choice import PlotChoice
+from compressor.report.additions import Add, Additions, Chapter, Draw, Note
+from compressor.report.figures import Drawing
+from compressor.report.figures.contact import MODE_COLORS, UNSEEN, mode_handles
+from compressor.report.figures.style import (
+    BLACK,
+    BLUE,
+    CYCLE,
+    GOLD,
+    GREY,
+    RED,
+    Line,
+    legend_above,
+    render,
+    sheet,
+    styled,
+)
+from compressor.report.figures.sweep_metric import (
+    FOOT,
+    MARKS,
+    Measure,
+    measures,
+    positions,
+    shown_value,
+)
+from compressor.report.page import Plate, Running, Section
+from compressor.report.plot_choice import PlotChoice, PlotError, Plotted, chosen, published
 from compressor.report.plots import write_plots
-from compressor.report.regime_plots import write_regime_plots
 from compressor.report.report import restate, write_report
+from compressor.report.study_section import file_name
+from compressor.report.tables import Cell, Row, Table, column_title

@@ -7,9 +7,10 @@ text that they print.
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 if TYPE_CHECKING:
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page: `template` prints its `content`, `anchor` is its id."""
+    """A part of the page: `template` prints its `content`, `anchor` is its id.
+
+    A template that lies in the folder `templates` of another package is named `package:file`.
+    """
 
     anchor: str
     title: str
@@ -80,13 +84,19 @@ class Running(NamedTuple):
 def templates() -> Environment:
     """The page's templates: they escape what they print, and what they lack is an error."""
     return Environment(
-        loader=PackageLoader(__name__.rpartition(".")[0]),
+        loader=ChoiceLoader([PackageLoader(__package__), FunctionLoader(template_elsewhere)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+
+
+def template_elsewhere(name: str) -> str | None:
+    """Return the text of a template `package:file`; None of a name without a package."""
+    package, _, file = name.rpartition(":")
+    return files(package).joinpath("templates", file).read_text("utf-8") if package else None
 
 
 def document(

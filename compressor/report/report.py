@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compressor.analysis import caption, case_of, claims
+from compressor.report.additions import Add, Additions, Note
 from compressor.report.answer import (
     Answer,
     Finding,
@@ -34,14 +35,7 @@ from compressor.report.figures.shown import as_csv
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import described, publish_library, script
 from compressor.report.job_series import job_scripts, series_name
-from compressor.report.machines_section import (
-    Part,
-    machine_drawings,
-    machine_files,
-    machine_sections,
-)
 from compressor.report.mechanism import mechanism_svg, mechanism_words
-from compressor.report.model_choices import headline, model_table, models_section, read_models
 from compressor.report.page import Plate, Running, Section, document, restated
 from compressor.report.paper_runs import PaperRuns, find_paper_runs, is_of_paper
 from compressor.report.paper_sections import missing_sections, paper_sections, spoken
@@ -60,7 +54,6 @@ from compressor.report.study_section import (
     file_name,
     job_counts,
     job_facts,
-    models_anchor,
     study_sections,
     table_anchor,
 )
@@ -81,17 +74,17 @@ def write_report(
     results: Folder,
     report: Folder,
     command: str = "",
-    claims: Folder = "",
+    add: Sequence[Add] = (),
     running: Running | None = None,
 ) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
-    claims: the folder of judged machines (`compsim claims`), if there is one. running: how the run
-    stands that still adds to the results; the page says so, and loads itself again.
+    add: what makes more of the page, such as `compressor.studies.page_additions` gives. running:
+    how the run stands that still adds to the results; the page says so, and loads itself again.
 
     Raises StoreError where there are no results, or the report's folder cannot be written.
     """
-    made = compose(results, command, claims, running)
+    made = compose(results, command, add, running)
     folder = Path(report)
     drawn = pictures(
         {plate.name: plate.figure for plate in made.plates},
@@ -129,9 +122,10 @@ class Made(NamedTuple):
     page: str
 
 
-def compose(results: Folder, command: str, claims: Folder, running: Running | None = None) -> Made:
-    """Everything of a report, in memory."""
-    judged = machine_files(claims) if claims else {}
+def compose(
+    results: Folder, command: str, add: Sequence[Add] = (), running: Running | None = None
+) -> Made:
+    """Return everything of a report, in memory."""
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     if not any(is_of_paper(stored, study) for study in studies):
@@ -143,15 +137,16 @@ def compose(results: Folder, command: str, claims: Folder, running: Running | No
     of_faults = [draw(*parts) for parts in diagnosis_drawings(found, paper)]
     shown = {run.attrs["key"] for run in paper.stored.values()}
     own = [study for study in studies if not shown.issuperset(study.keys)]
-    chosen = {study.name: models_line(results, study) for study in studies}
+    added = [one(results, studies, draw) for one in add]
     drawn = [
-        drawn_study(stored, study, others.get(study.name), chosen[study.name][0]) for study in own
+        drawn_study(stored, study, others.get(study.name), notes_on(study.name, added))
+        for study in own
     ]
     sets = [
         second_section(one, of_others[name], of_paper, table_anchor(name))
         for name, one in others.items()
     ]
-    of_machines = [drawn_part(*parts) for parts in machine_drawings(judged)]
+    chapters = [chapter for one in added for chapter in one.chapters]
     figures, tables = paper_sections(paper, of_paper)
     sections = [
         answer_section(summarised(stored, own, paper, drawn)),
@@ -159,8 +154,7 @@ def compose(results: Folder, command: str, claims: Folder, running: Running | No
         *figures,
         *sets,
         *diagnosis_sections(found, of_faults),
-        *machine_sections(of_machines),
-        *(section for _, section in chosen.values() if section),
+        *(chapter.section for chapter in chapters),
         *(one.table for one in drawn),
         *tables,
         assumptions_section(stored, studies, bool(paper.stored)),
@@ -168,7 +162,7 @@ def compose(results: Folder, command: str, claims: Folder, running: Running | No
         provenance_section(studies, results, command),
     ]
     plates = [*chain(of_paper, *of_others.values(), of_faults, *(one.plates for one in drawn))]
-    plates += [part.plate for part in of_machines if part.plate]
+    plates += [plate for chapter in chapters for plate in chapter.plates]
     jobs = {key: told for one in drawn for key, told in one.jobs.items()}
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs)}
     for key in series:
@@ -177,14 +171,9 @@ def compose(results: Folder, command: str, claims: Folder, running: Running | No
     return Made(plates, [study.name for study in studies], series, page)
 
 
-def drawn_part(
-    name: str, sentences: list[str], heading: str, caption: str, drawing: Drawing | None
-) -> Part:
-    """What is said of a file of judged machines, with its figure where it has one."""
-    if drawing is None:
-        return Part(name, sentences, None)
-    plate = draw(file_name("machines", name), heading, caption, drawing)
-    return Part(name, sentences, plate)
+def notes_on(study: str, added: Sequence[Additions]) -> list[Note]:
+    """Return what was added to the section of a study."""
+    return [one.notes[study] for one in added if study in one.notes]
 
 
 class DrawnStudy(NamedTuple):
@@ -198,18 +187,10 @@ class DrawnStudy(NamedTuple):
     jobs: dict[str, dict[str, Any]]
 
 
-def models_line(results: Folder, study: StoredStudy) -> tuple[str, Section | None]:
-    """Return the line on choices of the model of a study's job, and their section, if stored."""
-    data = read_models(results, study)
-    if data is None:
-        return "", None
-    return headline(model_table(data)), models_section(models_anchor(study.name), study, data)
-
-
 def drawn_study(
-    stored: Stored, study: StoredStudy, other: SecondSet | None, models: str
+    stored: Stored, study: StoredStudy, other: SecondSet | None, notes: Sequence[Note]
 ) -> DrawnStudy:
-    """A user's own study: its sections, and its sweep, drawn; `models`: its line on choices.
+    """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
 
     The sweep is not drawn where all of the study is shown as another set of the paper's figures.
     """
@@ -221,7 +202,7 @@ def drawn_study(
                  one.caption, one.figure)
             for one in ([] if whole else draw_sweep(data))
         ]  # fmt: skip
-        figures, table = study_sections(stored, study, data, plates, anchor, models)
+        figures, table = study_sections(stored, study, data, plates, anchor, notes)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MOST_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(

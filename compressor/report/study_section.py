@@ -11,6 +11,7 @@ import xarray as xr
 
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
+from compressor.report.additions import Note
 from compressor.report.figures.sweep_metric import measures
 from compressor.report.page import Plate, Section
 from compressor.report.tables import (
@@ -51,9 +52,8 @@ class Counts(NamedTuple):
 class StudyContent:
     """What a page says of a study; `chaotic` counts jobs of which statistics alone hold.
 
-    `second_set`: the id of the section with its own Figures 8 to 16; `models`: a line on how far
-    choices of the model move its numbers, and `models_table` the id of their section; empty where
-    it has none; `caveats`: what to know beside the numbers, a sentence each.
+    `second_set`: the id of the section with its own Figures 8 to 16, empty where it has none;
+    `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each.
     """
 
     case_file: str
@@ -65,8 +65,7 @@ class StudyContent:
     plates: Sequence[Plate]
     jobs: str
     second_set: str = ""
-    models: str = ""
-    models_table: str = ""
+    notes: Sequence[Note] = ()
 
 
 @dataclass(frozen=True)
@@ -85,11 +84,11 @@ def study_sections(
     data: xr.Dataset,
     plates: Sequence[Plate],
     second_set: str = "",
-    models: str = "",
+    notes: Sequence[Note] = (),
 ) -> tuple[Section, Section]:
-    """A study as `open_study` gives it: its figures and failures, and its table.
+    """Return the sections of a study as `open_study` gives it: figures and failures, and table.
 
-    models: the line on choices of the model, if there is a section of them.
+    notes: lines that others add to the first.
     """
     reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
     anchor = table_anchor(study.name)
@@ -103,8 +102,7 @@ def study_sections(
         plates=plates,
         jobs=anchor,
         second_set=second_set,
-        models=models,
-        models_table=models_anchor(study.name) if models else "",
+        notes=notes,
     )
     seen = [name for name in Regime if (data["regime"].values == name).any()]
     table = JobsContent(
@@ -119,11 +117,6 @@ def study_sections(
 def table_anchor(study: str) -> str:
     """The id of the section with a study's table."""
     return file_name("jobs", study)
-
-
-def models_anchor(study: str) -> str:
-    """The id of the section with the choices of the model of a study."""
-    return file_name("models", study)
 
 
 def file_name(*words: str) -> str:

@@ -21,7 +21,9 @@ from compressor.analysis.claim_rules import RULES
 from compressor.cases.case import Case
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.machines.findings import (
+from compressor.report.figures.style import render
+from compressor.studies.claims.figures import draw_claims_map
+from compressor.studies.claims.findings import (
     change,
     changes,
     consistency,
@@ -32,12 +34,10 @@ from compressor.machines.findings import (
     spoken,
     summary,
 )
-from compressor.machines.judged import CLAIMS, SHARES, cases_judged, judge
-from compressor.machines.search import least_change
-from compressor.machines.sensitivity import sensitivity
-from compressor.machines.study import judge_machines, machines
-from compressor.report.figures.claims import draw_claims_map
-from compressor.report.figures.style import render
+from compressor.studies.claims.judged import CLAIMS, SHARES, cases_judged, judge
+from compressor.studies.claims.search import least_change
+from compressor.studies.claims.sensitivity import sensitivity
+from compressor.studies.claims.study import judge_machines, machines
 
 FOLDER = "claims"
 GENERATIONS = 12

@@ -23,7 +23,7 @@ from sklearn.dummy import DummyClassifier
 from sklearn.ensemble import RandomForestClassifier, RandomForestRegressor
 from sklearn.metrics import balanced_accuracy_score, confusion_matrix, r2_score
 
-from compressor.diagnosis.data_set import DataSetOptions, make_data_set
+from compressor.studies.diagnosis.data_set import DataSetOptions, make_data_set
 
 MACHINES, SEED = 2000, 1
 NOISE = (0.0, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0)  # m/s2 rms, beside the sensor's own

@@ -23,10 +23,10 @@ from measure_accuracy import provenance
 from scipy.stats import binomtest, qmc
 
 from compressor.cases.case import Case
-from compressor.diagnosis.features import FEATURES, features
-from compressor.diagnosis.identify import Identifier
-from compressor.diagnosis.library import SIDES, open_library
 from compressor.solve.simulate import simulate
+from compressor.studies.diagnosis.features import FEATURES, features
+from compressor.studies.diagnosis.identify import Identifier
+from compressor.studies.diagnosis.library import SIDES, open_library
 
 STUDY, SEED, JUDGE = 3000, 2101, 2102  # machines of the study; seeds of it and of the judged
 JUDGED = 200

@@ -18,7 +18,12 @@ from measure_accuracy import provenance
 from compressor.analysis.paper_cases import FAULTS
 from compressor.cases.case import Case
 from compressor.cases.groups import Contact
-from compressor.measure.work_precision import (
+from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
+from compressor.report.figures.style import render
+from compressor.solve.attempts import attempt
+from compressor.solve.energy_audit import allowed
+from compressor.solve.simulate import simulate, with_series
+from compressor.studies.tradeoff.work_precision import (
     REFERENCES,
     default_cases,
     errors,
@@ -27,11 +32,6 @@ from compressor.measure.work_precision import (
     solved,
     stored_values,
 )
-from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
-from compressor.report.figures.style import render
-from compressor.solve.attempts import attempt
-from compressor.solve.energy_audit import allowed
-from compressor.solve.simulate import simulate, with_series
 
 TOLERANCES = [10.0**-k for k in range(2, 11)]
 CLEARANCES = [10.0**-k for k in range(7)]  # mm

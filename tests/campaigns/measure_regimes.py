@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from measure_accuracy import provenance
 
-from compressor.analysis.regime_captions import bifurcation
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.regimes.dataset import open_regimes
-from compressor.regimes.run import run_regimes
-from compressor.report.figures.regimes import draw_bifurcation
 from compressor.report.figures.style import render
+from compressor.studies.regimes.captions import bifurcation
+from compressor.studies.regimes.dataset import open_regimes
+from compressor.studies.regimes.figures import draw_bifurcation
+from compressor.studies.regimes.run import run_regimes
 
 FOLDER = "results"
 

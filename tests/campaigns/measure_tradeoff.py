@@ -16,9 +16,15 @@ from compsim import cli
 from measure_accuracy import provenance
 
 from compressor.cases.accuracy import ACCURACY
-from compressor.measure.work_precision import ERRORS, default_cases, fastest, faulty, solved
-from compressor.report.model_choices import model_table
 from compressor.solve.simulate import simulate
+from compressor.studies.tradeoff.page import model_table
+from compressor.studies.tradeoff.work_precision import (
+    ERRORS,
+    default_cases,
+    fastest,
+    faulty,
+    solved,
+)
 
 SERIES = "series kinematics (Eq. 3-4)"
 COMPILED = ("auto", "DOPRI5", "RODAS")

@@ -8,7 +8,7 @@ from page_tables import kept, regimes_table
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.regimes.values import run_value
+from compressor.studies.regimes.values import run_value
 
 
 @pytest.fixture(scope="module")

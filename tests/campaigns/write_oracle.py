@@ -21,9 +21,9 @@ from random_cases import strangers
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.measure.extremes import FEATURES, LAWS, Budget, values
 from compressor.program import ignore_warnings
 from compressor.solve.simulate import simulate
+from compressor.studies.stress.extremes import FEATURES, LAWS, Budget, values
 
 ROOT = Path(__file__).parents[2]
 SEED = 33

@@ -6,16 +6,16 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from compsim.claims import EXAMPLES
 
 from compressor.analysis.paper_cases import FAULT_LABELS, cases_of
 from compressor.cases.case import Case
 from compressor.cases.examples import FOLDER, STARTS, example, templates
 from compressor.cases.keys_read import itself
 from compressor.cases.load import load_studies
-from compressor.machines.judged import cases_judged
 from compressor.solve.cautions import cautions
 from compressor.solve.simulate import simulate
+from compressor.studies.claims.command import EXAMPLES
+from compressor.studies.claims.judged import cases_judged
 
 ROOT = Path(__file__).parent.parent.parent
 NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))

@@ -6,9 +6,9 @@ import pytest
 
 from compressor.cases.case import Case, CaseError
 from compressor.cases.materials import contact_stiffness
-from compressor.measure.explain import contact_words
 from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
+from compressor.studies.tradeoff.explain import contact_words
 
 WORN = {"joint": "both", "clearance_mm": 0.2}
 MATERIALS = {"materials": ["steel", "copper"]}

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compsim.claims import EXAMPLES
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,7 +21,8 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.shorthands import value_of
 from compressor.cases.table import GROUPS, outside_identity, table
 from compressor.cases.unread import reads
-from compressor.machines.judged import cases_judged
+from compressor.studies.claims.command import EXAMPLES
+from compressor.studies.claims.judged import cases_judged
 
 ROOT = Path(__file__).parents[2]
 FILES = [*(ROOT / "configs").glob("*.yaml"), *(ROOT / "compressor/cases/examples").glob("*.yaml")]

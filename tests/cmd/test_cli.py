@@ -333,9 +333,10 @@ def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
 def reporter(monkeypatch):
     """Stands in for compressor.report, which draws for seconds."""
 
-    def write_report(results, report, command, claims):
+    def write_report(results, report, command, add):
         read_studies(results)
-        return Path(report, command, claims)
+        (place,) = [one.keywords["place"] for one in add if one.keywords["place"]]
+        return Path(report, command, place)
 
     monkeypatch.setattr("compressor.report.write_report", write_report)
 
@@ -427,7 +428,7 @@ def test_explain_of_a_failed_job_says_so(case_file, capsys):
 
 
 def test_explain_of_an_effect_that_failed():
-    from compsim.explain import advised, without_nan
+    from compressor.studies.tradeoff.explain_command import advised, without_nan
 
     effect = types.SimpleNamespace(reason="non_finite")
     told = types.SimpleNamespace(advice=[types.SimpleNamespace(name="load", effect=effect)])
@@ -438,7 +439,7 @@ def test_explain_of_an_effect_that_failed():
 def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     import xarray as xr
 
-    from compressor.measure.work_precision import work_precision
+    from compressor.studies.tradeoff.work_precision import work_precision
 
     without_laws(monkeypatch)
     few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
@@ -467,7 +468,7 @@ def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
 
 def without_laws(monkeypatch):
     """Leave out laws and mechanisms, which take a minute to compile: tests/measure has them."""
-    from compressor.measure import model_choices as module
+    from compressor.studies.tradeoff import model_choices as module
 
     for name in ("model_variants", "model_choices"):
         whole = getattr(module, name)
@@ -479,7 +480,6 @@ def without_laws(monkeypatch):
 
 
 def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch):
-    from compressor.report.report import write_report
     from compressor.store.reader import open_study
 
     without_laws(monkeypatch)
@@ -503,7 +503,7 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
         assert any(f" {end} %" in rows[name] for name in scaled)
 
     assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
-    write_report("kept", "page")
+    assert cli.main(["report", "kept", "-o", "page"]) == 0
     page = Path("page/index.html").read_text(encoding="utf-8")
     assert f'<p>{lines[-1]}. <a href="#models-worn">' in page
     assert '<section id="models-worn">' in page
@@ -515,8 +515,10 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
 
     case_file("worn.yaml", joint="big_end", clearance_mm=[0.25, 0.3], machine={"rod_mass_kg": 3})
     assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
-    with pytest.warns(match="is of a job that worn no longer has: compsim explain --models "):
-        write_report("kept", "page")
+    capsys.readouterr()
+    assert cli.main(["report", "kept", "-o", "page"]) == 0
+    said = "is of a job that worn no longer has: compsim explain --models "
+    assert said in capsys.readouterr().err
     assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
 
 

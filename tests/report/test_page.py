@@ -19,8 +19,6 @@ from compressor.report import page
 from compressor.report.answer import Answer, Finding, Line
 from compressor.report.assumptions import Assumptions
 from compressor.report.diagnosis_section import DiagnosisContent
-from compressor.report.machines_section import Part
-from compressor.report.model_choices import ModelsContent
 from compressor.report.page import Plate, Running, Section, document, templates
 from compressor.report.paper_sections import MissingFigures
 from compressor.report.provenance import Provenance
@@ -28,6 +26,8 @@ from compressor.report.second_sets import Pair, SecondSetContent
 from compressor.report.study_section import JobsContent, StudyContent
 from compressor.report.tables import Cell, Row, Table
 from compressor.store.studies import StoredStudy
+from compressor.studies.claims.page import Part
+from compressor.studies.tradeoff.page import ModelsContent
 
 ROOT = Path(__file__).parents[2]
 HOME = Path(page.__file__).parent

@@ -13,7 +13,6 @@ from published import ASKED, DRY, GIVEN, MACHINE, STIFFNESS, drop, given_back
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
-from compressor.measure.explain import terms, unknowns
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import CARRIED
@@ -25,6 +24,7 @@ from compressor.solve.scipy_landing import needs_landings
 from compressor.solve.si_record import offsets, record
 from compressor.solve.simulate import simulate
 from compressor.solve.sizes import natural_sizes
+from compressor.studies.tradeoff.explain import terms, unknowns
 
 pytestmark = pytest.mark.compiled
 

@@ -8,8 +8,6 @@ import pytest
 from compsim import cli
 
 from compressor.cases.case import Case
-from compressor.diagnosis.data_card import data_card
-from compressor.diagnosis.data_set import make_data_set
 from compressor.outcome import REGIME_WORDS, Regime
 from compressor.report.report import write_report
 from compressor.solve.simulate import simulate
@@ -18,6 +16,8 @@ from compressor.store.caveats import is_late, is_unrepeated, job_caveats
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.rows import Rows
 from compressor.store.status import report_job, standings
+from compressor.studies.diagnosis.data_card import data_card
+from compressor.studies.diagnosis.data_set import make_data_set
 
 SOLVE = {"duration_rev": 3, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 STUDY = {

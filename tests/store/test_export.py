@@ -14,13 +14,13 @@ from compsim import cli
 from conftest import keep
 
 from compressor.cases.load import load_studies
-from compressor.diagnosis.record_file import read_record
 from compressor.metrics import METRICS, SIZES
 from compressor.solve.simulate import simulate
 from compressor.store.export import ExportError, ExportOptions, export
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import write_study
+from compressor.studies.diagnosis.record_file import read_record
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 GRID = {

@@ -1,0 +1,89 @@
+"""Studies that are built on the program, a folder each; the rest of the program knows this table.
+
+A study holds all of its own: run, file, figures, captions, section of the page, commands. Nothing
+of it is imported before it is used, but for its commands, which the command line lists.
+"""
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    import click
+
+    from compressor.cases import Study
+    from compressor.report import Add
+    from compressor.store import Folder
+
+
+class StudyKind(NamedTuple):
+    """A kind of study: where its parts are in its folder.
+
+    `verbs`: modules by the verb that each gives the command line.
+    `group`: the group of keys by which a case file asks `compsim run` for it; its module `command`
+    then has `check_options`, `run_studies`, `ahead` and `ahead_lines`.
+    `figures`: what `compsim plot` draws of it; its module `plots` has `is_stored` and `write`.
+    `has_page`: whether its module `page` has `add`, what it adds to the page of a report.
+    `page_folder`: the option, and default folder, of what it is made from beside the results.
+    """
+
+    name: str
+    verbs: Mapping[str, str] = {}
+    group: str = ""
+    figures: tuple[str, ...] = ()
+    has_page: bool = False
+    page_folder: str = ""
+
+    def module(self, name: str) -> Any:
+        """Return a module of its folder."""
+        return import_module(f"{__name__}.{self.name}.{name}")
+
+
+STUDIES = (
+    StudyKind("claims", {"claims": "command"}, has_page=True, page_folder="claims"),
+    StudyKind("regimes", group="regimes", figures=("bifurcation", "sections", "periods")),
+    StudyKind("wear", {"wear": "command"}),
+    StudyKind("diagnosis", {"dataset": "dataset_command", "identify": "identify_command"}),
+    StudyKind("tradeoff", {"tradeoff": "command", "explain": "explain_command"}, has_page=True),
+    StudyKind("stress", {"stress": "command"}),
+    StudyKind("search", {"find": "command"}),
+)
+
+
+def verbs() -> "list[click.Command]":
+    """Return the commands of all studies."""
+    return [
+        getattr(kind.module(module), verb)
+        for kind in STUDIES
+        for verb, module in kind.verbs.items()
+    ]
+
+
+def kind_of(study: "Study") -> StudyKind | None:
+    """Return the kind of study that a case file has a group of; None of a file of jobs."""
+    found = [kind for kind in STUDIES if kind.group and getattr(study, kind.group)]
+    return found[0] if found else None
+
+
+def by_kind(studies: "Iterable[Study]") -> "dict[StudyKind | None, list[Study]]":
+    """Return studies by their kind, those of jobs by None."""
+    found: dict[StudyKind | None, list[Study]] = {}
+    for study in studies:
+        found.setdefault(kind_of(study), []).append(study)
+    return found
+
+
+def kind_of_stored(results: "Folder", name: str) -> StudyKind | None:
+    """Return the kind of a stored study that `compsim plot` draws; None of jobs, or where none."""
+    drawn = (kind for kind in STUDIES if kind.figures)
+    return next((kind for kind in drawn if kind.module("plots").is_stored(results, name)), None)
+
+
+def page_additions(folders: "Mapping[str, Folder]") -> "list[Add]":
+    """Return what the studies add to a report; folders: by the option that names them."""
+    return [
+        partial(kind.module("page").add, place=folders.get(kind.page_folder, kind.page_folder))
+        for kind in STUDIES
+        if kind.has_page
+    ]

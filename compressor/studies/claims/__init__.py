@@ -1,0 +1,1 @@
+"""In which machines the paper's claims hold: over masses, friction, contact and loads."""

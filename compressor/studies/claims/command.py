@@ -1,0 +1,137 @@
+"""`compsim claims`: in which machines the paper's claims hold, and what decides them."""
+
+import json
+import shlex
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import click
+from compsim.results import files, folders
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    as_json,
+    jobs_option,
+    limit,
+    one_thread_each,
+    plural,
+    print_text,
+    say,
+    setting,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+EXAMPLES = ("claims", "assumptions")
+
+
+@click.command()
+@click.argument("configs", nargs=-1, metavar="[CONFIG...]", shell_complete=files)
+@click.option("-o", "--output", default="claims", show_default=True, shell_complete=folders,
+              help="Folder of the verdicts.")  # fmt: skip
+@click.option("--search", "generations", type=click.IntRange(min=0), default=0, metavar="N",
+              help="Then look for the least change that makes all claims hold: N generations of "
+              "some 50 machines, in the ranges that a CONFIG draws from.")  # fmt: skip
+@jobs_option("Worker processes.")
+@setting
+@limit
+@as_json
+@click.option("--quiet", is_flag=True, help="No progress.")
+def claims(
+    configs: tuple[str, ...],
+    output: str,
+    generations: int,
+    jobs: int | None,
+    overrides: tuple[str, ...],
+    max_jobs: int,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Judge the paper's eight claims on many machines, over assumptions that the paper leaves open.
+
+    Every point of a CONFIG is a machine: masses, friction, contact, loads. Each is judged by the
+    paper's nine worn cases, which are run in memory. NAME.nc in the folder has the margin of each
+    claim, 0 at its threshold, with its error; the same command goes on from it. Without CONFIG, the
+    map over rod and reciprocating mass (claims.nc), and all assumptions drawn for a variance-based
+    sensitivity (assumptions.nc), by the examples that come with the program. `compsim report` draws
+    them.
+
+    Exit code 3 if a machine has no verdict.
+    """
+    one_thread_each()  # before numpy loads
+    from compressor.cases import load_studies, templates
+    from compressor.store import writable_folder
+    from compressor.studies.claims.judged import cases_judged
+    from compressor.studies.claims.search import least_change
+    from compressor.studies.claims.study import judge_machines
+    from compressor.sweep import cores
+
+    paths = configs or tuple(str(templates()[name].path) for name in EXAMPLES)
+    studies = load_studies(
+        *paths, overrides=overrides, max_jobs=max_jobs, follow=False, variants=cases_judged
+    )
+    drawn = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
+    if generations and not drawn:
+        raise click.UsageError(
+            "--search needs a CONFIG whose keys are drawn from ranges, such as {saltelli: [2, 9]}"
+        )
+    writable_folder(output)
+    screen = Screen(quiet, "machines", alike=False)
+    found = []
+    try:
+        for study in studies:
+            say_unless(quiet, f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
+            found.append(judge_machines(study, output, jobs or cores(), screen))
+            screen.end()
+        for study in drawn if generations else ():
+            say_unless(quiet, f"{study.name}: {plural(generations, 'generation')} of a search")
+            found.append(least_change(study, output, jobs or cores(), generations, screen))
+            screen.end()
+    finally:
+        screen.end()
+    tell(found, as_json)
+    beside = "" if output == "claims" else f" --claims {shlex.quote(output)}"
+    say_unless(quiet, f"next: compsim report{beside}")
+    failed = any((one["status"] == "failed").any() for one in found)
+    return SOME_FAILED if failed else DONE
+
+
+def say_unless(quiet: bool, text: str) -> None:
+    """Say something on stderr, unless quiet is wanted."""
+    if not quiet:
+        say(text)
+
+
+def tell(found: "list[xr.Dataset]", as_json: bool) -> None:
+    """Files of judged machines on stdout, with what they say."""
+    told = {one.encoding["source"]: [*sentences(one)] for one in found}
+    if as_json:
+        print_text(json.dumps(told, indent=1))
+        return
+    for path, said in told.items():
+        print_text(path)
+        print_text("\n".join(f"  {text}" for text in said))
+
+
+def sentences(found: "xr.Dataset") -> Iterator[str]:
+    """What a file of judged machines says."""
+    from compressor.studies.claims.findings import (
+        change,
+        consistency,
+        deciding,
+        is_mass_plane,
+        summary,
+    )
+    from compressor.studies.claims.sensitivity import sensitivity
+
+    if "looked" in found.attrs:
+        yield from change(found)
+        return
+    yield from summary(found)
+    if is_mass_plane(found) and min(found["status"].shape) > 2:
+        yield consistency(found)
+    table = sensitivity(found)
+    if table is not None:
+        yield from deciding(table)

@@ -1,0 +1,206 @@
+"""The paper's claims over many machines: a study whose points are machines, judged side by side.
+
+What is finished is kept in one file a study, from which the same command goes on.
+"""
+
+import hashlib
+import time
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis import RULES
+from compressor.cases import Case, Study
+from compressor.program import PROGRAM, CompsimError
+from compressor.store import (
+    Folder,
+    StoreError,
+    coordinate_names,
+    read_dataset,
+    swept_column,
+    write_dataset,
+)
+from compressor.studies.claims.judged import CLAIMS, SHARES, Judged, judge
+from compressor.sweep import Done, Lost, Needs, Progress, run_here
+
+FLUSH = 3.0  # s between two writings of what is finished
+TIMEOUT = 900.0  # s that a machine may take, with all of its cases
+REMEDY = "delete it, or choose another folder"
+OTHERS = "holds machines of another case file, or of another version of compsim"
+ELSEWHERE = "choose another folder by -o, or delete it"
+ROLES = ("joint", "load", "clearance_mm", "initial_offset_mm", "body", "sensor")
+UNIT = {"units": "1"}
+
+
+class ClaimsError(CompsimError, ValueError):
+    """A study that makes no machines to judge."""
+
+    exit_code = 2
+
+
+def machines(study: Study) -> list[Case]:
+    """The machines of a study. Raises ClaimsError where it gives what the paper's cases decide."""
+    swept = [axis.key for axis in study.axes if axis.key.partition(".")[0] in ROLES]
+    given = swept or [key for key in ROLES if is_given(study.cases[0], key)]
+    if given:
+        raise ClaimsError(
+            f"{study.path}: {given[0]}: the paper's cases decide it, by which every machine is "
+            "judged: leave it out"
+        )
+    return [*study.cases]
+
+
+def is_given(case: Case, key: str) -> bool:
+    """Whether a case says something else of a key than an ideal machine with its default load."""
+    default = Case.from_values({})
+    return getattr(case, key) != getattr(default, key)
+
+
+def judge_machines(
+    study: Study,
+    folder: Folder,
+    workers: int,
+    progress: Progress = lambda done, total, remark: None,
+) -> xr.Dataset:
+    """Judge the machines of a study that FOLDER/NAME.nc does not hold yet; gives all of them.
+
+    As `dataset` makes it. Whatever ends the run early, what was finished is stored, but for the
+    last seconds. Raises ClaimsError, WorkersFailed, and StoreError also where the file holds
+    finished machines that the study does not have, which would be lost.
+    """
+    cases, path = machines(study), Path(folder) / f"{study.name}.nc"
+    keys = [machine_key(case) for case in cases]
+    known = kept(path)
+    if not known.keys() <= {*keys}:
+        raise StoreError(path, OTHERS, ELSEWHERE)
+    missing = [number for number, key in enumerate(keys) if key not in known]
+    total, written, done = len(keys), time.monotonic(), len(keys) - len(missing)
+    progress(done, total, "")
+    tasks = [(number, cases[number], TIMEOUT) for number in missing]
+    needs = Needs.of(cases)._replace(horizon=True)
+    running = run_here(judge, tasks, needs, workers, partial(progress, done, total))
+    try:
+        for end in running:
+            known[keys[end.id]] = judged(end)
+            done += 1
+            progress(done, total, "")
+            if time.monotonic() - written > FLUSH:
+                write_dataset(path, dataset(study, keys, known))
+                written = time.monotonic()
+    finally:
+        running.close()
+        if missing:
+            write_dataset(path, dataset(study, keys, known))
+    found = dataset(study, keys, known)
+    found.encoding["source"] = str(path)
+    return found
+
+
+def machine_key(case: Case) -> str:
+    """What a machine's verdict depends on: all of its case, and how claims are measured."""
+    rules = "\n".join(f"{rule.statement} {rule.threshold}" for rule in RULES)
+    return hashlib.sha256(f"{case.key} {rules}".encode()).hexdigest()[:20]
+
+
+def judged(end: Done | Lost) -> Judged:
+    """What a job says of its machine, also one that took its worker with it."""
+    return end.result if isinstance(end, Done) else Judged(failed=f"{end.reason}: {end.detail}")
+
+
+def dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr.Dataset:
+    """The machines of a study by their assumptions: `margin`, `held` and more over (claim, ...).
+
+    A grid has a dimension for each swept key, any other study the dimension machine; the keys are
+    coordinates, in the case file's unit. `margin` and `error` are relative to the threshold; `held`
+    is 1, 0, or -1 where the machine was not judged. `status` is ok, failed (see `failed`) or "".
+    """
+    names = coordinate_names([axis.key for axis in study.axes])
+    on_grid = study.is_grid and bool(study.axes)
+    dims = tuple(names.values()) if on_grid else ("machine",)
+    shape = tuple(len(axis.values) for axis in study.axes) if on_grid else (len(keys),)
+    coordinates: dict[str, tuple] = {
+        names[axis.key]: (
+            (names[axis.key],) if on_grid else dims, *swept_column(axis.key, axis.values)
+        )
+        for axis in study.axes
+    }  # fmt: skip
+    found = [rows.get(key, Judged()) for key in keys]
+    status = [
+        "" if key not in rows else "failed" if row.failed else "ok"
+        for key, row in zip(keys, found, strict=True)
+    ]
+    margin = np.array([row.margin for row in found])
+    held = np.where(np.isnan(margin), -1, margin >= 0.0).astype(np.int8)
+    phrases: dict[str, tuple[Any, tuple[str, ...], str]] = {
+        "margin": (margin, ("claim",), "how far a claim is from its threshold, relative to it"),
+        "error": ([r.error for r in found], ("claim",), "how far the margin may be off"),
+        "held": (held, ("claim",), "1: the claim holds, 0: it does not, -1: not judged"),
+        "share_margin": (
+            [row.share_margin for row in found], ("share",),
+            "margin of claim 7 by one share of the revolution alone",
+        ),
+        "share_error": (
+            [row.share_error for row in found], ("share",), "how far that margin may be off"
+        ),
+        "chaotic": ([row.chaotic for row in found], (), "how many of the nine cases are chaotic"),
+    }  # fmt: skip
+    texts = {"status": status, "failed": [row.failed for row in found], "key": [*keys]}
+    variables: dict[str, tuple] = {}
+    for name, (values, extra, phrase) in phrases.items():
+        array = np.array(values)
+        array = array.reshape(*shape, *array.shape[1:])
+        variables[name] = ((*dims, *extra), array, UNIT | {"long_name": phrase})
+    for name, words in texts.items():
+        variables[name] = (dims, np.array(words, object).reshape(shape))
+    coordinates |= {
+        "claim": ("claim", np.array(CLAIMS), {"long_name": "claim of the paper"}),
+        "share": ("share", np.array(SHARES, object), {"long_name": "measure of claim 7"}),
+    }
+    attrs = {
+        "title": "the paper's claims over machines",
+        "study": study.name,
+        "case": study.cases[0].attributes()["case"],
+        "thresholds": "; ".join(f"{n}. {r.threshold}" for n, r in enumerate(RULES, 1)),
+        "program": PROGRAM,
+    }
+    return xr.Dataset(variables, coordinates, attrs)
+
+
+def kept(path: Path) -> dict[str, Judged]:
+    """The machines of a file by key; none where there is no file. Raises StoreError."""
+    if not path.exists():
+        return {}
+    return rows_of(read_machines(path))
+
+
+def read_machines(path: Path) -> xr.Dataset:
+    """The machines of a file, as `dataset` made them. Raises StoreError where it is none."""
+    found = read_dataset(path, REMEDY)
+    if "share_margin" not in found or "key" not in found:
+        raise StoreError(path, "is no file of judged machines", REMEDY)
+    return found.set_coords([name for name in found if "case_key" in found[name].attrs])
+
+
+def rows_of(found: xr.Dataset) -> dict[str, Judged]:
+    """What is known of machines, by key."""
+    flat = found.stack(all_machines=found["key"].dims, create_index=False)
+    flat = flat.transpose("all_machines", ...)
+    columns = [flat[name].values.tolist() for name in Judged._fields]
+    keys, status = flat["key"].values.tolist(), flat["status"].values.tolist()
+    rows: dict[str, Judged] = {}
+    for key, known, values in zip(keys, status, zip(*columns, strict=True), strict=True):
+        if known:
+            margin, error, share_margin, share_error, chaotic, failed = values
+            rows[key] = Judged(
+                tuple(margin),
+                tuple(error),
+                tuple(share_margin),
+                tuple(share_error),
+                chaotic,
+                failed,
+            )
+    return rows

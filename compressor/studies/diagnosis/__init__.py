@@ -1,0 +1,1 @@
+"""Which joint is worn, as a sensor's record tells it."""

@@ -1,0 +1,148 @@
+"""`compsim identify`: which joint and clearance of a study explain a record."""
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+from compsim.results import files, of_results, one_word, results_folder, studies
+from compsim.screen import (
+    DONE,
+    Screen,
+    as_json,
+    one_thread_each,
+    plural,
+    print_text,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from compressor.studies.diagnosis.identify import Answer, Identifier
+
+
+@click.command()
+@of_results("RECORD.csv|JOB", files)
+@click.option("--study", required=True, shell_complete=studies,
+              help="Stored study with sensor records, to explain it by.")  # fmt: skip
+@click.option("--rpm", type=float, help="Steady speed of a record without a tacho.")
+@click.option("--tdc", type=float, help="A time of top dead centre in it, s.")
+@as_json
+@click.option("--quiet", is_flag=True, help="No progress.")
+def identify(
+    given: tuple[str, ...],
+    study: str,
+    folder: str | None,
+    rpm: float | None,
+    tdc: float | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Tell which joint, with which clearance, explains a record of an accelerometer.
+
+    The record is a CSV file with the columns time_s, acceleration_m_per_s2 and tacho, a signal that
+    rises at each top dead centre; or without tacho, with --rpm and --tdc. Or it is a stored job
+    with a sensor's record, named by its key or the beginning of it; it is then left out of the
+    study. Joints are ranked by probability, where the study's shares of them are the prior, and
+    each clearance has a 90 % interval. Where no joint of the study fits, that is said first.
+
+    Exit code 0 also where nothing fits: that is an answer.
+    """
+    folder, words = results_folder(given, folder)
+    record = one_word(words, "RECORD.csv|JOB")
+    one_thread_each()  # before numpy loads
+    from compressor.studies.diagnosis.identify import explain_record, find_record
+    from compressor.studies.diagnosis.record_file import SteadySpeed
+
+    if (rpm is None) != (tdc is None):
+        raise click.UsageError("--rpm and --tdc belong together")
+    steady = None if rpm is None or tdc is None else SteadySpeed(rpm, tdc)
+    key, found = find_record(record, folder, steady)
+    screen = Screen(quiet)
+    try:
+        fitted, answer = explain_record(found, folder, study, key, screen)
+    finally:
+        screen.end()
+    if as_json:
+        print_text(json.dumps(plain(record, fitted, answer), indent=1))
+        return DONE
+    pulses = found.tacho
+    rpm_told = 60.0 * (len(pulses) - 1) / (pulses[-1] - pulses[0])
+    rate = 1.0 / (found.times[1] - found.times[0])
+    print_text(f"{record}: {len(pulses) - 1} revolutions at {rpm_told:.4g} rpm, {rate:.6g} Hz")
+    for line in (*verdict(answer), *ranking(answer), *grounds(fitted, answer, folder)):
+        print_text(line)
+    return DONE
+
+
+def verdict(answer: "Answer") -> Iterator[str]:
+    """That nothing fits, and what may be done; nothing where something does."""
+    if answer.fits:
+        return
+    yield (f"NOTHING IN THIS STUDY FITS: {answer.p_value:.2%} of its own jobs are as strange "
+           "(see the distances below)")  # fmt: skip
+    odd = ", ".join(f"{name} ({value:+.1f} sd)" for name, value in answer.odd.items())
+    yield f"farthest from what other features foretell: {odd}"
+    yield ("what to do: check units, tacho and sensor against the study's; widen what it varies "
+           "(masses, speed, loads, friction, foundation, noise) and run it again")  # fmt: skip
+    yield "the ranking below is what is least far, and is not to be trusted"
+
+
+def ranking(answer: "Answer") -> Iterator[str]:
+    """The table of joints."""
+    yield f"{'rank':<5} {'joint':<10} {'probability':>11}  clearance, mm: median [90 % interval]"
+    for rank, one in enumerate(answer.candidates, 1):
+        yield f"{rank:<5} {one.joint:<10} {one.probability:>11.3f}  {ends(one.clearances)}".rstrip()
+
+
+def ends(clearances: dict[str, Any]) -> str:
+    """Clearances with their intervals, by end."""
+    return "; ".join(
+        f"{side} {found.median:.3f} [{found.low:.3f}, {found.high:.3f}]"
+        for side, found in clearances.items()
+    )
+
+
+def grounds(fitted: "Identifier", answer: "Answer", folder: str) -> Iterator[str]:
+    """What an answer rests on, and its cautions."""
+    library = fitted.library
+    yield (f"rests on {len(library.keys)} of {plural(library.jobs)} of study {library.study} in "
+           f"{folder}; the nearest one is {answer.nearest}")  # fmt: skip
+    yield (f"distance from the nearest jobs {answer.near.record:.3g} (usual "
+           f"{answer.near.usual:.3g}), of features from what others foretell "
+           f"{answer.apart.record:.3g} (usual {answer.apart.usual:.3g}); "
+           f"as strange are {answer.p_value:.0%} of its own jobs")  # fmt: skip
+    held = [value for ends in fitted.covered.values() for value in ends.values()]
+    told = f", clearance within its interval in {sum(held) / len(held):.0%}" if held else ""
+    yield f"on these jobs, each left out in turn: joint right in {fitted.right:.0%}{told}"
+    left = [
+        joint for joint in ("none", "big_end", "small_end", "both") if joint not in fitted.joints
+    ]
+    if left:
+        yield f"not told, since the study has too few jobs of it: {', '.join(left)}"
+    if fitted.equal and "both" in fitted.joints:
+        yield "the study has equal clearances at both joints, so it tells of equal ones only"
+    yield "caution: beside the joints, the study varies these alone; all else, such as the laws of"
+    yield "contact and friction, the foundation, the sensor and its noise, is as in its case file:"
+    for key, values in library.swept.items():
+        if key != "sensor.seed":
+            yield f"  {key:<28} {span(values)}"
+
+
+def span(values: "np.ndarray") -> str:
+    """The reach of a swept key's values."""
+    if values.dtype.kind in "iuf":
+        return f"{values.min():.4g} to {values.max():.4g}"
+    return ", ".join(sorted({str(value) for value in values.tolist()}))
+
+
+def plain(record: str, fitted: "Identifier", answer: "Answer") -> dict[str, Any]:
+    """An answer as JSON says it."""
+    library = fitted.library
+    return {
+        "record": record, "study": library.study, "jobs": len(library.keys),
+        "jobs_of_study": library.jobs, **dataclasses.asdict(answer),
+        "study_joint_right": fitted.right, "study_intervals_hold": fitted.covered,
+        "equal_clearances": fitted.equal, "joints": list(fitted.joints),
+    }  # fmt: skip

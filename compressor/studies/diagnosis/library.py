@@ -1,0 +1,178 @@
+"""A stored study as what records are compared with: the features of each job's record."""
+
+import hashlib
+import inspect
+import math
+import warnings
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from compressor.cases import Case, points
+from compressor.store import (
+    Folder,
+    Stored,
+    StoredStudy,
+    StoreError,
+    StoreWarning,
+    find_study,
+    read_dataset,
+    read_store,
+    report_job,
+    write_dataset,
+)
+from compressor.studies.diagnosis import features as table
+from compressor.studies.diagnosis.data_set import Progress
+from compressor.studies.diagnosis.features import FEATURES, RecordError, features
+from compressor.vibration import Record
+
+SERIES = ("sensor_time", "sensor_acceleration", "tacho_time")
+SIDES = ("big_end", "small_end")
+
+TOLD = ("joint", "clearance_mm")  # keys of what is asked for; all others are cautions
+
+
+@dataclass(frozen=True)
+class Library:
+    """The n jobs of a study that have a sensor's record.
+
+    joints: (n,) none, big_end, small_end or both; clearances: mm, (n, 2) of big and small end, 0
+    where there is none; features: (n, FEATURES), nan where a record does not have one; jobs: of the
+    study, with those that failed or are missing; swept: values (n,) by key of other swept keys.
+    """
+
+    study: str
+    keys: np.ndarray
+    joints: np.ndarray
+    clearances: np.ndarray
+    features: np.ndarray
+    jobs: int
+    swept: dict[str, np.ndarray]
+
+    def without(self, key: str) -> "Library":
+        """The same but for a job, since a job must not explain itself."""
+        return self.only(self.keys != key)
+
+    def only(self, kept: np.ndarray) -> "Library":
+        """The jobs that a mask (n,) keeps."""
+        swept = {name: values[kept] for name, values in self.swept.items()}
+        own = {n: getattr(self, n)[kept] for n in ("keys", "joints", "clearances", "features")}
+        return replace(self, swept=swept, **own)
+
+
+def open_library(
+    folder: Folder, name: str, progress: Progress = lambda done, total, remark: None
+) -> Library:
+    """The library of a stored study.
+
+    Features are kept in `<folder>/features/<study>.nc` and made again when jobs, or how features
+    are made, have changed. Raises StoreError where there is no such study or no record in it.
+    """
+    study, stored = find_study(folder, name), read_store(folder).warned()
+    positions = {key: place for key in study.keys if (place := _place(stored, key)) is not None}
+    made_of = _digest(stored, positions)
+    path = Path(folder) / "features" / f"{name}.nc"
+    kept = _kept(path, made_of)
+    if kept is None:
+        kept = _made(stored, positions, progress).assign_attrs(made_of=made_of)
+        try:
+            write_dataset(path, kept)
+        except StoreError as error:
+            warnings.warn(f"features are not kept: {error}", StoreWarning, stacklevel=2)
+    if not kept.sizes["job"]:
+        remedy = "run it with body: true, sensor: true and output.keep: series"
+        raise StoreError(folder, f"study {name!r} has no sensor's record", remedy)
+    keys = kept["key"].values.astype(str)
+    return Library(
+        name, keys, kept["joint"].values.astype(str), kept["clearance"].values,
+        kept["feature"].values, study.jobs, _swept(study, keys),
+    )  # fmt: skip
+
+
+def job_record(stored: Stored, key: str) -> Record | None:
+    """The sensor's record of a stored job; None where it has none."""
+    found = stored.values(key, SERIES)
+    if set(found) != set(SERIES):
+        return None
+    times, values, tacho = (np.asarray(found[name], float) for name in SERIES)
+    return Record(times, values, tacho, math.nan)
+
+
+def vector(record: Record) -> np.ndarray:
+    """The features of a record as a row of a library, (FEATURES,). Raises RecordError."""
+    found = features(record.times, record.values, record.tacho)
+    return np.array([found[name] for name in FEATURES])
+
+
+def _place(stored: Stored, key: str) -> int | None:
+    """Where a job that is ok and has series stands in the rows of a store."""
+    place = stored.position(key)
+    if place is None or stored.rows.words["status"][place] != "ok":
+        return None
+    return place if stored.rows.path(place) is not None else None
+
+
+def _digest(stored: Stored, positions: dict[str, int]) -> str:
+    """What features are made of: files by their digests, and the code that makes them."""
+    parts = (stored.rows.columns[name] for name in ("key", "digest"))
+    keys, digests = (column[[*positions.values()]].tolist() for column in parts)
+    names = [f"{k.decode()}-{d.decode()}.h5" for k, d in zip(keys, digests, strict=True)]
+    return hashlib.sha256("\n".join([inspect.getsource(table), *names]).encode()).hexdigest()
+
+
+def _kept(path: Path, made_of: str) -> xr.Dataset | None:
+    """The features that are kept, unless they are stale, damaged or absent."""
+    try:
+        found = read_dataset(path)
+        return found if found.attrs.get("made_of") == made_of else None
+    except (OSError, StoreError):
+        return None
+
+
+def _made(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.Dataset:
+    """The features of all jobs with a record; those whose record tells nothing are left out."""
+    rows: list[tuple[str, str, list[float], np.ndarray]] = []
+    for number, (key, place) in enumerate(positions.items()):
+        progress(number, len(positions), "")
+        record = job_record(stored, key)
+        if record is None:
+            continue
+        case = Case.from_attribute(str(stored.rows.attributes(place)["case"]))
+        clearances = [getattr(case.clearance_mm, side) for side in SIDES]
+        try:
+            rows.append((key, case.joint, clearances, vector(record)))
+        except RecordError as error:
+            warnings.warn(f"job {key} is left out: {error}", StoreWarning, stacklevel=2)
+    clearance = np.array([row[2] for row in rows], float).reshape(-1, len(SIDES))
+    found = np.array([row[3] for row in rows], float).reshape(-1, len(FEATURES))
+    return xr.Dataset(
+        {
+            "key": ("job", np.array([row[0] for row in rows], dtype="U20")),
+            "joint": ("job", np.array([row[1] for row in rows], dtype="U9")),
+            "clearance": (("job", "side"), clearance, {"units": "mm"}),
+            "feature": (("job", "name"), found),
+        }
+    )
+
+
+def _swept(study: StoredStudy, keys: np.ndarray) -> dict[str, np.ndarray]:
+    """Values of the swept keys other than joint and clearance, by key, (n,) each."""
+    own: dict[str, dict[str, Any]] = dict(zip(study.keys, points(study), strict=True))
+    others = [axis.key for axis in study.axes if axis.key.partition(".")[0] not in TOLD]
+    return {name: np.array([own[key].get(name) for key in keys.tolist()]) for name in others}
+
+
+def stored_record(folder: Folder, beginning: str) -> tuple[str, Record]:
+    """The key that begins so, and the sensor's record of that job.
+
+    Raises StoreError where there is no such job, or it has no record.
+    """
+    key = report_job(folder, beginning).key
+    record = job_record(read_store(folder), key)
+    if record is None:
+        remedy = "run it with body: true, sensor: true and output.keep: series"
+        raise StoreError(folder, f"job {key} has no sensor's record", remedy)
+    return key, record

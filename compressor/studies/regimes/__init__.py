@@ -1,0 +1,1 @@
+"""One machine followed along a parameter: its regimes, Poincaré points, second attractors."""

@@ -1,0 +1,113 @@
+"""What `compsim run` and `compsim plan` do with case files that have `regimes`."""
+
+import os
+from collections import Counter
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import click
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    all_stored,
+    duration,
+    plural,
+    print_text,
+    say,
+    stored_before,
+    unread,
+)
+
+from compressor.program import printable
+
+if TYPE_CHECKING:
+    from compressor.cases import Study
+    from compressor.studies.regimes.run import RegimesSummary, Standing
+
+MOST_FAILURES = 20  # listed one by one
+
+
+def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, quiet: bool) -> int:
+    """Follow the chains of studies; return the exit code."""
+    from compressor.studies.regimes.run import run_regimes
+
+    screen = Screen(quiet, "values", alike=False)
+    try:
+        summary = run_regimes(studies, folder, workers, screen, rerun)
+    except BaseException:
+        screen.end()
+        say(f"what is finished is stored in {folder}; the same command goes on from there")
+        raise
+    screen.end()
+    tell(summary, folder, quiet)
+    return SOME_FAILED if summary.failed else DONE
+
+
+def check_options(alone: bool, scheduler: str | None, rerun: tuple[str, ...], watch: bool) -> None:
+    """Raise UsageError for options that chains of regimes, `alone` or beside jobs, do not know."""
+    if scheduler:
+        raise click.UsageError("regimes run in processes here: leave --backend dask out")
+    if alone and "stale" in rerun:
+        raise click.UsageError("--rerun stale is for jobs, and regimes have none: leave it out")
+    if alone and watch:
+        raise click.UsageError("--watch shows jobs, and regimes have none: compsim plot draws them")
+
+
+def ahead(studies: "list[Study]", folder: str) -> "list[Standing]":
+    """Return how many values of each study's chains are stored."""
+    from compressor.studies.regimes.run import standing
+
+    return standing(studies, folder)
+
+
+def ahead_lines(standings: "list[Standing]") -> Iterator[str]:
+    """Yield how many values the chains of each study have, and how many of them are stored."""
+    for one in standings:
+        missing = one.chains * one.values - one.done
+        chains = f"{plural(one.chains, 'chain')} x {plural(one.values, 'value')}"
+        yield f"{one.study}  {chains}  {one.done:>4} done  {missing:>4} missing"
+
+
+def regimes_of(folder: str, study: str) -> str:
+    """How many values of a study are in which regime."""
+    from compressor.studies.regimes.dataset import open_regimes
+
+    found = open_regimes(folder, study)
+    words = [word for word in found["regime"].values.ravel().tolist() if word]
+    periods = [period for period in found["period"].values.ravel().tolist() if period == period]
+    told = [f"{number} {word}" for word, number in sorted(Counter(words).items())]
+    of = [f"{n} of {p:g} rev" for p, n in sorted(Counter(periods).items())]
+    return ", ".join(told) + (f"; periods: {', '.join(of)}" if of else "")
+
+
+def tell(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
+    """Say what there is now, and what failed."""
+    for count in summary.counts:
+        where = os.path.join(folder, "regimes", count.study)
+        chains = f"{plural(count.chains, 'chain')} x {plural(count.values, 'value')}"
+        ok = count.done - count.failed
+        with unread():
+            print_text(f"{count.study}  {chains}  {ok:>4} ok  {count.failed:>4} failed  {where}")
+            print_text(f"{count.study}  {regimes_of(folder, count.study)}")
+            if count.differ:
+                apart = plural(count.differ, "value")
+                print_text(f"{count.study}  up and down differ at {apart}; second attractors "
+                           f"confirmed at {count.confirmed}")  # fmt: skip
+    if not quiet:
+        new = summary.total - summary.done_before
+        done = f"{plural(new, 'value')} run in {duration(summary.seconds)}"
+        done += stored_before(summary.done_before)
+        say(done if new else all_stored(summary.total, folder, "value"))
+    if not summary.failed:
+        return
+    from compressor.reasons import remedy
+
+    for one in summary.failed[:MOST_FAILURES]:
+        point = "".join(f" {key}={value}" for key, value in one.point.items())
+        say(f"  {one.study}{point} {one.direction} at {one.value:g}: {one.reason}: "
+            f"{printable(one.detail)}")  # fmt: skip
+    if len(summary.failed) > MOST_FAILURES:
+        say(f"  and {len(summary.failed) - MOST_FAILURES} more")
+    for reason in dict.fromkeys(one.reason for one in summary.failed):
+        say(f"  {reason}: {remedy(reason)}")

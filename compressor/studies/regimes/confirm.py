@@ -1,0 +1,266 @@
+"""Second attractors: where a chain that goes up and one that goes down end differently.
+
+A difference may be a transient that is not over. So both ends' states are run on at the same value,
+and the machine is started from other places, too: a second attractor is confirmed where two
+different motions are reached by simulation at that value.
+
+    RESULTS/regimes/STUDY/pair-KEY.nc    of the two chains, over their values going up
+"""
+
+import hashlib
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from compressor.cases import Case
+from compressor.metrics import AXES, JOINTS
+from compressor.outcome import Regime
+from compressor.program import PROGRAM
+from compressor.solve import follow, record
+from compressor.store import Folder, StoreError, read_dataset, write_dataset
+from compressor.studies.regimes.chains import FOLDER, REMEDY, Chain, kept
+from compressor.studies.regimes.periods import apart, places, tolerance
+from compressor.studies.regimes.values import Clock, Motion, Row, measured, stretch
+
+FURTHER = 200  # rev that a motion runs on before it is looked at again
+STARTS = 8  # from other places
+SEED = 13  # of these places
+ROOM = 0.9  # of the clearance, within which they lie
+APART = 3.0  # tolerances: each of two sets may lie one, and a little more, beside its motion
+SURE = 3.0  # standard errors by which means of chaotic motions differ
+VERDICTS = {
+    "differs": "1: the chains that go up and down end in different motions here",
+    "confirmed": "1: two different motions were reached by further simulation here",
+    "motions": "different motions that further simulation reached, of up, down and other starts",
+    "starts_like_up": "of the other starts, those that end in the motion of the chain that goes up",
+    "starts_like_down": "the same of the chain that goes down",
+}
+
+
+class Seen(NamedTuple):
+    """What tells motions apart: regime, period (rev, nan: none), Poincaré places, rms, its error.
+
+    places: (k, joint, 2), in clearances; rms of acceleration and its standard error, m/s2.
+    """
+
+    regime: str
+    period: float
+    places: np.ndarray
+    rms: float
+    rms_error: float
+
+
+def differ(one: Seen, other: Seen, within: float) -> bool:
+    """Whether two motions of a machine are different ones.
+
+    Two that repeat themselves: by sets of Poincaré places that are farther apart than three times
+    the tolerance `within`, of the clearance; sets of other periods are, unless a period is doubled
+    by less than can be told. One that does and a chaotic one. Two chaotic ones: by
+    means of rms_acceleration that are more than 3 standard errors of their difference apart. Of a
+    motion of which less is known nothing is said.
+    """
+    regimes = {one.regime, other.regime}
+    if regimes == {Regime.PERIODIC}:
+        return apart(one.places, other.places) > APART * within
+    if regimes == {Regime.CHAOTIC}:
+        error = math.hypot(one.rms_error, other.rms_error)
+        return abs(one.rms - other.rms) > SURE * error
+    return regimes == {Regime.PERIODIC, Regime.CHAOTIC}
+
+
+def seen_in_row(row: Row, case: Case) -> Seen:
+    """What a stored value says of its motion."""
+    count = 0 if row["status"] != "ok" else int(row["revolutions"])
+    period = float(row["period"])
+    points = row["section"][: count if math.isnan(period) else int(period)]
+    found = places(points, record(case)["clearance"])
+    error = float(row["rms_acceleration_standard_error"])
+    return Seen(row["regime"], period, found, float(row["rms_acceleration"]), error)
+
+
+def seen_in_motion(motion: Motion, case: Case) -> Seen:
+    """The same of a motion that was followed now."""
+    found = places(motion.points, record(case)["clearance"])
+    if motion.reason:
+        return Seen("", math.nan, found, math.nan, math.nan)
+    rms = float(motion.leg.numbers(motion.count)["rms_acceleration"])
+    error = motion.leg.rms_error(motion.count)
+    return Seen(motion.regime, motion.period, found, rms, error)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The two chains of one machine, up and down."""
+
+    up: Chain
+    down: Chain
+
+    @cached_property
+    def key(self) -> str:
+        what = f"{self.up.key} {self.down.key} {FURTHER} {STARTS} {SEED}"
+        return hashlib.sha256(what.encode()).hexdigest()[:20]
+
+    def path(self, folder: Folder) -> Path:
+        """Where its verdicts are stored."""
+        return Path(folder) / FOLDER / self.up.study / f"pair-{self.key}.nc"
+
+
+class Doubt(NamedTuple):
+    """A value at which chains differ: its number going up, and where each of them ended."""
+
+    number: int
+    case: Case
+    up: np.ndarray
+    down: np.ndarray
+    pair: Pair
+
+
+class Verdict(NamedTuple):
+    """Numbers by the names of `VERDICTS`."""
+
+    differs: int
+    confirmed: int
+    motions: int
+    starts_like_up: int
+    starts_like_down: int
+
+
+AGREED = Verdict(0, 0, 0, 0, 0)
+
+
+def doubts(pair: Pair, folder: Folder) -> list[Doubt]:
+    """The values at which the stored chains of a pair differ."""
+    up = kept(pair.up, pair.up.path(folder))
+    down = kept(pair.down, pair.down.path(folder))
+    if min(len(up), len(down)) < len(pair.up.cases):
+        return []
+    found = []
+    for number, (one, other) in enumerate(zip(up, down[::-1], strict=False)):
+        case = pair.up.cases[number]
+        if differ(seen_in_row(one, case), seen_in_row(other, case), tolerance(case)):
+            found.append(Doubt(number, case, one["end_state"], other["end_state"], pair))
+    return found
+
+
+def confirm(doubt: Doubt) -> Verdict:
+    """Run a machine on from both chains' ends and from other starts, and count its motions.
+
+    Two motions are confirmed where two of these runs end differently, after `FURTHER` revolutions
+    each. The starts are drawn within the clearance, always the same ones.
+    """
+    case = doubt.case
+    of_ends = [later(case, state, doubt.pair.up) for state in (doubt.up, doubt.down)]
+    of_starts = [later(start, None, doubt.pair.up) for start in other_starts(case)]
+    within = tolerance(case)
+    different: list[Seen] = []
+    for one in (*of_ends, *of_starts):
+        if one.regime and all(differ(one, other, within) for other in different):
+            different.append(one)
+    up, down = (
+        sum(bool(one.regime) and one.regime == end.regime and not differ(one, end, within)
+            for one in of_starts)
+        for end in of_ends
+    )  # fmt: skip
+    return Verdict(1, int(len(different) > 1), len(different), up, down)
+
+
+def later(case: Case, state: np.ndarray | None, chain: Chain) -> Seen:
+    """The motion after many more revolutions from a state on, or from the case's own start."""
+    clock = Clock(case.solve.timeout_s)
+    leg = follow(case, state, stretch(chain.asked, FURTHER, clock))
+    if leg.reason:
+        return Seen("", math.nan, leg.points[:0, :, :2], math.nan, math.nan)
+    return seen_in_motion(measured(case, leg.state, chain.asked, clock), case)
+
+
+def other_starts(case: Case) -> list[Case]:
+    """The case with its journals starting elsewhere: evenly over a disk within each clearance."""
+    rng = np.random.default_rng(SEED)
+    found = []
+    for _ in range(STARTS):
+        shift: dict[str, float] = {}
+        for joint in JOINTS:
+            radius, angle = math.sqrt(rng.random()), 2.0 * math.pi * rng.random()
+            size = ROOM * getattr(case.clearance_mm, joint) * radius
+            place = (size * math.cos(angle), size * math.sin(angle))
+            shift |= {f"{joint}_{axis}": at for axis, at in zip(AXES, place, strict=True)}
+        found.append(replace(case, initial_offset_mm=replace(case.initial_offset_mm, **shift)))
+    return found
+
+
+def read_verdicts(pair: Pair, folder: Folder) -> dict[int, Verdict]:
+    """The stored verdicts by the number of the value, going up; none where there is no file."""
+    path = pair.path(folder)
+    if not path.exists():
+        return {}
+    found = read_dataset(path, REMEDY)
+    if found.attrs.get("key") != pair.key:
+        raise StoreError(path, "is not the pair that its name says", REMEDY)
+    columns = [found[name].values.tolist() for name in VERDICTS]
+    rows = zip(found["looked"].values.tolist(), zip(*columns, strict=True), strict=True)
+    return {n: Verdict(*row) for n, (looked, row) in enumerate(rows) if looked}
+
+
+def write_verdicts(pair: Pair, folder: Folder, known: Mapping[int, Verdict]) -> None:
+    """Store verdicts by the number of the value, going up; the others are not known yet."""
+    rows = [known.get(n, AGREED) for n in range(len(pair.up.cases))]
+    dims = ("value",)
+    variables: dict[str, tuple] = {
+        name: (dims, np.array([getattr(row, name) for row in rows]), attrs)
+        for name, attrs in verdict_attrs().items()
+    }
+    looked = np.array([int(n in known) for n in range(len(rows))])
+    variables["looked"] = dims, looked, {"units": "1", "long_name": "1: the verdict is known"}
+    value = np.array(pair.up.values), {"units": pair.up.asked.unit, "long_name": pair.up.asked.over}
+    attrs = {"key": pair.key, "study": pair.up.study, "program": PROGRAM}
+    write_dataset(pair.path(folder), xr.Dataset(variables, {"value": (dims, *value)}, attrs))
+
+
+def verdict_attrs() -> dict[str, dict[str, str]]:
+    """Units and long names of the verdicts."""
+    return {name: {"units": "1", "long_name": phrase} for name, phrase in VERDICTS.items()}
+
+
+class Book:
+    """The verdicts of a pair of chains as they arrive; written every few seconds."""
+
+    def __init__(self, pair: Pair, folder: Folder, flush: float):
+        self.pair, self.folder, self.flush = pair, folder, flush
+        self.known = read_verdicts(pair, folder)
+        stored = (len(kept(chain, chain.path(folder))) for chain in (pair.up, pair.down))
+        whole = min(stored) == len(pair.up.cases)
+        doubted = doubts(pair, folder)
+        self.numbers = {doubt.number for doubt in doubted}
+        self.missing = [d for d in doubted if not self.known.get(d.number, AGREED).differs]
+        before = dict(self.known)
+        if whole:
+            agreed = (n for n in range(len(pair.up.cases)) if n not in self.numbers)
+            self.known |= dict.fromkeys(agreed, AGREED)
+        for doubt in self.missing:
+            self.known.pop(doubt.number, None)
+        self.written = time.monotonic()
+        if self.known != before:
+            self.write()
+
+    def add(self, number: int, verdict: Verdict) -> None:
+        """Take note of a verdict."""
+        self.known[number] = verdict
+        if time.monotonic() - self.written > self.flush:
+            self.write()
+
+    def write(self) -> None:
+        """Store what is known."""
+        write_verdicts(self.pair, self.folder, self.known)
+        self.written = time.monotonic()
+
+    def count(self) -> tuple[int, int]:
+        """At how many values the chains differ, and how many of these are confirmed."""
+        found: Sequence[Verdict] = [*self.known.values()]
+        return len(self.numbers), sum(one.confirmed for one in found)

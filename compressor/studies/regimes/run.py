@@ -1,0 +1,317 @@
+"""Run the chains of regimes studies that a folder does not hold yet, side by side in workers.
+
+    RESULTS/regimes/STUDY/study.json    which chains a study has
+
+Chains of one machine are independent of each other; within a chain each value needs the last one's
+end. Where a study goes both ways, what differs is looked at again (`confirm`).
+"""
+
+import contextlib
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from compressor.cases import MODEL, Study, points
+from compressor.program import PROGRAM
+from compressor.store import Folder, StoreError, publish
+from compressor.studies.regimes.chains import (
+    FLUSH,
+    FOLDER,
+    Chain,
+    Ended,
+    Task,
+    read_chain,
+    run_chain,
+)
+from compressor.studies.regimes.confirm import Book, Pair, Verdict, confirm
+from compressor.sweep import Done, Lost, Needs, Progress, run_here
+
+LEGS = 4  # runs of a value, each with the case's own wall time at most, and some more
+LOOK = 1.0  # s between two looks at how far chains have come
+FILE = "study.json"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The chains of one case of a study, by direction; `point`: its swept values."""
+
+    study: str
+    point: dict[str, Any]
+    chains: tuple[Chain, ...]
+
+    @property
+    def pair(self) -> Pair | None:
+        """Up and down, where both are followed."""
+        return Pair(*self.chains) if len(self.chains) == 2 else None
+
+
+class Failure(NamedTuple):
+    """A failed value, or a chain that has no more of them."""
+
+    study: str
+    point: dict[str, Any]
+    direction: str
+    value: float
+    reason: str
+    detail: str
+
+
+class Count(NamedTuple):
+    """What a study has now: chains and values in each; values that are done, and failed.
+
+    differ, confirmed: values at which up and down differ, and second attractors among these.
+    """
+
+    study: str
+    chains: int
+    values: int
+    done: int
+    failed: int
+    differ: int
+    confirmed: int
+
+
+@dataclass(frozen=True)
+class RegimesSummary:
+    """What a run did: values in all, those that were stored before, by study what there is now."""
+
+    total: int
+    done_before: int
+    counts: tuple[Count, ...]
+    failed: tuple[Failure, ...]
+    seconds: float
+
+
+def run_regimes(
+    studies: Sequence[Study], folder: Folder, workers: int, progress: Progress, rerun: bool = False
+) -> RegimesSummary:
+    """Run and store what is missing of studies with `regimes`.
+
+    rerun: chains are run again from their first failed value on. Progress counts values, and then
+    second attractors. Raises StoreError and WorkersFailed; whatever ends it early, what was stored
+    stays, and the same call goes on.
+    """
+    began = time.monotonic()
+    folder = Path(folder).absolute()
+    machines = [machine for study in studies for machine in machines_of(study)]
+    for study in studies:
+        write_manifest(folder, study)
+    chains = [chain for machine in machines for chain in machine.chains]
+    total = sum(len(chain.cases) for chain in chains)
+    before = sum(done(chain, folder) for chain in chains)
+    tasks = [Task(str(folder), chain, rerun) for chain in chains]
+    ends = run_chains(tasks, workers, Watch(chains, folder, total, progress))
+    books = look_again(machines, ends, folder, workers, progress)
+    counts, failures = told(studies, machines, ends, books)
+    return RegimesSummary(total, before, counts, failures, time.monotonic() - began)
+
+
+def machines_of(study: Study) -> list[Machine]:
+    """The selected machines of a study with their chains."""
+    found, selected = [], {*study.selected}
+    for number, point in enumerate(points(study)):
+        if number in selected:
+            found.append(Machine(study.name, point, chains_of(study, number)))
+    return found
+
+
+def chains_of(study: Study, number: int) -> tuple[Chain, ...]:
+    """The chains of one case of a study."""
+    asked = study.regimes
+    assert asked
+    cases = study.chains[number]
+    return tuple(Chain.of(study.name, asked, way, cases) for way in asked.directions)
+
+
+def write_manifest(folder: Path, study: Study) -> None:
+    """Store which chains a study has."""
+    asked = study.regimes
+    assert asked
+    every = [chains_of(study, number) for number in range(study.jobs)]
+    plain = {
+        "name": study.name,
+        "case_file": os.path.abspath(study.path),
+        "regimes": asked.plain(),
+        "axes": [{"key": axis.key, "values": axis.values} for axis in study.axes],
+        "is_grid": study.is_grid,
+        "chains": [[chain.key for chain in chains] for chains in every],
+        "pairs": [Pair(*chains).key for chains in every if len(chains) == 2],
+        "model_version": MODEL,
+        "program": PROGRAM,
+    }
+    text = json.dumps(plain, indent=1) + "\n"
+    publish(folder / FOLDER / study.name / FILE, text.encode())
+
+
+def done(chain: Chain, folder: Path) -> int:
+    """How many values of a chain are stored. Raises StoreError."""
+    path = chain.path(folder)
+    return read_chain(path).sizes.get("value", 0) if path.exists() else 0
+
+
+class Watch:
+    """Tells how many values are stored, from the chains' files."""
+
+    def __init__(self, chains: Sequence[Chain], folder: Path, total: int, progress: Progress):
+        self.paths = {chain.path(folder): chain for chain in chains}
+        self.folder, self.total, self.progress = folder, total, progress
+        self.seen: dict[Path, float] = {}
+        self.counts = dict.fromkeys(self.paths, 0)
+        self.looked = 0.0
+        self.look()
+
+    def remark(self, text: str) -> None:
+        """Tell a remark."""
+        self.progress(sum(self.counts.values()), self.total, text)
+
+    def pulse(self) -> None:
+        """Look again, now and then."""
+        if time.monotonic() - self.looked > LOOK:
+            self.look()
+
+    def look(self) -> None:
+        """Read the files that have changed."""
+        for path, chain in self.paths.items():
+            with contextlib.suppress(OSError):
+                changed = path.stat().st_mtime
+                if self.seen.get(path) != changed:
+                    self.seen[path], self.counts[path] = changed, done(chain, self.folder)
+        self.looked = time.monotonic()
+        self.remark("")
+
+
+def run_chains(tasks: Sequence[Task], workers: int, watch: Watch) -> dict[str, Ended | Lost]:
+    """How each chain ended, by its key."""
+    missing = [task for task in tasks if task.rerun or not complete(task)]
+    cases = [case for task in missing for case in task.chain.cases[:1]]
+    jobs = [(task.chain.key, task, seconds(task.chain)) for task in missing]
+    found: dict[str, Ended | Lost] = {}
+    running = run_here(run_chain, jobs, Needs.of(cases), workers, watch.remark, watch.pulse)
+    with contextlib.closing(running):
+        for end in running:
+            found[end.id] = result(end)
+    if jobs:
+        watch.look()
+    for task in tasks:
+        if task.chain.key not in found:
+            stored = run_chain(Task(task.folder, task.chain))  # nothing is missing
+            assert isinstance(stored, Ended)
+            found[task.chain.key] = stored
+    return found
+
+
+def complete(task: Task) -> bool:
+    """Whether all values of a chain are stored."""
+    return done(task.chain, Path(task.folder)) == len(task.chain.cases)
+
+
+def seconds(chain: Chain) -> float:
+    """The wall time that a chain may take, s."""
+    return LEGS * sum(case.solve.timeout_s for case in chain.cases)
+
+
+def result(end: Done | Lost) -> Any:
+    """What a job gave, or how it was lost; raises the StoreError that one gave."""
+    if isinstance(end, Done) and isinstance(end.result, StoreError):
+        raise end.result
+    return end.result if isinstance(end, Done) else end
+
+
+def look_again(
+    machines: Sequence[Machine],
+    ends: dict[str, Ended | Lost],
+    folder: Path,
+    workers: int,
+    progress: Progress,
+) -> dict[str, Book]:
+    """The verdicts of all pairs of chains, by the pair's key; what is missing is run."""
+    pairs = [
+        machine.pair
+        for machine in machines
+        if machine.pair and all(isinstance(ends[c.key], Ended) for c in machine.chains)
+    ]
+    books = {pair.key: Book(pair, folder, FLUSH) for pair in pairs}
+    doubted = [doubt for book in books.values() for doubt in book.missing]
+    if not doubted:
+        return books
+    jobs = [
+        ((doubt.pair.key, doubt.number), doubt, 12 * LEGS * doubt.case.solve.timeout_s)
+        for doubt in doubted
+    ]
+    remark = partial(progress, 0, len(jobs))
+    remark(f"{len(jobs)} values differ between up and down: running on from both")
+    count, needs = 0, Needs.of(doubt.case for doubt in doubted)
+    running = run_here(confirm, jobs, needs, workers, remark)
+    try:
+        with contextlib.closing(running):
+            for end in running:
+                verdict = result(end)
+                key, number = end.id
+                if isinstance(verdict, Verdict):
+                    books[key].add(number, verdict)
+                count += 1
+                progress(count, len(jobs), "")
+    finally:
+        for book in books.values():
+            if book.missing:
+                book.write()
+    return books
+
+
+def told(
+    studies: Sequence[Study],
+    machines: Sequence[Machine],
+    ends: dict[str, Ended | Lost],
+    books: dict[str, Book],
+) -> tuple[tuple[Count, ...], tuple[Failure, ...]]:
+    """What each study has now, and every failed value."""
+    counts, failures = [], []
+    for study in studies:
+        own = [machine for machine in machines if machine.study == study.name]
+        chains = [chain for machine in own for chain in machine.chains]
+        bad = [failure for machine in own for failure in failed(machine, ends)]
+        finished = [end for c in chains if isinstance(end := ends[c.key], Ended)]
+        kept = [books[pair.key].count() for m in own if (pair := m.pair) and pair.key in books]
+        differ, confirmed = (sum(column) for column in zip(*kept, strict=True)) if kept else (0, 0)
+        values = study.regimes.n if study.regimes else 0
+        complete = sum(end.values for end in finished)
+        counts.append(Count(study.name, len(chains), values, complete, len(bad), differ, confirmed))
+        failures += bad
+    return tuple(counts), tuple(failures)
+
+
+def failed(machine: Machine, ends: dict[str, Ended | Lost]) -> Iterator[Failure]:
+    """The failed values of a machine; of a chain that was lost, its first value without a run."""
+    for chain in machine.chains:
+        end = ends[chain.key]
+        where = machine.study, machine.point, chain.direction
+        if isinstance(end, Lost):
+            yield Failure(*where, chain.values[0], str(end.reason), end.detail)
+            continue
+        for value, reason, detail in end.failed:
+            yield Failure(*where, value, reason, detail)
+
+
+class Standing(NamedTuple):
+    """How far a study is: its chains, the values of each, and how many are stored of all."""
+
+    study: str
+    chains: int
+    values: int
+    done: int
+
+
+def standing(studies: Sequence[Study], folder: Folder) -> list[Standing]:
+    """How far the chains of studies are in a folder; runs nothing. Raises StoreError."""
+    place: Callable[[Chain], int] = partial(done, folder=Path(folder))
+    found = []
+    for study in studies:
+        chains = [chain for machine in machines_of(study) for chain in machine.chains]
+        values = study.regimes.n if study.regimes else 0
+        found.append(Standing(study.name, len(chains), values, sum(map(place, chains))))
+    return found

@@ -1,0 +1,201 @@
+"""One value of a chain: the motion that a machine settles to from where it was, and its numbers."""
+
+import math
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis import MODES, contact_modes, impacts, mode_shares
+from compressor.cases import Case, Regimes
+from compressor.metrics import AXES, JOINTS
+from compressor.outcome import Regime
+from compressor.physics import state_names
+from compressor.solve import Leg, Stretch, follow, record, settle, with_samples
+from compressor.studies.regimes.exponent import exponent
+from compressor.studies.regimes.periods import MORE, period_of, places, tolerance
+
+COORDINATES = (*AXES, *(f"{axis}_rate" for axis in AXES))
+SAMPLED = 16  # rev, at most, of which contact modes and impacts are told
+
+Row = dict[str, Any]
+SECTION = ("revolution", "joint", "coordinate")
+TEXTS = {
+    "status": "ok or failed",
+    "reason": "why the value failed, by a stable name",
+    "detail": "what is known of a failure beyond its reason",
+    "regime": "periodic, chaotic or undecided",
+}
+# beside the value: dims, unit, long name
+NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "section": (SECTION, "m", "Poincaré points: eccentricity once a revolution; its rate in m/s"),
+    "period": ((), "rev", "period after which the Poincaré points repeat"),
+    "lyapunov_exponent": ((), "1/rev", "largest Lyapunov exponent"),
+    "lyapunov_exponent_error": ((), "1/rev", "error of the largest Lyapunov exponent"),
+    "settled_rev": ((), "rev", "revolution at this value from which on metrics agree"),
+    "revolutions": ((), "rev", "revolutions that the numbers are of"),
+    "mode_share": (("joint", "mode"), "1", "share of time in a contact mode"),
+    "impacts_per_revolution": (("joint",), "1/rev", "impacts a revolution"),
+    "mean_approach_speed": (("joint",), "m/s", "mean relative normal speed at first touch"),
+    "peak_approach_speed": (("joint",), "m/s", "greatest relative normal speed at first touch"),
+    "peak_acceleration": ((), "m/s2", "greatest |acceleration|"),
+    "rms_acceleration": ((), "m/s2", "root mean square of acceleration"),
+    "rms_acceleration_standard_error": ((), "m/s2", "standard error of rms_acceleration"),
+    "peak_contact_force": (("joint",), "N", "greatest joint force on the rod"),
+    "contact_loss_fraction": (("joint",), "1", "share of time without dry contact"),
+    "end_state": (("number",), "1", "motion at the end, as the solver holds it, in SI"),
+}
+METRICS = (
+    "peak_acceleration", "rms_acceleration", "peak_contact_force", "contact_loss_fraction",
+)  # fmt: skip
+
+
+@dataclass
+class Motion:
+    """What a motion settles to.
+
+    `regime`: of `Regime`; `period` (rev): nan where it does not repeat itself; `points`: of the
+    section, (k, joint, 4), of one period or all; `leg`: the revolutions that were measured, the
+    last `count` of which are meant; `exponent`: the largest Lyapunov exponent and its error, 1/rev.
+    """
+
+    regime: str
+    period: float
+    points: np.ndarray
+    leg: Leg
+    count: int
+    exponent: tuple[float, float] = (math.nan, math.nan)
+    reason: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.reason = self.leg.reason
+
+
+class Clock:
+    """The wall time (s) that a value may still take."""
+
+    def __init__(self, timeout: float):
+        self.deadline = time.monotonic() + timeout
+
+    @property
+    def left(self) -> float:
+        return max(self.deadline - time.monotonic(), 0.0)
+
+
+def sizes(asked: Regimes, case: Case) -> dict[str, int]:
+    """The lengths of the dimensions of a chain's variables."""
+    return {
+        "revolution": asked.measure_rev,
+        "joint": len(JOINTS),
+        "coordinate": len(COORDINATES),
+        "mode": len(MODES),
+        "number": len(state_names(record(case))),
+    }
+
+
+def empty(asked: Regimes, case: Case) -> Row:
+    """A row of which nothing is known."""
+    lengths = sizes(asked, case)
+    row: Row = dict.fromkeys(TEXTS, "")
+    for name, (dims, _, _) in NUMBERS.items():
+        row[name] = np.full([lengths[dim] for dim in dims], math.nan)
+    return row
+
+
+def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
+    """Follow a case from a state on, or from its own start, until it settles, and measure it.
+
+    What is found, by the names of `TEXTS` and `NUMBERS`. A run that stops is a row too, with its
+    reason and the state that it began from, so that the chain can go on from there. The wall time
+    is the case's own. Nothing in a row depends on how long it took.
+    """
+    row, clock = empty(asked, case), Clock(case.solve.timeout_s)
+    if state is not None:
+        row["end_state"] = state
+    settled, since = settle(case, state, stretch(asked, asked.settle_rev, clock))
+    if settled.reason:
+        return failed(row, settled.reason, settled.detail)
+    row["settled_rev"] = np.asarray(since)
+    motion = measured(case, settled.state, asked, clock)
+    if motion.reason:
+        return failed(row, motion.leg.reason, motion.leg.detail)
+    reason, detail = contacts(case, motion, asked, clock, row)
+    if reason:
+        return failed(row, reason, detail)
+    end, found = motion.leg.state, motion.leg.numbers(motion.count)
+    worn = record(case)["clearance"] > 0.0  # an ideal joint's journal does not move
+    row["section"][: len(motion.points), worn] = motion.points[:, worn]
+    known = {name: found[name] for name in METRICS}
+    known |= {
+        "period": motion.period,
+        "lyapunov_exponent": motion.exponent[0],
+        "lyapunov_exponent_error": motion.exponent[1],
+        "revolutions": motion.count,
+        "rms_acceleration_standard_error": motion.leg.rms_error(motion.count),
+        "end_state": end,
+    }
+    row |= {name: np.asarray(value, float) for name, value in known.items()}
+    return row | {"status": "ok", "regime": motion.regime}
+
+
+def failed(row: Row, reason: str, detail: str) -> Row:
+    """A row of a value whose run stopped."""
+    return row | {"status": "failed", "reason": str(reason), "detail": detail}
+
+
+def stretch(asked: Regimes, revolutions: int, clock: Clock) -> Stretch:
+    """So many revolutions, at most, within the time that is left."""
+    return Stretch(revolutions, math.radians(asked.section_deg), clock.left)
+
+
+def measured(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> Motion:
+    """The motion from a settled state on, followed until its Poincaré points repeat or suffice."""
+    within, clearance = tolerance(case), record(case)["clearance"].copy()
+
+    def period(points: np.ndarray) -> int | None:
+        return period_of(places(points, clearance), within)
+
+    leg = follow(
+        case, state, stretch(asked, asked.measure_rev, clock),
+        lambda turns, points: period(points) is not None,
+    )  # fmt: skip
+    found = None if leg.reason else period(leg.points)
+    if leg.reason:
+        return Motion("", math.nan, leg.points[:0], leg, 0)
+    exponents = math.nan, math.nan
+    if asked.exponent:
+        exponents = exponent(case, leg.state, found is not None, asked.measure_rev, clock.left)
+    parts = exponents[0] - exponents[1] > 0.0  # close motions part, as far as is known
+    if found:
+        count = found * ((2 * found + MORE) // found)
+        points = leg.points[-found:]
+        word = Regime.UNDECIDED if parts else Regime.PERIODIC
+        return Motion(word, float(found), points, leg, count, exponents)
+    word = Regime.CHAOTIC if parts else Regime.UNDECIDED
+    return Motion(word, math.nan, leg.points, leg, len(leg.turns), exponents)
+
+
+def contacts(case: Case, motion: Motion, asked: Regimes, clock: Clock, row: Row) -> tuple[str, str]:
+    """Write contact modes and impacts of the revolutions that follow into a row.
+
+    Of one period, or of up to `SAMPLED` revolutions; one more goes before, so that contacts have
+    begun. The reason and detail of a run that stopped, empty otherwise.
+    """
+    count = min(motion.count, SAMPLED) if math.isnan(motion.period) else int(motion.period)
+    span = stretch(asked, count + 1, clock)
+    table, reason, detail = with_samples(case, motion.leg.state, span)
+    if reason:
+        return reason, detail
+    run = xr.Dataset(table.variables, attrs=table.attrs)
+    shares, struck = mode_shares(contact_modes(run))["share"], impacts(run)
+    for joint in shares["joint"].values.tolist():
+        at = JOINTS.index(joint)
+        speeds = struck["approach_speed"].values[struck["joint"].values == joint]
+        row["mode_share"][at] = shares.sel(joint=joint).values
+        row["impacts_per_revolution"][at] = speeds.size / count
+        if speeds.size:
+            row["mean_approach_speed"][at] = speeds.mean()
+            row["peak_approach_speed"][at] = speeds.max()
+    return "", ""

@@ -1,0 +1,200 @@
+"""`compsim find`: where a metric first passes a value, or is greatest or least, over a key."""
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+from compsim.results import files
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    as_json,
+    caution,
+    jobs_option,
+    one_thread_each,
+    output_option,
+    plural,
+    print_text,
+    setting,
+)
+from compsim.show import sayable
+
+if TYPE_CHECKING:
+    from compressor.studies.search.find import Answer
+    from compressor.studies.search.question import Question
+
+KINDS = ("first", "greatest", "least")
+MOST_TOLD = 5  # points that do not decide, one by one
+AVERAGED = " (mean over revolutions: chaotic)"
+UNBARRED = " (no error bar was made)"
+
+
+@click.command()
+@click.argument("config", metavar="CONFIG", shell_complete=files)
+@click.option("--over", required=True, metavar="KEY=LOW:HIGH",
+              help="The key to search over and its range, in the case file's unit.")  # fmt: skip
+@click.option("--first", metavar="'METRIC[.JOINT] > VALUE'",
+              help="Where this first becomes true going up: > >= < <=, VALUE in SI.")  # fmt: skip
+@click.option("--greatest", metavar="METRIC[.JOINT]", help="Where the metric is greatest.")
+@click.option("--least", metavar="METRIC[.JOINT]", help="Where the metric is least.")
+@click.option("--tolerance", type=click.FloatRange(1e-9, 0.5), default=1e-3, show_default=True,
+              help="Of the answer, relative to the range.")  # fmt: skip
+@click.option("--scan", type=click.IntRange(3, 1000), default=9, show_default=True,
+              help="Evenly spaced points that are looked at first.")  # fmt: skip
+@click.option("--log", "logarithmic", is_flag=True, help="Evenly in the logarithm of the key.")
+@setting
+@output_option
+@jobs_option("Worker processes, and points of one step of --first.")
+@as_json
+@click.option("--quiet", is_flag=True, help="No progress.")
+def find(
+    config: str, output: str, jobs: int | None, as_json: bool, quiet: bool, **asked: Any
+) -> int:
+    """Search one key of a case for where a metric passes a value, or is greatest or least.
+
+    \b
+    compsim find worn.yaml --over clearance_mm=0.01:0.3 \\
+        --first 'contact_loss_fraction.small_end > 0.001'
+    compsim find worn.yaml --over machine.speed_rpm=200:900 \\
+        --greatest peak_acceleration
+
+    CONFIG makes one case once the key is given. The answer of --first is an interval: at its lower
+    end the comparison does not hold, at its upper end it does. Points whose error bars do not let
+    that be told, or whose job failed, stay inside the interval and are named. Of --greatest and
+    --least it is the best point, and the points whose error bars reach its own. Structure that is
+    finer than the scan may be missed. In a chaotic motion a peak stands for its mean over
+    revolutions.
+
+    Every point is a job of the study CONFIG-find-KEY in the folder of results: it is stored, and
+    not run again. Exit code 3 if any point's job failed.
+    """
+    one_thread_each()  # before numpy loads
+    question = asked_for(config, asked)
+    study = question.checked()
+    if not quiet:
+        caution([study])
+    from compressor.studies.search.find import find as search
+    from compressor.sweep import cores
+
+    screen = Screen(quiet, "points")
+    try:
+        answer = search(question, output, jobs or cores(), screen)
+    finally:
+        screen.end()
+    if as_json:
+        print_text(json.dumps(plain(question, answer), indent=1))
+    else:
+        for line in lines(question, answer, output):
+            print_text(line)
+    return SOME_FAILED if answer.failed else DONE
+
+
+def asked_for(config: str, asked: dict[str, Any]) -> "Question":
+    """The question of the options; a usage error where it is none, or more than one."""
+    from compressor.studies.search.question import Question
+
+    given = [kind for kind in KINDS if asked[kind] is not None]
+    if len(given) != 1:
+        raise click.UsageError("give one of --first, --greatest and --least")
+    more = {name: asked[name] for name in ("tolerance", "scan", "logarithmic", "overrides")}
+    return Question.written(config, asked["over"], asked[given[0]], given[0], **more)
+
+
+def lines(question: "Question", answer: "Answer", folder: str) -> Iterator[str]:
+    """An answer as it is printed."""
+    told = comparison_lines if answer.best is None else extremum_lines
+    yield from told(question, answer)
+    for point in answer.blind[:MOST_TOLD]:
+        yield f"  {at(question, point)}: {undecided(question, point)}  job {point.key[:8]}"
+    if len(answer.blind) > MOST_TOLD:
+        yield f"  and {len(answer.blind) - MOST_TOLD} more"
+    outside = [point for point in answer.failed if point not in answer.blind]
+    for point in outside[:MOST_TOLD]:
+        yield f"  {at(question, point)}, outside: {point.told.reason}  job {point.key[:8]}"
+    yield f"what is finer than the scan, {spacing(question)}, may be missed"
+    yield (f"{plural(len(answer.points))}, {answer.run_now} of them run now, in study "
+           f"{answer.study} of {folder}")  # fmt: skip
+
+
+def comparison_lines(question: "Question", answer: "Answer") -> Iterator[str]:
+    """Where a comparison first becomes true."""
+    goal = question.goal
+    text = f"{goal.name} {goal.sign} {goal.limit:g} {goal.unit}".rstrip()
+    low, high = answer.low, answer.high
+    if high is None:
+        many = f"at none of {len(answer.points)} points from {question.low:g} to {question.high:g}"
+        unsure = f", and {len(answer.blind)} of them {doubt(answer)}:" if answer.blind else ""
+        yield f"{text} surely holds {many}{unsure}" if unsure else f"{text} holds {many}"
+    elif answer.kind == "at_low":
+        yield f"{text} holds from the range's lower end on"
+        yield f"  {at(question, high)}: yes, {number(question, high)}  job {high.key[:8]}"
+    else:
+        start = f"at most {question.low:g}" if low is None else f"{low.argument:.9g}"
+        yield f"{text} first holds between {question.key} = {start} and {high.argument:.9g}"
+        if low is not None:
+            yield f"  {at(question, low)}: no, {number(question, low)}  job {low.key[:8]}"
+        yield f"  {at(question, high)}: yes, {number(question, high)}  job {high.key[:8]}"
+        if answer.blind:
+            yield f"  {plural(len(answer.blind), 'point')} between {doubt(answer)}:"
+
+
+def doubt(answer: "Answer") -> str:
+    """What points do whose error bars reach the limit."""
+    return "does not decide" if len(answer.blind) == 1 else "do not decide"
+
+
+def extremum_lines(question: "Question", answer: "Answer") -> Iterator[str]:
+    """Where a metric is greatest or least."""
+    best = answer.best
+    assert best is not None
+    yield (f"{question.goal.name} is {question.goal.sign} at {at(question, best)}: "
+           f"{number(question, best)}  job {best.key[:8]}")  # fmt: skip
+    first, last = answer.within[0].argument, answer.within[-1].argument
+    if len(answer.within) > 1:
+        yield (f"  as far as error bars tell, {len(answer.within)} points from {first:.9g} to "
+               f"{last:.9g} may be as good")  # fmt: skip
+    low = "none" if answer.low is None else f"{answer.low.argument:.9g}"
+    high = "none" if answer.high is None else f"{answer.high.argument:.9g}"
+    yield f"  nearest points that are surely worse: below {low}, above {high}"
+    if answer.blind:
+        verb = "tells" if len(answer.blind) == 1 else "tell"
+        yield f"  {plural(len(answer.blind), 'point')} between {verb} nothing:"
+
+
+def at(question: "Question", point: Any) -> str:
+    """A point's place."""
+    return f"{question.key} = {point.argument:.9g}"
+
+
+def number(question: "Question", point: Any) -> str:
+    """A point's number with its error bar."""
+    from compressor.digits import by_bar
+
+    told = point.told
+    text = by_bar(told.value, told.bar if told.barred else math.nan, False)
+    return (f"{text} {question.goal.unit}".rstrip() + AVERAGED * told.averaged
+            + UNBARRED * (not told.barred))  # fmt: skip
+
+
+def undecided(question: "Question", point: Any) -> str:
+    """Why a point does not decide."""
+    return point.told.reason or f"{number(question, point)}: within its error bar of the limit"
+
+
+def spacing(question: "Question") -> str:
+    """How far the points of a scan are apart."""
+    steps = question.scan - 1
+    if question.logarithmic:
+        factor = (question.high / question.low) ** (1 / steps)
+        return f"{question.scan} points a factor {factor:.4g} apart"
+    return f"{question.scan} points {(question.high - question.low) / steps:.4g} apart"
+
+
+def plain(question: "Question", answer: "Answer") -> dict[str, Any]:
+    """A question and its answer as JSON says them."""
+    asked = dataclasses.asdict(question)
+    return sayable(asked | {"unit": question.goal.unit} | dataclasses.asdict(answer))

@@ -1,0 +1,249 @@
+"""Questions as searches: where a metric first passes a value, or where it is greatest or least.
+
+A scan of evenly spaced points in parallel finds the interval, sections of it or Brent's bounded
+minimisation (Brent 1973, Algorithms for Minimization without Derivatives, ch. 5) narrow it. Each
+point is a job of a study that grows, stored and run as any other. Structure that is finer than the
+scan may be missed.
+"""
+
+import contextlib
+import math
+import shlex
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from scipy.optimize import minimize_scalar
+
+from compressor.store import Folder, StoreError, read_store, read_studies
+from compressor.studies.search.question import Question, Reading
+from compressor.sweep import Options, Progress, sweep
+
+MOST_POINTS = 200  # that one search may ask for beyond its scan
+
+
+@dataclass(frozen=True)
+class Point:
+    """A share of the range from 0 to 1, the key's value there, and what its job says."""
+
+    share: float
+    argument: float
+    told: Reading
+    key: str = ""  # of the job
+    failed: bool = False
+
+
+Evaluate = Callable[[Sequence[float]], list[Point]]  # shares -> their points, in any order
+Holds = Callable[[Reading], bool | None]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a search found.
+
+    kind: `found`; `undecided`: found, but points inside the interval cannot be decided; `at_low`:
+    the comparison holds from the range's lower end on; `nowhere`: it holds at no point; `unclear`:
+    no point surely meets the goal, and some say nothing.
+    low, high: the ends of the interval. Of a comparison: where it does not hold and where it does;
+    low is None where no point below surely fails. Of an extremum: the nearest points that are
+    surely worse, None where the range ends before.
+    best: of an extremum, the best point; within: the points whose bars reach the best one's.
+    blind: points inside the interval that do not decide.
+    points: all, by argument; run_now: jobs that were not stored before; study: where they are.
+    """
+
+    kind: str
+    low: Point | None
+    high: Point | None
+    best: Point | None = None
+    within: tuple[Point, ...] = ()
+    blind: tuple[Point, ...] = ()
+    points: tuple[Point, ...] = ()
+    run_now: int = 0
+    study: str = ""
+
+    @property
+    def failed(self) -> list[Point]:
+        return [point for point in self.points if point.failed]
+
+
+def first(
+    evaluate: Evaluate, holds: Holds, shares: Sequence[float], tolerance: float, at_once: int = 1
+) -> Answer:
+    """The interval in which a comparison first becomes true, going up from share 0.
+
+    Its ends are decided points, less than `tolerance` (a share) apart, or less than that from the
+    points between them that are not decided. at_once: points of one call to evaluate.
+    """
+    points: list[Point] = []
+    wanted: Sequence[float] = shares
+    while wanted and len(points) < len(shares) + MOST_POINTS:
+        points = sorted([*points, *evaluate(wanted)], key=lambda point: point.share)
+        answer = interval(points, holds)
+        wanted = sections(answer, tolerance, at_once)
+    return answer
+
+
+def interval(points: Sequence[Point], holds: Holds) -> Answer:
+    """What some points, in their order, say of where a comparison first becomes true."""
+    low: Point | None = None
+    blind: list[Point] = []
+    for point in points:
+        verdict = holds(point.told)
+        if verdict:
+            kind = "undecided" if blind else "found" if low else "at_low"
+            return Answer(kind, low, point, blind=tuple(blind), points=tuple(points))
+        if verdict is None:
+            blind.append(point)
+        else:
+            low, blind = point, []
+    silent = tuple(point for point in points if holds(point.told) is None)
+    return Answer("unclear" if silent else "nowhere", None, None, blind=silent,
+                  points=tuple(points))  # fmt: skip
+
+
+def sections(answer: Answer, tolerance: float, at_once: int) -> list[float]:
+    """The shares that narrow an interval: of it, or of what is left and right of blind points."""
+    if answer.high is None or answer.kind == "at_low":
+        return []
+    chain = [point for point in (answer.low, *answer.blind, answer.high) if point is not None]
+    gaps = [*pairwise(chain)]
+    if answer.blind:
+        gaps = gaps[-1:] if answer.low is None else [gaps[0], gaps[-1]]
+    found = []
+    for left, right in gaps:
+        width = right.share - left.share
+        # not more than bring the gap below the tolerance
+        enough = math.ceil(width / tolerance * (1.0 - 1e-9)) - 1
+        count = min(max(1, at_once // len(gaps)), enough)
+        found += [left.share + width * (n + 1) / (count + 1) for n in range(count)]
+    return found
+
+
+def extremum(
+    evaluate: Evaluate, greatest: bool, shares: Sequence[float], tolerance: float
+) -> Answer:
+    """Where a metric is greatest or least: near the best of the points at `shares`.
+
+    Between the two neighbours of that, minimize_scalar(method="bounded") goes on until its argument
+    is known to `tolerance`, a share. Points that say nothing count as the worst one that is known.
+    """
+    points = sorted(evaluate(shares), key=lambda point: point.share)
+    usable = [point for point in points if not point.told.reason]
+    if not usable:
+        return Answer("unclear", None, None, blind=tuple(points), points=tuple(points))
+    factor = -1.0 if greatest else 1.0
+    known = {point.share: point for point in points}
+    worst = max(factor * point.told.value for point in usable)
+
+    def cost(share: float) -> float:
+        share = float(share)
+        if share not in known:
+            (known[share],) = evaluate([share])
+        told = known[share].told
+        return worst if told.reason else factor * told.value
+
+    at = points.index(min(usable, key=lambda point: factor * point.told.value))
+    bounds = (points[max(at - 1, 0)].share, points[min(at + 1, len(points) - 1)].share)
+    minimize_scalar(cost, bounds=bounds, method="bounded",
+                    options={"xatol": tolerance, "maxiter": MOST_POINTS})  # fmt: skip
+    return around(known.values(), factor)
+
+
+def around(known: Iterable[Point], factor: float) -> Answer:
+    """The best of some points, those that may be as good, and the surely worse ones around them.
+
+    factor: 1 where the least is best, -1 where the greatest is.
+    """
+    points = sorted(known, key=lambda point: point.share)
+    usable = [point for point in points if not point.told.reason]
+    best = min(usable, key=lambda point: factor * point.told.value)
+    within: list[Point] = []
+    worse: list[Point] = []
+    for point in usable:
+        behind = factor * (point.told.value - best.told.value)
+        (within if behind <= point.told.bar + best.told.bar else worse).append(point)
+    low = max((p for p in worse if p.share < within[0].share), key=place, default=None)
+    high = min((p for p in worse if p.share > within[-1].share), key=place, default=None)
+    left = -math.inf if low is None else low.share
+    right = math.inf if high is None else high.share
+    blind = tuple(p for p in points if p.told.reason and left < p.share < right)
+    return Answer("undecided" if blind else "found", low, high, best, tuple(within), blind,
+                  tuple(points))  # fmt: skip
+
+
+def place(point: Point) -> float:
+    """Where on the range a point lies."""
+    return point.share
+
+
+def find(
+    question: Question,
+    folder: Folder,
+    workers: int = 2,
+    progress: Progress = lambda done, total, remark: None,
+) -> Answer:
+    """Answer a question by jobs in a folder's store; those that it holds are not run again.
+
+    The study is called after the file and the key. It keeps the points of earlier questions that
+    are of the same case. Raises QuestionError, CaseFileError, StoreError and WorkersFailed.
+    """
+    question.checked()
+    jobs = Jobs(question, folder, workers, progress)
+    goal, shares, tolerance = question.goal, question.shares, question.tolerance
+    if goal.sign in ("greatest", "least"):
+        answer = extremum(jobs, goal.sign == "greatest", shares, tolerance)
+    else:
+        answer = first(jobs, goal.holds, shares, tolerance, workers)
+    return replace(answer, run_now=jobs.run_now, study=jobs.name)
+
+
+class Jobs:
+    """Evaluates a question's goal by jobs of one study that grows."""
+
+    def __init__(self, question: Question, folder: Folder, workers: int, progress: Progress):
+        self.question, self.folder = question, folder
+        self.workers, self.progress = workers, progress
+        self.run_now = 0
+        self.name = question.study([question.low]).name
+        self.values = self.earlier()
+
+    def earlier(self) -> set[float]:
+        """The key's values in the stored study of this name whose jobs are of this case."""
+        with contextlib.suppress(StoreError):  # no study yet
+            for study in read_studies(self.folder):
+                if study.name == self.name and [a.key for a in study.axes] == [self.question.key]:
+                    values, stored = study.axes[0].values, read_store(self.folder).keys()
+                    with contextlib.suppress(ValueError):  # the case file no longer takes them
+                        now = self.question.study(values).keys
+                        pairs = zip(values, now, strict=True)
+                        return {value for value, key in pairs if key in stored}
+        return set()
+
+    def __call__(self, shares: Sequence[float]) -> list[Point]:
+        """The points of some shares of the range, each a stored job."""
+        question = self.question
+        wanted = {share: question.argument(share) for share in shares}
+        self.values |= {*wanted.values()}
+        values = sorted(self.values)
+        study = question.study(values)
+        words = ["compsim", "run", question.path, "-o", str(self.folder)]
+        for text in question.settings(values):
+            words += ["--set", text]
+        options = Options(shlex.join(words))  # so that `status` tells how to go on
+        self.run_now += sweep([study], self.folder, self.workers, self.progress, options).run_now
+        keys = dict(zip(values, study.keys, strict=True))
+        store = read_store(self.folder)
+        found = []
+        for share, value in wanted.items():
+            key = keys[value]
+            position = store.position(key)
+            if position is None:
+                raise StoreError(self.folder, f"job {key} is gone", "ask again")
+            end = store.status_at(position)
+            if end.status != "ok":
+                told = Reading(reason=f"the job failed, {end.reason}: {end.detail}")
+            else:
+                told = question.goal.read(end.numbers, str(store.rows.words["regime"][position]))
+            found.append(Point(share, value, told, key, end.status != "ok"))
+        return found

@@ -1,0 +1,1 @@
+"""Numerical stability at the extremes: scenes drawn at random, each run and judged."""

@@ -1,0 +1,137 @@
+"""`compsim stress`: extreme scenes, each run and judged; what ends how, and what is worst."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Screen,
+    duration,
+    jobs_option,
+    one_thread_each,
+    plural,
+    print_text,
+    say,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@click.command()
+@click.option("-n", "--scenes", type=click.IntRange(min=1), default=2000, show_default=True,
+              help="How many scenes are drawn.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
+              help="Of the draws.")  # fmt: skip
+@click.option(
+    "--laws",
+    "drawn",
+    flag_value="laws",
+    help="Draw laws of contact and friction as well, each as often as any other.",
+)
+@click.option(
+    "--features",
+    "drawn",
+    flag_value="features",
+    help="Draw laws, oil, guide, drive and rod as well.",
+)
+@jobs_option("Worker processes.")
+@click.option("-o", "--output", default="stress", show_default=True,
+              help="Folder of the campaign.")  # fmt: skip
+@click.option("--scene", type=click.IntRange(min=0),
+              help="Repeat this scene of the seed alone, and store nothing.")  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No progress.")
+def stress(
+    scenes: int, seed: int, drawn: str | None, jobs: int | None, output: str, scene: int | None,
+    quiet: bool,
+) -> int:  # fmt: skip
+    """Test numerical stability at the extremes: draw scenes, run each, and judge what it says.
+
+    Half of the scenes lie in the range that is documented as supported, half go far beyond. A scene
+    ends ok, confirmed by another integrator at a hundredth of its tolerance; failed, with a named
+    reason; silent_wrong, when a number lies ten times farther off than its error bar tells; or
+    unjudged. Writes stress.nc, from which the same command goes on, and the map stress.png and
+    stress.svg; shares and worst cases go to stdout. --scene prints one as a case file, and its end.
+
+    Exit code 3 if any number is wrong in silence, or more than 2 % of the scenes are unjudged.
+    """
+    one_thread_each()  # before numpy loads
+    from compressor.sweep import cores
+
+    if scene is not None:
+        print_text("\n".join(repeated(scene, seed, drawn or "")))
+        return DONE
+    from compressor.report import render
+    from compressor.store import publish, writable_folder
+    from compressor.studies.stress.extremes import Budget
+    from compressor.studies.stress.figures import draw_outcomes
+    from compressor.studies.stress.stress import campaign
+
+    writable_folder(output)
+    screen = Screen(quiet, "scenes")
+    try:
+        study = campaign(output, scenes, seed, jobs or cores(), screen, Budget(drawn or ""))
+    finally:
+        screen.end()
+    drawing = draw_outcomes(study)
+    for kind in ("png", "svg"):
+        publish(Path(output, f"stress.{kind}"), render(drawing, kind))
+    print_text("\n".join(summary(study)))
+    if not quiet:
+        say(study.encoding["source"])
+        say(os.path.join(output, "stress.png"))
+    verdicts = study["verdict"].values.tolist()
+    doubtful = verdicts.count("silent_wrong") or verdicts.count("unjudged") > 0.02 * scenes
+    return SOME_FAILED if doubtful else DONE
+
+
+def repeated(number: int, seed: int, drawn: str) -> Iterator[str]:
+    """A scene as a case file, and below it, as comments, how it ends."""
+    from compressor.studies.stress.stress import repeat
+
+    made, row = repeat(number, seed, drawn)
+    yield from (f"{key}: {json.dumps(value)}" for key, value in made.items())
+    for key, value in row.items():
+        if key not in ("load", "joint") and value != "":
+            yield f"# {key}: {value:.3g}" if isinstance(value, float) else f"# {key}: {value}"
+
+
+def summary(study: "xr.Dataset") -> Iterator[str]:
+    """Shares, the worst scenes with the command that repeats each, and the slowest one."""
+    from compressor.studies.stress.stress import counts, slowest, worst
+
+    for kind, ends in counts(study).items():
+        total = sum(ends.values())
+        named = ", ".join(f"{name} {count}" for name, count in sorted(ends.items()))
+        share = ends.get("ok", 0) / max(total, 1)
+        yield f"{kind} range: {plural(total, 'scene')}, {share:.1%} ok: {named}"
+    yield ""
+    yield f"{'verdict':<13} {'excess':>7} {'beyond':>7} {'error':>8} {'bar':>8}  repeat by"
+    most = worst(study)
+    for place in range(most.sizes["scene"]):
+        row = most.isel(scene=place)
+        far, beyond, error, size = (
+            row[name].item() for name in ("excess", "excess_beyond", "error", "bar")
+        )
+        yield (
+            f"{row['verdict'].item():<13} {far:>7.2g} {beyond:>7.2g} {error:>8.1e} {size:>8.1e}  "
+            f"{command(row, study.attrs)}"
+        )
+    longest = slowest(study)
+    if longest is not None:
+        yield (
+            f"slowest ok scene: {duration(longest['seconds'].item())}, "
+            f"{command(longest, study.attrs)}"
+        )
+    yield f"peak memory of a worker: {study['peak_memory'].max().item() / 2**20:.0f} MiB"
+
+
+def command(row: "xr.Dataset", attrs: dict[str, Any]) -> str:
+    """What repeats a scene of a campaign."""
+    drawn = f" --{attrs['drawn']}" if attrs.get("drawn") else ""
+    return f"compsim stress --scene {row['scene'].item()} --seed {attrs['seed']}{drawn}"

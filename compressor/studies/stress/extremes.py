@@ -1,0 +1,240 @@
+"""Extreme scenes: journals in clearances drawn far beyond what a machine is built with.
+
+Scene k of a seed is always the same, however many are drawn. Even scenes lie inside the range that
+is documented as supported, odd ones in the whole range; each kind has a scrambled Sobol sequence of
+its own, over the numbers of `SPANS` and over load, scene, friction's ratio and the start. A span of
+None is the same for both kinds. Contact stiffness is drawn in N/m^1.5; with another exponent it is
+the one whose force at 0.1 mm, the law's full damping, is the same.
+
+With laws, the same scenes have laws of contact and friction that are drawn as well, each as often
+as any other, with the numbers that they read; with features also each of oil, guide, drive, rod and
+friction of ideal joints in three of ten (`extreme_features`).
+"""
+
+import math
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from compressor.cases import Case, design, judged_range, table
+from compressor.metrics import JOINTS
+from compressor.studies.stress.extreme_features import features
+
+Span = tuple[float, float]
+
+
+def _judged(key: str, factor: float = 1.0) -> Span:
+    """The supported range of a key: the one that the table of parameters has, times a factor."""
+    low, high = judged_range(key)
+    return low * factor, high * factor
+
+
+# name: (unit, whole range, supported range, log-uniform)
+SPANS: dict[str, tuple[str, Span, Span | None, bool]] = {
+    "clearance_big_end": ("m", (1e-9, 3e-3), _judged("clearance_mm.big_end", 1e-3), True),
+    "clearance_small_end": ("m", (1e-9, 3e-3), _judged("clearance_mm.small_end", 1e-3), True),
+    "stiffness": (
+        "N/m^1.5", (1e6, 1e14), _judged("contact.stiffness_N_per_mm15", 1000.0**1.5), True,
+    ),
+    "exponent": ("1", _judged("contact.exponent"), None, False),
+    "damping": ("1", (1e-2, 1e2), None, True),  # over the paper's; a tenth of the scenes has none
+    "friction": ("1", (0.0, 1.0), _judged("friction.static"), False),
+    "stiction_velocity": (
+        "m/s", (1e-6, 0.1), _judged("friction.stiction_velocity_mm_per_s", 1e-3), True,
+    ),
+    "rod_mass": ("kg", (1e-3, 100.0), _judged("machine.rod_mass_kg"), True),
+    "reciprocating_mass": ("kg", (1e-3, 100.0), _judged("machine.reciprocating_mass_kg"), True),
+    "speed": ("rpm", (1.0, 20_000.0), _judged("machine.speed_rpm"), True),
+    "pin_radius": ("m", _judged("machine.pin_radius_mm", 1e-3), None, True),
+    "rtol": ("1", (1e-10, 1e-2), None, True),
+}  # fmt: skip
+OTHERS = 3 + 3 * len(JOINTS)  # friction's ratio, load, scene; how each journal starts
+LOADS = ("none", "gas", "spring")
+SCENES = ("big_end", "small_end", "both")
+UNDAMPED = 0.1  # share of the scenes
+MASS_RATIO = 1e4  # at most
+PAPER_DAMPING = 336.0  # N s/mm
+FULL_DAMPING = 1e-4  # m
+DEEPEST_START = 0.03  # of the pin radius
+FORCES = {"none": 0.0, "gas": 3087.0, "spring": 3347.0}  # N, greatest of each load
+CRANK = 0.12  # m
+SAMPLES = 720  # of the output grid
+# (whole range, supported range) of what chosen laws read, drawn evenly in the logarithm
+OF_LAWS = {
+    "contact.restitution": ((0.05, 1.0), _judged("contact.restitution")),
+    "contact.least_approach_mm_per_s": ((0.1, 1000.0), _judged("contact.least_approach_mm_per_s")),
+    "contact.length_mm": ((1.0, 1000.0), _judged("contact.length_mm")),
+    "contact.modulus_GPa": ((0.1, 1000.0), _judged("contact.modulus_GPa")),
+    "friction.bristle_stiffness_per_mm": ((1.0, 1e5), _judged("friction.bristle_stiffness_per_mm")),
+    "friction.bristle_damping_s_per_mm": (
+        (1e-4, 0.3),
+        _judged("friction.bristle_damping_s_per_mm"),
+    ),
+    "friction.viscous_s_per_mm": ((1e-6, 1e-2), (1e-5, 1e-3)),
+}
+LAWS, FEATURES = "laws", "features"
+ELASTIC = ("johnson", "liu")  # which need no restitution: half of them have none
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How far scenes run, and what each run may cost; `seconds` are more than steps ever need.
+
+    drawn: what is drawn beside their numbers: nothing (""), "laws", or laws and "features".
+    """
+
+    drawn: str = ""
+    revolutions: float = 0.25
+    max_steps: int = 500_000
+    seconds: float = 30.0
+
+
+def supported(number: int) -> bool:
+    """Whether a scene lies inside the range that is documented as supported."""
+    return number % 2 == 0
+
+
+def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
+    """Scene `number` of a seed as the values of a case file."""
+    point = iter(_points(seed, number % 2, 1 << (number // 2).bit_length())[number // 2])
+    found = _numbers(point, supported(number))
+    ratio, load, joint = next(point), LOADS[_which(point)], SCENES[_which(point)]
+    exponent = found["exponent"]
+    stiffness = found["stiffness"] * FULL_DAMPING ** (1.5 - exponent)
+    force = found["reciprocating_mass"] * CRANK * (found["speed"] * math.pi / 30) ** 2
+    depth = ((force + FORCES[load]) / stiffness) ** (1 / exponent)  # at rest
+    worn = [one for one in JOINTS if joint in (one, "both")]
+    offset: dict[str, float] = {}
+    for one in JOINTS:
+        drawn = next(point), next(point), next(point)
+        if one in worn:
+            deepest = min(depth, DEEPEST_START * found["pin_radius"])
+            offset |= _start(one, drawn, found[f"clearance_{one}"], deepest)
+    stiction = 1e3 * found["stiction_velocity"]
+    made: dict[str, Any] = {
+        "name": f"stress-{seed}-{number}",
+        "load": load,
+        "joint": joint,
+        "clearance_mm": {one: 1e3 * found[f"clearance_{one}"] for one in worn},
+        "initial_offset_mm": offset,
+        "machine": {
+            "speed_rpm": found["speed"],
+            "rod_mass_kg": found["rod_mass"],
+            "reciprocating_mass_kg": found["reciprocating_mass"],
+            "pin_radius_mm": 1e3 * found["pin_radius"],
+        },
+        "contact": {
+            "stiffness_N_per_mm15": stiffness / 1000.0**exponent,
+            "exponent": exponent,
+            "damping_N_s_per_mm": PAPER_DAMPING * found["damping"],
+        },
+        "friction": {
+            "static": found["friction"],
+            "dynamic": found["friction"] * (0.3 + 0.7 * ratio),
+            "stiction_velocity_mm_per_s": stiction,
+            "friction_velocity_mm_per_s": 10.0 * stiction,
+        },
+    }
+    if budget.drawn:
+        draw = random.Random(f"{seed} {number}")
+        for group in ("contact", "friction"):
+            made[group] |= chosen(group, draw, supported(number))
+        if budget.drawn == FEATURES:
+            made |= features(made, draw, supported(number))
+    return _rounded(made) | {
+        "output": {"keep": "series"},
+        "solve": {
+            "duration_rev": budget.revolutions,
+            "settle_rev": 0.0,
+            "output_step_deg": 360.0 * budget.revolutions / SAMPLES,
+            "rtol": float(f"{found['rtol']:.2g}"),
+            "horizon": False,  # whether numbers can be judged is the judge's to find out
+            "max_steps": budget.max_steps,
+            "timeout_s": budget.seconds,
+        },
+    }
+
+
+def chosen(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
+    """A law of contact or friction, and all that any law reads beside the default one's numbers."""
+    found: dict[str, Any] = {"law": draw.choice(table()[f"{group}.law"].choices)}
+    for key, (whole, narrow) in OF_LAWS.items():
+        low, high = narrow if inside else whole
+        value = low * (high / low) ** draw.random()
+        if key.startswith(group):
+            found[key.partition(".")[2]] = value
+    if found["law"] in ELASTIC and draw.random() < 0.5:
+        del found["restitution"]
+    return found
+
+
+def place(case: Case) -> dict[str, float]:
+    """Where a scene lies on the axes of `SPANS`; the clearance of an ideal joint is nan."""
+    exponent = case.contact.exponent
+    stiffness = (case.contact.stiffness_N_per_mm15 or math.nan) * 1000.0**exponent
+    friction = case.friction
+    clearances = {
+        f"clearance_{one}": getattr(case.clearance_mm, one) / 1e3 or math.nan for one in JOINTS
+    }
+    return clearances | {
+        "stiffness": stiffness / FULL_DAMPING ** (1.5 - exponent),
+        "exponent": exponent,
+        "damping": case.contact.damping_N_s_per_mm / PAPER_DAMPING,
+        "friction": friction.static if friction else 0.0,
+        "stiction_velocity": friction.stiction_velocity_mm_per_s / 1e3 if friction else math.nan,
+        "rod_mass": case.machine.rod_mass_kg,
+        "reciprocating_mass": case.machine.reciprocating_mass_kg,
+        "speed": case.machine.speed_rpm,
+        "pin_radius": case.machine.pin_radius_mm / 1e3,
+        "rtol": case.rtol,
+    }
+
+
+@cache
+def _points(seed: int, kind: int, count: int) -> list[list[float]]:
+    """At least `count` points of a kind of scene; the first ones do not depend on the count."""
+    return design("sobol", count, len(SPANS) + OTHERS, 2 * seed + kind)
+
+
+def _numbers(point: Iterator[float], inside: bool) -> dict[str, float]:
+    """The numbers of `SPANS` at a point of the unit cube."""
+    found = {}
+    for name, (_, whole, narrow, log) in SPANS.items():
+        low, high = narrow if inside and narrow else whole
+        u = next(point)
+        if name == "damping":
+            share = (u - UNDAMPED) / (1.0 - UNDAMPED)
+            found[name] = low * (high / low) ** share if share >= 0.0 else 0.0
+        else:
+            found[name] = low * (high / low) ** u if log else low + u * (high - low)
+    rod = found["rod_mass"]
+    mass = max(found["reciprocating_mass"], rod / MASS_RATIO)
+    found["reciprocating_mass"] = min(mass, rod * MASS_RATIO)
+    return found
+
+
+def _which(point: Iterator[float]) -> int:
+    """One of three."""
+    return int(3 * next(point))
+
+
+def _start(
+    joint: str, drawn: tuple[float, float, float], clearance: float, deepest: float
+) -> dict[str, float]:
+    """A journal's initial offset (mm): none, within the clearance, or sunk into the bearing."""
+    kind, size, turn = drawn
+    if kind < 1 / 3:
+        return {}
+    depth = deepest * 10.0 ** (-3.0 * size)
+    radius = 1e3 * (clearance * size if kind < 2 / 3 else clearance + depth)
+    angle = 2 * math.pi * turn
+    return {f"{joint}_x": radius * math.cos(angle), f"{joint}_y": radius * math.sin(angle)}
+
+
+def _rounded(made: Any) -> Any:
+    """Numbers to five digits, so that a case can be written into a file."""
+    if isinstance(made, dict):
+        return {key: _rounded(value) for key, value in made.items()}
+    return float(f"{made:.5g}") if isinstance(made, float) else made

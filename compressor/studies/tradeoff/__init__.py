@@ -1,0 +1,1 @@
+"""What accuracy and each part of the model cost, and what they change."""

@@ -1,0 +1,299 @@
+"""How far choices of the model move a case's metrics: the table, its line, and its section.
+
+The numbers are those of `compsim explain --models`: metrics of the case itself and of each choice,
+with error bars. A change is what lies beyond both bars.
+"""
+
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+import xarray as xr
+
+from compressor.cases import Study, points
+from compressor.digits import by_bar, is_known
+from compressor.metrics import METRICS
+from compressor.outcome import Regime
+from compressor.report import (
+    Additions,
+    Cell,
+    Chapter,
+    Draw,
+    Measure,
+    Note,
+    Row,
+    Section,
+    Table,
+    column_title,
+    file_name,
+    measures,
+)
+from compressor.store import (
+    Folder,
+    StoredStudy,
+    StoreError,
+    StoreWarning,
+    models_file,
+    read_dataset,
+)
+
+NONE_SEEN = "none seen"  # less than both error bars
+NO_VALUE = "–"
+FINEST = 1e-5  # relative: a smaller change or error is not written out
+LEAST_ERROR = 1e-4
+
+
+@dataclass(frozen=True)
+class ModelRow:
+    """A choice of the model: its cell for each measure, how long it runs, and what it assumes.
+
+    `changes`: relative, or in the unit of a share; nan where none is known. `time_ratio`: wall time
+    over that of the case itself.
+    """
+
+    name: str
+    cells: tuple[str, ...]
+    changes: tuple[float, ...]
+    time_ratio: float
+    note: str
+
+
+@dataclass(frozen=True)
+class ModelTable:
+    """What choices of the model change in each measure that the case itself has a number of.
+
+    `values`, `bars`: of the case itself, in the measures' units; `spans`: (least, greatest) change
+    of each measure, 0 among them; `unknown`: titles of measures that the case has no number of.
+    """
+
+    measures: tuple[Measure, ...]
+    values: tuple[float, ...]
+    bars: tuple[float, ...]
+    rows: tuple[ModelRow, ...]
+    spans: tuple[tuple[float, float], ...]
+    unknown: tuple[str, ...]
+
+    @property
+    def span_texts(self) -> tuple[str, ...]:
+        """The spans in words, `-66 to +93 %`."""
+        return tuple(span_text(m, *span) for m, span in zip(self.measures, self.spans, strict=True))
+
+
+def model_table(data: xr.Dataset) -> ModelTable:
+    """Return the changes of a table of choices, dim `choice`, the case itself first.
+
+    Counts, which depend on how long a run is, are left out, and choices without run and note.
+    """
+    first = data.isel(choice=0)
+    shown = [m for m in measures(first) if METRICS[m.variable].kind != "count"]
+    known = [m for m in shown if has_number(m, float(m.of(first)), float(m.bar(first)))]
+    there = data.isel(choice=(data["status"] != "missing") | (data["note"] != ""))
+    columns = [(m, m.of(there).values, m.bar(there).values) for m in known]
+    rows = []
+    for n in range(1, there.sizes["choice"]):
+        one = there.isel(choice=n)
+        found = [change(m, values[[0, n]], bars[[0, n]], one) for m, values, bars in columns]
+        ratio = float(one["seconds"]) / float(first["seconds"])
+        rows.append(
+            ModelRow(
+                str(one["choice"].item()), tuple(text for text, _ in found),
+                tuple(size for _, size in found), ratio, note_of(one),
+            )
+        )  # fmt: skip
+    spans = []
+    for n in range(len(known)):
+        sizes = [0.0, *(row.changes[n] for row in rows if not math.isnan(row.changes[n]))]
+        spans.append((min(sizes), max(sizes)))
+    return ModelTable(
+        tuple(known), tuple(float(v[0]) for _, v, _ in columns),
+        tuple(float(b[0]) for _, _, b in columns), tuple(rows),
+        tuple(spans), tuple(m.title for m in shown if m not in known),
+    )  # fmt: skip
+
+
+def has_number(measure: Measure, value: float, bar: float) -> bool:
+    """Return whether a case knows a measure so well that others can be compared with it."""
+    known = is_known(value, bar, measure.is_relative)
+    return known and (value > 0.0 or not measure.is_relative)
+
+
+def change(
+    measure: Measure, values: np.ndarray, bars: np.ndarray, choice: xr.Dataset
+) -> tuple[str, float]:
+    """Return what a choice changes in a measure, in words and as a number, nan where unknown.
+
+    values, bars: of the case itself, and of the choice.
+    """
+    status = str(choice["status"].item())
+    if status != "ok":
+        return ("failed" if status == "failed" else NO_VALUE), math.nan
+    relative = measure.is_relative
+    if math.isnan(values[1]):
+        return NO_VALUE, math.nan
+    if not is_known(values[1], bars[1], relative):
+        chaotic = str(choice["regime"].item()) == Regime.CHAOTIC
+        return ("chaotic" if chaotic else "unknown"), math.nan
+    if relative and values[1] <= 0.0:  # a penetration
+        return "no contact", math.nan
+    apart = values[1] - values[0]
+    if abs(apart) <= bars.sum():
+        return NONE_SEEN, 0.0
+    size = float(apart / values[0] if relative else apart)
+    return change_text(measure, size), size
+
+
+def change_text(measure: Measure, size: float) -> str:
+    """Return a change with its unit: +12 %, or +3.1 points of a share in percent."""
+    if measure.is_relative:
+        return percent(size)
+    return f"{size:+z.2g} points"
+
+
+def percent(size: float) -> str:
+    """Return a relative change in percent, to two digits or whole."""
+    if abs(size) < FINEST:
+        return f"below {100 * FINEST:g} %"
+    return f"{100 * size:+.0f} %" if abs(size) >= 0.995 else f"{100 * size:+.2g} %"
+
+
+def span_text(measure: Measure, low: float, high: float) -> str:
+    """Return how far choices move a measure, as `-66 to +93 %`."""
+    if low == high == 0.0:
+        return NONE_SEEN
+    unit = "%" if measure.is_relative else "points"
+    texts = [
+        change_text(measure, size).removesuffix(f" {unit}") if abs(size) >= FINEST else "0"
+        for size in (low, high)
+    ]
+    return f"{' to '.join(texts)} {unit}"
+
+
+def note_of(choice: xr.Dataset) -> str:
+    """Return what a choice assumes, and why its run failed, if it did."""
+    reason, note = str(choice["reason"].item()), str(choice["note"].item())
+    failed = f"failed: {reason}" if reason else ""
+    return "; ".join(text for text in (failed, note) if text)
+
+
+def headline(table: ModelTable) -> str:
+    """Return a line on the peak that choices of the model move most, beside its numerical error.
+
+    Of a case without known peaks, as a chaotic one, on another measure with a relative error.
+    """
+    places = [n for n, m in enumerate(table.measures) if m.is_relative]
+    if not places:
+        return "No metric of the case is known well enough to see a change of it"
+    peaks = [n for n in places if table.measures[n].variable.startswith("peak")]
+    n = max(peaks or places, key=lambda n: table.spans[n][1] - table.spans[n][0])
+    measure, value, bar = table.measures[n], table.values[n], table.bars[n]
+    number = f"{by_bar(value, bar, measure.is_relative, bare=True)} {measure.unit}"
+    share = bar / value
+    error = f"below {100 * LEAST_ERROR:g}" if share < LEAST_ERROR else f"{100 * share:.1g}"
+    word = "peak" if peaks else "number"
+    span = table.span_texts[n]
+    moved = f"choices of the model move this {word} by {span}"
+    if span == NONE_SEEN:
+        moved = f"no choice of the model is seen to move this {word}"
+    blank = [row.cells[n] for row in table.rows if math.isnan(row.changes[n])]
+    if blank:
+        words = ", ".join(dict.fromkeys("impossible" if b == NO_VALUE else b for b in blank))
+        verb = "gives" if len(blank) == 1 else "give"
+        moved += f"; {len(blank)} of {len(table.rows)} choices {verb} no number ({words})"
+    start = "" if peaks else "no peak of the case is known; "
+    title = f"{start}{measure.title}"
+    return f"{title[0].upper()}{title[1:]}: {number.rstrip()}; numerical error {error} %; {moved}"
+
+
+def place_text(study: Study | StoredStudy, key: str) -> str:
+    """Return which job of its study the choices are of, in words."""
+    at = next(islice(points(study), study.keys.index(key), None))
+    point = ", ".join(f"{name} = {value}" for name, value in at.items())
+    which = "the only job" if study.jobs == 1 else f"one of {study.jobs} jobs"
+    return f"{study.name}{f' at {point}' if point else ''}, {which}"
+
+
+# ---- on the page --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ModelsContent:
+    """What a page says of choices of the model: of which job, a line, and a table."""
+
+    place: str
+    headline: str
+    unknown: str
+    table: Table
+
+
+def read_models(folder: Folder, study: StoredStudy) -> xr.Dataset | None:
+    """Read what `compsim explain --models` stored of a job of a study; None where nothing.
+
+    Numbers of a job that the study no longer has, or that are damaged, are left out with a warning.
+    """
+    path = models_file(folder, study.name)
+    again = f"compsim explain --models {study.case_file} -o {folder} makes it anew"
+    if not path.exists():
+        return None
+    try:
+        data = read_dataset(path, again)
+        if data.attrs["key"] in study.keys:
+            return data
+        problem = f"{path}: is of a job that {study.name} no longer has: {again}"
+    except StoreError as error:
+        problem = str(error)
+    except KeyError:
+        problem = f"{path}: holds no choices of the model: {again}"
+    warnings.warn(problem, StoreWarning, stacklevel=2)
+    return None
+
+
+def add(results: Folder, studies: Sequence[StoredStudy], draw: Draw, place: Folder) -> Additions:
+    """Return what is stored of choices of the model: a line on each study, and a section."""
+    notes, chapters = {}, []
+    for study in studies:
+        data = read_models(results, study)
+        if data is not None:
+            anchor = file_name("models", study.name)
+            line = headline(model_table(data))
+            notes[study.name] = Note(line, anchor, "Table of the choices")
+            chapters.append(Chapter(models_section(anchor, study, data)))
+    return Additions(notes, chapters)
+
+
+def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section:
+    """Return the section with the choices of the model of a study's job."""
+    table = model_table(data)
+    content = ModelsContent(
+        place_text(study, data.attrs["key"]),
+        headline(table),
+        ", ".join(table.unknown),
+        page_table(table),
+    )
+    title = f"Choices of the model in study {study.name}"
+    return Section(anchor, title, "compressor.studies.tradeoff:models.html", content)
+
+
+def page_table(table: ModelTable) -> Table:
+    """Return the cells of a table: the case itself, each choice, and the span."""
+    numbers = zip(table.measures, table.values, table.bars, strict=True)
+    values = [number_cell(by_bar(value, bar, m.is_relative)) for m, value, bar in numbers]
+    itself = [Cell("the case itself"), *values, Cell("")]
+    span = [Cell("all of them"), *map(number_cell, table.span_texts), Cell("")]
+    rows = [Row(itself), *(Row([*row_cells(row)]) for row in table.rows), Row(span)]
+    return Table(["choice of the model", *map(column_title, table.measures), "assumed"], rows)
+
+
+def row_cells(row: ModelRow) -> Iterator[Cell]:
+    """Yield the cells of a choice."""
+    yield Cell(row.name)
+    for text, size in zip(row.cells, row.changes, strict=True):
+        yield number_cell(text, size)
+    yield Cell(row.note)
+
+
+def number_cell(text: str, value: float = math.nan) -> Cell:
+    """Return a cell that is sorted by its number."""
+    return Cell(text, "number", None if math.isnan(value) else value)

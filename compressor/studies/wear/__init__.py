@@ -1,0 +1,1 @@
+"""Bores that wear over operating hours, until a joint is worn out."""

@@ -1,0 +1,194 @@
+"""`compsim wear`: how bores wear over operating hours, and when a joint is worn out."""
+
+import json
+import math
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    Reading,
+    Screen,
+    all_stored,
+    as_json,
+    configs_argument,
+    duration,
+    jobs_option,
+    one_thread_each,
+    output_option,
+    plural,
+    print_text,
+    say,
+    setting,
+    stored_before,
+)
+
+from compressor.program import printable
+
+if TYPE_CHECKING:
+    from compressor.cases import Study
+    from compressor.studies.wear.run import Machine, WearSummary
+
+MOST_DRAWN = 12  # machines that get a figure
+HEAD = f"{'worn out after, h':>17}  {'with f times to 1/f of the wear':>31}  at the end"
+
+
+@click.command()
+@configs_argument
+@output_option
+@jobs_option("Worker processes.")
+@setting
+@click.option("--rerun", is_flag=True, help="Go on with machines whose motion failed.")
+@as_json
+@click.option("--quiet", is_flag=True, help="No progress; errors are still told.")
+def wear(
+    configs: tuple[str, ...],
+    output: str,
+    jobs: int | None,
+    overrides: tuple[str, ...],
+    rerun: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Wear the bores of case files with `wear`, until a joint is worn out.
+
+    Motion and wear take turns: a motion on the bores as they are wears them by Archard's law, and
+    stands for all revolutions until the deepest place has grown by wear.step_mm. One line a machine
+    goes to stdout: the hours until a clearance reaches wear.limit_mm, with the least and the
+    greatest coefficient beside them. Profiles and the motion on them are kept in wear/ of the
+    folder, with a figure; what was interrupted goes on from there.
+    """
+    one_thread_each()  # before numpy loads
+    from compressor.cases import load_studies
+    from compressor.studies.wear.run import run_wear
+    from compressor.sweep import cores
+
+    with Reading(quiet) as told:
+        studies = load_studies(*configs, overrides=overrides, follow=False, told=told)
+    check(studies)
+    screen = Screen(quiet, "machines", alike=False)
+    try:
+        summary = run_wear(studies, output, jobs or cores(), screen, rerun)
+    except BaseException:
+        screen.end()
+        say(f"what is finished is stored in {output}; the same command goes on from there")
+        raise
+    screen.end()
+    if as_json:
+        print_text(json.dumps([plain(one, output) for one in summary.machines], indent=1))
+    else:
+        for line in table(summary.machines):
+            print_text(line)
+    drawn = [*draw(summary, output)]
+    if not quiet:
+        tell(summary, output, drawn)
+    for one in summary.failed:
+        fail(one)
+    return SOME_FAILED if summary.failed else DONE
+
+
+def check(studies: "list[Study]") -> None:
+    """Each case wears, and its motions end where they begin: at top dead centre."""
+    for study in studies:
+        for case in study.cases:
+            if case.joint == "none":
+                raise click.UsageError(
+                    f"{study.path}: joint: none has no bore that wears: leave none out"
+                )
+            if not case.wear:
+                raise click.UsageError(
+                    f"{study.path}: has no wear: write wear: true, or keys of it (compsim schema)"
+                )
+            turns = case.duration / case.turn
+            if isinstance(case.solve.settle_rev, str) or isinstance(case.solve.duration_rev, str):
+                raise click.UsageError(
+                    f"{study.path}: solve.settle_rev and solve.duration_rev: give numbers in place "
+                    "of auto: each profile has a motion of that length"
+                )
+            if abs(turns - round(turns)) > 1e-9 or turns - case.settle / case.turn < 1.0 - 1e-9:
+                raise click.UsageError(
+                    f"{study.path}: solve.duration_rev: {turns:g} must be whole revolutions, and "
+                    "one more than settle_rev at least"
+                )
+
+
+def table(machines: "tuple[Machine, ...]") -> Iterator[str]:
+    """A line for each machine, below a head."""
+    names = [" ".join([one.study, *(f"{k}={v}" for k, v in one.point.items())]) for one in machines]
+    width = max(map(len, names))
+    yield f"{'machine':<{width}}  {HEAD}"
+    for name, one in zip(names, machines, strict=True):
+        yield f"{name:<{width}}  {ending(one)}"
+
+
+def ending(one: "Machine") -> str:
+    """How a machine ended, in a line."""
+    found, how = one.life, one.case.wear
+    if not found or not how:
+        return f"failed: {one.reason}"
+    most = hours(how.hours, "> ")
+    low, mid, high = (
+        most if math.isnan(value) else hours(value)
+        for value in (found.low, found.hours, found.high)
+    )
+    where = f"{1e3 * found.clearance:.3f} mm at {found.joint}, {math.degrees(found.angle):.0f} deg"
+    return f"{mid:>17}  {f'{low} to {high}':>31}  {where}" + f"; failed: {one.reason}" * bool(
+        one.reason
+    )
+
+
+def hours(value: float, sign: str = "") -> str:
+    """Hours in four digits."""
+    return f"{sign}{value:.0f}" if value >= 1000 else f"{sign}{value:.4g}"
+
+
+def plain(one: "Machine", folder: str) -> dict[str, Any]:
+    """A machine as JSON says it."""
+    from compressor.studies.wear.stages import wear_file
+
+    found: dict[str, Any] = {"study": one.study, **one.point, "reason": one.reason}
+    if one.life:
+        numbers = {
+            name: None if isinstance(value, float) and math.isnan(value) else value
+            for name, value in one.life._asdict().items()
+        }
+        found |= {**numbers, "file": str(wear_file(folder, one.case))}
+    return found
+
+
+def tell(summary: "WearSummary", folder: str, drawn: list[str]) -> None:
+    """Say what was done, and where figures are."""
+    total = len(summary.machines)
+    done = f"{plural(total - summary.done_before, 'machine')} in {duration(summary.seconds)}"
+    done += stored_before(summary.done_before)
+    say(done if summary.done_before < total else all_stored(total, folder, "machine"))
+    for path in drawn:
+        say(path)
+
+
+def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
+    """Draw the first machines that have a life."""
+    from compressor.report import render
+    from compressor.store import publish
+    from compressor.studies.wear.figures import draw_wear
+    from compressor.studies.wear.stages import open_wear, wear_file
+
+    for one in [one for one in summary.machines if one.life][:MOST_DRAWN]:
+        path = wear_file(folder, one.case).with_suffix(".png")
+        how = one.case.wear
+        assert how
+        bounds = how.limit_mm or math.nan, how.coefficient_factor
+        publish(path, render(draw_wear(open_wear(folder, one.case), *bounds), "png"))
+        yield os.fspath(path)
+
+
+def fail(one: "Machine") -> None:
+    """Say why a machine ended early, and what to do."""
+    from compressor.reasons import remedy
+
+    point = "".join(f" {key}={value}" for key, value in one.point.items())
+    say(f"{one.study}{point}: {one.reason}: {printable(one.detail)}")
+    say(f"  {remedy(one.reason)}; then: compsim wear --rerun")

@@ -1,0 +1,146 @@
+"""Follow the wear of machines that a folder does not hold yet, side by side in workers."""
+
+import contextlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from compressor.cases import Case, Study, points
+from compressor.store import Folder, StoreError, writable_folder
+from compressor.studies.wear.life import Life, life
+from compressor.studies.wear.stages import Stage, Worn, dataset, first, following, kept, write
+from compressor.sweep import Done, Lost, Needs, Progress, run_here
+
+AT_MOST = 100_000  # motions, the wall time of which a machine may take
+
+
+@dataclass(frozen=True)
+class Machine:
+    """How a machine of a study has worn; `point`: its swept values, `reason`: why it ended early.
+
+    `stages`: profiles that are stored; `life`: None where there is none.
+    """
+
+    study: str
+    point: dict[str, Any]
+    case: Case
+    stages: int
+    life: Life | None
+    reason: str = ""
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class WearSummary:
+    """What a run did: machines, how many of them were complete before, and seconds."""
+
+    machines: tuple[Machine, ...]
+    done_before: int
+    seconds: float
+
+    @property
+    def failed(self) -> list[Machine]:
+        """Those that ended early."""
+        return [machine for machine in self.machines if machine.reason]
+
+
+class Task(NamedTuple):
+    """A machine to be followed in a folder of results; `rerun`: from its failed stage on."""
+
+    folder: str
+    worn: Worn
+    rerun: bool = False
+
+
+class Ended(NamedTuple):
+    """How a machine's wear ended: stages, its life, and why it ended early."""
+
+    stages: int
+    life: Life | None
+    reason: str
+    detail: str
+
+
+def run_wear(
+    studies: Sequence[Study], folder: Folder, workers: int, progress: Progress, rerun: bool = False
+) -> WearSummary:
+    """Follow and store the wear of all cases of studies, as far as it is missing.
+
+    rerun: machines that failed go on from their last good stage. Progress counts machines. Raises
+    StoreError and WorkersFailed; whatever ends it early, what was stored stays, and the same call
+    goes on.
+    """
+    began = time.monotonic()
+    writable_folder(folder)
+    listed = [
+        (study.name, point, case)
+        for study in studies
+        for point, case in zip(points(study), study.cases, strict=True)
+    ]
+    tasks = {(worn := Worn(case)).key: Task(str(folder), worn, rerun) for _, _, case in listed}
+    before = [key for key, task in tasks.items() if complete(task)]
+    missing = [task for key, task in tasks.items() if key not in before]
+    ends: dict[str, Ended | Lost] = {}
+
+    def remark(text: str) -> None:
+        progress(len(before) + len(ends), len(tasks), text)
+
+    remark("")
+    jobs = [(t.worn.key, t, AT_MOST * t.worn.case.solve.timeout_s) for t in missing]
+    needs = Needs.of(task.worn.case for task in missing)._replace(features=True)
+    running = run_here(follow_wear, jobs, needs, workers, remark)
+    with contextlib.closing(running):
+        for end in running:
+            if isinstance(end, Done) and isinstance(end.result, StoreError):
+                raise end.result
+            ends[end.id] = end.result if isinstance(end, Done) else end
+            remark("")
+    ends |= {key: ended(tasks[key].worn, stored(tasks[key])) for key in before}
+    found = tuple(machine(*one, ends[Worn(one[2]).key]) for one in listed)
+    return WearSummary(found, len(before), time.monotonic() - began)
+
+
+def stored(task: Task) -> list[Stage]:
+    """The stages of a machine that are kept of an earlier run. Raises StoreError."""
+    stages = kept(task.worn, task.worn.path(task.folder))
+    good = [stage for stage in stages if not stage["reason"]]
+    return good if task.rerun else stages
+
+
+def complete(task: Task) -> bool:
+    """Whether all stages of a machine are stored. Raises StoreError."""
+    stages = stored(task)
+    return bool(stages) and task.worn.over(stages[-1])
+
+
+def follow_wear(task: Task) -> Ended | StoreError:
+    """Follow what is missing of a machine, in a worker.
+
+    A StoreError is returned: it ends the run, while an exception is a failure of the machine.
+    """
+    worn = task.worn
+    try:
+        stages = stored(task)
+        if not stages:
+            stages = [first(worn)]
+            write(worn, task.folder, stages)
+        while not worn.over(stages[-1]):
+            stages.append(following(worn, stages[-1]))
+            write(worn, task.folder, stages)
+    except StoreError as error:
+        return error
+    return ended(worn, stages)
+
+
+def ended(worn: Worn, stages: list[Stage]) -> Ended:
+    """How a machine's wear has ended."""
+    last = stages[-1]
+    return Ended(len(stages), life(worn, dataset(worn, stages)), last["reason"], last["detail"])
+
+
+def machine(study: str, point: dict[str, Any], case: Case, end: Ended | Lost) -> Machine:
+    """A machine of a study, and how it ended."""
+    if isinstance(end, Lost):
+        return Machine(study, point, case, 0, None, str(end.reason), end.detail)
+    return Machine(study, point, case, *end)

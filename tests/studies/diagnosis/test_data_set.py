@@ -1,0 +1,210 @@
+"""Data sets: windows hold whole revolutions, labels are those of the case, no machine is split."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compressor.cases.case import Case
+from compressor.store.files import WrongName
+from compressor.store.reader import read_store
+from compressor.studies.diagnosis.data_set import (
+    LABELS,
+    DataSetError,
+    DataSetOptions,
+    job_rows,
+    labels_of,
+    machine_of,
+    make_data_set,
+    noisy,
+    split_by_machine,
+    windows,
+)
+from compressor.studies.diagnosis.features import FEATURES, features
+
+OPTIONS = DataSetOptions(noise=(0.0, 0.5))
+
+
+@pytest.fixture(scope="module")
+def made(worn):
+    return make_data_set(worn, "worn", OPTIONS)
+
+
+def test_windows_reach_from_pulse_to_pulse():
+    times = np.arange(1000) / 100.0
+    tacho = 0.103 + 0.77 * np.arange(12)
+    record = {"sensor_time": times, "sensor_acceleration": np.sin(times), "tacho_time": tacho}
+    found = [*windows(record, 3, 2)]
+    assert [one.first for one in found] == [0, 2, 4, 6, 8]
+    for one in found:
+        assert len(one.tacho) == 4
+        assert 0.0 <= one.tacho[0] < 0.01
+        assert 0.0 <= one.times[-1] - one.tacho[-1] < 0.01
+        since = tacho[one.first] - one.tacho[0]
+        assert one.times[0] == 0.0
+        assert one.values == pytest.approx(np.sin(one.times + since), abs=1e-12)
+    assert [*windows(record, 12, 1)] == []
+    assert len([*windows(record, 11, 1)]) == 1
+
+
+def test_no_record_is_kept_in_memory(worn):
+    """A view would keep the whole record, in double precision."""
+    stored = read_store(worn)
+    key = make_data_set(worn, "worn")["key"].values[0]
+    for signals in (True, False):
+        for row in job_rows(stored, key, replace(OPTIONS, signals=signals)):
+            kept = row["window"]
+            assert all(part.base is None for part in (kept.times, kept.values, kept.tacho))
+            assert kept.values.dtype == np.float32
+            assert (kept.values.size > 0) == signals
+
+
+def test_every_job_that_can_gives_windows(made):
+    """Ten jobs of five machines, each with ten whole revolutions."""
+    assert made.sizes["window"] == 2 * 10
+    assert [*np.unique(made["key"].values, return_counts=True)[1]] == [2] * 10
+    assert made["first_pulse"].values.tolist() == [0, 5] * 10
+    assert len({*made["machine"].values.tolist()}) == 5
+    assert json.loads(made.attrs["left_out"]) == {"budget_steps": 2, "too_short": 2}
+    assert made.attrs["jobs"] == 14
+
+
+def test_labels_are_those_of_the_case(made, worn):
+    stored = read_store(worn)
+    for number in range(made.sizes["window"]):
+        row = made.isel(window=number)
+        case = Case.from_attribute(stored.job(row["key"].item()).attrs["case"])
+        assert row["joint"] == case.joint
+        assert row["load"] == case.load
+        assert row["machine"] == machine_of(case)
+        assert row["speed_rpm"] == case.machine.speed_rpm
+        assert row["rod_mass_kg"] == case.machine.rod_mass_kg
+        worn_ends = {"none": (0, 0), "both": (0.1, 0.3)}.get(case.joint)
+        ends = row["clearance_mm_big_end"].item(), row["clearance_mm_small_end"].item()
+        assert ends == (worn_ends or (case.clearance_mm.big_end, 0))
+        assert row["regime"] in ("predictable", "periodic", "chaotic", "undecided")
+
+
+def test_features_are_those_of_the_stored_samples(made):
+    """With the noise that the card describes; samples are rounded to single precision."""
+    for number in (0, 7, 19):
+        row = made.isel(window=number)
+        count = row["samples"].item()
+        times = np.arange(count) / row["rate"].item()
+        values = row["signal"].values[:count].astype(float)
+        assert np.isnan(row["signal"].values[count:]).all()
+        for level, rms in enumerate(OPTIONS.noise):
+            seed = [OPTIONS.seed, int(row["key"].item(), 16), row["first_pulse"].item(), level]
+            found = features(times, noisy(values, rms, seed), row["tacho"].values)
+            assert [*found] == made["feature"].values.tolist()
+            assert row["features"].values[level] == pytest.approx([*found.values()], abs=1e-4)
+    assert made["signal"].dtype == np.float32
+
+
+def test_speed_and_noise_are_seen_in_the_features(made):
+    speeds = 60.0 * 10.0 ** made["features"].sel(feature="speed").values[:, 0]
+    assert speeds == pytest.approx(made["speed_rpm"].values, rel=0.01)
+    rms = 10.0 ** made["features"].sel(feature="level").values
+    # the spline that resamples takes up to a quarter of white noise's power, at its highest part
+    assert (rms[:, 1] < 1.02 * np.hypot(rms[:, 0], 0.5)).all()
+    assert (rms[:, 1] > 0.98 * np.hypot(rms[:, 0], 0.43)).all()
+
+
+def test_noise_is_as_loud_as_it_says_and_repeats_itself():
+    values = np.zeros(100_000)
+    found = noisy(values, 0.3, [1, 2, 3, 4])
+    assert np.std(found) == pytest.approx(0.3, rel=0.01)
+    assert np.array_equal(found, noisy(values, 0.3, [1, 2, 3, 4]))
+    for other in ([2, 2, 3, 4], [1, 3, 3, 4], [1, 2, 4, 4], [1, 2, 3, 5]):
+        assert abs(np.corrcoef(found, noisy(values, 0.3, other))[0, 1]) < 0.02
+    assert noisy(values, 0.0, [1]) is values
+
+
+def test_no_machine_is_on_both_sides(made):
+    for one in {*made["machine"].values.tolist()}:
+        assert len({*made["split"].values[made["machine"].values == one].tolist()}) == 1
+    # of three machines one is drawn; of one of its kind none can be
+    kinds = made["joint"].values, made["split"].values
+    assert {*kinds[1][kinds[0] == "none"].tolist()} == {"train"}
+    assert {*kinds[1][kinds[0] == "big_end"].tolist()} == {"train", "test"}
+
+
+def test_the_split_knows_no_order_and_keeps_shares():
+    machines = [f"m{k}" for k in range(100) for _ in range(3)]
+    strata = [("none", "both")[k < 40] for k in range(100) for _ in range(3)]
+    test = split_by_machine(machines, strata, 0.3, 5)
+    assert test.sum() == 90
+    assert sum(t for t, s in zip(test, strata, strict=True) if s == "both") == 36
+    order = np.random.default_rng(1).permutation(300)
+    again = split_by_machine([machines[i] for i in order], [strata[i] for i in order], 0.3, 5)
+    assert np.array_equal(again, test[order])
+    assert not np.array_equal(split_by_machine(machines, strata, 0.3, 6), test)
+
+
+def test_a_machine_is_what_is_built():
+    values = {"joint": "both", "clearance_mm": 0.2, "body": True, "sensor": {"seed": 4}}
+    solve = {"duration_rev": 4, "settle_rev": 1}
+    one = Case.from_values({**values, "solve": solve})
+    for other in (
+        {"load": "gas"}, {"machine": {"speed_rpm": 300}}, {"sensor": {"seed": 5}},
+        {"solve": {**solve, "accuracy": "draft"}}, {"name": "other"},
+    ):  # fmt: skip
+        assert machine_of(Case.from_values({**values, "solve": solve, **other})) == machine_of(one)
+    for other in (
+        {"clearance_mm": 0.21}, {"machine": {"rod_mass_kg": 5}}, {"joint": "big_end"},
+        {"body": {"mass_kg": 501}}, {"friction": False},
+    ):  # fmt: skip
+        assert machine_of(Case.from_values({**values, "solve": solve, **other})) != machine_of(one)
+
+
+def test_an_ideal_machine_has_no_clearance():
+    found = labels_of(Case.from_values({"joint": "none"}))
+    assert [*found] == [*LABELS]
+    assert found["clearance_mm_big_end"] == found["clearance_mm_small_end"] == 0.0
+
+
+def test_windows_may_overlap_and_go_without_samples(worn):
+    made = make_data_set(worn, "worn", DataSetOptions(4, hop=3, signals=False))
+    assert {*made["first_pulse"].values.tolist()} == {0, 3, 6}
+    assert "signal" not in made
+    assert made["features"].shape == (made.sizes["window"], 1, len(FEATURES))
+
+
+def test_jobs_that_are_not_run_are_counted(worn, tmp_path):
+    """A store of the studies alone."""
+    (tmp_path / "studies").symlink_to(worn / "studies")
+    with pytest.raises(DataSetError, match="has no record to cut windows of: 14 missing"):
+        make_data_set(tmp_path, "worn")
+
+
+@pytest.mark.parametrize(
+    ("study", "told"),
+    [
+        ("deaf", "has no sensor's record: write `body: true` and `sensor:.*deaf.yaml"),
+        ("worm", "holds no study 'worm'; did you mean worn?"),
+        ("quite another", "it holds deaf, worn"),
+        (None, "several studies; name one: deaf, worn"),
+    ],
+)
+def test_a_study_that_cannot_be_used(worn, study, told):
+    with pytest.raises((DataSetError, WrongName), match=told):
+        make_data_set(worn, study)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"revolutions": 1}, "at least 2 revolutions, not 1"),
+        ({"hop": 0}, "at least 1 revolution apart"),
+        ({"noise": ()}, "noise is an rms"),
+        ({"noise": (0.1, -1.0)}, "noise is an rms"),
+        ({"noise": (float("nan"),)}, "noise is an rms"),
+        ({"noise": (0.1, 0.1)}, "given twice"),
+        ({"test_share": 0.0}, "between 0 and 1, not 0"),
+        ({"test_share": 1.0}, "between 0 and 1, not 1"),
+    ],
+)
+def test_options_that_make_no_sense(change, told):
+    with pytest.raises(DataSetError, match=told):
+        replace(OPTIONS, **change)

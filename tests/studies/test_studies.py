@@ -1,0 +1,124 @@
+"""The table of studies: what each gives the program, and that the program does without each."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+import test_layers
+
+from compressor.studies import STUDIES, by_kind, kind_of_stored, verbs
+
+ROOT = Path(__file__).parent.parent.parent
+FOLDERS = sorted(path.parent.name for path in (ROOT / "compressor/studies").glob("*/__init__.py"))
+NAMES = [kind.name for kind in STUDIES]
+OLD_PLACES = [place.rpartition(".")[2] for place in test_layers.OLD_PLACES]
+
+
+def test_every_folder_is_in_the_table_and_the_other_way_round():
+    assert sorted(NAMES) == FOLDERS
+
+
+@pytest.mark.parametrize("kind", STUDIES, ids=NAMES)
+def test_a_study_has_the_parts_that_its_line_names(kind):
+    for verb, module in kind.verbs.items():
+        assert isinstance(getattr(kind.module(module), verb), click.Command)
+    if kind.group:
+        command = kind.module("command")
+        for name in ("check_options", "run_studies", "ahead", "ahead_lines"):
+            assert callable(getattr(command, name))
+    if kind.figures:
+        plots = kind.module("plots")
+        assert callable(plots.is_stored)
+        assert callable(plots.write)
+    assert hasattr(kind.module("page"), "add") if kind.has_page else not kind.page_folder
+
+
+def test_a_verb_belongs_to_one_study():
+    names = [command.name for command in verbs()]
+    assert len({*names}) == len(names) > len(NAMES) - 1
+
+
+def test_of_a_folder_without_studies_nothing_is_drawn_by_one(tmp_path):
+    assert kind_of_stored(tmp_path, "wear") is None
+    assert by_kind([]) == {}
+
+
+def copy_without(folder, names):
+    """Copy the source, without the folders of some studies and their lines in the table."""
+    ignore = shutil.ignore_patterns("__pycache__", ".compsim*")
+    shutil.copytree(ROOT / "compressor", folder / "compressor", ignore=ignore)
+    shutil.copytree(ROOT / "cmd", folder / "cmd", ignore=ignore)
+    table = folder / "compressor/studies/__init__.py"
+    lines = table.read_text().split("\n")
+    for name in names:
+        shutil.rmtree(folder / "compressor/studies" / name)
+        (line,) = [line for line in lines if line.startswith(f'    StudyKind("{name}"')]
+        lines.remove(line)
+    table.write_text("\n".join(lines))
+    for name in {*names} & {*OLD_PLACES}:
+        (folder / f"compressor/{name}.py").unlink()
+    return folder
+
+
+def run_in(folder, code):
+    """Run Python in a copy, and return what it prints."""
+    begin = f"import sys; sys.path[:0] = [{str(folder)!r}, {str(folder / 'cmd')!r}]\n"
+    done = subprocess.run([sys.executable, "-c", begin + code], capture_output=True, text=True,
+                          cwd=folder)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+EVERY_MODULE = """
+import importlib, pathlib
+import compressor
+assert compressor.__file__.startswith(sys.path[0])
+for top, root in (("compressor", "."), ("cmd/compsim", "cmd")):
+    for path in sorted(pathlib.Path(top).rglob("*.py")):
+        if path.stem not in ("__main__", "_jit"):
+            parts = path.relative_to(root).with_suffix("").parts
+            importlib.import_module(".".join(part for part in parts if part != "__init__"))
+from compsim.cli import cli
+print(*cli.commands)
+"""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_program_does_without_each_study(name, tmp_path, monkeypatch):
+    copy = copy_without(tmp_path, [name])
+    monkeypatch.setattr(test_layers, "ROOT", copy)
+    sources = test_layers.read_sources()
+    assert len(sources) < len(test_layers.SOURCES)
+    missing = [
+        f"{module} imports {source}"
+        for module in sources
+        for source, _ in test_layers.ours(sources, module)
+        if test_layers.study(source) == name
+    ]
+    assert missing == []
+    for rule in test_layers.RULES:
+        if rule is not test_layers.faults_of_doors:  # some names are given to this study alone
+            assert rule(sources) == []
+
+
+MAIN_JOB = """
+from pathlib import Path
+from compsim import cli
+Path("one.yaml").write_text("clearance_mm: 0\\njoint: none\\nload: [spring, none]\\n")
+assert cli.main(["plan", "one.yaml"]) == 0
+assert cli.main(["run", "one.yaml", "-j", "1", "--quiet"]) == 0
+assert cli.main(["report"]) == 0
+assert cli.main(["show", "one", "load=none"]) == 0
+assert "Study one" in Path("report/index.html").read_text()
+"""
+
+
+def test_the_program_does_without_all_of_them(tmp_path):
+    copy = copy_without(tmp_path, NAMES)
+    left = run_in(copy, EVERY_MODULE).split()
+    assert sorted(left) == ["completion", "export", "init", "plan", "plot", "report", "run",
+                            "schema", "show", "status", "verify"]  # fmt: skip
+    run_in(copy, MAIN_JOB)

@@ -1,0 +1,147 @@
+"""What a case asks for, and what it pays for in vain."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from compressor.cases.accuracy import ACCURACY
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.studies.tradeoff.explain import explain, ideal_scales, promise, terms, unknowns
+
+SOLVE = {"duration_rev": 0.25, "settle_rev": 0}
+
+
+@pytest.fixture
+def explained(tmp_path):
+    """Explain a case file with these values."""
+
+    def made(**values):
+        values["solve"] = SOLVE | values.get("solve", {})
+        path = tmp_path / "made.yaml"
+        Path(path).write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.2} | values))
+        return explain(load_studies(path)[0], workers=2, repeats=1)
+
+    return made
+
+
+def advice(told, key):
+    return next(one for one in told.advice if one.key == key)
+
+
+def test_gravity_that_is_off_is_not_paid_for(explained):
+    told = explained()
+    assert [one.name for one in told.advice] == ["friction", "spring damping", "load"]
+    assert "gravity" in told.absent
+    assert "gravity" not in told.active
+
+
+def test_friction_that_matters_is_kept(explained):
+    one = advice(explained(), "friction")
+    assert abs(one.effect.change_peak_acceleration) > 0.005
+    assert not one.removable
+    assert "peak acceleration" in one.needed_for
+
+
+def test_what_changes_less_than_the_promise_can_go(explained):
+    told = explained(machine={"gravity_m_per_s2": 1e-4}, friction={"static": 1e-7, "dynamic": 1e-7})
+    for key in ("machine.gravity_m_per_s2", "friction"):
+        one = advice(told, key)
+        assert one.removable
+        assert one.needed_for == ()
+        assert 0 < abs(one.effect.change_peak_acceleration) < told.promise
+    assert advice(told, "friction").neutral == "friction: false"
+
+
+def test_a_tighter_promise_keeps_what_a_looser_one_drops(explained):
+    weak = {"spring": {"damping_N_s_per_mm": 1e-3}}
+    key = "spring.damping_N_s_per_mm"
+    assert advice(explained(**weak, solve={"accuracy": "draft"}), key).removable
+    assert not advice(explained(**weak, solve={"accuracy": "reference"}), key).removable
+
+
+def test_a_job_costs_more_than_its_solution(explained):
+    told = explained(body={"start": "rest"}, sensor={"place": "guide"})
+    assert 0 < told.solution_seconds < told.seconds
+    assert told.other_work == (
+        "the runs that its error bars come from", "its time series", "the motion of its body",
+        "the record of its sensor",
+    )  # fmt: skip
+    assert all(one.effect.time_ratio > 0 for one in told.advice)
+    alone = explained(solve={"error_bars": False}, output={"keep": "metrics"})
+    assert alone.other_work == ()
+
+
+def test_a_sweep_is_explained_by_its_first_job(explained):
+    told = explained(clearance_mm=[0.1, 0.2, 0.3], load=["gas", "spring"])
+    assert told.jobs == 6
+    assert told.point == {"clearance_mm": 0.1, "load": "gas"}
+    assert told.sweep_seconds == pytest.approx(3 * told.seconds)
+    assert told.steps > 0
+    assert "0.1 mm at the big end" in told.active["clearance"]
+
+
+def test_the_ideal_machine_integrates_nothing(explained):
+    told = explained(clearance_mm=0)
+    assert told.unknowns == told.scales == told.advice == ()
+    assert {"clearance", "contact", "friction"} < {*told.absent}
+    assert told.reason == ""
+
+
+def test_a_job_that_fails_is_told_and_no_advice_given(explained):
+    told = explained(solve={"max_steps": 20})
+    assert told.reason == "budget_steps"
+    assert told.detail == "more than 20 steps"
+    assert told.advice == ()
+
+
+def test_scales_follow_the_contact():
+    both = Case.from_values({"joint": "both", "clearance_mm": 0.2})
+    big, small = ideal_scales(both)
+    assert (big.joint, small.joint) == ("big_end", "small_end")
+    assert big.penetration == pytest.approx((big.force / 1.0625e10) ** (2 / 3), rel=1e-3)
+    assert big.limited_by == "contact damping"
+    stiff = Case.from_values(
+        {"joint": "big_end", "clearance_mm": 0.2, "friction": False,
+         "contact": {"stiffness_N_per_mm15": 3.36e7, "damping_N_s_per_mm": 0}}
+    )  # fmt: skip
+    (found,) = ideal_scales(stiff)
+    assert found.limited_by == "contact stiffness"
+    # the contact's own rate goes as K^(1/2 + (p - 1)(-1/p) / 2) = K^(1/3) at a given force
+    assert big.implicit_step / found.implicit_step == pytest.approx(100 ** (1 / 3), rel=1e-9)
+    assert (big.damping_ratio > 1, found.damping_ratio) == (True, 0.0)
+
+
+def test_scales_are_those_of_the_machine_without_features():
+    values = {"joint": "both", "clearance_mm": 0.2}
+    more = {"guide": {"clearance_mm": 0.1}, "drive": True, "rod": True, "lubricant": True}
+    plain, full = Case.from_values(values), Case.from_values(values | more)
+    assert [*ideal_scales(full)] == [*ideal_scales(plain)]
+    names = unknowns(full)
+    assert len(names) == 11
+    assert names[4:6] == ("height in the guide, m", "tilt in the guide, rad")
+    assert names[-1] == "crank's lag, s"
+
+
+def test_freedoms_and_terms():
+    both = Case.from_values({"joint": "both", "clearance_mm": {"big_end": 0.1, "small_end": 0.2}})
+    active, absent = terms(both)
+    assert active["clearance"] == "0.1 mm at the big end, 0.2 mm at the small end"
+    assert active["load"] == "load = spring"
+    assert absent == (
+        "gravity", "back pressure", "play of the guide", "friction of ideal joints",
+        "oil film", "friction of the guide", "speed that gives way", "elastic rod",
+    )  # fmt: skip
+    steel = Case.from_values(
+        {"joint": "big_end", "clearance_mm": 0.1, "contact": {"materials": ["steel", "copper"]}}
+    )
+    assert "steel on copper" in terms(steel)[0]["contact"]
+
+
+@pytest.mark.parametrize("word", ACCURACY)
+def test_promises(word):
+    assert promise(Case.from_values({"solve": {"accuracy": word}})) == ACCURACY[word].promise
+    looser = Case.from_values({"solve": {"rtol": ACCURACY[word].rtol * 0.9}})
+    assert promise(looser) == ACCURACY[word].promise
+    assert promise(Case.from_values({"solve": {"rtol": 0.05}})) == ACCURACY["draft"].promise

@@ -1,0 +1,186 @@
+"""`compsim wear`: from a case file to lives, figures and files that go on after a kill."""
+
+import json
+import multiprocessing
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from compsim.cli import main
+
+from compressor.cases.load import load_cases
+from compressor.store.files import StoreError
+from compressor.studies.wear import stages
+from compressor.studies.wear.run import Task, follow_wear, run_wear
+from compressor.studies.wear.stages import Worn, open_wear, wear_file
+
+TEXT = """
+joint: both
+clearance_mm: 0.2
+machine: {speed_rpm: [400, 500]}
+solve: {accuracy: draft, duration_rev: 2}
+wear: {limit_mm: 0.23, step_mm: 0.01}
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with a case file and its results."""
+    folder = tmp_path_factory.mktemp("worn")
+    (folder / "bearing.yaml").write_text(TEXT, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def told(place):
+    """What the command gave, and its code."""
+    here, out = place / "bearing.yaml", place / "results"
+    assert main(["wear", str(here), "-o", str(out), "-j", "2", "--quiet"]) == 0
+    return load_cases(here), out
+
+
+def same(one, other):
+    """Whether two Datasets are equal to the bit."""
+    assert one.identical(other)
+    for name in one.variables:
+        a, b = one[name].values, other[name].values
+        assert a.dtype.kind != "f" or a.tobytes() == b.tobytes()
+    return True
+
+
+def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, capsys):
+    cases, out = told
+    assert main(["wear", str(place / "bearing.yaml"), "-o", str(out)]) == 0
+    said = capsys.readouterr()
+    head, *lines = said.out.splitlines()
+    assert "worn out after, h" in head
+    assert "all 2 machines are stored" in said.err
+    assert main(["wear", str(place / "bearing.yaml"), "-o", str(out), "--json"]) == 0
+    numbers = json.loads(capsys.readouterr().out)
+    for line, one, case in zip(lines, numbers, cases, strict=True):
+        assert f"machine.speed_rpm={case.machine.speed_rpm}" in line
+        assert f"{one['hours']:.4g}" in line
+        assert f"{one['low']:.4g} to {one['high']:.4g}" in line
+        assert one["low"] < one["hours"] < one["high"]
+        found = open_wear(out, case)
+        assert one["file"] == str(wear_file(out, case))
+        worst = float(found["clearance"].sel(joint=one["joint"]).values[-1])
+        assert worst == found["clearance"].values.max() == one["clearance"] >= 0.23e-3
+        assert f"{1e3 * worst:.3f} mm at {one['joint']}" in line
+        figure = wear_file(out, case).with_suffix(".png")
+        assert str(figure) in said.err
+        assert figure.stat().st_size > 10_000
+
+
+def test_stored_stages_are_labelled(told):
+    cases, out = told
+    found = open_wear(out, cases[0])
+    assert found["worn_depth"].dims == ("stage", "joint", "angle")
+    for name in found.data_vars:
+        assert found[name].attrs["long_name"]
+    assert found["angle"].values[-1] == pytest.approx(2 * np.pi * 71 / 72)
+    assert (np.diff(found["worn_volume"].values, axis=0) > 0).all()
+
+
+@pytest.mark.slow
+def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
+    """SIGKILL at random, until all stages are there."""
+    cases, out = told
+    worn, rng, stops = Worn(cases[0]), np.random.default_rng(3), []
+    stages.first(worn)  # loads the equations, which forked processes share
+    path = worn.path(tmp_path)
+    for _ in range(30):
+        before = len(stages.kept(worn, path))
+        stops.append(before)
+        process = multiprocessing.get_context("fork").Process(
+            target=follow_wear, args=(Task(str(tmp_path), worn),)
+        )
+        process.start()
+        seen = path.stat().st_mtime_ns if path.exists() else 0
+        while process.is_alive() and (path.stat().st_mtime_ns if path.exists() else 0) == seen:
+            time.sleep(0.005)
+        time.sleep(rng.uniform(0.0, 0.3))
+        if process.is_alive():
+            os.kill(process.pid, signal.SIGKILL)
+        process.join()
+        if process.exitcode == 0:
+            break
+    assert process.exitcode == 0
+    assert same(open_wear(tmp_path, cases[0]), open_wear(out, cases[0]))
+    assert len({*stops}) > 1
+
+
+def test_a_failed_machine_is_told_and_goes_on_when_asked(place, tmp_path, capsys, monkeypatch):
+    file = place / "failing.yaml"
+    file.write_text(TEXT.replace("[400, 500]", "400"), encoding="utf-8")
+    rub, calls = stages.rub, []
+
+    def failing(*given):
+        calls.append(given)
+        found = rub(*given)
+        return found._replace(reason="budget_seconds", detail="slow") if len(calls) == 4 else found
+
+    monkeypatch.setattr(stages, "rub", failing)
+    (case,) = load_cases(file)
+    worn = Worn(case)
+    end = follow_wear(Task(str(tmp_path), worn))
+    assert (end.reason, end.detail) == ("budget_seconds", "slow")
+    again = follow_wear(Task(str(tmp_path), worn))
+    assert (again.stages, again.reason) == (end.stages, end.reason)
+    assert main(["wear", str(file), "-o", str(tmp_path)]) == 3
+    said = capsys.readouterr()
+    assert "failing: budget_seconds: slow" in said.err
+    assert "--rerun" in said.err
+    assert "failed: budget_seconds" in said.out
+    assert main(["wear", str(file), "-o", str(tmp_path), "--rerun"]) == 0
+    assert same(open_wear(tmp_path, case), whole(worn, tmp_path / "undisturbed"))
+
+
+def whole(worn, folder):
+    """The stages of an undisturbed run."""
+    follow_wear(Task(str(folder), worn))
+    return open_wear(folder, worn.case)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("joint: big_end\nclearance_mm: 0.2\n", "has no wear: write wear: true"),
+        (TEXT.replace("duration_rev: 2", "duration_rev: auto"), "give numbers in place of auto"),
+        (TEXT.replace("duration_rev: 2", "duration_rev: 2.5"), "2.5 must be whole revolutions"),
+        (TEXT + "lubricant: true\n", "leave out lubricant or wear"),
+        (TEXT.replace("0.23", "0.1"), "0.1 mm must be more than the clearance, 0.2 mm"),
+        ("joint: [none, big_end]\nclearance_mm: 0.1\nwear: true\n", "none has no bore that wears"),
+        ("joint: none\nwear: true\n", "wear: nothing reads this group: it needs clearance_mm"),
+    ],
+)
+def test_what_cannot_wear_is_refused(text, message, tmp_path, capsys):
+    file = tmp_path / "odd.yaml"
+    file.write_text(text, encoding="utf-8")
+    assert main(["wear", str(file), "-o", str(tmp_path / "none")]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_file_of_something_else_is_told(told, tmp_path):
+    cases, out = told
+    place = Worn(cases[1]).path(tmp_path)
+    place.parent.mkdir(parents=True)
+    place.write_bytes(wear_file(out, cases[0]).read_bytes())
+    with pytest.raises(StoreError, match="does not hold the machine that its name says"):
+        stages.kept(Worn(cases[1]), place)
+    with pytest.raises(StoreError, match="compsim wear the case file"):
+        open_wear(tmp_path / "nowhere", cases[0])
+
+
+def test_progress_counts_machines(told, place):
+    seen = []
+    from compressor.cases.load import load_studies
+
+    found = run_wear(
+        load_studies(place / "bearing.yaml"), told[1], 1, lambda *now: seen.append(now)
+    )
+    assert (found.done_before, len(found.machines), found.failed) == (2, 2, [])
+    assert seen == [(2, 2, "")]
