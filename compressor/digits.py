@@ -11,7 +11,7 @@ SMALL, LARGE = 1e-3, 1e7  # sizes between which a number is written without a po
 
 
 def is_known(value: float, bar: float, relative: bool = True) -> bool:
-    """Whether a number is larger than its error bar; nan, of no bar, is no error bar at all.
+    """Return whether a number is larger than its error bar; nan, of no bar, is no error bar at all.
 
     Of a share or a count (not relative) any bar below inf tells something, also beside 0.
     """
@@ -21,7 +21,8 @@ def is_known(value: float, bar: float, relative: bool = True) -> bool:
 
 
 def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) -> str:
-    """A number and its error bar, such as 647.1 ± 0.3, or at most six of its digits alone (bare).
+    """Return a number and its error bar, such as 647.1 ± 0.3, or at most six of its digits alone
+    (bare).
 
     bar: nan where none was made; the number then has six digits.
     """
@@ -47,7 +48,9 @@ def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) 
 
 
 def _rounded_up(bar: float) -> tuple[float, int]:
-    """A bar to one digit, two where the first is 1, never shorter; and its last digit's power."""
+    """Return a bar to one digit, two where the first is 1, never shorter; and its last digit's
+    power.
+    """
     place = math.floor(math.log10(bar))
     if bar / 10.0**place < 2.0:
         place -= 1

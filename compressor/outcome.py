@@ -23,7 +23,7 @@ NOTHING = np.full(1, math.nan, ROW).tobytes()
 
 
 def row(data: bytes = NOTHING) -> np.void:
-    """A job's numbers, to be written: from their bytes, or nan.
+    """Return a job's numbers, to be written: from their bytes, or nan.
 
     To copy so many named numbers takes twenty times as long.
     """
@@ -104,7 +104,7 @@ class Outcome:
         return Table(named, self.attributes)
 
     def variables(self) -> dict[str, tuple]:
-        """Status, reason and numbers as xarray variables: (dims, values, attributes).
+        """Return the status, reason and numbers as xarray variables: (dims, values, attributes).
 
         Statistics of a chaotic motion are absent from any other, rod-load numbers without signals.
         """
@@ -124,7 +124,7 @@ def _received(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:
 
 
 def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more: Any) -> Outcome:
-    """The outcome of a job of which no run can tell.
+    """Return the outcome of a job of which no run can tell.
 
     `attributes`: what is to be said of its case (`Case.attributes`); `more`: other attributes.
     """
@@ -150,7 +150,9 @@ class Table:
 
 
 def coordinates(used: Iterable[Any] = SIZES) -> dict[str, tuple]:
-    """The coordinates of those dimensions that are used as xarray variables; always the space's."""
+    """Return the coordinates of those dimensions that are used as xarray variables; always the
+    space's.
+    """
     wanted = {"joint", "axis", *used}
     every = {
         "joint": (("joint",), list(JOINTS), {"long_name": "joint of the rod"}),

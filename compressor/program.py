@@ -74,7 +74,7 @@ def printable(text: str) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | None = None) -> str:
-    """What was probably meant by a word that is not known, as `did you mean A or B?`, or "".
+    """Return what was probably meant by a word that is not known, as `did you mean A or B?`, or "".
 
     told: what to tell for each, itself by default. A path or a file's name stands for its stem,
     too; upper and lower case are the same.
@@ -91,7 +91,7 @@ def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | N
 
 
 def library_versions(*names: str) -> dict[str, str]:
-    """The installed version of each distribution by name; raises PackageNotFoundError."""
+    """Return the installed version of each distribution by name; raises PackageNotFoundError."""
     return {name: metadata.version(name) for name in names}
 
 
@@ -139,7 +139,7 @@ def _user_cache() -> Path:
 
 
 def _may_write(folder: Path) -> bool:
-    """Whether files can be written to a folder, which need not be there yet."""
+    """Return whether files can be written to a folder, which need not be there yet."""
     above = next((one for one in (folder, *folder.parents) if os.path.exists(one)), folder)
     return os.path.isdir(above) and os.access(above, os.W_OK | os.X_OK)
 

@@ -118,13 +118,13 @@ class Reason(StrEnum):
 
 
 def remedy(name: str) -> str:
-    """What to do about a stored reason, also one of another version's."""
+    """Return what to do about a stored reason, also one of another version's."""
     known = Reason.__members__.get(name.upper())
     return known.remedy if known else "compsim show JOB tells its detail"
 
 
 def reason_table() -> str:
-    """The reasons in Markdown, for the README."""
+    """Return the reasons in Markdown, for the README."""
     lines = ["| reason | what it means | what to do |", "|---|---|---|"]
     lines += [f"| `{one}` | {one.meaning} | {one.remedy} |" for one in Reason]
     return "\n".join(lines) + "\n"

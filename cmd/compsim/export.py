@@ -71,7 +71,7 @@ def export(
 
 
 def told(found: "list[Exported]", output: str) -> list[str]:
-    """What was written, a line a file; files in a folder of the output are told together."""
+    """Return what was written, a line a file; files in a folder of the output are told together."""
     lines = []
     for (place, _), group in itertools.groupby(found, key=lambda one: _line_of(one, output)):
         files = [*group]
@@ -84,7 +84,7 @@ def told(found: "list[Exported]", output: str) -> list[str]:
 
 
 def _line_of(one: "Exported", output: str) -> tuple[str, str]:
-    """The path of the line that tells of a file, and its kind."""
+    """Return the path of the line that tells of a file, and its kind."""
     above = os.path.dirname(one.path)
     return (one.path if above in ("", os.path.normpath(output)) or one.path == output else above,
             one.kind)  # fmt: skip

@@ -14,7 +14,7 @@ from compsim.usage import CASE_FILES
 
 
 def names(_: click.Context, __: click.Parameter, word: str) -> Items:
-    """The templates, for a shell."""
+    """Return the templates, for a shell."""
     from compressor.cases import templates
 
     return [CompletionItem(name) for name in templates() if name.startswith(word)]
@@ -50,7 +50,7 @@ def init(template: str | None, output: str | None) -> int:
 
 
 def unknown(template: str, known: Iterable[str]) -> str:
-    """What is said of a template that there is not."""
+    """Return what is said of a template that there is not."""
     if template.endswith(CASE_FILES):
         return f"a template comes first: compsim init wear -o {template}"
     near = did_you_mean(template, known) or f"there are {', '.join(known)}"

@@ -27,7 +27,9 @@ FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
 
 def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[str, list[str]]]:
-    """Headings and lines of a job; limits: of the rod load's reversal, degrees and percent."""
+    """Yield the headings and lines of a job; limits: of the rod load's reversal, degrees and
+    percent.
+    """
     yield "", aligned(stop(found))
     # a count grows with the run: the number per revolution is shown in its place
     shown = [name for name, row in metrics.METRICS.items() if row.kind != "count"]
@@ -42,13 +44,15 @@ def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[
 
 
 def aligned(lines: list[Line]) -> list[str]:
-    """Lines with their labels in a column."""
+    """Return the lines with their labels in a column."""
     width = max((len(label) for label, _ in lines), default=0)
     return [f"{label:<{max(width, WIDTH)}}  {text}" for label, text in lines]
 
 
 def stop(found: "JobReport") -> list[Line]:
-    """Where a job's run stopped, and how its last steps went, a line each; none that ended."""
+    """Return where a job's run stopped, and how its last steps went, a line each; none that
+    ended.
+    """
     told = found.attributes
     if "stop_history_words" not in told:
         return []
@@ -72,7 +76,9 @@ def stop(found: "JobReport") -> list[Line]:
 
 
 def numbers(found: "JobReport", names: list[str]) -> list[Line]:
-    """Some of a job's numbers, a line for each joint and axis, to the digits that errors allow."""
+    """Return some of a job's numbers, a line for each joint and axis, to the digits that errors
+    allow.
+    """
     lines = []
     for name in names:
         if name.endswith(SPREAD) or name not in found.numbers:
@@ -94,7 +100,7 @@ def numbers(found: "JobReport", names: list[str]) -> list[Line]:
 
 
 def series_errors(found: "JobReport", names: list[str]) -> list[Line]:
-    """How far time series may be from the exact ones, a line for each joint."""
+    """Return how far time series may be from the exact ones, a line for each joint."""
     lines = []
     for name in names:
         for place, label in places(name, metrics.NUMBERS[name][0]):
@@ -105,7 +111,9 @@ def series_errors(found: "JobReport", names: list[str]) -> list[Line]:
 
 
 def bar_of(found: "JobReport", name: str) -> tuple[Any, bool, str]:
-    """The errors of a number, None without; whether they are relative; and what kind they are."""
+    """Return the errors of a number, None without; whether they are relative; and what kind they
+    are.
+    """
     barred = metrics.METRICS | metrics.ROD_LOAD
     if name in barred:
         return found.numbers.get(f"{name}_error"), barred[name].bar.relative, ""
@@ -113,7 +121,7 @@ def bar_of(found: "JobReport", name: str) -> tuple[Any, bool, str]:
 
 
 def unit_of(name: str) -> tuple[str, float]:
-    """The unit in which a number is shown, as the report does, and its factor from SI."""
+    """Return the unit in which a number is shown, as the report does, and its factor from SI."""
     row = metrics.METRICS.get(name)
     if row and row.shown and row.unit != "1":
         return row.shown.unit, row.shown.factor
@@ -127,7 +135,8 @@ def unit_of(name: str) -> tuple[str, float]:
 
 
 def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], str]]:
-    """Where each of a number's values stands, and what it is called: `peak contact force, big end`.
+    """Yield where each of a number's values stands, and what it is called: `peak contact force, big
+    end`.
 
     The error of a series is called after the series.
     """
@@ -144,14 +153,14 @@ def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], 
 
 
 def picked(values: Any, place: tuple[int, ...]) -> float:
-    """One of a number's values."""
+    """Return one of a number's values."""
     for number in place:
         values = values[number]
     return float(values)
 
 
 def tells_nothing(found: "JobReport", name: str, place: tuple[int, ...]) -> bool:
-    """Whether a number is that of the contact in a joint that has no clearance."""
+    """Return whether a number is that of the contact in a joint that has no clearance."""
     if not place or metrics.JOINTS[place[0]] in worn(found):
         return False
     rows = (row for row in metrics.METRICS.values() if name.startswith(row.name))
@@ -159,7 +168,7 @@ def tells_nothing(found: "JobReport", name: str, place: tuple[int, ...]) -> bool
 
 
 def worn(found: "JobReport") -> tuple[str, ...]:
-    """The joints of a job's case that have clearance."""
+    """Return the joints of a job's case that have clearance."""
     from compressor.cases import Case
 
     joint = Case.from_attribute(found.attributes["case"]).joint
@@ -167,12 +176,14 @@ def worn(found: "JobReport") -> tuple[str, ...]:
 
 
 def measured(value: float, error: float, relative: bool) -> str:
-    """A number with its error, by the digits that it allows; six digits without one."""
+    """Return a number with its error, by the digits that it allows; six digits without one."""
     return f"{value:.6g}" if math.isnan(error) else by_bar(value, error, relative)
 
 
 def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[Line]:
-    """Whether the rod load changes its side for long and far enough; none without signals."""
+    """Return whether the rod load changes its side for long and far enough; none without
+    signals.
+    """
     worst, told = math.inf, []
     for name, unit, least in (("angle", math.degrees(1.0), degrees), ("share", 100.0, percent)):
         value = unit * found.numbers.get(f"rod_load_reversal_{name}", math.nan)
@@ -192,7 +203,7 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
 
 
 def cautions(found: "JobReport") -> list[str]:
-    """How far the numbers may be trusted, where their errors do not say it."""
+    """Return how far the numbers may be trusted, where their errors do not say it."""
     if found.attributes.get("regime") == "undecided":
         return ["errors are as large as numbers, and chaos could not be ruled out in the time that "
                 "was spent: ask by solve.horizon: true"]  # fmt: skip
@@ -207,7 +218,7 @@ def cautions(found: "JobReport") -> list[str]:
 
 
 def facts(found: "JobReport") -> list[Line]:
-    """How a job was run, a line each."""
+    """Return how a job was run, a line each."""
     from compressor.outcome import regime_words
 
     told = {name: str(found.attributes[name]) for name in FACTS if name in found.attributes}

@@ -97,7 +97,7 @@ def plan(
 
 
 def cost(whole: "Forecast") -> str:
-    """The line of what a run will take: time with its range, workers, bytes, compiling."""
+    """Return the line of what a run will take: time with its range, workers, bytes, compiling."""
     workers, by = plural(whole.workers, "worker"), f"by {plural(whole.timed, 'timed job')}"
     if whole.timed < whole.missing and not math.isnan(whole.most):
         by = f"{duration(whole.least)} to {duration(whole.most)} {by}"

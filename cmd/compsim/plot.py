@@ -18,7 +18,7 @@ KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
 
 
 def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
-    """The names of a list with commas; () for all. Raises BadParameter."""
+    """Return the names of a list with commas; () for all. Raises BadParameter."""
     names = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     wrong = [name for name in names if name not in (*FIGURES, "all")]
     if wrong:

@@ -26,7 +26,7 @@ Complete = Callable[[click.Context, click.Parameter, str], Items]
 def results_folder(
     words: Sequence[str], option: str | None, named: bool = True
 ) -> tuple[str, tuple[str, ...]]:
-    """The folder of results, by the first of some words or by -i, and the other words.
+    """Return the folder of results, by the first of some words or by -i, and the other words.
 
     option: what -i says, None without it; named: whether words name studies and jobs, too. A first
     word that is a folder is the folder of results, unless -i is given and holds a study of its
@@ -58,7 +58,7 @@ def is_study(name: str, folder: str) -> bool:
 
 
 def one_word(words: Sequence[str], name: str, context: Any = None) -> str:
-    """The one word that is left beside the folder of results. Raises UsageError."""
+    """Return the one word that is left beside the folder of results. Raises UsageError."""
     if not words:
         raise click.UsageError(f"Missing argument '{name}'", context)
     if len(words) > 1:
@@ -84,13 +84,13 @@ def folders(_: click.Context, __: click.Parameter, word: str) -> Items:
 
 
 def studies(context: click.Context, _: click.Parameter, word: str) -> Items:
-    """Names of the stored studies."""
+    """Return the names of the stored studies."""
     folder, _rest = read_so_far(context)
     return [CompletionItem(name) for name in sorted(stored(folder)) if name.startswith(word)]
 
 
 def jobs(context: click.Context, _: click.Parameter, word: str) -> Items:
-    """Names of studies and keys of jobs; after a study's name values of its axes."""
+    """Return the names of studies and keys of jobs; after a study's name values of its axes."""
     folder, words = read_so_far(context)
     known = stored(folder)
     if words and words[0] in known:
@@ -107,7 +107,7 @@ def jobs(context: click.Context, _: click.Parameter, word: str) -> Items:
 
 
 def read_so_far(context: click.Context) -> tuple[str, tuple[str, ...]]:
-    """The folder of results that is meant, and the words before the one to be completed."""
+    """Return the folder of results that is meant, and the words before the one to be completed."""
     words = tuple(context.params.get("given") or ())
     option = context.params.get("folder")
     try:
@@ -117,12 +117,12 @@ def read_so_far(context: click.Context) -> tuple[str, tuple[str, ...]]:
 
 
 def stored(folder: str) -> dict[str, Path]:
-    """The files of a folder's studies by name."""
+    """Return the files of a folder's studies by name."""
     return {path.stem: path for path in Path(folder).glob("studies/*.json")}
 
 
 def read(path: Path) -> dict[str, Any]:
-    """A study's file; nothing where it is large, or damaged."""
+    """Return a study's file; nothing where it is large, or damaged."""
     try:
         if path.stat().st_size > MOST_BYTES:
             return {}
@@ -133,7 +133,9 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def keys(folder: str, known: dict[str, Path]) -> list[str]:
-    """Keys of jobs: of those with time series, and of all where the files of studies are small."""
+    """Return the keys of jobs: of those with time series, and of all where the files of studies
+    are small.
+    """
     found = {path.name[:20] for path in Path(folder).glob("jobs/*.h5")}
     if sum(path.stat().st_size for path in known.values()) <= MOST_BYTES:
         found.update(key for path in known.values() for key in read(path).get("keys", ()))
@@ -141,14 +143,14 @@ def keys(folder: str, known: dict[str, Path]) -> list[str]:
 
 
 def values(path: Path) -> Iterator[str]:
-    """`axis=value` of all values of a study's axes."""
+    """Yield `axis=value` of all values of a study's axes."""
     for axis in read(path).get("axes", ()):
         for value in dict.fromkeys(map(str, axis["values"])):
             yield f"{axis['key']}={value.lower() if value in ('True', 'False') else value}"
 
 
 def of_results(metavar: str = "", complete: Complete = folders) -> Callable[..., Any]:
-    """The folder of results, as the first of `given` or by -i, and other words after it."""
+    """Return the folder of results, as the first of `given` or by -i, and other words after it."""
 
     def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
         option = click.option(

@@ -167,7 +167,7 @@ def run_jobs(
 def watching(
     results: str, page: str, command: str, quiet: bool
 ) -> "contextlib.AbstractContextManager[Watch | None]":
-    """What keeps a page fresh in a folder; nothing where the folder is ""."""
+    """Return what keeps a page fresh in a folder; nothing where the folder is ""."""
     if not page:
         return contextlib.nullcontext()
     from compsim.watch import Watch
@@ -189,7 +189,7 @@ def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None
 
 
 def cluster(scheduler: str | None) -> contextlib.AbstractContextManager[Any]:
-    """The cluster of a scheduler; none where jobs run here."""
+    """Return the cluster of a scheduler; none where jobs run here."""
     if scheduler is None:
         return contextlib.nullcontext()
     from compressor.sweep import Cluster

@@ -40,7 +40,7 @@ class CaseFile(click.ParamType):
     name = "case file"
 
     def get_missing_message(self, param: Any, ctx: Any) -> str:
-        """What could have been named, and how to make one."""
+        """Return what could have been named, and how to make one."""
         made = "compsim init writes one to start from"
         near = nearby_case_files()
         if not near:
@@ -50,7 +50,7 @@ class CaseFile(click.ParamType):
 
 
 def nearby_case_files() -> list[str]:
-    """The case files here and in `configs`, by their names; what cannot be read is none."""
+    """Return the case files here and in `configs`, by their names; what cannot be read is none."""
     found = []
     for place in map(Path, PLACES):
         with contextlib.suppress(OSError):
@@ -138,14 +138,16 @@ class Screen:
             self.log()
 
     def words(self) -> tuple[str, str, str]:
-        """How many are done, how many failed, and how long it will take, as far as it is known."""
+        """Return how many are done, how many failed, and how long it will take, as far as it is
+        known.
+        """
         things = self.things if self.total != 1 else self.things.removesuffix("s")
         share = f", {100 * self.done // self.total} %" if self.total else ""
         failed = f", {self.failed} failed" if self.failed else ""
         return f"{self.done} of {self.total} {things}{share}", failed, self.time_left()
 
     def time_left(self) -> str:
-        """A guess from what has been done in this run; nothing as long as there is none."""
+        """Return a guess from what has been done in this run; nothing as long as there is none."""
         if self.done == self.total:
             return ""
         if self.known:
@@ -218,7 +220,7 @@ class Pace:
             self.first = self.first or self.last
 
     def left(self, total: int) -> float | None:
-        """Seconds until all are done; None as long as too few are done to say."""
+        """Return the seconds until all are done; None as long as too few are done to say."""
         if not self.first or not self.last:
             return None
         things, seconds = self.last[0] - self.first[0], self.last[1] - self.first[1]
@@ -278,7 +280,9 @@ def say(text: str, end: str = "\n") -> None:
 
 
 def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
-    """The commands that run the missing jobs of studies, one for those with the same overrides."""
+    """Return the commands that run the missing jobs of studies, one for those with the same
+    overrides.
+    """
     found: dict[tuple[str, ...], list[Again]] = {}
     for study in dict.fromkeys(studies):
         found.setdefault(study.overrides, []).append(study)
@@ -327,7 +331,7 @@ def tell_changes(studies: "Sequence[Study]", folder: str) -> None:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them."""
+    """Return the seconds as people say them."""
     if seconds < 100:
         return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
     minutes = round(seconds / 60)
@@ -335,23 +339,23 @@ def duration(seconds: float) -> str:
 
 
 def plural(count: int, thing: str = "job") -> str:
-    """A number of things in words: 1 job, 2 jobs."""
+    """Return a number of things in words: 1 job, 2 jobs."""
     return f"{count} {thing}" + ("s" if count != 1 else "")
 
 
 def all_stored(count: int, folder: str, thing: str = "job") -> str:
-    """That there is nothing to run."""
+    """Return that there is nothing to run."""
     every = f"the {thing} is" if count == 1 else f"all {count} {thing}s are"
     return f"nothing to do: {every} stored in {folder}"
 
 
 def stored_before(count: int) -> str:
-    """That some of what was asked for was there already; "" for none."""
+    """Return that some of what was asked for was there already; "" for none."""
     return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
 
 
 def guessed(seconds: float) -> str:
-    """Seconds that are a guess."""
+    """Return the seconds that are a guess."""
     return duration(seconds) if seconds >= 1 else "under 1 s"
 
 
@@ -359,7 +363,7 @@ as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON
 
 
 def size(count: float) -> str:
-    """Bytes as people say them."""
+    """Return the bytes as people say them."""
     for unit in ("B", "kB", "MB"):
         if count < 999.5:
             return f"{count:.3g} {unit}"

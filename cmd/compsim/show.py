@@ -25,7 +25,7 @@ MOST_NAME = 64 - 1 - SHORT  # characters of a study's name
 
 
 def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[float, float]:
-    """Least angle (degrees) and share (percent) of a reversal, from the option's text."""
+    """Return least angle (degrees) and share (percent) of a reversal, from the option's text."""
     try:
         degrees, percent = (float(part) for part in text.split(","))
     except ValueError:
@@ -111,7 +111,9 @@ def tell(found: "JobReport", folder: str, reversal: tuple[float, float]) -> None
 
 
 def whole_case(found: "JobReport", folder: str) -> str:
-    """A job's case as a case file, under a name of its own: its study's may be another file's."""
+    """Return a job's case as a case file, under a name of its own: its study's may be another
+    file's.
+    """
     from compressor.cases import Case, to_yaml
 
     if "case" not in found.attributes:
@@ -123,14 +125,14 @@ def whole_case(found: "JobReport", folder: str) -> str:
 
 
 def ending(found: "JobReport") -> str:
-    """How a job ended, in a line."""
+    """Return how a job ended, in a line."""
     if found.status == "missing":
         return "not run yet"
     return "ok" if found.status == "ok" else f"failed: {found.reason}: {found.detail}"
 
 
 def sayable(value: Any) -> Any:
-    """A value as JSON can say it: null for nan, "inf" for an unknown error."""
+    """Return a value as JSON can say it: null for nan, "inf" for an unknown error."""
     if isinstance(value, dict):
         return {key: sayable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

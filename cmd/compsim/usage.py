@@ -20,7 +20,9 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command and its arguments. Raises UsageError where there is none of this name."""
+        """Return the command and its arguments. Raises UsageError where there is none of this
+        name.
+        """
         word = args[0]
         unknown = self.get_command(ctx, word) is None and not word.startswith("-")
         if unknown and not ctx.resilient_parsing:
@@ -28,7 +30,7 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
     def meant(self, word: str, more: Sequence[str]) -> str:
-        """What is said of a word in the place of a command."""
+        """Return what is said of a word in the place of a command."""
         if word == "help" and more and more[0] in self.commands:
             return f"No such command 'help': compsim {more[0]} --help"
         if word in ASKED:
@@ -45,7 +47,9 @@ class Commands(click.Group):
 
 
 def one_line(error: click.ClickException, arguments: Sequence[str]) -> str:
-    """A mistake in the use of a command, and where to read on; arguments: after `compsim`."""
+    """Return a mistake in the use of a command, and where to read on; arguments: after
+    `compsim`.
+    """
     context = getattr(error, "ctx", None)
     path = context.command_path if context else " ".join(["compsim", *arguments[:1]])
     text = " ".join(error.format_message().split())

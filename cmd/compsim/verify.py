@@ -53,7 +53,7 @@ def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 
 
 def plain(damage: "Damage") -> dict[str, Any]:
-    """Damage as JSON has it."""
+    """Return the damage as JSON has it."""
     return {
         "path": str(damage.path),
         "problem": damage.problem,

@@ -88,7 +88,7 @@ class Watch:
             self.pipe().flush()
 
     def pipe(self) -> IO[str]:
-        """The input of the process, which is started where there is none."""
+        """Return the input of the process, which is started where there is none."""
         if self.process is None:
             self.process = started(self.told)
             threading.Thread(target=self.listen, args=[self.process], daemon=True).start()
@@ -134,7 +134,7 @@ class Watch:
             say(f"{self.page} is not fresh: {problem}; the run does not depend on it")
 
     def finished(self) -> bool:
-        """Whether the process has written the ordinary page and has ended."""
+        """Return whether the process has written the ordinary page and has ended."""
         process = self.process
         with contextlib.suppress(BrokenPipeError):
             self.pipe().close()
@@ -148,7 +148,7 @@ class Watch:
 
 
 def started(told: dict[str, str]) -> "subprocess.Popen[str]":
-    """The process, in a session of its own: Ctrl-C is for the run."""
+    """Return the process, in a session of its own: Ctrl-C is for the run."""
     return subprocess.Popen(
         [sys.executable, "-m", "compsim.watch", json.dumps(told)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
@@ -158,7 +158,7 @@ def started(told: dict[str, str]) -> "subprocess.Popen[str]":
 
 
 def ending(code: int) -> str:
-    """The end of a process in words."""
+    """Return the end of a process in words."""
     return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
 
@@ -217,7 +217,7 @@ class Writer:
 
 
 def spent() -> float:
-    """Seconds of processor time of this process and of those that it has waited for."""
+    """Return the seconds of processor time of this process and of those that it has waited for."""
     return sum(os.times()[:4])
 
 

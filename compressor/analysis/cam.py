@@ -22,7 +22,9 @@ ALLOWED_PRESSURE_ANGLE = math.radians(30)  # the usual limit of a translating fo
 
 
 def cam_profile(p, angles):
-    """Follower displacement s (m) over cam angles (rad, any shape) of the closed cam (Eq. 10)."""
+    """Return the follower displacement s (m) over cam angles (rad, any shape) of the closed cam
+    (Eq. 10).
+    """
     turned = np.mod(angles, 2 * math.pi)
     x, _, _ = exact_motion(turned, p.crank_radius, p.rod_length, p.omega)
     rise, bottom, fall = p.corners
@@ -34,7 +36,9 @@ def cam_profile(p, angles):
 
 
 def cam_slope(p, angles):
-    """ds/dphi (m/rad) of `cam_profile`: the ideal piston's speed while the follower moves."""
+    """Return the ds/dphi (m/rad) of `cam_profile`: the ideal piston's speed while the follower
+    moves.
+    """
     turned = np.mod(angles, 2 * math.pi)
     _, v, _ = exact_motion(turned, p.crank_radius, p.rod_length, p.omega)
     rise, bottom, fall = p.corners
@@ -43,12 +47,12 @@ def cam_slope(p, angles):
 
 
 def printed_corners_of_gas(p):
-    """The ideal gas's corners (rad), with which Eq. 10 as printed is evaluated."""
+    """Return the ideal gas's corners (rad), with which Eq. 10 as printed is evaluated."""
     return gas_corners(p, p.discharge_force / p.suction_force)
 
 
 def printed_profile(p, angles):
-    """Follower displacement (m) of Eq. 10 taken literally; it jumps instead of closing.
+    """Return the follower displacement (m) of Eq. 10 taken literally; it jumps instead of closing.
 
     Rise from the end of the gas's expansion, dwell at the height reached, fall from the end of its
     compression, low dwell at zero.
@@ -64,7 +68,9 @@ def printed_profile(p, angles):
 
 
 def contour(p, angles, base_radius):
-    """Pitch curve (x, y) in m of the cam: base radius plus displacement, aligned roller (e = 0)."""
+    """Return the pitch curve (x, y) in m of the cam: base radius plus displacement, aligned
+    roller (e = 0).
+    """
     radius = base_radius + cam_profile(p, angles)
     return radius * np.cos(angles), radius * np.sin(angles)
 
@@ -104,25 +110,26 @@ class Cam:
         return float(2.0 * p.crank_radius - p.spring_stroke)
 
     def contour(self, angles, base_radius):
-        """`contour` of the closed cam around a base circle (m)."""
+        """Return `contour` of the closed cam around a base circle (m)."""
         return contour(record_of(self.run), angles, base_radius)
 
     def follower(self, angles):
-        """Displacement of the closed cam's follower."""
+        """Return the displacement of the closed cam's follower."""
         return cam_profile(record_of(self.run), angles)
 
     def printed_follower(self, angles):
-        """Displacement of the follower by Eq. 10 taken literally."""
+        """Return the displacement of the follower by Eq. 10 taken literally."""
         return printed_profile(record_of(self.run), angles)
 
 
 def pressure_angle(p, angles, base_radius):
-    """Pressure angle (rad) of the aligned roller follower: tan = (ds/dphi) / (r0 + s)."""
+    """Return pressure angle (rad) of the aligned roller follower: tan = (ds/dphi) / (r0 + s)."""
     return np.arctan(cam_slope(p, angles) / (base_radius + cam_profile(p, angles)))
 
 
 def least_base_radius(p, allowed, with_displacement=True):
-    """Least base radius (m) for an allowed pressure angle (rad): Eq. 11 with e = 0, or Eq. 12.
+    """Return the least base radius (m) for an allowed pressure angle (rad): Eq. 11 with e = 0, or
+    Eq. 12.
 
     Eq. 12 as printed drops the displacement s_c, which Eq. 11 subtracts.
     """
@@ -145,7 +152,7 @@ class Comparison:
 
 
 def comparisons(p=None):
-    """What the paper prints of spring and cam beside what follows (Eq. 8-12, Table 1).
+    """Return what the paper prints of spring and cam beside what follows (Eq. 8-12, Table 1).
 
     `p` is a record of the spring load with the paper's pressures, by default the paper's; returns a
     list of Comparison.

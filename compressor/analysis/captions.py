@@ -90,7 +90,7 @@ def piston_force(runs: Runs) -> str:
 
 
 def in_degrees(found: np.ndarray) -> str:
-    """Angles, one after the other."""
+    """Return the angles, one after the other."""
     return ", ".join(f"{angle:.2f}°" for angle in found)
 
 
@@ -108,7 +108,7 @@ def response(runs: Runs, fault: str) -> str:
 
 
 def deviations(of: Sequence[xr.Dataset]) -> str:
-    """How far the motion leaves that of the machine without clearance."""
+    """Return how far the motion leaves that of the machine without clearance."""
     greatest = np.zeros(3)
     for run in of:
         kept = settled(run)
@@ -124,7 +124,7 @@ def deviations(of: Sequence[xr.Dataset]) -> str:
 
 
 def motion(courses: Sequence[Course]) -> str:
-    """How the journal moves in its bearing."""
+    """Return how the journal moves in its bearing."""
     joint = SPOKEN[courses[0].joint]
     apart = [one.apart for one in courses]
     spans = spanned([one.turns for one in courses])
@@ -149,7 +149,7 @@ def motion(courses: Sequence[Course]) -> str:
 
 
 def rings(courses: Sequence[Course]) -> list[str]:
-    """The frequencies after the first change of sign, where all runs have the same one."""
+    """Return the frequencies after the first change of sign, where all runs have the same one."""
     found = [one.rings for one in courses]
     spans = spanned([one.turns[:1] for one in courses])
     if not np.isfinite(found).all() or not spans or max(spans[0]) - min(spans[0]) > APART:
@@ -158,7 +158,7 @@ def rings(courses: Sequence[Course]) -> list[str]:
 
 
 def peaks(of: Sequence[xr.Dataset]) -> str:
-    """The greatest accelerations, and whether they grow with clearance."""
+    """Return the greatest accelerations, and whether they grow with clearance."""
     found = [float(run["peak_acceleration"]) for run in of]
     grows = all(b > a for a, b in itertools.pairwise(found))
     how = "grows with clearance" if grows else "does not always grow with clearance"
@@ -199,7 +199,8 @@ def relation(runs: Runs, joint: str) -> str:
 
 
 def spanned(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
-    """The least and the greatest of each angle (degrees) over runs, in the order of the first run.
+    """Return the least and the greatest of each angle (degrees) over runs, in the order of the
+    first run.
 
     Angles of one turn belong together that lie nearest round the circle, so that 359 and 1 degrees
     are one change: given as (359, 361). Empty where the runs have not the same number of them.
@@ -215,35 +216,35 @@ def spanned(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
 
 
 def said(span: tuple[float, float]) -> str:
-    """A span of angles in words."""
+    """Return a span of angles in words."""
     low, high = (f"{angle % 360.0:.0f}".replace("360", "0") for angle in span)
     return f"{low}°" if low == high else f"{low}–{high}°"
 
 
 def apart_from_each_other(courses: Sequence[Course]) -> str:
-    """The angles of each run, where they are not the same few."""
+    """Return the angles of each run, where they are not the same few."""
     of = [", ".join(f"{turn:.0f}°" for turn in one.turns) or "no angle" for one in courses]
     return ", ".join(f"{at} at {c:g} mm" for at, c in zip(of, CLEARANCES, strict=True))
 
 
 def percent(share: float) -> str:
-    """A share in percent, to two digits or whole."""
+    """Return a share in percent, to two digits or whole."""
     return f"{two_digits(100.0 * share)} %"
 
 
 def two_digits(value: float) -> str:
-    """A number to two digits or whole, without a power of ten."""
+    """Return a number to two digits or whole, without a power of ten."""
     text = f"{value:.2g}"
     return f"{value:.{decimals(abs(value), 0)}f}" if "e" in text else text
 
 
 def decimals(size: float, usual: int) -> int:
-    """Digits after the point: as usual, or as many more as two digits of a number need."""
+    """Return digits after the point: as usual, or as many more as two digits of a number need."""
     return max(usual, 1 - math.floor(math.log10(size))) if size > 0 else usual
 
 
 def listed(values: Sequence[float] | np.ndarray, usual: int) -> str:
-    """Numbers of 0.1, 0.2 and 0.3 mm, in this order; usual: digits after the point."""
+    """Return the numbers of 0.1, 0.2 and 0.3 mm, in this order; usual: digits after the point."""
     digits = decimals(float(np.abs(values).min()), usual)
     return ", ".join(f"{value:.{digits}f}" for value in values)
 
@@ -266,5 +267,7 @@ CAPTIONS: dict[int, Callable[[Runs], str]] = {
 
 
 def caption(number: int, runs: Runs) -> str:
-    """The caption of a figure, by its number in the paper, of the runs that it is drawn from."""
+    """Return the caption of a figure, by its number in the paper, of the runs that it is drawn
+    from.
+    """
     return CAPTIONS[number](runs)

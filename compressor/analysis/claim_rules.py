@@ -66,7 +66,7 @@ class Rule:
 
 
 def same_motion(runs: Runs) -> Verdict:
-    """Claim 1: both ideal machines move alike."""
+    """Return the claim 1: both ideal machines move alike."""
     rows, margins = [], []
     for name in MOTION:
         one, other = runs["design"][name].values, runs["typical"][name].values
@@ -77,7 +77,7 @@ def same_motion(runs: Runs) -> Verdict:
 
 
 def design_force(runs: Runs) -> Verdict:
-    """Claim 2: the spring load peaks higher, and its corners lie elsewhere."""
+    """Return the claim 2: the spring load peaks higher, and its corners lie elsewhere."""
     peaks = {load: float(runs[load]["piston_force"].max()) for load in ("design", "typical")}
     corners = {load: np.degrees(load_corners(runs[load])) for load in peaks}
     apart = np.abs(corners["design"] - corners["typical"])[[0, 2]]
@@ -91,7 +91,7 @@ def design_force(runs: Runs) -> Verdict:
 
 
 def acceleration_alone(runs: Runs) -> Verdict:
-    """Claim 3: displacement and velocity hardly change with clearance, acceleration does."""
+    """Return claim 3: displacement and velocity hardly change with clearance, acceleration does."""
     rows, margins = [], []
     for name in FAULT_LABELS:
         kept = settled(runs[name])
@@ -113,7 +113,7 @@ def acceleration_alone(runs: Runs) -> Verdict:
 
 
 def growing_peaks(runs: Runs) -> Verdict:
-    """Claim 4: peaks of acceleration and contact force grow with clearance."""
+    """Return the claim 4: peaks of acceleration and contact force grow with clearance."""
     rows, margins = [], []
     for fault in FAULTS:
         line = [runs[label(fault, c)] for c in CLEARANCES]
@@ -129,7 +129,7 @@ def growing_peaks(runs: Runs) -> Verdict:
 
 
 def horizontal_force(runs: Runs) -> Verdict:
-    """Claim 5: the horizontal contact force far exceeds the vertical one."""
+    """Return the claim 5: the horizontal contact force far exceeds the vertical one."""
     rows, margins = [], []
     for fault in FAULTS:
         for joint in faulty_joints(fault):
@@ -145,7 +145,8 @@ def horizontal_force(runs: Runs) -> Verdict:
 
 
 def across_over_up(run: xr.Dataset, joint: str) -> Measure:
-    """The horizontal over the vertical contact force at the same times, weighted by the force.
+    """Return the horizontal over the vertical contact force at the same times, weighted by the
+    force.
 
     The mean of |F| |F_x| over that of |F| |F_y|. Its error is what the force's one allows by
     Cauchy's inequality.
@@ -172,7 +173,7 @@ def across_over_up(run: xr.Dataset, joint: str) -> Measure:
 
 
 def proportional_force(runs: Runs) -> Verdict:
-    """Claim 6: acceleration is proportional to the horizontal contact force."""
+    """Return the claim 6: acceleration is proportional to the horizontal contact force."""
     rows, margins = [], []
     for name in FAULT_LABELS:
         fault = name.split()[0]
@@ -205,7 +206,9 @@ def correlation(run: xr.Dataset, joint: str) -> Measure:
 
 
 def steady_impacts(runs: Runs) -> Verdict:
-    """Claim 7: nearly continuous impacts at the big end, intermittent ones at the small end."""
+    """Return the claim 7: nearly continuous impacts at the big end, intermittent ones at the
+    small end.
+    """
     margins = []
     for c in CLEARANCES:
         big, small = (measured_shares(runs[label(joint, c)], joint) for joint in JOINTS)
@@ -214,12 +217,16 @@ def steady_impacts(runs: Runs) -> Verdict:
 
 
 def more_continuous(big: Shares, small: Shares) -> list[Margin]:
-    """How far a big end is more continuous than a small end, by each share of crank angle."""
+    """Return how far a big end is more continuous than a small end, by each share of crank
+    angle.
+    """
     return [exceeds(one, other, EXCESS) for one, other in zip(big, small, strict=True)]
 
 
 def impact_rows(runs: Runs) -> Iterator[tuple[str, str]]:
-    """What claim 7 shows: big end and small end, settled, from the start, and as they vibrate."""
+    """Yield what claim 7 shows: big end and small end, settled, from the start, and as they
+    vibrate.
+    """
     for begin, start_up in (("settled", False), ("from the start", True)):
         for c in CLEARANCES:
             pair = [continuity(runs[label(joint, c)], joint, start_up) for joint in JOINTS]
@@ -244,13 +251,13 @@ def per_revolution(run: xr.Dataset, count: str, joint: str) -> float:
 
 
 def vibrating(runs: Runs) -> Margin:
-    """Claim 7 by the share of time in which the machine vibrates, beside its verdict."""
+    """Return the claim 7 by the share of time in which the machine vibrates, beside its verdict."""
     pairs = ([active_share(runs[label(joint, c)]) for joint in JOINTS] for c in CLEARANCES)
     return least([exceeds(Measure(big), Measure(small), EXCESS) for big, small in pairs])
 
 
 def two_are_worse(runs: Runs) -> Verdict:
-    """Claim 8: two clearances are worse than one of the same size."""
+    """Return the claim 8: two clearances are worse than one of the same size."""
     rows, margins = [], []
     for c in CLEARANCES:
         for name, unit in (("peak_acceleration", "peak"), ("rms_acceleration_deviation", "rms")):

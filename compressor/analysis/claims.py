@@ -37,7 +37,8 @@ def claims(runs: Runs) -> list[Claim]:
 
 
 def claim_margins(runs: Runs) -> tuple[list[Margin], dict[str, Margin]]:
-    """How far each claim is from its threshold, as `claims` tells, all of whose runs are there.
+    """Return how far each claim is from its threshold, as `claims` tells, all of whose runs are
+    there.
 
     Of claim 7 also by each of its shares alone, and by the share of time in which the machine
     vibrates (`active_share`), without an error.

@@ -26,7 +26,7 @@ UNKNOWN = -1  # of a bin without samples
 
 
 def contact_modes(run: xr.Dataset) -> xr.Dataset:
-    """The mode of each joint with clearance after settling: `mode` over (time, joint).
+    """Return the mode of each joint with clearance after settling: `mode` over (time, joint).
 
     Integers with their meanings in `flag_values` and `flag_meanings`; `time` has the crank angle
     (rad) as a coordinate. Raises ValueError for a run without time series or clearance.
@@ -54,7 +54,7 @@ def contact_modes(run: xr.Dataset) -> xr.Dataset:
 
 
 def modes_of(run: xr.Dataset, joint: str) -> np.ndarray:
-    """The mode of a joint at each sample of the whole run, (m,) integers."""
+    """Return the mode of a joint at each sample of the whole run, (m,) integers."""
     series = contact_series(run, joint)
     modes = np.where(flights(series), FLIGHT, FOLLOWING).astype(np.int8)
     for one in impacts_of(run, joint):
@@ -63,7 +63,7 @@ def modes_of(run: xr.Dataset, joint: str) -> np.ndarray:
 
 
 def mode_shares(modes: xr.Dataset) -> xr.Dataset:
-    """Shares of time of what `contact_modes` gives.
+    """Return the shares of time of what `contact_modes` gives.
 
     `share` over (joint, mode), and with two joints `combination_share` over (big_end_mode,
     small_end_mode), nine numbers. Samples stand for the step that they begin.
@@ -85,12 +85,14 @@ def mode_shares(modes: xr.Dataset) -> xr.Dataset:
 
 
 def angle_modes(run: xr.Dataset) -> xr.Dataset:
-    """`mode_map` of a run's `contact_modes`, in bins of 1 degree; raises ValueError as they do."""
+    """Return `mode_map` of a run's `contact_modes`, in bins of 1 degree; raises ValueError as
+    they do.
+    """
     return mode_map(contact_modes(run))
 
 
 def mode_map(modes: xr.Dataset, width_deg: float = 1.0) -> xr.Dataset:
-    """What `contact_modes` gives over the crank angle, all revolutions together.
+    """Return what `contact_modes` gives over the crank angle, all revolutions together.
 
     Over bins of `width_deg`, with `angle` (deg, 0 to 360) the middle of each: `share` over (angle,
     joint, mode), and `majority` over (angle, joint), the mode with the greatest share, the first

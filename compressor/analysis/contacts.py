@@ -45,7 +45,7 @@ class Span:
 
 
 def joints_with_clearance(run: xr.Dataset) -> dict[str, float]:
-    """The joints of a run that have clearance, with it, m.
+    """Return the joints of a run that have clearance, with it, m.
 
     Raises ValueError where the run has no time series or no joint has clearance.
     """
@@ -59,12 +59,12 @@ def joints_with_clearance(run: xr.Dataset) -> dict[str, float]:
 
 
 def clearance_of(run: xr.Dataset, joint: str) -> float:
-    """Radial clearance (m) of a joint of a run."""
+    """Return the radial clearance (m) of a joint of a run."""
     return float(record_of(run)["clearance"][JOINTS.index(joint)])
 
 
 def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
-    """A joint's samples, up to where the run stopped."""
+    """Return a joint's samples, up to where the run stopped."""
     # arrays one by one: cutting the whole Dataset takes ten times as long
     depth = run["penetration"].sel(joint=joint).values.astype(float)
     there = np.isfinite(depth)
@@ -89,7 +89,7 @@ def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
 
 
 def contact_spans(series: ContactSeries) -> list[Span]:
-    """The contacts of a joint in order of time; one between two samples is not seen."""
+    """Return the contacts of a joint in order of time; one between two samples is not seen."""
     touching = series.normal > 0
     edges = np.flatnonzero(np.diff(touching, prepend=False, append=False)).reshape(-1, 2)
     found, before = [], 0
@@ -101,7 +101,8 @@ def contact_spans(series: ContactSeries) -> list[Span]:
 
 
 def flights(series: ContactSeries) -> np.ndarray:
-    """Which samples are in flight, (m,) booleans: no contact until the next, and once off the bore.
+    """Return which samples are in flight, (m,) booleans: no contact until the next, and once off
+    the bore.
 
     A contact that is lost and found again within the penetration leaves no flight.
     """

@@ -54,7 +54,7 @@ class Evidence(NamedTuple):
 
 
 def evidence(run: xr.Dataset, joint: str) -> Evidence:
-    """The `Evidence` of a joint. Raises as `continuity`."""
+    """Return the `Evidence` of a joint. Raises as `continuity`."""
     from compressor.vibration import high_pass_orders
 
     kept, count = whole_revolutions(run)
@@ -65,7 +65,7 @@ def evidence(run: xr.Dataset, joint: str) -> Evidence:
 
 
 def continuity(run: xr.Dataset, joint: str, start_up: bool = False) -> Continuity:
-    """The `Continuity` of a joint with clearance, over settled whole revolutions of a run.
+    """Return the `Continuity` of a joint with clearance, over settled whole revolutions of a run.
 
     `start_up`: over whole revolutions from the run's begin. Raises NoSeriesError where there is
     none, ValueError where the joint has no clearance.
@@ -74,7 +74,7 @@ def continuity(run: xr.Dataset, joint: str, start_up: bool = False) -> Continuit
 
 
 def told_by(found: Evidence, joint: str) -> Continuity:
-    """The `Continuity` of a joint by its evidence."""
+    """Return the `Continuity` of a joint by its evidence."""
     from compressor.vibration import energy_angle, shape
 
     modes = contact_modes(found.kept)["mode"].sel(joint=joint).values[:-1]
@@ -87,7 +87,8 @@ def told_by(found: Evidence, joint: str) -> Continuity:
 
 
 def measured_shares(run: xr.Dataset, joint: str) -> Shares:
-    """The settled shares of a joint with clearance; errors as far as the run's error bars tell.
+    """Return the settled shares of a joint with clearance; errors as far as the run's error bars
+    tell.
 
     Of `apart`, the error bar of the share of time without contact, and two samples for each impact;
     of `hit`, a window for each impact that is within the velocity's error of `SLOWEST`, or within a
@@ -110,14 +111,14 @@ def measured_shares(run: xr.Dataset, joint: str) -> Shares:
 
 
 def apart_error(by: Evidence, joint: str) -> float:
-    """The error of the share of crank angle in flight or impact."""
+    """Return the error of the share of crank angle in flight or impact."""
     count = int((by.table["joint"].values == joint).sum())
     told = float(by.kept["contact_loss_fraction_error"].sel(joint=joint))
     return told + 2.0 * count / (by.kept.sizes["time"] - 1)
 
 
 def hit_error(by: Evidence, joint: str) -> float:
-    """The error of the share of windows that are hit."""
+    """Return the error of the share of windows that are hit."""
     mine = by.table["joint"].values == joint
     speed, angle = (by.table[name].values[mine] for name in ("approach_speed", "crank_angle"))
     doubt = series_error(by.kept, "velocity", by.kept["velocity"].values)
@@ -130,7 +131,7 @@ def hit_error(by: Evidence, joint: str) -> float:
 
 
 def angle_error(by: Evidence, joint: str) -> float:
-    """The error of the share of crank angle that holds `ENERGY` of the energy."""
+    """Return the error of the share of crank angle that holds `ENERGY` of the energy."""
     from compressor.vibration import energy_angle
 
     force = by.kept["contact_force"].sel(joint=joint).values
@@ -145,7 +146,7 @@ def angle_error(by: Evidence, joint: str) -> float:
 
 
 def compared(big: Continuity, small: Continuity) -> str:
-    """The measures of a big end beside those of a small end, in words."""
+    """Return the measures of a big end beside those of a small end, in words."""
     return (
         f"flight and impact {big.apart:.1%} and {small.apart:.1%} of the angle; "
         f"{WINDOW:g}° windows hit {big.hit:.1%} and {small.hit:.1%}; {ENERGY:.0%} of the energy of "
@@ -155,7 +156,9 @@ def compared(big: Continuity, small: Continuity) -> str:
 
 
 def hit_share(table: xr.Dataset, joint: str, revolutions: int) -> float:
-    """The share of windows of `WINDOW` degrees, over the revolutions, that a joint hits in."""
+    """Return the share of windows of `WINDOW` degrees, over the revolutions, that a joint hits
+    in.
+    """
     counts = (table["joint"].values == joint) & (table["approach_speed"].values > SLOWEST)
     angle = 360.0 * table["revolution"].values[counts] + table["crank_angle"].values[counts]
     return np.unique(angle // WINDOW).size * WINDOW / (360.0 * revolutions)

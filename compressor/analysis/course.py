@@ -35,7 +35,7 @@ class Course:
 
 
 def course(run: xr.Dataset, joint: str) -> Course:
-    """The course of a joint with clearance, from a run with time series."""
+    """Return the course of a joint with clearance, from a run with time series."""
     kept = settled(run)
     angle = np.degrees(kept["crank_angle"].values)
     place = kept["eccentricity"].sel(joint=joint).values
@@ -54,7 +54,7 @@ def course(run: xr.Dataset, joint: str) -> Course:
 
 
 def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
-    """Crank angles (degrees, 0 to 360) at which a force changes its sign.
+    """Return the crank angles (degrees, 0 to 360) at which a force changes its sign.
 
     angle: of the samples, (m,) degrees; changes of several revolutions, and of a force that
     trembles about zero, are put together where they are nearer than `APART`.
@@ -73,7 +73,9 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
 
 
 def ringing(kept: xr.Dataset, turn: float) -> float:
-    """The strongest frequency (Hz) of the acceleration's deviation after a turn (degrees)."""
+    """Return the strongest frequency (Hz) of the acceleration's deviation after a turn
+    (degrees).
+    """
     from scipy.signal import find_peaks, periodogram
 
     angle = np.degrees(kept["crank_angle"].values)

@@ -86,7 +86,7 @@ def angles(found: Shakings, runs: Runs) -> str:
 
 
 def why(of: list[Shaking], near: list[float], rest: list[float]) -> str:
-    """What decides whether the whole rises or falls."""
+    """Return what decides whether the whole rises or falls."""
     whole = [one.spectrum.above for one in of]
     bigger = "larger" if near[-1] > rest[-1] else "smaller"
     if near[-1] > near[0] and whole[-1] > whole[0]:
@@ -116,7 +116,7 @@ def friction(of: list[Shaking], run) -> list[str]:
 
 
 def flights(runs: Runs) -> str:
-    """Whether any joint is ever in flight."""
+    """Return whether any joint is ever in flight."""
     following, most = True, 0.0
     for joint in ALONE:
         for clearance in CLEARANCES:
@@ -130,7 +130,7 @@ def flights(runs: Runs) -> str:
 
 
 def course_of(values: list[float]) -> str:
-    """How forces (N) go from the first to the last clearance, and through what."""
+    """Return how forces (N) go from the first to the last clearance, and through what."""
     first, *_, last = values
     steps = np.diff(values)
     if (steps > 0).all():
@@ -151,7 +151,7 @@ CAPTIONS: dict[str, Callable[[Shakings, Runs], str]] = {
 
 
 def diagnosis_caption(name: str, found: Shakings, runs: Runs) -> str:
-    """The caption of one of the three figures: spectra, orbits, angles.
+    """Return the caption of one of the three figures: spectra, orbits, angles.
 
     found: `shaking` of the runs, by label of the paper's cases.
     """

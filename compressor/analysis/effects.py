@@ -45,7 +45,7 @@ class Effects:
 
 
 def grid_effects(values: np.ndarray) -> Effects | None:
-    """Main and total effects of a grid's axes; None where too little of it is known.
+    """Return the main and total effects of a grid's axes; None where too little of it is known.
 
     values: an axis a key, nan where unknown. Every point of the grid counts alike, so that the
     decomposition of the variance (Hoeffding 1948; Sobol', Mathematics and Computers in Simulation
@@ -75,7 +75,9 @@ def grid_effects(values: np.ndarray) -> Effects | None:
 
 
 def filled(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """Values with unknown points as the sum of their axes' main effects, which this finds."""
+    """Return the values with unknown points as the sum of their axes' main effects, which this
+    finds.
+    """
     if not unknown.any():
         return values
     found = np.where(unknown, values[~unknown].mean(), values)
@@ -94,7 +96,7 @@ def filled(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
 
 
 def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effects | None:
-    """The effects of keys of which a design drew values; None where too little is known.
+    """Return the effects of keys of which a design drew values; None where too little is known.
 
     columns: a key's value at each point, or words; values: (points,), nan where unknown. Of a
     `saltelli` design Sobol's indices, unknown points having the median, of a large one of
@@ -126,7 +128,7 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
 
 
 def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
-    """The correlation of ranks of a key and a quantity with the ends of its 95 % interval.
+    """Return the correlation of ranks of a key and a quantity with the ends of its 95 % interval.
 
     Of numbers Spearman's, the interval by Bonett and Wright (Psychometrika 65, 2000, 23-28). Of
     words the correlation ratio of the ranks, which is the root of Kruskal and Wallis' H / (n - 1),
@@ -149,7 +151,9 @@ def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, f
 
 
 def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
-    """The correlation ratio of the ranks of values in groups, and the ends of its interval."""
+    """Return the correlation ratio of the ranks of values in groups, and the ends of its
+    interval.
+    """
     from scipy.stats import kruskal, rankdata
 
     if np.unique(codes).size < 2:
@@ -171,7 +175,8 @@ def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, flo
 
 
 def trend(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...] | None:
-    """A parabola through points by least squares, at places: it and the ends of its 95 % interval.
+    """Return a parabola through points by least squares, at places: it and the ends of its 95 %
+    interval.
 
     x, y: (points,), nan where unknown; None of fewer than FEWEST points or three places. The
     interval is that of the mean at a place, by Student's t and the covariance HC3, which holds

@@ -42,7 +42,7 @@ def frame_forces(run: xr.Dataset) -> dict[str, np.ndarray]:
 
 
 def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:
-    """The settled samples up to the last whole revolution's end, and how many they are.
+    """Return the settled samples up to the last whole revolution's end, and how many they are.
 
     Raises NoSeriesError for a run without time series, or that settles within less than one.
     """
@@ -57,7 +57,7 @@ def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:
 
 
 def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
-    """The last whole settled revolution, both ends included, and its crank angles (degrees).
+    """Return the last whole settled revolution, both ends included, and its crank angles (degrees).
 
     The first angle lies from 0 to 360. Raises NoSeriesError as `whole_revolutions`.
     """
@@ -69,7 +69,7 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
 
 
 def healthy_twin(run: xr.Dataset) -> xr.Dataset:
-    """The same machine with ideal joints, on the run's output grid, from closed forms."""
+    """Return the same machine with ideal joints, on the run's output grid, from closed forms."""
     values = replace(with_ideal_joints(case_of(run)), body=None, sensor=None).values()
     values["solve"]["error_bars"] = False
     values["output"] = {"keep": "series"}

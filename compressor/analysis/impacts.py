@@ -56,7 +56,8 @@ class Impact:
 
 
 def impacts(run: xr.Dataset) -> xr.Dataset:
-    """The table of impacts after settling, in order of time: `COLUMNS` over the dim `impact`.
+    """Return the table of impacts after settling, in order of time: `COLUMNS` over the dim
+    `impact`.
 
     An impact is a contact (F_N > 0) that begins after the journal was off its bore, as in
     `impact_count`; one that lies between two samples is not seen. `lost_energy` is what the contact
@@ -82,7 +83,7 @@ def impacts(run: xr.Dataset) -> xr.Dataset:
 
 
 def impacts_of(run: xr.Dataset, joint: str) -> list[Impact]:
-    """The impacts at one joint over the whole run, start-up included."""
+    """Return the impacts at one joint over the whole run, start-up included."""
     series = contact_series(run, joint)
     p = record_of(run)
     number = JOINTS.index(joint)
@@ -103,7 +104,7 @@ def impacts_of(run: xr.Dataset, joint: str) -> list[Impact]:
 
 
 def touch(series: ContactSeries, span: Span) -> tuple[float, float]:
-    """Time (s) and approach speed (m/s) of a contact's first touch.
+    """Return the time (s) and approach speed (m/s) of a contact's first touch.
 
     Without contact the eccentricity is smooth, so that it is taken as the polynomial through the
     last `STENCIL` samples without contact; of shorter flights through those and the first one in
@@ -130,7 +131,7 @@ def touch(series: ContactSeries, span: Span) -> tuple[float, float]:
 
 
 def release(series: ContactSeries, span: Span) -> float:
-    """Time (s) at which the normal force of a contact vanishes: by its last slope.
+    """Return the time (s) at which the normal force of a contact vanishes: by its last slope.
 
     Known to a part of a sample step. Of a contact of one sample it is half a step later; of one
     that the run's end cuts off, the run's end.
@@ -149,7 +150,7 @@ def release(series: ContactSeries, span: Span) -> float:
 def impact(
     series: ContactSeries, span: Span, touched: tuple[float, float], longest: float
 ) -> Impact:
-    """The impact of a contact, from its first touch (s, m/s); `longest`: it may last, s."""
+    """Return the impact of a contact, from its first touch (s, m/s); `longest`: it may last, s."""
     begin, speed = touched
     end = release(series, span)
     follows = following_from(series, span, begin + longest)
@@ -173,7 +174,7 @@ def impact(
 
 
 def following_from(series: ContactSeries, span: Span, until: float) -> int:
-    """The first sample of a contact that is no longer impact.
+    """Return the first sample of a contact that is no longer impact.
 
     An impact is one compression and one restitution. It ends where the penetration has passed a
     maximum and then a minimum, and at the latest at `until`, s.
@@ -192,7 +193,7 @@ def following_from(series: ContactSeries, span: Span, until: float) -> int:
 def impulse_and_loss(
     series: ContactSeries, span: Span, begin: float, end: float
 ) -> tuple[float, float]:
-    """Impulse (N s) and lost energy (J) of a contact from `begin` to `end`, s.
+    """Return the impulse (N s) and lost energy (J) of a contact from `begin` to `end`, s.
 
     The force is a monotone cubic (Fritsch and Carlson) through the samples in contact and zero at
     both ends; the journal's path is a cubic spline through them and two samples on either side.

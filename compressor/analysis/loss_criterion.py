@@ -49,7 +49,7 @@ Interval = tuple[float, float]  # begin and end, deg; the end may exceed 360
 
 
 def loss_indices(case: Case) -> xr.Dataset:
-    """`INDICES` of the case's joints with clearance, over a revolution of its ideal machine.
+    """Return `INDICES` of the case's joints with clearance, over a revolution of its ideal machine.
 
     Dims `angle` (deg, 0 to 360, `STEP_DEG` apart) and `joint`. The rate is (F_x F_y' - F_y F_x') /
     F^2 by central differences, so that a jump of the load counts as a fast turn. Where the force is
@@ -81,7 +81,7 @@ def loss_indices(case: Case) -> xr.Dataset:
 
 
 def ideal_revolution(case: Case) -> xr.Dataset:
-    """A revolution of the case's machine with ideal joints, as a run with time series."""
+    """Return a revolution of the case's machine with ideal joints, as a run with time series."""
     values = with_ideal_joints(case).values()
     values["solve"] = {"duration_rev": 1, "settle_rev": 0, "output_step_deg": STEP_DEG}
     values["output"] = {"keep": "series"}
@@ -89,7 +89,7 @@ def ideal_revolution(case: Case) -> xr.Dataset:
 
 
 def swing_mass(p: np.record, joint: str) -> float:
-    """Mass times radial clearance (kg m) of the journal's swing in its bore."""
+    """Return the mass times radial clearance (kg m) of the journal's swing in its bore."""
     scales = joint_scales(p, joint, 1.0)
     length = scales.clearance + scales.penetration
     mass = scales.force / (length * (2.0 * np.pi * scales.swing_frequency) ** 2)
@@ -97,7 +97,8 @@ def swing_mass(p: np.record, joint: str) -> float:
 
 
 def indices_of(time: np.ndarray, force: np.ndarray, inertia: float) -> dict[str, np.ndarray]:
-    """`INDICES` of a periodic joint force (N), (m, 2), over a period with both ends; inertia: m c.
+    """Return `INDICES` of a periodic joint force (N), (m, 2), over a period with both ends;
+    inertia: m c.
 
     `time`: (m,), s, evenly spaced.
     """
@@ -133,7 +134,7 @@ class Lookout:
 
 
 def compare_losses(run: xr.Dataset, lookout: Lookout | None = None) -> xr.Dataset:
-    """Predicted losses of contact beside those of a run with time series, after settling.
+    """Return predicted losses of contact beside those of a run with time series, after settling.
 
     Over the dim `interval`: `joint_of`, `outcome` and `begin`, `end` (deg; the end may exceed 360,
     and what holds all round is 0 to 360). A predicted interval is a `hit` where it, or `slack`
@@ -163,7 +164,7 @@ def compare_losses(run: xr.Dataset, lookout: Lookout | None = None) -> xr.Datase
 def comparison(
     rows: list[tuple[str, str, float, float]], joints: np.ndarray, shares: np.ndarray
 ) -> xr.Dataset:
-    """The Dataset of `compare_losses`."""
+    """Return the Dataset of `compare_losses`."""
     degrees = {"units": "deg"}
     kinds: dict[str, tuple[type | str, dict[str, str]]] = {
         "joint_of": ("U9", {"long_name": "joint of the interval"}),
@@ -183,7 +184,9 @@ def comparison(
 
 
 def arcs(mask: np.ndarray) -> list[Interval]:
-    """Where a mask over equal bins of a revolution holds: arcs in degrees, each begins in it."""
+    """Return where a mask over equal bins of a revolution holds: arcs in degrees, each begins in
+    it.
+    """
     width = 360.0 / mask.size
     if mask.all():
         return [(0.0, 360.0)]
@@ -198,7 +201,7 @@ def arcs(mask: np.ndarray) -> list[Interval]:
 
 
 def joined(lost: list[Interval], slack: float) -> list[Interval]:
-    """Arcs of the circle (deg) in order, those less than `slack` apart put together."""
+    """Return the arcs of the circle (deg) in order, those less than `slack` apart put together."""
     found: list[Interval] = []
     for begin, end in lost:
         if found and begin - found[-1][1] < slack:
@@ -214,7 +217,9 @@ def joined(lost: list[Interval], slack: float) -> list[Interval]:
 def outcomes(
     predicted: list[Interval], lost: list[Interval], slack: float
 ) -> list[tuple[str, Interval]]:
-    """Each predicted arc as hit or false alarm, and each lost arc that none overlaps as a miss."""
+    """Return each predicted arc as hit or false alarm, and each lost arc that none overlaps as a
+    miss.
+    """
     late = [(begin, end + slack) for begin, end in predicted]
     hits = [any(overlap(one, other) for other in lost) for one in late]
     found = [
@@ -225,6 +230,6 @@ def outcomes(
 
 
 def overlap(one: Interval, other: Interval) -> bool:
-    """Whether two arcs of the circle (deg) share more than an end."""
+    """Return whether two arcs of the circle (deg) share more than an end."""
     shifts = (-360.0, 0.0, 360.0)
     return any(one[0] < other[1] + s and other[0] + s < one[1] for s in shifts)

@@ -23,7 +23,7 @@ class Measure(NamedTuple):
     error: float = 0.0
 
     def over(self, other: "Measure") -> "Measure":
-        """The ratio of two measures; relative errors add, as errors of one model may."""
+        """Return the ratio of two measures; relative errors add, as errors of one model may."""
         ratio = self.value / other.value if other.value else math.inf
         away = self.error / abs(self.value) if self.value else 0.0
         return Measure(ratio, ratio * (away + other.error / abs(other.value or math.inf)))
@@ -49,23 +49,23 @@ class Margin(NamedTuple):
 
 
 def at_least(measure: Measure, threshold: float) -> Margin:
-    """The margin of a measure that is to be at least a threshold."""
+    """Return the margin of a measure that is to be at least a threshold."""
     return Margin(measure.value / threshold - 1.0, measure.error / threshold)
 
 
 def above(measure: Measure, threshold: float) -> Margin:
-    """The margin of a measure that is to exceed a threshold: of a tie it is below zero."""
+    """Return the margin of a measure that is to exceed a threshold: of a tie it is below zero."""
     margin = at_least(measure, threshold)
     return margin._replace(value=math.nextafter(0.0, -1.0)) if margin.value == 0.0 else margin
 
 
 def at_most(measure: Measure, threshold: float) -> Margin:
-    """The margin of a measure that is to be at most a threshold."""
+    """Return the margin of a measure that is to be at most a threshold."""
     return Margin(1.0 - measure.value / threshold, measure.error / threshold)
 
 
 def least(margins: Sequence[Margin]) -> Margin:
-    """The smallest margin: of a claim that asks for all of them.
+    """Return the smallest margin: of a claim that asks for all of them.
 
     Its error reaches to the lowest that any of them may be, so that a larger margin with a long
     error bar counts, too. nan where any error is not known.
@@ -77,17 +77,21 @@ def least(margins: Sequence[Margin]) -> Margin:
 
 
 def exceeds(one: Measure, other: Measure, by: float) -> Margin:
-    """The margin, in the measures' own unit, of a measure that is to exceed another one by this."""
+    """Return the margin, in the measures' own unit, of a measure that is to exceed another one
+    by this.
+    """
     return Margin(one.value - other.value - by, one.error + other.error)
 
 
 def is_chaotic(run: xr.Dataset) -> bool:
-    """Whether the course of a run's motion cannot be foretold, so that averages alone count."""
+    """Return whether the course of a run's motion cannot be foretold, so that averages alone
+    count.
+    """
     return run.attrs.get("regime") == "chaotic"
 
 
 def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
-    """The whole settled revolutions of a run, both ends included."""
+    """Yield the whole settled revolutions of a run, both ends included."""
     kept = settled(run)
     turns = (kept["crank_angle"].values - kept["crank_angle"].values[0]) / (2.0 * math.pi)
     for number in range(int(turns[-1] + 1e-6)):
@@ -96,7 +100,7 @@ def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
 
 
 def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> float:
-    """Half of the 95 % interval of a value's mean over revolutions, by their scatter.
+    """Return half of the 95 % interval of a value's mean over revolutions, by their scatter.
 
     inf of a single revolution.
     """
@@ -104,13 +108,13 @@ def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> floa
 
 
 def measured(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> Measure:
-    """A value of a run's settled part with an error; of a chaotic run by its revolutions."""
+    """Return a value of a run's settled part with an error; of a chaotic run by its revolutions."""
     kept = settled(run)
     return Measure(value(kept), by_revolution(kept, value) if is_chaotic(run) else error)
 
 
 def peak(run: xr.Dataset, name: str, **where: str) -> Measure:
-    """A greatest value of a run with its error bar; where: its joint.
+    """Return a greatest value of a run with its error bar; where: its joint.
 
     Of a chaotic run the mean over revolutions of each one's greatest value, since that of the whole
     run grows with its length.
@@ -124,13 +128,14 @@ def peak(run: xr.Dataset, name: str, **where: str) -> Measure:
 
 
 def metric(run: xr.Dataset, name: str, **where: str) -> Measure:
-    """A metric of a run with its error bar; where: its joint and axis."""
+    """Return a metric of a run with its error bar; where: its joint and axis."""
     value, error = (float(run[n].sel(where)) for n in (name, f"{name}_error"))
     return Measure(value, error)
 
 
 def series_error(run: xr.Dataset, name: str, values: np.ndarray, **where: str) -> float:
-    """The rms of the error of a settled time series, in its unit: its relative one times its rms.
+    """Return the rms of the error of a settled time series, in its unit: its relative one times its
+    rms.
 
     values: the settled series, of vectors by component; where: its joint.
     """

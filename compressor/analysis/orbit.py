@@ -27,7 +27,7 @@ NUMBERS = {  # over joint
 
 
 def orbit(run: xr.Dataset) -> xr.Dataset:
-    """The orbit of each journal with clearance after settling.
+    """Return the orbit of each journal with clearance after settling.
 
     Over (time, joint): `SERIES`; over joint: `NUMBERS`; `time` has the crank angle (rad) as a
     coordinate. The contact angle is that of the bearing's wall next to the journal. Where the
@@ -54,7 +54,7 @@ def orbit(run: xr.Dataset) -> xr.Dataset:
 
 
 def orbit_of(series: ContactSeries) -> dict[str, np.ndarray]:
-    """`SERIES` and `NUMBERS` of one joint: arrays (m,) and scalars."""
+    """Return `SERIES` and `NUMBERS` of one joint: arrays (m,) and scalars."""
     ratio = np.linalg.norm(series.place, axis=1) / series.clearance
     angle = np.unwrap(np.arctan2(series.place[:, 1], series.place[:, 0]))
     off = series.depth < 0

@@ -13,22 +13,22 @@ SPOKEN = {"big_end": "big end", "small_end": "small end", "both": "both joints"}
 
 
 def label(fault: str, clearance: float) -> str:
-    """The name of one of the paper's fault cases, such as `big_end 0.2`."""
+    """Return the name of one of the paper's fault cases, such as `big_end 0.2`."""
     return f"{fault} {clearance:g}"
 
 
 def faulty_joints(fault: str) -> tuple[str, ...]:
-    """The joints with clearance of a fault."""
+    """Return the joints with clearance of a fault."""
     return JOINTS if fault == "both" else (fault,)
 
 
 def paper_cases(**machine: float) -> dict[str, Case]:
-    """The paper's eleven cases by label; `machine` overrides keys such as rod_mass_kg."""
+    """Return the paper's eleven cases by label; `machine` overrides keys such as rod_mass_kg."""
     return cases_of(Case.resolve({"machine": machine}))
 
 
 def cases_of(machine: Case) -> dict[str, Case]:
-    """The paper's eleven cases by label, alike in all other assumptions of a case.
+    """Return the paper's eleven cases by label, alike in all other assumptions of a case.
 
     Its own load, joints and clearances are left aside. The gas load may not fit a machine of
     other lengths: such a case has `problems`, and no run of it is ok.

@@ -27,7 +27,7 @@ LEAST = 0.05  # N: below it a force is told as less than 0.1
 
 
 def caution(run: xr.Dataset) -> str:
-    """What is added to the captions of a chaotic run."""
+    """Return what is added to the captions of a chaotic run."""
     return CHAOTIC if run.attrs.get("regime") == "chaotic" else ""
 
 
@@ -177,7 +177,7 @@ def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
 
 
 def left_out(rows: Sequence[SweptRow]) -> str:
-    """The rows that could not be drawn, and those of chaotic motion."""
+    """Return the rows that could not be drawn, and those of chaotic motion."""
     gone, wild = sum(bool(row.problem) for row in rows), sum(row.chaotic for row in rows)
     said = f" {plural(gone, 'job')} of {len(rows)} without series to draw." if gone else ""
     return said + (f" {plural(wild, 'job')} chaotic: their lines change." if wild else "")
@@ -189,7 +189,7 @@ def span(values: np.ndarray, form: str = ".2f") -> str:
 
 
 def newtons(force: float) -> str:
-    """A force (N) in words."""
+    """Return a force (N) in words."""
     if force < LEAST:
         return "less than 0.1 N"
     return f"{force:.0f} N" if force >= 9.95 else f"{force:.1f} N"

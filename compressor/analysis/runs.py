@@ -15,7 +15,7 @@ ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibra
 
 
 def settled(run: xr.Dataset) -> xr.Dataset:
-    """The samples from `settle_rev` on: start-up is not the machine."""
+    """Return the samples from `settle_rev` on: start-up is not the machine."""
     time, begin = run["time"].values, run.attrs["settle"] * (1 - 1e-12)
     return run if time[0] >= begin else run.isel(time=time >= begin)
 
@@ -35,7 +35,7 @@ class Relation:
 
 
 def force_relation(run: xr.Dataset, joint: str) -> Relation:
-    """`Relation` of a run's settled series at one joint (force on the rod)."""
+    """Return `Relation` of a run's settled series at one joint (force on the rod)."""
     kept = settled(run)
     a = kept["acceleration"].values
     force = kept["contact_force"].sel(joint=joint, axis="x").values
@@ -44,29 +44,33 @@ def force_relation(run: xr.Dataset, joint: str) -> Relation:
 
 
 def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Displacement, velocity and acceleration (SI) of the run's ideal twin on its own grid."""
+    """Return the displacement, velocity and acceleration (SI) of the run's ideal twin on its own
+    grid.
+    """
     case = case_of(run)
     lengths = case.machine.crank_radius_mm / 1000, case.machine.rod_length_mm / 1000
     return exact_motion(run["crank_angle"].values, *lengths, case.omega)
 
 
 def case_of(run: xr.Dataset) -> Case:
-    """The case that a stored run belongs to, from its attributes."""
+    """Return the case that a stored run belongs to, from its attributes."""
     return _case(run.attrs["case"])
 
 
 def record_of(run: xr.Dataset) -> np.record:
-    """The record (SI) of the case that a stored run belongs to; not to be written."""
+    """Return the record (SI) of the case that a stored run belongs to; not to be written."""
     return _record(run.attrs["case"])
 
 
 def load_corners(run: xr.Dataset) -> np.ndarray:
-    """Crank angles (rad) at which the phases of a run's load change, three a revolution."""
+    """Return crank angles (rad) at which the phases of a run's load change, three a revolution."""
     return np.array(record_of(run).corners)
 
 
 def load_phases(run: xr.Dataset) -> np.ndarray:
-    """Phase of the load at each sample, integers: expansion, suction, compression, discharge."""
+    """Return the phase of the load at each sample, integers: expansion, suction, compression,
+    discharge.
+    """
     times = run["time"].values
     edges, phases = segments(record_of(run), times[-1])
     return phases[sample_segments(times, edges)]
@@ -83,7 +87,7 @@ def _record(text: str) -> np.record:
 
 
 def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = ACTIVE) -> float:
-    """Share of the settled time in which the machine vibrates.
+    """Return the share of the settled time in which the machine vibrates.
 
     It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation
     from the ideal motion exceeds `level` times the ideal peak acceleration.

@@ -64,12 +64,12 @@ class Shaking:
     ring: float
 
     def near(self, angle: np.ndarray) -> np.ndarray:
-        """Which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn."""
+        """Return which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn."""
         return near_a_turn(angle, self.turns)
 
 
 def shaking(run: xr.Dataset) -> Shaking:
-    """What `Shaking` says of a run with time series; of ideal joints there are no turns.
+    """Return what `Shaking` says of a run with time series; of ideal joints there are no turns.
 
     Raises NoSeriesError where the series hold no whole settled revolution, SignalError where they
     are too coarse for `ORDER`.
@@ -102,7 +102,9 @@ def shaking(run: xr.Dataset) -> Shaking:
 
 
 def evenly(kept: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
-    """A signal of `whole_revolutions` at an even number of equal crank angles a turn, and this."""
+    """Return a signal of `whole_revolutions` at an even number of equal crank angles a turn, and
+    this.
+    """
     from compressor.vibration import resampled
 
     crank = kept["crank_angle"].values
@@ -111,7 +113,9 @@ def evenly(kept: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.n
 
 
 def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
-    """The order spectrum of a signal at a_turn equal crank angles a revolution, whole ones."""
+    """Return the order spectrum of a signal at a_turn equal crank angles a revolution, whole
+    ones.
+    """
     from compressor.vibration import line_amplitudes, rms_above
 
     amplitudes = line_amplitudes(even, a_turn, "rectangular", False)
@@ -121,14 +125,16 @@ def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
 
 
 def deviation_spectrum(run: xr.Dataset) -> Spectrum:
-    """The order spectrum of the crosshead's acceleration less the ideal machine's, m/s2."""
+    """Return the order spectrum of the crosshead's acceleration less the ideal machine's, m/s2."""
     kept, revolutions = whole_revolutions(run)
     deviation = kept["acceleration"].values - ideal_motion(kept)[2]
     return order_lines(*evenly(kept, revolutions, deviation))
 
 
 def directions_change(kept: xr.Dataset) -> tuple[float, ...]:
-    """Crank angles (degrees) at which forces along the cylinder change sign, of all worn joints."""
+    """Return the crank angles (degrees) at which forces along the cylinder change sign, of all
+    worn joints.
+    """
     try:
         joints = joints_with_clearance(kept)
     except ValueError:
@@ -139,7 +145,7 @@ def directions_change(kept: xr.Dataset) -> tuple[float, ...]:
 
 
 def near_a_turn(angle: np.ndarray, turns: tuple[float, ...]) -> np.ndarray:
-    """Which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` one of the turns."""
+    """Return which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` one of the turns."""
     near = np.zeros(angle.size, bool)
     for turn in turns:
         near |= (angle - turn + BEFORE) % 360.0 < BEFORE + AFTER
@@ -161,7 +167,9 @@ class SensorEnvelope:
 
 
 def sensor_envelope(run: xr.Dataset) -> SensorEnvelope | None:
-    """The envelope spectrum of a run's sensor; None where it has none, or too short a record."""
+    """Return the envelope spectrum of a run's sensor; None where it has none, or too short a
+    record.
+    """
     from compressor.vibration import envelope_spectrum, kurtogram, line_amplitudes
 
     if "sensor_acceleration" not in run:

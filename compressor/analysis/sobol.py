@@ -26,11 +26,14 @@ class SaltelliDesign:
     mixed: np.ndarray
 
     def first(self, count: int) -> "SaltelliDesign":
-        """The design of the first points of the sequence; a power of two keeps its balance."""
+        """Return the design of the first points of the sequence; a power of two keeps its
+        balance.
+        """
         return SaltelliDesign(self.a[:count], self.b[:count], self.mixed[:, :count])
 
     def indices(self, values: np.ndarray, resamples: int = RESAMPLES) -> dict[str, np.ndarray]:
-        """Both indices of a quantity over k keys with their 95 % bootstrap intervals, (k,) each.
+        """Return both indices of a quantity over k keys with their 95 % bootstrap intervals, (k,)
+        each.
 
         values: of all points, finite and not all the same, shape (n (k + 2),). `first_order` and
         `total_order`, with `_low` and `_high`, by SciPy's sobol_indices (Saltelli et al., Computer
@@ -66,7 +69,9 @@ def seeded() -> Iterator[None]:
 
 
 def saltelli_design(columns: np.ndarray) -> SaltelliDesign | None:
-    """The parts of a `saltelli` design; None where the columns, (points, k), are no such design."""
+    """Return the parts of a `saltelli` design; None where the columns, (points, k), are no such
+    design.
+    """
     count, keys = columns.shape
     n, rest = divmod(count, keys + 2)
     if rest or n < 2 or n & (n - 1) or columns.dtype == object:

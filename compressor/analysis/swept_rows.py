@@ -29,7 +29,8 @@ class SweptRow:
 
 
 def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
-    """The most frequent modes by joint that has clearance anywhere, (rows, bins of the angle).
+    """Return the most frequent modes by joint that has clearance anywhere, (rows, bins of the
+    angle).
 
     Integers, -1 where nothing is known; {} where no joint has clearance.
     """

@@ -2,5 +2,5 @@
 
 
 def plural(count: int, thing: str) -> str:
-    """A number of things in words."""
+    """Return a number of things in words."""
     return f"{count} {thing}" + ("s" if count != 1 else "")

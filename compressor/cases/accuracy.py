@@ -40,12 +40,12 @@ Targets = tuple[tuple[str, float], ...]  # (metric, greatest relative error), by
 
 
 def first_rung(targets: Targets) -> float:
-    """The tolerance of the first run where accuracy is asked for by number."""
+    """Return the tolerance of the first run where accuracy is asked for by number."""
     return min(LOOSEST, *(FIRST * target for _, target in targets))
 
 
 def checked_targets(key: str, value: Mapping[Any, Any], problems: list[Problem]) -> Targets:
-    """Accuracy by number as a case holds it; what is wrong with it joins `problems`."""
+    """Return the accuracy by number as a case holds it; what is wrong with it joins `problems`."""
     if not value:
         problems.append(Problem(key, "needs a metric, such as {peak_acceleration: 0.01}"))
     good = []

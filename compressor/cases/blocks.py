@@ -54,7 +54,7 @@ class Draft:
         return any(sweep.kind in SAMPLED for sweep in self.sweeps.values())
 
     def sizes(self) -> dict[str, int]:
-        """How many values each factor has, by its keys."""
+        """Return how many values each factor has, by its keys."""
         return {" with ".join(keys): self.size(keys[0]) for keys in self.factors}
 
     def size(self, key: str) -> int:
@@ -64,7 +64,9 @@ class Draft:
         )
 
     def block(self) -> Block:
-        """The block, its values made; wrong ones join `problems`, and leave it without jobs."""
+        """Return the block, its values made; wrong ones join `problems`, and leave it without
+        jobs.
+        """
         factors = tuple((keys, self.rows(keys)) for keys in self.factors)
         count = math.prod(len(rows) for _, rows in factors)
         if self.problems:
@@ -79,7 +81,9 @@ class Draft:
         return replace(found, kept=kept.nonzero()[0].tolist())
 
     def rows(self, keys: tuple[str, ...]) -> list[Row]:
-        """The values of keys that advance together; each wrong one, and repetition, is told."""
+        """Return the values of keys that advance together; each wrong one, and repetition, is
+        told.
+        """
         points: list[list[float]] = []
         if self.sweeps[keys[0]].kind in SAMPLED:
             points = design(self.sweeps[keys[0]].kind, self.samples, len(keys), self.seed)
@@ -102,7 +106,7 @@ class Draft:
         return rows
 
     def checked(self, sweep: Sweep, nodes: Sequence[Node]) -> list[Node]:
-        """The valid ones of a key's values; of wrong ones that were made, one is told."""
+        """Return the valid ones of a key's values; of wrong ones that were made, one is told."""
         good = []
         for node in nodes:
             value = check(sweep.key, node, self.problems)
@@ -114,7 +118,7 @@ class Draft:
 
 
 def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
-    """A block as far as it goes without making any value."""
+    """Return a block as far as it goes without making any value."""
     found = Draft(leaves, problems)
     for key, node in leaves.values.items():
         if key.partition(".")[0] in SWEEP:
@@ -135,7 +139,9 @@ def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
 
 
 def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
-    """A node with its value as the case holds it; None if that is wrong, which joins `problems`."""
+    """Return a node with its value as the case holds it; None if that is wrong, which joins
+    `problems`.
+    """
     if node.value is None or key in WORDS:  # told when it was read; or its word, which is valid
         return node if key in WORDS and node.value is WORDS[key] else None
     if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
@@ -153,7 +159,7 @@ def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
 
 
 def _sampled(found: Draft) -> tuple[str, ...]:
-    """The keys that one sampling design draws together, in the order of the file."""
+    """Return the keys that one sampling design draws together, in the order of the file."""
     keys = tuple(key for key, sweep in found.sweeps.items() if sweep.kind in SAMPLED)
     for name, least, most in (("n", 1, math.inf), ("seed", 0, MAX_SEED)):
         node = found.leaves.values.get(f"sample.{name}")
@@ -180,7 +186,7 @@ def _sampled(found: Draft) -> tuple[str, ...]:
 
 
 def _zipped(found: Draft) -> Iterable[tuple[str, ...]]:
-    """The good groups of `zip`: swept keys, each in one group, with equally many values."""
+    """Yield the good groups of `zip`: swept keys, each in one group, with equally many values."""
     node = found.leaves.values.get("zip")
     taken: set[str] = set()
     for keys, group in _words(found, node) if node else ():
@@ -206,7 +212,7 @@ def _zipped(found: Draft) -> Iterable[tuple[str, ...]]:
 
 
 def _words(found: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
-    """The groups of keys that `zip` lists."""
+    """Yield the groups of keys that `zip` lists."""
     groups = node.value if isinstance(node.value, list) else [node]
     for group in groups:
         items = group.value if isinstance(group.value, list) else []
@@ -218,7 +224,7 @@ def _words(found: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
 
 
 def _exclusions(found: Draft) -> Iterable[Test]:
-    """What `exclude` says; a combination is left out where any of its comparisons holds."""
+    """Yield what `exclude` says; a combination is left out where any of its comparisons holds."""
     node = found.leaves.values.get("exclude")
     if not node:
         return

@@ -162,7 +162,7 @@ class Case(Settings):
 
     @classmethod
     def from_attribute(cls, text: str) -> "Case":
-        """The case of a stored Dataset, from its attribute `case` (JSON of `values`).
+        """Return the case of a stored Dataset, from its attribute `case` (JSON of `values`).
 
         Raises CaseError where this version of the program has no such case, and where the text is
         no JSON.
@@ -184,7 +184,7 @@ class Case(Settings):
         return cls.resolve(values)
 
     def values(self) -> dict[str, Any]:
-        """The case as plain nested values; `from_values` reads them back to an equal case.
+        """Return the case as plain nested values; `from_values` reads them back to an equal case.
 
         >>> import compressor
         >>> case = compressor.Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
@@ -274,7 +274,8 @@ class Case(Settings):
         return digest(canonical(identity(self, with_solver=True)))
 
     def attributes(self) -> dict[str, Any]:
-        """What a stored outcome says of its case: `name`, `case` (JSON), `key`, `physics_key`.
+        """Return what a stored outcome says of its case: `name`, `case` (JSON), `key`,
+        `physics_key`.
 
         The keys of a case with values that none can be made of, such as a speed of 0, are "".
         """
@@ -317,7 +318,7 @@ def parts_of(
 
 
 def identity(case: Case, with_solver: bool) -> dict[str, Any]:
-    """What makes a case's results: nested values whose text a key is the hash of."""
+    """Return what makes a case's results: nested values whose text a key is the hash of."""
     values, solve = case.values(), case.solve
     if values["contact"].get("geometry") == "external":  # as no key was, once
         del values["contact"]["geometry"]
@@ -336,7 +337,7 @@ def identity(case: Case, with_solver: bool) -> dict[str, Any]:
 
 
 def canonical(values: Mapping[str, Any], held: Callable[[Any], str] | None = None) -> str:
-    """The one text of some values; `held`: what stands for those that JSON does not know."""
+    """Return the one text of some values; `held`: what stands for those that JSON does not know."""
     return json.dumps(values, sort_keys=True, separators=(",", ":"), default=held)
 
 
@@ -351,7 +352,7 @@ def _everything_wrong(
     problems: Sequence[Problem],
     to_read: Mapping[str, Any],
 ) -> Iterator[Problem]:
-    """What is wrong with values one by one, and what does not fit together in the others.
+    """Yield what is wrong with values one by one, and what does not fit together in the others.
 
     A value that would be swept in a case file is told that one case has no sweep.
     """
@@ -373,14 +374,14 @@ def _everything_wrong(
 
 
 def _value_at(key: str, values: Mapping[str, Any]) -> Any:
-    """The value of a dotted key in nested values; None where there is none."""
+    """Return the value of a dotted key in nested values; None where there is none."""
     group, _, name = key.rpartition(".")
     within = values.get(group) if group else values
     return within.get(name) if isinstance(within, Mapping) else None
 
 
 def _is_swept(key: str, value: Any) -> bool:
-    """Whether a case file would sweep a key by this value, or by what stands under it."""
+    """Return whether a case file would sweep a key by this value, or by what stands under it."""
     if key in SWEEP:
         return True
     if isinstance(value, Mapping):
@@ -390,7 +391,7 @@ def _is_swept(key: str, value: Any) -> bool:
 
 
 def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[Problem]:
-    """Problems of a shorthand's parts as problems of the shorthand, each once."""
+    """Return the problems of a shorthand's parts as problems of the shorthand, each once."""
     short = {
         part: key
         for key in SHORTHANDS
@@ -403,6 +404,6 @@ def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[
 
 @cache
 def _groups_outside_identity() -> tuple[str, ...]:
-    """The keys at the top of a case file of which nothing is part of a job's identity."""
+    """Return the keys at the top of a case file of which nothing is part of a job's identity."""
     inside = {key.partition(".")[0] for key in table().keys() - outside_identity()}
     return tuple(sorted({key.partition(".")[0] for key in outside_identity()} - inside))

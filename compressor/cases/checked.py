@@ -14,7 +14,9 @@ PLAIN = (int, float, str)
 
 
 def checked(key: str, value: Any, problems: list[Problem]) -> Any:
-    """A value as its dataclass holds it; its default if it is wrong, which joins `problems`."""
+    """Return a value as its dataclass holds it; its default if it is wrong, which joins
+    `problems`.
+    """
     row, before = table()[key], len(problems)
     if value is None and row.optional:
         return row.default
@@ -35,12 +37,12 @@ def checked(key: str, value: Any, problems: list[Problem]) -> Any:
 
 
 def _scalar(value: Any) -> Any:
-    """A scalar of numpy or xarray as Python has it; any other value as it is."""
+    """Return a scalar of numpy or xarray as Python has it; any other value as it is."""
     return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
 
 
 def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
-    """The dataclass, scalar or None that stands for a key at the top of a case file.
+    """Return the dataclass, scalar or None that stands for a key at the top of a case file.
 
     What is wrong with its value joins `problems`.
     """
@@ -65,7 +67,8 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
 
 @lru_cache(maxsize=256)
 def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[Any, list[Problem]]:
-    """A group from its values, and what is wrong; jobs of a sweep share those they have alike.
+    """Return a group from its values, and what is wrong; jobs of a sweep share those they have
+    alike.
 
     Types are part of the values, since 1, 1.0 and true are equal.
     """
@@ -73,7 +76,7 @@ def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[A
 
 
 def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Problem]]:
-    """A group from its values, the defaults in place of wrong ones, and what is wrong."""
+    """Return a group from its values, the defaults in place of wrong ones, and what is wrong."""
     problems: list[Problem] = []
     fields = {item.name for item in dataclasses.fields(GROUPS[key])}
     good = {}

@@ -27,7 +27,9 @@ def _numbers(value: Any) -> Any:
 
 
 def _by(operation: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """The operator and its reflection; what is neither a number nor a column is left to Python."""
+    """Return the operator and its reflection; what is neither a number nor a column is left to
+    Python.
+    """
 
     def direct(self: "Column", other: Any) -> Any:
         if not isinstance(other, Column | int | float | complex):
@@ -43,7 +45,7 @@ def _by(operation: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Calla
 
 
 def _power(base: Any, exponent: Any) -> np.ndarray:
-    """Powers as Python takes them: numpy's may differ in the last bit."""
+    """Return the powers as Python takes them: numpy's may differ in the last bit."""
     bases, exponents = np.broadcast_arrays(base, exponent)
     return np.array(list(map(pow, bases.tolist(), exponents.tolist())))
 
@@ -105,7 +107,7 @@ def places_where(test: Callable[[np.ndarray], bool], count: int) -> np.ndarray:
 
 
 def alike(axes: Iterable[Axis], count: int) -> list[np.ndarray]:
-    """The places of `count` jobs, for each combination of what is no number."""
+    """Return the places of `count` jobs, for each combination of what is no number."""
     codes = np.zeros(count, dtype=np.int64)
     for values, which in axes:
         if not is_numeric(values):
@@ -117,5 +119,5 @@ def alike(axes: Iterable[Axis], count: int) -> list[np.ndarray]:
 
 
 def is_numeric(values: Sequence[Any]) -> bool:
-    """Whether all values are floats, so that a column can hold them."""
+    """Return whether all values are floats, so that a column can hold them."""
     return all(type(value) is float for value in values)

@@ -31,7 +31,7 @@ class Alike(NamedTuple):
     columns: "dict[str, Column]"
 
     def some(self, places: "np.ndarray") -> dict[str, Node]:
-        """The values of some of them by dotted key, columns where they may differ."""
+        """Return the values of some of them by dotted key, columns where they may differ."""
         from compressor.cases.columns import Column
 
         some = {key: Column(column.numbers[places]) for key, column in self.columns.items()}
@@ -49,7 +49,7 @@ class Block:
     is_grid: bool  # whether every key is an axis of its own, and no combination is left out
 
     def chosen(self, number: int) -> dict[str, Node]:
-        """The values of one combination by dotted key."""
+        """Return the values of one combination by dotted key."""
         found = dict(self.fixed)
         for keys, rows in reversed(self.factors):
             number, place = divmod(number, len(rows))
@@ -66,7 +66,7 @@ class Block:
         return [key for keys, _ in self.factors for key in keys]
 
     def alike(self) -> list[Alike]:
-        """All jobs, those together that differ in numbers alone."""
+        """Return all jobs, those together that differ in numbers alone."""
         import numpy as np
 
         from compressor.cases.columns import Column, alike, is_numeric
@@ -111,7 +111,7 @@ class Block:
 
 
 def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
-    """The function that gives a combination's value of a key, or its default, or None."""
+    """Return the function that gives a combination's value of a key, or its default, or None."""
 
     def value(key: str) -> Any:
         group = key.partition(".")[0]
@@ -127,7 +127,7 @@ def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:
 
 
 def columns(blocks: Sequence[Block]) -> list[str]:
-    """The keys by which the jobs of blocks differ: swept in one, or not the same in all."""
+    """Return the keys by which the jobs of blocks differ: swept in one, or not the same in all."""
     found = dict.fromkeys(key for block in blocks for key in block.swept)
     fixed = dict.fromkeys(key for block in blocks for key in block.fixed)
     for key in [key for key in fixed if key not in outside_identity()]:

@@ -51,7 +51,7 @@ class NoComparison(ValueError):
 
 
 def comparison(text: str) -> Test:
-    """The test that a text means. Raises NoComparison, which tells where and why."""
+    """Return the test that a text means. Raises NoComparison, which tells where and why."""
     if len(text) > MAX_LENGTH:
         raise NoComparison(f"is longer than {MAX_LENGTH} characters")
     reader = _Reader(text)
@@ -77,7 +77,7 @@ class _Reader:
         raise NoComparison(f"{message} (at {where if rest else 'the end'})")
 
     def tree(self) -> ast.expr:
-        """The tree of the code; it may still hold what is no comparison."""
+        """Return the tree of the code; it may still hold what is no comparison."""
         if barred := BARRED.search(self.code):
             self.refuse(barred.start(), "write == for equal" if barred[0] == "=" else UNREADABLE)
         depths = itertools.accumulate((c == "(") - (c == ")") for c in self.code)
@@ -96,18 +96,18 @@ class _Reader:
         return tree
 
     def beyond(self, node: ast.expr) -> int:
-        """Where the code goes on after a node and the parentheses around it."""
+        """Return where the code goes on after a node and the parentheses around it."""
         end = node.end_col_offset or 0
         return len(self.code) - len(self.code[end:].lstrip(" )"))
 
     def written(self, node: ast.expr) -> str:
-        """A key, a word or a number as it is written; "" for anything else."""
+        """Return a key, a word or a number as it is written; "" for anything else."""
         if not isinstance(node, ast.Name | ast.Attribute | ast.Constant):
             return ""
         return self.code[node.col_offset : node.end_col_offset].replace(" ", "")
 
     def test(self, node: ast.expr, depth: int) -> Test:
-        """The test that a node means."""
+        """Return the test that a node means."""
         if depth > MAX_DEPTH:
             self.refuse(node.col_offset, f"is nested deeper than {MAX_DEPTH} levels")
         if isinstance(node, ast.BoolOp):
@@ -120,7 +120,7 @@ class _Reader:
         return self.compared(node)
 
     def compared(self, node: ast.expr) -> Test:
-        """The test of one comparison of a key with a value."""
+        """Return the test of one comparison of a key with a value."""
         left = node.left if isinstance(node, ast.Compare) else node
         while isinstance(left, ast.BinOp):
             left = left.left
@@ -152,7 +152,7 @@ class _Reader:
         return test
 
     def key(self, node: ast.expr) -> tuple[str, Parameter]:
-        """A key that can be compared, and the row that its values keep."""
+        """Return a key that can be compared, and the row that its values keep."""
         key = self.written(node)
         if not key or isinstance(node, ast.Constant):
             self.refuse(node.col_offset, NEEDS_KEY)
@@ -164,7 +164,7 @@ class _Reader:
         return key, row
 
     def value(self, node: ast.expr) -> Any:
-        """What a number or a word means in a case file; None for anything else."""
+        """Return what a number or a word means in a case file; None for anything else."""
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
             sign = "-" if isinstance(node.op, ast.USub) else "+"
             return resolved(sign + self.written(node.operand))
@@ -172,7 +172,9 @@ class _Reader:
 
 
 def _misfit(code: str, error: SyntaxError) -> tuple[int, str]:
-    """Where a code cannot be read and why: words that cannot be neighbours, or Python's error."""
+    """Return where a code cannot be read and why: words that cannot be neighbours, or Python's
+    error.
+    """
     earlier, before = "", ""
     ends, opened = False, 0  # ends: whether a comparison may end with `before`
     for token in TOKEN.finditer(code):
@@ -196,5 +198,5 @@ def _misfit(code: str, error: SyntaxError) -> tuple[int, str]:
 
 
 def _missing(before: str) -> str:
-    """What is missing after a word of a code, "" at its beginning."""
+    """Return what is missing after a word of a code, "" at its beginning."""
     return f"needs a value after {before}" if before in (*WRITTEN, "+", "-") else NEEDS_KEY

@@ -74,7 +74,9 @@ def conflicts(
 
 
 def _undecided(wrong: frozenset[str]) -> frozenset[str]:
-    """The keys of which nothing is known where some are wrong: these, and what they decide."""
+    """Return the keys of which nothing is known where some are wrong: these, and what they
+    decide.
+    """
     filled_in = {key for key, by in FILLED_IN.items() if wrong & {*by, "machine"}}
     rivals = {pair[not place] for pair in IN_PLACE_OF for place in (0, 1) if pair[place] in wrong}
     return wrong | filled_in | rivals
@@ -104,7 +106,7 @@ class _Known:
 
 
 def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """What a body and its sensor need; one that would move the machine back is refused."""
+    """Yield what a body and its sensor need; one that would move the machine back is refused."""
     body, sensor = case.body, case.sensor
     if body is None:
         return
@@ -135,7 +137,7 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
 
 
 def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
-    """The first two orders of the speed carry most of the shaking force."""
+    """Yield the first two orders of the speed carry most of the shaking force."""
     for order in (1, 2):
         frequency = order * case.machine.speed_rpm / 60.0
         back = abs(back_action(case, axis, frequency))
@@ -150,7 +152,7 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
 
 
 def _inertia_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """A default inertia may leave the range that a given one must keep."""
+    """Yield a default inertia may leave the range that a given one must keep."""
     key, inertia = "machine.rod_inertia_kg_m2", case.machine.rod_inertia_kg_m2
     if inertia is None or not table()[key].holds(inertia):
         yield Problem(key, f"m L^2 / 12 of the rod: {table()[key].check(inertia)}")
@@ -241,12 +243,12 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
 
 
 def _play(case: Settings) -> float:
-    """How much farther than ideal joints those with clearance let the crosshead go (mm)."""
+    """Return how much farther than ideal joints those with clearance let the crosshead go (mm)."""
     return case.clearance_mm.big_end + case.clearance_mm.small_end
 
 
 def _gas_geometry(case: Settings) -> tuple[float, ...]:
-    """What decides where the gas cycle's corners lie."""
+    """Return what decides where the gas cycle's corners lie."""
     gas, machine = case.gas, case.machine
     return (
         machine.crank_radius_mm,

@@ -6,5 +6,7 @@ from compressor.cases.case import Case
 
 
 def with_ideal_joints(case: Case) -> Case:
-    """The case without clearance, and without oil and wear, which only a clearance can have."""
+    """Return the case without clearance, and without oil and wear, which only a clearance can
+    have.
+    """
     return replace(case, joint="none", lubricant=None, wear=None)

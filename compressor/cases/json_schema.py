@@ -27,7 +27,7 @@ Schema = dict[str, Any]
 
 
 def case_schema() -> Schema:
-    """The schema of a whole case file, in the dialect 2020-12."""
+    """Return the schema of a whole case file, in the dialect 2020-12."""
     found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in _top_keys()}
     found |= _sweeps() | {"regimes": _regimes()}
     in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}
@@ -38,7 +38,7 @@ def case_schema() -> Schema:
 
 
 def _top_keys() -> list[str]:
-    """The keys at the top of a case file that are of a case, in its order."""
+    """Return the keys at the top of a case file that are of a case, in its order."""
     return list(dict.fromkeys(key.partition(".")[0] for key in table()))
 
 
@@ -47,7 +47,7 @@ def _mapping(properties: Schema) -> Schema:
 
 
 def _group(name: str) -> Schema:
-    """The schema of a group of keys."""
+    """Return the schema of a group of keys."""
     rows = [row for row in table().values() if row.key.startswith(f"{name}.")]
     rows += [_doubled(word, key) for word, key in DOUBLES.items() if word.startswith(f"{name}.")]
     mapping = _mapping({row.key.removeprefix(f"{name}."): _value(row) for row in rows})
@@ -74,7 +74,7 @@ def _doubled(word: str, key: str) -> Parameter:
 
 
 def _value(row: Parameter) -> Schema:
-    """The schema of a parameter: one value, or a sweep of it."""
+    """Return the schema of a parameter: one value, or a sweep of it."""
     one = _one(row)
     about = f"{row.phrase}, {row.unit}" if row.unit else row.phrase
     found: Schema = {"description": f"{about} ({row.source})"}
@@ -88,7 +88,7 @@ def _value(row: Parameter) -> Schema:
 
 
 def _one(row: Parameter) -> Schema:
-    """The schema of one value of a parameter, as `Parameter.check` has it."""
+    """Return the schema of one value of a parameter, as `Parameter.check` has it."""
     words = {"enum": [*row.choices, *(alias for alias, _ in row.aliases)]}
     if row.kind in ("number", "integer"):
         lower = {"exclusiveMinimum" if row.above else "minimum": row.low}
@@ -108,7 +108,7 @@ def _one(row: Parameter) -> Schema:
 
 
 def _made() -> Schema:
-    """The schema of values that are made, such as {linspace: [0.1, 0.3, 5]}."""
+    """Return the schema of values that are made, such as {linspace: [0.1, 0.3, 5]}."""
     counted = {**NUMBER, "multipleOf": 1, "minimum": 2}
     forms = []
     for word, inside in FORMS.items():
@@ -121,7 +121,7 @@ def _made() -> Schema:
 
 
 def _sweeps() -> Schema:
-    """The schemas of the keys that say how values are swept together."""
+    """Return the schemas of the keys that say how values are swept together."""
     whole = {"type": "integer", "minimum": 1}
     sample = _mapping({"n": whole, "seed": {"type": "integer", "minimum": 0, "maximum": MAX_SEED}})
     keys = {"enum": [*_sweepable()]}
@@ -137,7 +137,7 @@ def _sweeps() -> Schema:
 
 
 def _regimes() -> Schema:
-    """The schema of what is followed, value after value."""
+    """Return the schema of what is followed, value after value."""
     ends = {"over": {"description": "the key that is followed", "enum": [*followable()]}}
     ends |= {
         "from": {"description": "its least value", **NUMBER},
@@ -156,6 +156,6 @@ def _regimes() -> Schema:
 
 
 def _sweepable() -> Iterable[str]:
-    """The keys that can be swept, shorthands among them."""
+    """Yield the keys that can be swept, shorthands among them."""
     yield from SHORTHANDS
     yield from (key for key in table() if key not in outside_identity())

@@ -47,7 +47,7 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _judged_values(values: Mapping[str, Any]) -> Iterator[tuple[str, float, tuple[float, float]]]:
-    """The keys with a judged range that a case reads, their values, and the ranges."""
+    """Yield the keys with a judged range that a case reads, their values, and the ranges."""
     ideal = values.get("joint") == "none"
     other_exponent = value_in(values, "contact.exponent") != 1.5  # the stiffness has another unit
     for key, row in table().items():

@@ -31,7 +31,9 @@ class Leaves:
 
 
 def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
-    """The leaves of a tree; keys that are unknown, or no group where one is due, are problems."""
+    """Return the leaves of a tree; keys that are unknown, or no group where one is due, are
+    problems.
+    """
     found = Leaves({}, {})
     for name, node in _known("", root, problems, root):
         found.places[name] = node.key_place
@@ -88,7 +90,7 @@ def _halved(node: Node, first: int | None = None) -> Node:
 
 
 def _is_sweep(name: str, node: Node) -> bool:
-    """Whether a group's mapping sweeps a value that stands for the whole group."""
+    """Return whether a group's mapping sweeps a value that stands for the whole group."""
     few = name in SHORTHANDS and len(node.value) <= 2  # a word of FORMS, and `log`
     return few and any(get_close_matches(word, FORMS, n=1) for word in node.value)
 
@@ -96,7 +98,9 @@ def _is_sweep(name: str, node: Node) -> bool:
 def _known(
     group: str, node: Node, problems: list[FileProblem], root: Node
 ) -> Iterable[tuple[str, Node]]:
-    """The entries of a group (or, for "", of a file) that it may hold and that have a value."""
+    """Yield the entries of a group (or, for "", of a file) that it may hold and that have a
+    value.
+    """
     for name, item in node.value.items():
         if name not in accepted(group):
             message = "unknown key"
@@ -109,7 +113,7 @@ def _known(
 
 
 def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[str, Leaves]:
-    """The leaves of each `key=value` of the command line, by its key."""
+    """Return the leaves of each `key=value` of the command line, by its key."""
     found: dict[str, Leaves] = {}
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
@@ -128,7 +132,7 @@ def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[st
 
 
 def overridden(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
-    """A file's leaves with every override in place of the leaves at or under its key."""
+    """Return a file's leaves with every override in place of the leaves at or under its key."""
     new = {key: node for change in overrides.values() for key, node in change.values.items()}
     places = {key: place for change in overrides.values() for key, place in change.places.items()}
     gone = [*overrides]
@@ -146,26 +150,28 @@ def overridden(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
 
 
 def merged(file: Leaves, block: Leaves) -> Leaves:
-    """A file's leaves with every leaf of one of its blocks in place of the file's."""
+    """Return a file's leaves with every leaf of one of its blocks in place of the file's."""
     changes = {key: Leaves({key: node}, {}) for key, node in block.values.items()}
     found = overridden(file, changes)
     return Leaves(found.values, file.places | block.places)
 
 
 def _opened(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
-    """A value that stands for a whole group, split up if an override sets a part of the group."""
+    """Return a value that stands for a whole group, split up if an override sets a part of the
+    group.
+    """
     if not any(other.startswith(f"{key}.") for other in new):
         return {key: node}
     return dict.fromkeys(stands_for(key), node)
 
 
 def covers(outer: str, key: str) -> bool:
-    """Whether a key is another one, or in the group that the other names."""
+    """Return whether a key is another one, or in the group that the other names."""
     return f"{key}.".startswith(f"{outer}.")
 
 
 def nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
-    """Values by dotted key as a case file has them, group by group."""
+    """Return the values by dotted key as a case file has them, group by group."""
     values: dict[str, Any] = {}
     for key, node in chosen.items():
         group, _, name = key.rpartition(".")

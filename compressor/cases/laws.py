@@ -37,12 +37,12 @@ USUAL = {
 
 
 def law_of(group: Any) -> str:
-    """The law of a case's contact or friction by name."""
+    """Return the law of a case's contact or friction by name."""
     return str(group.law or FRICTION_LAWS[0])
 
 
 def with_law(name: str, group: Any) -> Any:
-    """Contact or friction with what its law reads filled in, and the rest at its default."""
+    """Return contact or friction with what its law reads filled in, and the rest at its default."""
     law, changes = law_of(group), {}
     for field in fields(group):
         readers = READ_BY[name].get(field.name)

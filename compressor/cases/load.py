@@ -47,7 +47,7 @@ class _Draft:
 
 
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
-    """The cases of YAML case files, in the order of the files and of their axes.
+    """Return the cases of YAML case files, in the order of the files and of their axes.
 
     A list of values in a file is an axis, and axes multiply; `configs/README.md` tells every key.
     Raises CaseFileError with everything that is wrong in all files, each with its place.
@@ -76,7 +76,8 @@ def load_studies(
     told: Told = unheard,
     variants: Variants = itself,
 ) -> list[Study]:
-    """The studies of YAML case files; each override, `key=value`, replaces a value in all of them.
+    """Return the studies of YAML case files; each override, `key=value`, replaces a value in all of
+    them.
 
     A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
     comparison, selects the jobs to be run. A file with `regimes` is refused where the caller cannot
@@ -112,7 +113,7 @@ def _path_of(path: Any) -> str:
 
 
 def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
-    """The comparison of the command line."""
+    """Return the comparison of the command line."""
     try:
         return comparison(text)
     except NoComparison as error:
@@ -140,7 +141,9 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
 
 
 def _name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
-    """The study's name: the file's value, checked later with all others, or the file's stem."""
+    """Return the study's name: the file's value, checked later with all others, or the file's
+    stem.
+    """
     if "name" in found.values:
         name = found.values["name"].value
         return "" if table()["name"].check(name) else name
@@ -238,7 +241,9 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told, read: Ke
 
 
 def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
-    """The leaves of each block, over those of the file; the file's alone where it has no blocks."""
+    """Yield the leaves of each block, over those of the file; the file's alone where it has no
+    blocks.
+    """
     node = draft.leaves.values.get("blocks")
     own = {key: item for key, item in draft.leaves.values.items() if key != "blocks"}
     file = Leaves(own, draft.leaves.places)
@@ -266,7 +271,7 @@ def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
 
 
 def _block_leaves(item: Node, draft: _Draft) -> Leaves:
-    """What a block says; what only a file can say is a problem."""
+    """Return what a block says; what only a file can say is a problem."""
     found = leaves(item, draft.problems)
     whole = ("name", "blocks", GROUP)
     for key in [key for key in found.values if key.partition(".")[0] in whole]:
@@ -278,7 +283,7 @@ def _block_leaves(item: Node, draft: _Draft) -> Leaves:
 
 
 def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> bool:
-    """Whether there are few enough jobs to make their values; too many are a problem."""
+    """Return whether there are few enough jobs to make their values; too many are a problem."""
     sizes = [one.sizes() for one in drafts]
     total = sum(math.prod(one.values()) for one in sizes)
     if total <= max_jobs:
@@ -311,7 +316,9 @@ def _refuse_conflicts(draft: _Draft, cases: Cases) -> None:
 
 
 def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
-    """The cases of each chain; what cannot be followed, and too many values, are problems."""
+    """Return the cases of each chain; what cannot be followed, and too many values, are
+    problems.
+    """
     asked, places = draft.regimes, draft.leaves.places
     assert asked
     place = places.get(GROUP, Place(draft.path, 1, 1))
@@ -335,7 +342,7 @@ def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...
 
 
 def _located(problem: Problem, chosen: Mapping[str, Node], block: Block, path: str) -> FileProblem:
-    """A case's problem at the value it is about, or at the nearest key, group or block."""
+    """Return a case's problem at the value it is about, or at the nearest key, group or block."""
     group = problem.key.partition(".")[0]
     for key in (problem.key, group):
         if key in chosen:

@@ -14,7 +14,7 @@ MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326
 
 
 def contact_stiffness(first, second, journal_radius, bearing_radius, internal=False):
-    """Eq. 15's stiffness K (N/m^1.5) of two materials by name and two radii (m).
+    """Return the Eq. 15's stiffness K (N/m^1.5) of two materials by name and two radii (m).
 
     The paper adds the radii's curvatures, as of two discs side by side; internal: it takes them
     from each other, as of a pin in a bore (Flores and Lankarani, Contact force models for multibody
@@ -44,7 +44,7 @@ def composite_modulus(first, second):
 
 
 def joint_stiffness(contact: "Contact", pin_radius_mm: float, clearance_mm: float) -> float:
-    """What a joint's contact law is scaled by: K (N/m^p), or pi E* L (N/m) with johnson.
+    """Return what a joint's contact law is scaled by: K (N/m^p), or pi E* L (N/m) with johnson.
 
     With liu K (N/m^1.5) at small penetrations, which depends on the clearance; 0 without any.
     """

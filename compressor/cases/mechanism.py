@@ -162,7 +162,7 @@ class Rod:
 
 
 def filled_guide(guide: Guide, mass: float) -> Guide:
-    """A guide with its crosshead's inertia, by the mass (kg) that reciprocates."""
+    """Return a guide with its crosshead's inertia, by the mass (kg) that reciprocates."""
     if guide.crosshead_inertia_kg_m2 is not None:
         return guide
     square = (guide.crosshead_length_mm / 1000) ** 2 + (guide.crosshead_height_mm / 1000) ** 2

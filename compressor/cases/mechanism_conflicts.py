@@ -43,7 +43,7 @@ def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
 
 
 def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """What does not fit together in guide, drive, rod and the friction of ideal joints."""
+    """Yield what does not fit together in guide, drive, rod and the friction of ideal joints."""
     machine, friction = case.machine, case.friction
     if case.drive and case.body:
         yield Problem(

@@ -14,7 +14,7 @@ MOST_NAMES = 5
 
 
 def unreadable(path: str, error: OSError | ValueError) -> str:
-    """Why a file cannot be read, and what to do about it."""
+    """Return why a file cannot be read, and what to do about it."""
     message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
     if isinstance(error, FileNotFoundError):
         return f"{message}; {_instead(Path(path))}"
@@ -26,14 +26,14 @@ def unreadable(path: str, error: OSError | ValueError) -> str:
 
 
 def no_text(data: bytes) -> str:
-    """What is said of a file that is no text in UTF-8."""
+    """Return what is said of a file that is no text in UTF-8."""
     if data.startswith(RESULTS):
         return "is a file of results (netCDF or HDF5); a case file is YAML text"
     return "is not UTF-8 text"
 
 
 def case_files(folder: Path) -> list[Path]:
-    """The case files in a folder, by their names."""
+    """Return the case files in a folder, by their names."""
     try:
         entries = sorted(islice(folder.iterdir(), MOST_LOOKED_AT))
     except OSError:
@@ -42,7 +42,7 @@ def case_files(folder: Path) -> list[Path]:
 
 
 def _instead(path: Path) -> str:
-    """What to give in place of a file that is not there."""
+    """Return what to give in place of a file that is not there."""
     if "*" in path.name:
         return f"no file has such a name; {START}"
     found = {path.stem: path for path in [*case_files(Path("configs")), *case_files(path.parent)]}

@@ -6,7 +6,7 @@ from compressor.cases.table import Settings
 
 
 def back_action(case: Settings, axis: str, frequency: Any) -> Any:
-    """The relative change of the shaking force by the motion of the body it drives, complex.
+    """Return the relative change of the shaking force by the motion of the body it drives, complex.
 
     A body that accelerates by a takes the moving parts m along, so that the force X on it becomes
     X - m a. With a = -X G / M, G = f^2 / (f_n^2 - f^2 + 2 i zeta f f_n), the change is m G / M of
@@ -23,5 +23,5 @@ def back_action(case: Settings, axis: str, frequency: Any) -> Any:
 
 
 def moving_mass(case: Settings) -> float:
-    """Rod and reciprocating parts (kg), which a body takes along in both directions."""
+    """Return the rod and reciprocating parts (kg), which a body takes along in both directions."""
     return case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg

@@ -100,7 +100,7 @@ SHORT.maxstring = SHORT.maxother = SHORT.maxlong = 60
 
 
 def shown(value: Any) -> str:
-    """A value as an error message quotes it: control characters escaped, long values cut."""
+    """Return a value as an error message quotes it: control characters escaped, long values cut."""
     if isinstance(value, bool):
         return str(value).lower()
     return SHORT.repr(value)
@@ -108,7 +108,9 @@ def shown(value: Any) -> str:
 
 @lru_cache(4096)  # the jobs of a study share most of their values
 def to_si(value: float, unit: str) -> float:
-    """A case-file value in SI; powers of ten are divided, so that 0.1 mm is exactly 1e-4 m."""
+    """Return a case-file value in SI; powers of ten are divided, so that 0.1 mm is exactly 1e-4
+    m.
+    """
     _, numerator, denominator = UNITS[unit]
     return value * numerator / denominator
 
@@ -187,11 +189,11 @@ class Parameter:
         return next((choice for alias, choice in self.aliases if alias == value), value)
 
     def holds(self, value: float) -> bool:
-        """Whether a number is in range."""
+        """Return whether a number is in range."""
         return (value > self.low if self.above else value >= self.low) and value <= self.high
 
     def check(self, value: Any) -> str | None:
-        """What is wrong with a scalar value of this parameter, or None."""
+        """Return what is wrong with a scalar value of this parameter, or None."""
         if value is None:
             return NO_VALUE
         if self.kind == "text":
@@ -219,7 +221,9 @@ class Parameter:
         return None
 
     def _refused(self, value: Any, word: Any = None) -> str:
-        """The error of a value of another kind; `word`: what may be a choice that is misspelt."""
+        """Return the error of a value of another kind; `word`: what may be a choice that is
+        misspelt.
+        """
         message = f"needs {self.needed}, not {shown(value)}"
         if not isinstance(word, str):
             return message
@@ -243,12 +247,12 @@ class Parameter:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Words as a sentence lists them: a, b or c."""
+    """Return the words as a sentence lists them: a, b or c."""
     return " or ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
 def _is_finite(value: float) -> bool:
-    """Whether a number fits a float; an integer may be too large to be asked by math."""
+    """Return whether a number fits a float; an integer may be too large to be asked by math."""
     try:
         return math.isfinite(value)
     except OverflowError:
@@ -258,14 +262,16 @@ def _is_finite(value: float) -> bool:
 def parameter(
     default: Any, unit: str, span: tuple[float, float], source: str, phrase: str, **more: Any
 ) -> Any:
-    """A dataclass field that is also a row of the table; `more`: other fields of `Parameter`."""
+    """Return a dataclass field that is also a row of the table; `more`: other fields of
+    `Parameter`.
+    """
     row = {"unit": unit, "low": span[0], "high": span[1], "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "number"}
     return _field(default, row | more)
 
 
 def choice(default: Any, choices: tuple[str, ...], source: str, phrase: str, **more: Any) -> Any:
-    """A field whose value is one of a few words, or of another `kind` that is given."""
+    """Return a field whose value is one of a few words, or of another `kind` that is given."""
     row = {"unit": "", "low": 0.0, "high": 0.0, "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "choice", "choices": choices}
     return _field(default, row | more)
@@ -280,7 +286,9 @@ def _field(default: Any, row: dict[str, Any]) -> Any:
 
 
 def documented(group: type[Group]) -> type[Group]:
-    """A group's dataclass, its fields told in its docstring: range, unit, default, source."""
+    """Return a group's dataclass, its fields told in its docstring: range, unit, default,
+    source.
+    """
     lines = []
     for item in fields(group):  # type: ignore[arg-type]
         row = Parameter(item.name, default=item.default, **item.metadata)
@@ -296,7 +304,7 @@ def documented(group: type[Group]) -> type[Group]:
 
 
 def parameter_table(rows: Iterable[Parameter]) -> str:
-    """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
+    """Return the table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
     heads = ("key", "unit", "default", "range", "judged on", "source", "what it is", "read with")
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for row in rows:

@@ -24,23 +24,23 @@ class Reader:
 
 
 def has_clearance(case: Any) -> bool:
-    """Whether a joint has clearance."""
+    """Return whether a joint has clearance."""
     sizes = case.clearance_mm
     return bool(sizes.big_end > 0) or bool(sizes.small_end > 0)
 
 
 def has_play(case: Any) -> bool:
-    """Whether the guide has clearance."""
+    """Return whether the guide has clearance."""
     return bool(case.guide and case.guide.clearance_mm > 0)
 
 
 def has_ideal_friction(case: Any) -> bool:
-    """Whether joints without clearance rub."""
+    """Return whether joints without clearance rub."""
     return bool(case.friction and case.friction.ideal_joints)
 
 
 def hears_casing(case: Any) -> bool:
-    """Whether a sensor stands where a casing mode is heard."""
+    """Return whether a sensor stands where a casing mode is heard."""
     return bool(case.body and case.sensor and case.sensor.place != "body")
 
 

@@ -1,6 +1,6 @@
 """The `regimes` of a case file: one machine followed along a parameter, value after value.
 
-Each value's run starts from the end of the last one's (`compressor.studies.regimes`). What a file says is
+Each value's run starts from the end of the last one's (`studies.regimes`). What a file says is
 read and checked here; the key that is followed stands in the file's own cases at its first value.
 """
 
@@ -93,12 +93,13 @@ class Regimes:
         return row.unit if row else ""
 
     def plain(self) -> dict[str, Any]:
-        """The fields by name."""
+        """Return the fields by name."""
         return asdict(self)
 
 
 def read(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
-    """What `regimes` asks for in a file's leaves; None without it, or with something wrong in it.
+    """Return what `regimes` asks for in a file's leaves; None without it, or with something wrong
+    in it.
 
     What is wrong joins `problems`.
     """
@@ -124,7 +125,7 @@ def read(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
 
 
 def _checked(name: str, node: Node, problems: list[FileProblem]) -> Any:
-    """The value of a key of `regimes`; what is wrong with it joins `problems`."""
+    """Return the value of a key of `regimes`; what is wrong with it joins `problems`."""
     value, key = node.plain(), f"{GROUP}.{name}"
     if name == "over":
         message = _not_followed(value)
@@ -141,7 +142,7 @@ def _checked(name: str, node: Node, problems: list[FileProblem]) -> Any:
 
 
 def _not_followed(key: Any) -> str | None:
-    """Why a key cannot be followed, or None."""
+    """Return why a key cannot be followed, or None."""
     row = row_of(key) if isinstance(key, str) else None
     if row is None:
         hint = suggestion(key, "") if isinstance(key, str) else ""
@@ -175,13 +176,13 @@ def _check_range(
 
 
 def without(leaves: Leaves) -> Leaves:
-    """The leaves that are of cases."""
+    """Return the leaves that are of cases."""
     kept = {key: node for key, node in leaves.values.items() if not covers(GROUP, key)}
     return Leaves(kept, leaves.places)
 
 
 def at_first(leaves: Leaves, asked: Regimes, problems: list[FileProblem]) -> Leaves:
-    """A block's leaves with the key that is followed at its first value.
+    """Return a block's leaves with the key that is followed at its first value.
 
     A key that is given in vain, or sets what is followed, is a problem.
     """
@@ -199,14 +200,16 @@ def at_first(leaves: Leaves, asked: Regimes, problems: list[FileProblem]) -> Lea
 
 
 def followed(asked: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
-    """A combination of a file's values at each value of the key that is followed, going up."""
+    """Yield a combination of a file's values at each value of the key that is followed, going
+    up.
+    """
     if at := chosen.get(asked.over):  # an ideal machine has no clearance
         for value in asked.values:
             yield {**chosen, asked.over: Node(value, at.place, at.key_place)}
 
 
 def objection(cases: tuple[Case, ...], asked: Regimes) -> str:
-    """Why the cases of a chain cannot be followed, or ""."""
+    """Return why the cases of a chain cannot be followed, or ""."""
     worn = {tuple(getattr(case.clearance_mm, joint) > 0.0 for joint in JOINTS) for case in cases}
     if len(worn) > 1:
         at = f"{asked.over} = {asked.first:g}"
@@ -220,5 +223,5 @@ def objection(cases: tuple[Case, ...], asked: Regimes) -> str:
 
 
 def followable() -> Iterable[str]:
-    """The keys that can be followed, shorthands among them."""
+    """Yield the keys that can be followed, shorthands among them."""
     yield from (key for key in (*SHORTHANDS, *table()) if _not_followed(key) is None)

@@ -24,7 +24,7 @@ class Change(NamedTuple):
 
 
 def _rubs_on_the_pin(values: Mapping[str, Any]) -> bool:
-    """Whether friction puts a couple on the crosshead pin that an ideal guide bears."""
+    """Return whether friction puts a couple on the crosshead pin that an ideal guide bears."""
     friction = values.get("friction")
     if not friction or (values.get("guide") or {}).get("clearance_mm"):
         return False

@@ -36,7 +36,8 @@ class Sheet:
 
     @classmethod
     def of(cls, name: str, jobs: Alike, before: int) -> "Sheet":
-        """The sheet of jobs of a block, `before` which the study has others; `name`: the study's.
+        """Return the sheet of jobs of a block, `before` which the study has others; `name`: the
+        study's.
 
         Raises CaseError where values do not fit that all jobs share.
         """
@@ -64,7 +65,7 @@ class Sheet:
         return found
 
     def _picked(self, pick: Callable[[np.ndarray], Any]) -> Case:
-        """The case with something made of each column in its place."""
+        """Return the case with something made of each column in its place."""
         made = object.__new__(Case)
         values = vars(made)
         values.update(vars(self.case))
@@ -77,13 +78,13 @@ class Sheet:
         return made
 
     def at(self, place: int) -> Case:
-        """The case of one job, of which it is known that its values fit."""
+        """Return the case of one job, of which it is known that its values fit."""
         made = self._picked(lambda numbers: numbers[place].item())
         vars(made)["problems"] = ()
         return made
 
     def doubtful(self) -> np.ndarray:
-        """Whether a rule may find values that do not fit each other, of each job, (m,)."""
+        """Return whether a rule may find values that do not fit each other, of each job, (m,)."""
         found = np.zeros(len(self), dtype=bool)
         for rule in RULES:
 
@@ -106,7 +107,7 @@ class Sheet:
         return bool(places_where(holds, len(self)).any())
 
     def keys(self) -> list[str]:
-        """The keys of the jobs: of all from one text, in which the numbers change."""
+        """Return the keys of the jobs: of all from one text, in which the numbers change."""
         columns: list[Column] = []
 
         def held(value: Column) -> str:
@@ -127,7 +128,7 @@ class Sheet:
         return [digest(frame % row) for row in rows]
 
     def values(self, key: str) -> list[Any]:
-        """The value of a dotted key in each job, as `value_of` gives it."""
+        """Return the value of a dotted key in each job, as `value_of` gives it."""
         if key in SHORTHANDS:
             rows = zip(*(self.values(part) for part in stands_for(key)), strict=True)
             return [single(size for size in sizes if size > 0) for sizes in rows]

@@ -30,12 +30,12 @@ SHORTHANDS = {
 
 
 def stands_for(key: str) -> tuple[str, ...]:
-    """The keys that a shorthand sets; none where a key is no shorthand."""
+    """Return the keys that a shorthand sets; none where a key is no shorthand."""
     return SHORTHANDS[key].keys if key in SHORTHANDS else ()
 
 
 def row_of(key: str) -> Parameter | None:
-    """The row of the table that a key's values must keep; None where there is none."""
+    """Return the row of the table that a key's values must keep; None where there is none."""
     return table().get(next(iter(stands_for(key)), key))
 
 
@@ -46,7 +46,7 @@ def phrase_of(key: str) -> str:
 
 
 def expanded(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested values with every shorthand written out as the group that it stands for."""
+    """Return the nested values with every shorthand written out as the group that it stands for."""
     return {
         key: {name.rpartition(".")[2]: value for name in stands_for(key)}
         if key in SHORTHANDS and not isinstance(value, Mapping)
@@ -56,13 +56,13 @@ def expanded(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def single(values: Iterable[Any]) -> Any:
-    """The one value that all are equal to, or None."""
+    """Return the one value that all are equal to, or None."""
     found = {*values}
     return found.pop() if len(found) == 1 else None
 
 
 def value_of(case: Settings, key: str) -> Any:
-    """A case's value of a dotted key; None where it has none, or no single one."""
+    """Return a case's value of a dotted key; None where it has none, or no single one."""
     if key in WORDS:
         return getattr(case, key) is not None
     if key in SHORTHANDS:
@@ -74,7 +74,9 @@ def value_of(case: Settings, key: str) -> Any:
 
 
 def value_in(values: Mapping[str, Any], key: str) -> Any:
-    """The value of a dotted key in nested values; None where they have none, or no single one."""
+    """Return the value of a dotted key in nested values; None where they have none, or no single
+    one.
+    """
     value: Any = values
     for part in key.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None

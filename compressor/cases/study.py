@@ -66,11 +66,13 @@ class Study:
         return len(self.keys)
 
     def sheet_of(self, number: int) -> int:
-        """A number that jobs share only if their cases differ in nothing but swept numbers."""
+        """Return a number that jobs share only if their cases differ in nothing but swept
+        numbers.
+        """
         return self.cases.sheet_of(number) if isinstance(self.cases, Cases) else number
 
     def shard(self, number: int, of: int) -> "Study":
-        """The study with the jobs of one shard selected, 1 <= number <= of.
+        """Return the study with the jobs of one shard selected, 1 <= number <= of.
 
         A job's key says which shard it belongs to, so that any number of machines agree without
         asking each other, and studies that share a job put it in the same one.
@@ -119,7 +121,7 @@ class Cases(Sequence[Case]):
         return found
 
     def sheet_of(self, number: int) -> int:
-        """The number of a case's sheet."""
+        """Return the number of a case's sheet."""
         return self._sheet_of[number]
 
     @cached_property
@@ -142,17 +144,17 @@ class Cases(Sequence[Case]):
         return self.parts[bisect.bisect_right(self.ends, number)]
 
     def keys(self, told: Told = unheard) -> list[str]:
-        """The key of each case; `told` hears how many of how many have been made."""
+        """Return the key of each case; `told` hears how many of how many have been made."""
         if not self._keys:
             self._keys = self._each(lambda sheet: sheet.keys(), told)
         return self._keys
 
     def values(self, key: str) -> list[Any]:
-        """The value of a dotted key in each case, as `value_of` gives it."""
+        """Return the value of a dotted key in each case, as `value_of` gives it."""
         return self._each(lambda sheet: sheet.values(key))
 
     def _each(self, of: "Callable[[Sheet], Sequence[Any]]", told: Told = unheard) -> list[Any]:
-        """What a function gives for the jobs of each sheet, of all cases in their order."""
+        """Return what a function gives for the jobs of each sheet, of all cases in their order."""
         found: list[Any] = [None] * len(self)
         done = 0
         for sheet in self.sheets:
@@ -164,7 +166,9 @@ class Cases(Sequence[Case]):
         return found
 
     def doubtful(self) -> Iterator[tuple[Block, dict[str, Node]]]:
-        """Combinations in which a rule may find values that do not fit each other, in order."""
+        """Yield the combinations in which a rule may find values that do not fit each other, in
+        order.
+        """
         try:
             sheets = self.sheets
         except CaseError:  # told of each combination
@@ -177,17 +181,17 @@ class Cases(Sequence[Case]):
             yield part, part.chosen(part.kept[number - before])
 
     def case(self, chosen: Mapping[str, Node]) -> Case:
-        """The case of one combination. Raises CaseError where its values do not fit."""
+        """Return the case of one combination. Raises CaseError where its values do not fit."""
         return Case.resolve(nested(chosen) | {"name": self.name})
 
     def combinations(self) -> Iterator[tuple[Block, dict[str, Node]]]:
-        """The values of every case by dotted key, and the block that they are of."""
+        """Yield the values of every case by dotted key, and the block that they are of."""
         for part in self.parts:
             for number in part.kept:
                 yield part, part.chosen(number)
 
     def where(self, test: Test) -> list[int]:
-        """The numbers of the cases for which a comparison holds."""
+        """Return the numbers of the cases for which a comparison holds."""
         holds = itertools.chain.from_iterable(part.where(test).tolist() for part in self.parts)
         return [number for number, held in enumerate(holds) if held]
 
@@ -204,7 +208,7 @@ class Jobs(Protocol):
 
 
 def points(study: Jobs) -> Iterator[dict[str, Any]]:
-    """The swept values that each job has, by dotted key, in the order of the jobs.
+    """Yield the swept values that each job has, by dotted key, in the order of the jobs.
 
     What is swept in other blocks only is left out.
     """

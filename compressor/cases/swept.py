@@ -41,16 +41,18 @@ class Sweep:
     spread: Spread = float
 
     def nodes(self) -> list[Node]:
-        """The values; made ones stand where their mapping does."""
+        """Return the values; made ones stand where their mapping does."""
         return self.node.value if self.kind == "list" else self.placed(self.make())
 
     def placed(self, values: list[float]) -> list[Node]:
-        """Made values as nodes."""
+        """Return the made values as nodes."""
         return [Node(value, self.node.place, self.node.key_place) for value in values]
 
 
 def is_swept(key: str, node: Node) -> bool:
-    """Whether a value stands for many: not the pair of a contact's materials, nor an accuracy."""
+    """Return whether a value stands for many: not the pair of a contact's materials, nor an
+    accuracy.
+    """
     if isinstance(node.value, dict):
         return key != "solve.accuracy"
     if not isinstance(node.value, list):
@@ -59,7 +61,7 @@ def is_swept(key: str, node: Node) -> bool:
 
 
 def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> Sweep | None:
-    """How a key is swept, or None, what is wrong having joined `problems`."""
+    """Return how a key is swept, or None, what is wrong having joined `problems`."""
 
     def refuse(message: str, at: Node = node) -> None:
         problems.append(FileProblem(at.place, key, message))
@@ -87,12 +89,12 @@ def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> Sweep | None:
 
 
 def is_number(row: Parameter | None) -> bool:
-    """Whether a row of the table is one of numbers."""
+    """Return whether a row of the table is one of numbers."""
     return row is not None and row.kind in ("number", "integer")
 
 
 def _numbers(word: str, node: Node, refuse: Callable[..., None]) -> list[Fraction]:
-    """The numbers in the brackets of a word; none where anything is wrong with them."""
+    """Return the numbers in the brackets of a word; none where anything is wrong with them."""
     items = [item.value for item in node.value] if isinstance(node.value, list) else []
     if len(items) != FORMS[word].count(",") + 1 or not all(map(_is_finite, items)):
         refuse(f"{word} needs {FORMS[word]}, finite numbers", node)
@@ -109,7 +111,7 @@ def _ranged(
     key: str, node: Node, word: str, numbers: list[Fraction], log: bool,
     refuse: Callable[..., None],
 ) -> Sweep | None:  # fmt: skip
-    """The sweep between two numbers, if both are good values of the key."""
+    """Return the sweep between two numbers, if both are good values of the key."""
     first, last, *more = numbers
     count, message = 0, ""
     if first == last and word != "range":
@@ -143,7 +145,9 @@ def _ranged(
 
 
 def between(word: str, first: Fraction, last: Fraction, count: int) -> Make:
-    """The function that makes `count` values from first to last, evenly or with even ratios."""
+    """Return the function that makes `count` values from first to last, evenly or with even
+    ratios.
+    """
     low, high = float(first), float(last)
 
     def even() -> list[float]:
@@ -157,7 +161,7 @@ def between(word: str, first: Fraction, last: Fraction, count: int) -> Make:
 
 
 def _spread(low: float, high: float, log: bool) -> Spread:
-    """The function that takes [0, 1) to [low, high), evenly or with even ratios."""
+    """Return the function that takes [0, 1) to [low, high), evenly or with even ratios."""
 
     def spread(share: float) -> float:
         value = low * (high / low) ** share if log else low + (high - low) * share
@@ -167,22 +171,22 @@ def _spread(low: float, high: float, log: bool) -> Spread:
 
 
 def rounded(value: float) -> float:
-    """A made value to 12 digits, which print alike wherever its last bits come from."""
+    """Return a made value to 12 digits, which print alike wherever its last bits come from."""
     return float(f"{value:.12g}")
 
 
 def counted(count: int) -> str:
-    """A number of jobs as it is told, however large."""
+    """Return a number of jobs as it is told, however large."""
     return str(count) if count < 10**100 else f"over 10^{int(count.bit_length() * 0.30103) - 1}"
 
 
 def design_size(kind: str, count: int, keys: int) -> int:
-    """How many points `design` makes."""
+    """Return how many points `design` makes."""
     return count * (keys + 2) if kind == "saltelli" else count
 
 
 def design(kind: str, count: int, keys: int, seed: int) -> list[list[float]]:
-    """Points of a sampling design: `count` of `keys` coordinates in [0, 1).
+    """Return the points of a sampling design: `count` of `keys` coordinates in [0, 1).
 
     The same seed gives the same points. `random` is uniform, `lhs` a Latin hypercube, `sobol`
     Sobol's sequence, scrambled, whose balance is best where `count` is a power of two. `saltelli`

@@ -145,7 +145,7 @@ class Settings:
 
 
 def parameters() -> Iterator[Parameter]:
-    """The rows of the table, in the order of the case file."""
+    """Yield the rows of the table, in the order of the case file."""
     for item in dataclasses.fields(Settings):
         if item.name not in GROUPS:
             yield Parameter(key=item.name, default=item.default, **item.metadata)
@@ -165,11 +165,13 @@ def group_readers(name: str) -> tuple[Reader, ...]:
 
 @cache
 def table() -> dict[str, Parameter]:
-    """The table of parameters by dotted key, such as `machine.rod_mass_kg`."""
+    """Return the table of parameters by dotted key, such as `machine.rod_mass_kg`."""
     return {row.key: row for row in parameters()}
 
 
 @cache
 def outside_identity() -> frozenset[str]:
-    """The keys that change nothing of what a job computes, so that no study can sweep them."""
+    """Return the keys that change nothing of what a job computes, so that no study can sweep
+    them.
+    """
     return frozenset(row.key for row in parameters() if not row.identity)

@@ -25,7 +25,9 @@ MOST_MEANT = 3  # keys that an unknown one may have meant
 
 
 def known(group: str, file: bool = True) -> list[str]:
-    """The keys that a group (or, for "", the top) may hold; of a `file`, those of sweeps, too."""
+    """Return the keys that a group (or, for "", the top) may hold; of a `file`, those of sweeps,
+    too.
+    """
     if group in MAPPINGS:
         return [*MAPPINGS[group]]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
@@ -53,13 +55,13 @@ def unknown(name: str, group: str, file: bool = True, value: Any = None, values:
 
 
 def no_mapping(key: str, value: Any) -> str:
-    """What is told of a value that stands where a group's keys are due."""
+    """Return what is told of a value that stands where a group's keys are due."""
     word = f"{shown(WORDS[key])} or " if key in WORDS else ""
     return f"needs {word}a mapping of keys{_example(key)}, not {shown(value)}"
 
 
 def _example(group: str) -> str:
-    """A key of a group with its default, such as crank_radius_mm: 120."""
+    """Return a key of a group with its default, such as crank_radius_mm: 120."""
     for name in known(group) if group in GROUPS else ():
         row = table()[f"{group}.{name}"]
         if row.default is not None:
@@ -69,7 +71,7 @@ def _example(group: str) -> str:
 
 
 def suggestion(name: str, group: str) -> str:
-    """The end of an error about an unknown key: what was probably meant, if anything."""
+    """Return the end of an error about an unknown key: what was probably meant, if anything."""
     if name in table() and "." in name:
         outer, _, inner = name.partition(".")
         return f"; write {inner} inside {outer}"
@@ -99,7 +101,7 @@ def meant(name: str, group: str) -> list[str]:
 
 
 def _holding(name: str, within: str = "") -> list[str]:
-    """The keys, if they are few, in whose name all words of another one stand."""
+    """Return the keys, if they are few, in whose name all words of another one stand."""
     words = {word for word in name.lower().split("_") if word}
     found = [
         key
@@ -114,7 +116,7 @@ def _leaf(key: str) -> str:
 
 
 def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
-    """The allowed key with another unit, or else the one most alike."""
+    """Return the allowed key with another unit, or else the one most alike."""
     stems = {_stem(key): key for key in reversed(allowed)}
     for stem in sorted(stems, key=len, reverse=True):
         if stem != stems[stem] and f"{name}_".startswith(f"{stem}_"):
@@ -125,7 +127,7 @@ def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
 
 
 def _stem(name: str) -> str:
-    """A key's name without its unit."""
+    """Return a key's name without its unit."""
     if name in map(_leaf, DOUBLES):
         return name.removesuffix("_mm")
     if name in map(_leaf, DOUBLES):

@@ -55,6 +55,6 @@ class Wear:
 
 
 def filled_wear(wear: Wear, clearance_mm: PerJoint) -> Wear:
-    """Wear with its limit, by the clearances of both joints."""
+    """Return the wear with its limit, by the clearances of both joints."""
     most = max(clearance_mm.big_end, clearance_mm.small_end)
     return wear if wear.limit_mm or not most else replace(wear, limit_mm=2.0 * most)

@@ -55,7 +55,7 @@ def _is_same(values: Mapping[str, Any], case: Case) -> bool:
 
 
 def _scalar(value: Any) -> str:
-    """A value in YAML: as JSON, but plain where a word reads back as text."""
+    """Return a value in YAML: as JSON, but plain where a word reads back as text."""
     if isinstance(value, str) and WORD.fullmatch(value) and resolved(value) == value:
         return value
     return json.dumps(value)

@@ -68,7 +68,7 @@ class Node:
     key_place: Place  # of the key that the value belongs to
 
     def plain(self) -> Any:
-        """The value without places."""
+        """Return the value without places."""
         if isinstance(self.value, list):
             return [item.plain() for item in self.value]
         if isinstance(self.value, dict):
@@ -81,12 +81,12 @@ class _Unreadable(Exception):
 
 
 def shortened(text: str, most: int = 60) -> str:
-    """Text of at most `most` characters."""
+    """Return the text of at most `most` characters."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def read_file(path: str, problems: list[FileProblem]) -> Node | None:
-    """The content of a case file, or None; what is wrong with it joins `problems`."""
+    """Return the content of a case file, or None; what is wrong with it joins `problems`."""
     try:
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
@@ -106,7 +106,9 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
 
 
 def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | None:
-    """The value of a YAML text, or None; a `start` without a line places everything there."""
+    """Return the value of a YAML text, or None; a `start` without a line places everything
+    there.
+    """
     builder = _Builder(text, start, problems)
     if odd := ODD_BREAKS.search(text):
         problems.append(_forbidden(text, odd.start(), start))
@@ -134,12 +136,12 @@ def _forbidden(text: str, position: int, start: Place) -> FileProblem:
 
 
 def _place_at(path: str, before: str) -> Place:
-    """The place that follows the text `before`."""
+    """Return the place that follows the text `before`."""
     return Place(path, before.count("\n") + 1, len(before) - before.rfind("\n"))
 
 
 def resolved(text: str) -> Any:
-    """What a plain scalar means in the core schema of YAML 1.2."""
+    """Return what a plain scalar means in the core schema of YAML 1.2."""
     if text in NULLS:
         return None
     if text in BOOLEANS:
@@ -157,7 +159,7 @@ def resolved(text: str) -> Any:
 
 
 def _integer(text: str) -> float:
-    """An integer; one beyond any float is infinite, since its digits may be a million."""
+    """Return an integer; one beyond any float is infinite, since its digits may be a million."""
     if text[:2] in ("0o", "0x"):
         value = int(text, 0)
         return value if value.bit_length() < 1000 else math.inf
@@ -188,7 +190,7 @@ class _Builder:
         self.problems.append(FileProblem(self.place(event.start_mark), key, message))
 
     def document(self) -> Node | None:
-        """The one document of the text."""
+        """Return the one document of the text."""
         next(self.events)  # the stream's start
         opening = next(self.events)
         if isinstance(opening, yaml.StreamEndEvent):
@@ -204,7 +206,7 @@ class _Builder:
         return node
 
     def node(self, event: Any, key: str, depth: int, key_place: Place | None) -> Node:
-        """The value that begins with an event, and all that is in it."""
+        """Return the value that begins with an event, and all that is in it."""
         place = self.place(event.start_mark)
         if depth > MAX_DEPTH:
             message = f"nested deeper than {MAX_DEPTH} levels"
@@ -255,7 +257,7 @@ class _Builder:
         return entries
 
     def name(self, event: Any, owner: str, depth: int) -> str | None:
-        """The text of a key, or None if it is refused."""
+        """Return the text of a key, or None if it is refused."""
         if not isinstance(event, yaml.ScalarEvent):
             if not isinstance(event, yaml.AliasEvent):
                 self.note(event, owner, "a key must be plain text")

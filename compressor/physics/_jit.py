@@ -116,16 +116,16 @@ def jit(function: Function) -> Function:
 
 
 def merged(function: Function) -> Function:
-    """`jit`, written by LLVM into each caller, whatever its size: at a small part of the time that
-    `inlined` takes to compile.
+    """Return `jit`, written by LLVM into each caller, whatever its size: at a small part of the
+    time that `inlined` takes to compile.
     """
     return _compiled(function, forceinline=True)
 
 
 def inlined(function: Function) -> Function:
-    """`jit`, written into each caller by numba, with its types: for what loops over lanes call with
-    tuples or arrays. `merged` into one another, LLVM sees too late that nothing is called there,
-    and makes no vector code of the loop.
+    """Return `jit`, written into each caller by numba, with its types: for what loops over lanes
+    call with tuples or arrays. `merged` into one another, LLVM sees too late that nothing is called
+    there, and makes no vector code of the loop.
     """
     return _compiled(function, inline="always")
 
@@ -148,7 +148,7 @@ class ByKind:
         return (self.special if max(lengths, default=0) >= self.least else self.usual)(*arguments)
 
     def of(self, arguments: Any) -> Any:
-        """The dispatcher for arguments of these types of numba's."""
+        """Return the dispatcher for arguments of these types of numba's."""
         for one in arguments:
             members = getattr(one, "members", ())
             for name, field in members:
@@ -157,22 +157,24 @@ class ByKind:
         return self.usual.made
 
     def get_call_template(self, arguments: Any, keywords: Any) -> Any:
-        """What numba asks of a function that another calls: it compiles the one that is meant."""
+        """Return what numba asks of a function that another calls: it compiles the one that is
+        meant.
+        """
         return self.of(arguments).get_call_template(arguments, keywords)
 
     def get_overload(self, arguments: Any) -> Any:
-        """What numba asks for when it writes the call."""
+        """Return what numba asks for when it writes the call."""
         return self.of(arguments).get_overload(arguments)
 
 
 def by_kind(least: int, special: Function, usual: Function) -> Function:
-    """`special` for records whose `laws` are at least so many, `usual` for all others."""
+    """Return `special` for records whose `laws` are at least so many, `usual` for all others."""
     chosen: Any = ByKind(least, special, usual)
     return chosen
 
 
 def plain(function: Function) -> Function:
-    """The Python function itself: for a single call, which does not wait for machine code.
+    """Return the Python function itself: for a single call, which does not wait for machine code.
 
     What it calls is compiled all the same.
     """
@@ -235,12 +237,14 @@ def fused(a: float, b: float, c: float) -> float:
 
 
 def square_root(a: float) -> float:
-    """The square root, by one instruction: numba's own calls the C library, which sets errno."""
+    """Return the square root, by one instruction: numba's own calls the C library, which sets
+    errno.
+    """
     return math.sqrt(a)
 
 
 def borrowed(array: Any) -> Any:
-    """The same array without a share in its ownership: nothing counts its references.
+    """Return the same array without a share in its ownership: nothing counts its references.
 
     Counting is atomic, and every call that takes an array counts twice.
     """

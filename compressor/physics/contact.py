@@ -38,8 +38,8 @@ def hysteresis(contact: str, restitution: float) -> float:
 
 @merged
 def carried_by(joint, y, p):
-    """What a joint's contact carries in the state: the speed (m/s) at which the bodies met, and the
-    mean deflection (m) of the bristles. Nothing with the default laws.
+    """Return what a joint's contact carries in the state: the speed (m/s) at which the bodies met,
+    and the mean deflection (m) of the bristles. Nothing with the default laws.
     """
     if has_chosen_laws(p):
         return y[2 * p.freedoms + joint], y[2 * p.freedoms + 2 + joint]
@@ -66,7 +66,7 @@ NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @inlined
 def joint_contact(eccentricity, spins, bearing, carried, p):
-    """Contact between a joint's journal and the rod's bore.
+    """Return the contact between a joint's journal and the rod's bore.
 
     eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); spins of
     journal and rod (rad/s, counter-clockwise); bearing: the joint's journal radius (m), clearance
@@ -101,7 +101,8 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
 
 @merged
 def nearness(contact, stiffness, clearance, p):
-    """Positive in contact; otherwise how far from it: the gap (m), or the clamped force as one.
+    """Return the positive in contact; otherwise how far from it: the gap (m), or the clamped force
+    as one.
 
     A clamped force is turned into a length by the contact's stiffness at the penetration of full
     damping, so that both parts are small where contact is near.

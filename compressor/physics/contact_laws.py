@@ -60,13 +60,13 @@ IMPACT, JOHNSON, LIU = int(Law.IMPACT), int(Law.JOHNSON), int(Law.LIU)
 
 @merged
 def has_chosen_laws(p):
-    """Whether laws other than the default ones may be a record's: a constant of its type."""
+    """Return whether laws other than the default ones may be a record's: a constant of its type."""
     return len(p.laws) > 1
 
 
 @merged
 def rise(s):
-    """ADAMS's STEP from 0 at s = 0 to 1 at s = 1: a cubic, constant outside."""
+    """Return ADAMS's STEP from 0 at s = 0 to 1 at s = 1: a cubic, constant outside."""
     if s <= 0.0:
         return 0.0
     if s >= 1.0:
@@ -84,13 +84,13 @@ def power(base, exponent):
 
 @merged
 def impact_elastic(penetration, stiffness, p):
-    """Elastic force (N) of ADAMS's IMPACT: K delta^p."""
+    """Return the elastic force (N) of ADAMS's IMPACT: K delta^p."""
     return stiffness * power(penetration, p.exponent)
 
 
 @merged
 def impact(penetration, rate, stiffness, p):
-    """`normal_force` by ADAMS's IMPACT, damped by C_max STEP(delta / d_max) (N s/m)."""
+    """Return `normal_force` by ADAMS's IMPACT, damped by C_max STEP(delta / d_max) (N s/m)."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = impact_elastic(penetration, stiffness, p)
@@ -100,7 +100,7 @@ def impact(penetration, rate, stiffness, p):
 
 @merged
 def elastic_force(penetration, stiffness, clearance, p):
-    """Elastic force (N) of the record's law at a positive penetration (m).
+    """Return the elastic force (N) of the record's law at a positive penetration (m).
 
     stiffness and clearance (m): the joint's.
     """
@@ -113,7 +113,9 @@ def elastic_force(penetration, stiffness, clearance, p):
 
 @merged
 def elastic_energy(elastic, penetration, stiffness, clearance, p):
-    """Energy (J) that is stored where the elastic force (N) has reached a penetration (m)."""
+    """Return the energy (J) that is stored where the elastic force (N) has reached a penetration
+    (m).
+    """
     if has_chosen_laws(p) and elastic > 0.0 and p.law == JOHNSON:
         return johnson_energy(elastic, penetration, stiffness, clearance)
     if has_chosen_laws(p) and elastic > 0.0 and p.law == LIU:
@@ -123,7 +125,7 @@ def elastic_energy(elastic, penetration, stiffness, clearance, p):
 
 @jit
 def hysteretic(penetration, rate, approach, stiffness, clearance, p):
-    """`normal_force` by a law of HYSTERESIS: F_e (1 + chi delta' / delta'_0)."""
+    """Return `normal_force` by a law of HYSTERESIS: F_e (1 + chi delta' / delta'_0)."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = elastic_force(penetration, stiffness, clearance, p)
@@ -145,7 +147,7 @@ def normal_force(penetration, rate, approach, stiffness, clearance, p):
 
 @inlined
 def in_contact(normal):
-    """Whether a joint is in contact: F_N > 0, everywhere in the program."""
+    """Return whether a joint is in contact: F_N > 0, everywhere in the program."""
     return normal > 0.0
 
 
@@ -162,29 +164,30 @@ class Power:
     deepest: float = math.inf  # m: beyond which the law has no force
 
     def static_depth(self, force: float) -> float:
-        """Penetration (m) at rest under a force (N): (F / K)^(1/p)."""
+        """Return the penetration (m) at rest under a force (N): (F / K)^(1/p)."""
         return (force / self.stiffness) ** (1 / self.exponent)
 
     def tangent(self, depth: float) -> float:
-        """Stiffness (N/m) of small motion about a penetration (m)."""
+        """Return the stiffness (N/m) of small motion about a penetration (m)."""
         return self.exponent * self.stiffness * depth ** (self.exponent - 1)
 
     def damping(self, depth: float) -> float:
-        """Damping coefficient (N s/m) at a penetration (m)."""
+        """Return the damping coefficient (N s/m) at a penetration (m)."""
         return self.full_damping * plain(rise)(depth * self.per_full_damping)
 
     def energy(self, depth: float) -> float:
-        """Energy (J) that is stored at a penetration (m)."""
+        """Return the energy (J) that is stored at a penetration (m)."""
         return self.stiffness * depth ** (self.exponent + 1.0) / (self.exponent + 1.0)
 
     def impact_depth(self, mass: float, speed: float) -> float:
-        """Greatest penetration (m) of an impact: m v^2 / 2 = K delta^(p+1) / (p+1)."""
+        """Return the greatest penetration (m) of an impact: m v^2 / 2 = K delta^(p+1) / (p+1)."""
         above = self.exponent + 1.0
         return (above * mass * speed**2 / (2.0 * self.stiffness)) ** (1.0 / above)
 
     def impact_time(self, depth: float, speed: float) -> float:
-        """Contact time (s) of an impact that goes to a depth (m): 2 (delta / v) times the integral
-        of 1 / sqrt(1 - x^(p+1)) from 0 to 1; 2.9432 delta / v with Hertz's 1.5 (Johnson 1985).
+        """Return the contact time (s) of an impact that goes to a depth (m): 2 (delta / v) times
+        the integral of 1 / sqrt(1 - x^(p+1)) from 0 to 1; 2.9432 delta / v with Hertz's 1.5
+        (Johnson 1985).
         """
         share = 1.0 / (self.exponent + 1.0)
         beta = math.sqrt(math.pi) * math.gamma(1.0 + share) / math.gamma(0.5 + share)
@@ -192,7 +195,9 @@ class Power:
 
 
 def elastic_form(stiffness: float, clearance: float, p) -> Power | Conformal:
-    """The record's law with a joint's stiffness and clearance (m), for scales before a run."""
+    """Return the record's law with a joint's stiffness and clearance (m), for scales before a
+    run.
+    """
     if p["law"] == Law.IMPACT:
         return Power(stiffness, p["exponent"], p["damping"], p["per_full_damping"])
     if p["law"] == Law.JOHNSON:

@@ -42,7 +42,7 @@ def johnson_share(depth):
 
 @jit
 def johnson(penetration, stiffness, clearance):
-    """Johnson's elastic force (N) at a positive penetration (m); stiffness: S (N/m)."""
+    """Return Johnson's elastic force (N) at a positive penetration (m); stiffness: S (N/m)."""
     depth = 0.25 * penetration / clearance
     steepest = FLATTEST * math.exp(-1.0 - FLATTEST)
     if depth < steepest:
@@ -53,7 +53,7 @@ def johnson(penetration, stiffness, clearance):
 
 @jit
 def johnson_energy(elastic, penetration, stiffness, clearance):
-    """Energy (J) that is stored where Johnson's force (N) has reached a penetration (m)."""
+    """Return energy (J) that is stored where Johnson's force (N) has reached a penetration (m)."""
     force = 4.0 * stiffness * clearance * math.exp(-1.0 - FLATTEST)
     depth = FLATTEST * force / stiffness
     if penetration <= depth:
@@ -64,13 +64,13 @@ def johnson_energy(elastic, penetration, stiffness, clearance):
 
 @jit
 def liu(penetration, stiffness, clearance):
-    """Liu's elastic force (N) at a positive penetration (m); stiffness: K (N/m^1.5)."""
+    """Return Liu's elastic force (N) at a positive penetration (m); stiffness: K (N/m^1.5)."""
     return stiffness * penetration * square_root(penetration / (1.0 + penetration / clearance))
 
 
 @jit
 def liu_energy(penetration, stiffness, clearance):
-    """Energy (J) that is stored at a penetration (m): the integral of Liu's force."""
+    """Return the energy (J) that is stored at a penetration (m): the integral of Liu's force."""
     x = penetration / clearance
     if x < FEW:
         whole = 0.0
@@ -97,24 +97,24 @@ class Conformal:
     deepest: float = math.inf
 
     def static_depth(self, force: float) -> float:
-        """Penetration (m) at rest under a force (N)."""
+        """Return the penetration (m) at rest under a force (N)."""
         return solved(self.force, force)
 
     def tangent(self, depth: float) -> float:
-        """Stiffness (N/m) of small motion about a penetration (m)."""
+        """Return the stiffness (N/m) of small motion about a penetration (m)."""
         return self.slope(depth)
 
     def damping(self, depth: float) -> float:
-        """Damping coefficient (N s/m): unknown before bodies meet."""
+        """Return the damping coefficient (N s/m): unknown before bodies meet."""
         return 0.0
 
     def impact_depth(self, mass: float, speed: float) -> float:
-        """Greatest penetration (m) of an impact: m v^2 / 2 is the energy there."""
+        """Return the greatest penetration (m) of an impact: m v^2 / 2 is the energy there."""
         return solved(self.energy, 0.5 * mass * speed**2)
 
     def impact_time(self, depth: float, speed: float) -> float:
-        """Contact time (s) of an impact that goes to a depth (m): 2 / v times the integral of
-        1 / sqrt(1 - U / U_max) over the penetration.
+        """Return the contact time (s) of an impact that goes to a depth (m): 2 / v times the
+        integral of 1 / sqrt(1 - U / U_max) over the penetration.
         """
         if not speed > 0.0:
             return math.inf
@@ -126,7 +126,7 @@ class Conformal:
 
 
 def solved(rising: Callable[[float], float], value: float) -> float:
-    """Where a function that rises with a length (m) from 0 has a value, by bisection."""
+    """Return where a function that rises with a length (m) from 0 has a value, by bisection."""
     low, high = 1e-30, 1e3
     if not value > rising(low):
         return 0.0
@@ -136,7 +136,7 @@ def solved(rising: Callable[[float], float], value: float) -> float:
 
 
 def johnson_form(stiffness: float, clearance: float) -> Conformal:
-    """Johnson's law in a joint of a clearance (m)."""
+    """Return Johnson's law in a joint of a clearance (m)."""
 
     def slope(depth: float) -> float:
         share = depth * stiffness / johnson(depth, stiffness, clearance)
@@ -152,7 +152,7 @@ def johnson_form(stiffness: float, clearance: float) -> Conformal:
 
 
 def liu_form(stiffness: float, clearance: float) -> Conformal:
-    """Liu's law in a joint of a clearance (m)."""
+    """Return Liu's law in a joint of a clearance (m)."""
 
     def slope(depth: float) -> float:
         return liu(depth, stiffness, clearance) * (1.5 / depth - 0.5 / (clearance + depth))

@@ -25,14 +25,14 @@ AXIAL = np.array([[16.0, -8.0], [-8.0, 7.0]]) / 3.0  # over E A / L
 
 
 def shapes(s):
-    """The four shapes at fractions s of the rod, (4, s.size)."""
+    """Return the four shapes at fractions s of the rod, (4, s.size)."""
     return np.array(
         [np.sin(math.pi * s), np.sin(2.0 * math.pi * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)]
     )
 
 
 def integrals():
-    """Means over the rod: of the shapes, (4,), of those times s, and of products, (4, 4)."""
+    """Return means over the rod: of the shapes, (4,), of those times s, and of products, (4, 4)."""
     nodes, weights = np.polynomial.legendre.leggauss(24)
     s, weights = (nodes + 1.0) / 2.0, weights / 2.0
     each = shapes(s)
@@ -44,7 +44,7 @@ FIRST, MOMENT, PRODUCT = integrals()
 
 @jit
 def summed(row, begin, end, q):
-    """Sum of a row of numbers times those of q, from begin to end."""
+    """Return the sum of a row of numbers times those of q, from begin to end."""
     total = 0.0
     for i in range(begin, end):
         total += row[i] * q[i]
@@ -111,7 +111,7 @@ def add_modes(axes, spin, q, rates, p, mass, force):
 
 @jit
 def material(i, q, p):
-    """Elastic force (N) against mode i of the deflections q, (4,) m."""
+    """Return the elastic force (N) against mode i of the deflections q, (4,) m."""
     if i < ACROSS:
         return p.bending_stiffness * BENDING[i] * q[i]
     return p.axial_stiffness * (AXIAL[i - 2, 0] * q[2] + AXIAL[i - 2, 1] * q[3])
@@ -119,7 +119,9 @@ def material(i, q, p):
 
 @jit
 def material_work(q, other, p):
-    """Sum of the elastic forces of deflections q times others, both (4,): twice the energy (J)."""
+    """Return the sum of the elastic forces of deflections q times others, both (4,): twice the
+    energy (J).
+    """
     total = 0.0
     if p.elastic:
         for i in range(MODES):

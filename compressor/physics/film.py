@@ -45,7 +45,7 @@ TURNED, SQUEEZED = 14, 28  # where the second and the third begin
 
 @jit
 def polynomial(constants, begin, end, x):
-    """Value of the polynomial whose constants, the lowest first, stand from begin to end."""
+    """Return value of the polynomial whose constants, the lowest first, stand from begin to end."""
     total = 0.0
     for i in range(end - 1, begin - 1, -1):
         total = total * x + constants[i]
@@ -54,7 +54,9 @@ def polynomial(constants, begin, end, x):
 
 @jit
 def ends(eps, b):
-    """How the open ends weaken a film, by the length over the diameter b: Butenschoen's a1, a2."""
+    """Return how the open ends weaken a film, by the length over the diameter b: Butenschoen's
+    a1, a2.
+    """
     a1 = 1.1642 + b * (-1.9456 + b * (7.1161 + b * (-10.1073 + b * 5.0141)))
     a2 = 1.000026 + b * (0.023634 + b * (0.4215 + b * (0.038817 + b * 0.090551)))
     return b * b * a1 * (1.0 - eps) / (a2 - eps)
@@ -62,7 +64,7 @@ def ends(eps, b):
 
 @jit
 def rotation_shape(eps, b):
-    """Sommerfeld number of the rotation over eps, which stays finite at the centre."""
+    """Return the Sommerfeld number of the rotation over eps, which stays finite at the centre."""
     room = 1.0 - eps * eps
     size = math.sqrt(math.pi * math.pi * room + 16.0 * eps * eps)
     return size / (2.0 * room * room) * ends(eps, b)
@@ -70,7 +72,7 @@ def rotation_shape(eps, b):
 
 @jit
 def squeeze_shape(eps, b):
-    """Sommerfeld number of the squeeze; eps negative: of a film that is pulled apart."""
+    """Return the Sommerfeld number of the squeeze; eps negative: of a film that is pulled apart."""
     room = 1.0 - eps * eps
     half = (0.5 * math.pi - 0.5 * math.acos(eps)) * (1.0 + 2.0 * eps * eps)
     shape = half + 1.5 * eps * math.sqrt(room)
@@ -79,7 +81,7 @@ def squeeze_shape(eps, b):
 
 @jit
 def attitude_shape(eps, b):
-    """The angle (rad) from the load to the line of centres, along the rotation."""
+    """Return the angle (rad) from the load to the line of centres, along the rotation."""
     series = 6.6294 - 1.591732 * b
     series = series * eps - 13.3415 + 3.424337 * b
     series = series * eps + 8.73393 - 2.3291 * b
@@ -89,7 +91,8 @@ def attitude_shape(eps, b):
 
 
 def film_constants(ratio, share, number):
-    """Constants of the film's polynomials, `TERMS` of them, and the squeeze's number at the wall.
+    """Return the constants of the film's polynomials, `TERMS` of them, and the squeeze's number at
+    the wall.
 
     They lead from Butenschoen's approximations to other numbers at Chebyshev's points of the
     eccentricities that a film with this last share may have. ratio: B / D; number: of a name in
@@ -110,7 +113,7 @@ def film_constants(ratio, share, number):
 
 @jit
 def rotation_number(eps, b, constants):
-    """`rotation_shape` as Reynolds' equation has it; level at the centre."""
+    """Return `rotation_shape` as Reynolds' equation has it; level at the centre."""
     found = rotation_shape(eps, b) * polynomial(constants, 0, TURNED, eps)
     centre = rotation_shape(0.0, b) * constants[0]
     return centre + (found - centre) * rise(eps / CENTRED)
@@ -118,14 +121,16 @@ def rotation_number(eps, b, constants):
 
 @jit
 def attitude(eps, b, constants):
-    """`attitude_shape` as Reynolds' equation has it; a right angle at the centre."""
+    """Return `attitude_shape` as Reynolds' equation has it; a right angle at the centre."""
     found = attitude_shape(eps, b) * polynomial(constants, TURNED, SQUEEZED, eps)
     return 0.5 * math.pi + (found - 0.5 * math.pi) * rise(eps / CENTRED)
 
 
 @jit
 def squeeze_number(eps, b, constants):
-    """`squeeze_shape` as Reynolds' equation has it; at the centre the same in all directions."""
+    """Return `squeeze_shape` as Reynolds' equation has it; at the centre the same in all
+    directions.
+    """
     found = squeeze_shape(eps, b) * polynomial(constants, SQUEEZED, TERMS, eps)
     centre = 2.0 * rotation_number(0.0, b, constants)
     return centre + (found - centre) * rise(abs(eps) / CENTRED)
@@ -143,7 +148,8 @@ def kept(eps, share):
 
 @jit
 def film(joint, eccentricity, spins, p):
-    """Force on the journal x, y (N), moments on journal and bore (N m), and the power lost (W).
+    """Return the force on the journal x, y (N), moments on journal and bore (N m), and the power
+    lost (W).
 
     eccentricity: journal centre less bore centre, x and y (m), and its rate (m/s); spins: of
     journal and bore (rad/s). The moments balance: both have half of that of the

@@ -31,7 +31,9 @@ AMBROSIO, LUGRE = int(FrictionLaw.AMBROSIO), int(FrictionLaw.LUGRE)
 
 @merged
 def adams(slip, p):
-    """ADAMS's law: rises from 0 to `static` over the stiction velocity, falls to `dynamic`."""
+    """Return ADAMS's law: rises from 0 to `static` over the stiction velocity, falls to
+    `dynamic`.
+    """
     fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
     size = fused(p.dynamic - p.static, fall, p.static)
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
@@ -39,28 +41,32 @@ def adams(slip, p):
 
 @jit
 def threlfall(slip, p):
-    """Threlfall's law: an exponential rise (Mech. Mach. Theory 13, 1978)."""
+    """Return Threlfall's law: an exponential rise (Mech. Mach. Theory 13, 1978)."""
     speed = min(1.0, abs(slip) / p.stiction_velocity)
     return math.copysign(p.dynamic * (1.0 - math.exp(-3.0 * speed)) / SATURATED, slip)
 
 
 @jit
 def ambrosio(slip, p):
-    """Ambrosio's law: nothing below the stiction velocity, then a line up to the friction one."""
+    """Return Ambrosio's law: nothing below the stiction velocity, then a line up to the friction
+    one.
+    """
     share = (abs(slip) - p.stiction_velocity) * p.per_transition
     return math.copysign(p.dynamic * min(1.0, max(0.0, share)), slip)
 
 
 @jit
 def stribeck(slip, p):
-    """LuGre's coefficient in steady sliding without its viscous part."""
+    """Return LuGre's coefficient in steady sliding without its viscous part."""
     ratio = slip / p.stiction_velocity
     return fused(p.static - p.dynamic, math.exp(-ratio * ratio), p.dynamic)
 
 
 @jit
 def bristle_rate(slip, bristle, p):
-    """How fast LuGre's bristles bend (m/s), of a mean deflection (m); there are none at mu 0."""
+    """Return how fast LuGre's bristles bend (m/s), of a mean deflection (m); there are none at
+    mu 0.
+    """
     if p.static == 0.0 and p.dynamic == 0.0:
         return 0.0
     held = p.bristle_stiffness * abs(slip) * bristle / stribeck(slip, p)
@@ -69,14 +75,14 @@ def bristle_rate(slip, bristle, p):
 
 @jit
 def lugre(slip, bristle, p):
-    """LuGre's law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995)."""
+    """Return LuGre's law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995)."""
     bending = p.bristle_damping * bristle_rate(slip, bristle, p)
     return fused(p.bristle_stiffness, bristle, fused(p.viscous, slip, bending))
 
 
 @jit
 def chosen_coefficient(slip, bristle, p):
-    """The coefficient by the law that a record has chosen."""
+    """Return the coefficient by the law that a record has chosen."""
     if p.friction == COULOMB_TANH:
         return p.dynamic * math.tanh(slip / p.stiction_velocity)
     if p.friction == THRELFALL:
@@ -90,14 +96,16 @@ def chosen_coefficient(slip, bristle, p):
 
 @merged
 def friction_coefficient(slip, bristle, p):
-    """Signed friction coefficient of a slip (m/s) and of the bristles' deflection (m)."""
+    """Return signed friction coefficient of a slip (m/s) and of the bristles' deflection (m)."""
     if has_chosen_laws(p):
         return chosen_coefficient(slip, bristle, p)
     return adams(slip, p)
 
 
 def steepest(p) -> float:
-    """The greatest change of a record's coefficient with the slip (s/m), which holds steps back."""
+    """Return the greatest change of a record's coefficient with the slip (s/m), which holds
+    steps back.
+    """
     law, rise_over = p["friction"], p["stiction_velocity"].item()
     if law == FrictionLaw.ADAMS:
         return 1.5 * p["static"].item() / rise_over

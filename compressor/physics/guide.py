@@ -33,19 +33,22 @@ UNGUIDED = Guided(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @jit
 def guide_coefficient(slip, p):
-    """Friction coefficient of the guide at a slip (m/s): mu tanh(v / v_s)."""
+    """Return the friction coefficient of the guide at a slip (m/s): mu tanh(v / v_s)."""
     return p.guide_friction * math.tanh(slip / p.guide_stiction) if p.guide_friction else 0.0
 
 
 @jit
 def spent(u, chi):
-    """Integral of u / (1 + chi u) from 0 to u: what damping has taken of a strike's motion."""
+    """Return the integral of u / (1 + chi u) from 0 to u: what damping has taken of a strike's
+    motion.
+    """
     return (u - math.log(1.0 + chi * u) / chi) / chi
 
 
 @jit
 def approach_speed(rate, stored, mass, chi):
-    """Speed (m/s) at which a mass (kg) that strikes freely has met, by depth's rate and energy (J).
+    """Return the speed (m/s) at which a mass (kg) that strikes freely has met, by depth's rate and
+    energy (J).
 
     From m delta'' = -F_e (1 + chi delta' / v) with the elastic energy E: u du / (1 + chi u) from
     delta' / v to 1 is E / (m v^2). So a free strike has the restitution of the joints' law, and no
@@ -70,7 +73,8 @@ def approach_speed(rate, stored, mass, chi):
 
 @jit
 def corner_force(penetration, rate, lever, p):
-    """Normal force (N) of a corner and its elastic part, at a penetration (m) and its rate (m/s).
+    """Return the normal force (N) of a corner and its elastic part, at a penetration (m) and its
+    rate (m/s).
 
     lever: of the force about the pin (m), by which the crosshead weighs less there than as a whole.
     """
@@ -89,7 +93,7 @@ def corner_force(penetration, rate, lever, p):
 
 @jit
 def corner_depth(height, tilt, end, side, p):
-    """Penetration (m) of a corner: end and side, -1 or 1, along and across the guide."""
+    """Return the penetration (m) of a corner: end and side, -1 or 1, along and across the guide."""
     half = math.sin(0.5 * tilt)
     depth = side * (height + end * p.guide_length * math.sin(tilt))
     return depth - (p.guide_clearance + p.guide_height * 2.0 * half * half)
@@ -97,7 +101,9 @@ def corner_depth(height, tilt, end, side, p):
 
 @jit
 def corners(height, tilt, rates, p):
-    """`Guided` of a crosshead with play: height of its pin (m), tilt (rad), rates of x, y, tilt."""
+    """Return `Guided` of a crosshead with play: height of its pin (m), tilt (rad), rates of x,
+    y, tilt.
+    """
     v, rise, spin = rates
     fx, fy, moment, stored, damped, rubbed = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     deepest = -math.inf

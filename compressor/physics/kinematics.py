@@ -34,14 +34,14 @@ class Motion(NamedTuple):
 
 @jit
 def ideal(t, p):
-    """Ideal `Motion` at time t (s): Eq. 1 exactly, with its derivatives."""
+    """Return the ideal `Motion` at time t (s): Eq. 1 exactly, with its derivatives."""
     theta = p.omega * t
     return ideal_at(math.cos(theta), math.sin(theta), p)
 
 
 @inlined
 def ideal_at(cos_theta, sin_theta, p):
-    """Ideal `Motion` at a crank angle given by its cosine and sine."""
+    """Return the ideal `Motion` at a crank angle given by its cosine and sine."""
     ratio = p.crank_ratio
     sin_phi = ratio * sin_theta
     cos_phi = square_root((1.0 - sin_phi) * (1.0 + sin_phi))
@@ -58,7 +58,7 @@ def ideal_at(cos_theta, sin_theta, p):
 
 @inlined
 def small_angle(angle, p):
-    """Sine and cosine of an angle (rad); up to SMALL by their series, which are exact there.
+    """Return sine and cosine of an angle (rad); up to SMALL by their series, which are exact there.
 
     Where the record says that no angle is `wide`, there is nothing but the series.
     """
@@ -73,13 +73,13 @@ def small_angle(angle, p):
 
 @inlined
 def crank_direction(t, p):
-    """Cosine and sine of the crank angle at time t (s)."""
+    """Return the cosine and sine of the crank angle at time t (s)."""
     return direction(p.omega * t)
 
 
 @inlined
 def ideal_after(base, span, p):
-    """Ideal `Motion` a time (s) after the crank angle whose (cosine, sine) is the base.
+    """Return the ideal `Motion` a time (s) after the crank angle whose (cosine, sine) is the base.
 
     A step turns the crank by little, so that these need no sine and cosine of their own.
     """
@@ -89,7 +89,8 @@ def ideal_after(base, span, p):
 
 
 def exact_motion(theta, crank_radius, rod_length, omega):
-    """Exact piston displacement (m), velocity (m/s) and acceleration (m/s^2) over theta (rad).
+    """Return the exact piston displacement (m), velocity (m/s) and acceleration (m/s^2) over theta
+    (rad).
 
     Arrays of theta's shape. The displacement counts from the crank centre (Eq. 1 counts from the
     head: L + R + S0 minus this).
@@ -107,7 +108,8 @@ def exact_motion(theta, crank_radius, rod_length, omega):
 
 
 def series_motion(theta, crank_radius, rod_length, omega):
-    """The paper's truncated series (Eq. 3-4), in this program's frame; to be compared with only.
+    """Return the paper's truncated series (Eq. 3-4), in this program's frame; to be compared with
+    only.
 
     Arrays of theta's shape: displacement from the crank centre (m), velocity (m/s), acceleration
     (m/s^2). Off by 0.122 mm at 90 degrees for the paper's geometry.
@@ -124,7 +126,7 @@ def series_motion(theta, crank_radius, rod_length, omega):
 
 
 def angle_at(x, crank_radius, rod_length):
-    """Crank angle in [0, pi] (rad) at which the ideal crosshead stands at x (m).
+    """Return the crank angle in [0, pi] (rad) at which the ideal crosshead stands at x (m).
 
     Raises ValueError when x lies outside the stroke [L - R, L + R].
     """

@@ -53,7 +53,9 @@ from compressor.physics.step_control import (
 
 @inlined
 def added_late(W, i, j, total):
-    """Number i of what the state at the step's end is more than at its fifth stage, squared."""
+    """Return the number i of what the state at the step's end is more than at its fifth stage,
+    squared.
+    """
     u = LANES * i + j
     h, w = W[H + j], STEP_WEIGHTS[5]
     change = W[NEW + u] - W[Z + u]
@@ -67,7 +69,7 @@ def added_late(W, i, j, total):
 
 @inlined
 def added_rate(W, i, j, total):
-    """The same of dz/dt."""
+    """Return the same of dz/dt."""
     u = LANES * i + j
     change = W[K + 6 * STATE * LANES + u] - W[K + 5 * STATE * LANES + u]
     return total + (change / W[SIZE + u]) ** 2
@@ -75,7 +77,7 @@ def added_rate(W, i, j, total):
 
 @inlined
 def stiffness(scene, W, j):
-    """The step's length over what stability allows, as `step_control.stiff_rate` has it."""
+    """Return the step's length over what stability allows, as `step_control.stiff_rate` has it."""
     above = added_rate(W, 1, j, added_rate(W, 0, j, 0.0))
     above = added_rate(W, 3, j, added_rate(W, 2, j, above))
     below = added_late(W, 1, j, added_late(W, 0, j, 0.0))

@@ -94,13 +94,13 @@ class Runs(NamedTuple):
 
 @inlined
 def end_of(runs, job):
-    """When the segment ends that a run is in."""
+    """Return when the segment ends that a run is in."""
     return runs.edges[runs.places[job, 0] + job + runs.walkers[job].segment + 1]
 
 
 @jit
 def plain_ahead(w, omega, end):
-    """Whether the next step is an explicit one in which nothing is known to begin or end."""
+    """Return whether the next step is an explicit one in which nothing is known to begin or end."""
     ready = not w.fresh and w.observed and not w.stiff and w.landing == 0.0 and w.h > 0.0
     return ready and w.t + 1.01 * w.h < end and omega * w.h <= SMALL
 
@@ -127,7 +127,7 @@ def march_alone(runs, job, work, most):
 
 @jit
 def next_sample(runs, job):
-    """Time of a run's next output sample."""
+    """Return the time of a run's next output sample."""
     sample, samples = runs.walkers[job].sample, runs.places[job, 3]
     return runs.times[runs.places[job, 2] + sample] if sample < samples else math.inf
 
@@ -237,7 +237,7 @@ def sample_lane(W, j, runs, job, work):
 
 @jit
 def work_of(runs, job):
-    """What `march` works in for a run."""
+    """Return what `march` works in for a run."""
     w = runs.works
     return Work(
         w.k[job], w.new[job], w.column[job], w.jacobian[job], w.dense[job], w.weights[job],

@@ -69,7 +69,7 @@ TOTAL = _next
 
 
 def new_lanes():
-    """The numbers of all lanes, at a boundary of 64 bytes."""
+    """Return the numbers of all lanes, at a boundary of 64 bytes."""
     raw = np.zeros(TOTAL * LANES + 8)
     skip = (-raw.ctypes.data // 8) % 8
     return raw[skip : skip + TOTAL * LANES]

@@ -30,13 +30,13 @@ class Run(NamedTuple):
 
 
 def fits(p: np.record) -> bool:
-    """Whether runs of a record can march in lanes: default laws and powers of 1.5."""
+    """Return whether runs of a record can march in lanes: default laws and powers of 1.5."""
     default = p["laws"].size == 1
     return bool(default and p["load"] != Load.GAS and p["exponent"] == 1.5)
 
 
 def march_side_by_side(runs: Sequence[Run], most: int) -> list[Run | None]:
-    """Runs of one scene with clearance at their ends, to the bit as by `march`.
+    """Return the runs of one scene with clearance at their ends, to the bit as by `march`.
 
     None for one that does not fit into a lane, that failed, or that took more than `most` attempts
     of a step. What the runs hold is left as it is.
@@ -59,7 +59,7 @@ def march_side_by_side(runs: Sequence[Run], most: int) -> list[Run | None]:
 
 
 def gathered(runs: Sequence[Run]) -> Runs:
-    """Runs in arrays."""
+    """Return the runs in arrays."""
     m, n = len(runs), runs[0].size.size
     records = np.array([run.p for run in runs], RECORD).view(np.recarray)
     walkers = np.array([run.walker for run in runs], WALKER).view(np.recarray)

@@ -43,7 +43,7 @@ R0, R1, R2, R3, R4 = (NODE_ROWS + i * ROW for i in range(5))
 
 @inlined
 def record_of(scene, W, j):
-    """The record of lane j, its scene being the length of the tuple.
+    """Return the record of lane j, its scene being the length of the tuple.
 
     Choices that are constants leave of the equations of motion what the scene needs.
     """
@@ -69,7 +69,7 @@ def record_of(scene, W, j):
 
 @inlined
 def combined(W, i, j, w):
-    """Number i of the state of lane j where the stages have the weights w, (7,)."""
+    """Return the number i of the state of lane j where the stages have the weights w, (7,)."""
     u = LANES * i + j
     total = fused(w[1], W[K + 12 * LANES + u], fused(w[0], W[K + u], 0.0))
     total = fused(w[3], W[K + 36 * LANES + u], fused(w[2], W[K + 24 * LANES + u], total))
@@ -79,7 +79,7 @@ def combined(W, i, j, w):
 
 @inlined
 def state_of(scene, W, j, w):
-    """The motion of lane j where the stages have the weights w, eight numbers."""
+    """Return the motion of lane j where the stages have the weights w, eight numbers."""
     y0, y1 = combined(W, 0, j, w), combined(W, 1, j, w)
     y2, y3 = combined(W, 2, j, w), combined(W, 3, j, w)
     y4, y5, y6, y7 = 0.0, 0.0, 0.0, 0.0
@@ -253,7 +253,9 @@ def finish_step(scene, W, k, w):
 
 @inlined
 def part_of_error(W, i, j, total):
-    """A total and the square of number i's estimated error over its tolerance and the step."""
+    """Return a total and the square of number i's estimated error over its tolerance and the
+    step.
+    """
     u, w = LANES * i + j, ERROR_WEIGHTS
     e = fused(w[1], W[K + 12 * LANES + u], fused(w[0], W[K + u], 0.0))
     e = fused(w[3], W[K + 36 * LANES + u], fused(w[2], W[K + 24 * LANES + u], e))
@@ -265,7 +267,7 @@ def part_of_error(W, i, j, total):
 
 @inlined
 def weights_of(table, i):
-    """Row i of a table of weights of the stages as a tuple."""
+    """Return the row i of a table of weights of the stages as a tuple."""
     return (
         table[i, 0], table[i, 1], table[i, 2], table[i, 3], table[i, 4], table[i, 5], table[i, 6]
     )  # fmt: skip

@@ -55,13 +55,13 @@ KINETIC, POTENTIAL = 16 * LANES, 17 * LANES
 
 @inlined
 def touches(scene, joint):
-    """Whether a joint of the scene has clearance."""
+    """Return whether a joint of the scene has clearance."""
     return len(scene) == 3 or len(scene) == joint + 1
 
 
 @inlined
 def nears(W, j, column):
-    """Whether the greatest size of a column may be beaten within the step."""
+    """Return whether the greatest size of a column may be beaten within the step."""
     c = column * LANES + j
     top = max(abs(W[R0 + c]), abs(W[R2 + c]), abs(W[R4 + c]))
     return (top >= NEAR_SHARE * W[PEAK + c]) & (top > 0.0)
@@ -69,7 +69,7 @@ def nears(W, j, column):
 
 @inlined
 def deepens(W, j, joint):
-    """Whether the greatest penetration of a joint may be beaten within the step."""
+    """Return whether the greatest penetration of a joint may be beaten within the step."""
     c = joint * LANES + j
     top = max(W[R0 + PENETRATION + c], W[R2 + PENETRATION + c], W[R4 + PENETRATION + c])
     return (top > 0.0) & (top >= NEAR_SHARE * W[MAX_PENETRATION + c])
@@ -77,7 +77,7 @@ def deepens(W, j, joint):
 
 @inlined
 def changes(W, j, joint):
-    """Whether contact may begin or end at a joint within the step, as `march.may_change`."""
+    """Return whether contact may begin or end at a joint within the step, as `march.may_change`."""
     c = NEARNESS + joint * LANES + j
     low = min(W[R0 + c], W[R2 + c], W[R4 + c])
     high = max(W[R0 + c], W[R2 + c], W[R4 + c])
@@ -87,7 +87,8 @@ def changes(W, j, joint):
 
 @jit
 def judge(scene, W, k):
-    """Which lanes take their step (PLAIN), and which of these are to be looked at closer (NEAR).
+    """Return which lanes take their step (PLAIN), and which of these are to be looked at closer
+    (NEAR).
 
     Returns whether any is.
     """
@@ -114,7 +115,7 @@ def judge(scene, W, k):
 
 @inlined
 def may_touch(W, j, joint):
-    """`march.may_touch` at a joint, by all nodes."""
+    """Return `march.may_touch` at a joint, by all nodes."""
     c = NEARNESS + joint * LANES + j
     low = min(min(min(W[R0 + c], W[R1 + c]), min(W[R2 + c], W[R3 + c])), W[R4 + c])
     high = max(max(max(W[R0 + c], W[R1 + c]), max(W[R2 + c], W[R3 + c])), W[R4 + c])
@@ -158,7 +159,7 @@ def rises(a, b, c, d, e, fine):
 
 @inlined
 def passed(touching, flown, impacts, releases, normal, depth, counts, measured):
-    """Touching, flown, impacts and releases after a node, if it counts."""
+    """Return the touching, flown, impacts and releases after a node, if it counts."""
     now = in_contact(normal)
     off = flown | (depth < 0.0)
     begins = counts & measured & now & (not touching)
@@ -209,7 +210,7 @@ def tally_joint(W, j, joint, plain, fine, measured):
 
 @inlined
 def squared(W, c, total, h, fine):
-    """The square of a column added to a total at the nodes, by their weights."""
+    """Return the square of a column added to a total at the nodes, by their weights."""
     b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
     total += h * (F0 if fine else G0) * W[R0 + c] ** 2
     total += h * F1 * b**2
@@ -220,7 +221,7 @@ def squared(W, c, total, h, fine):
 
 @inlined
 def integrated(W, c, total, h, fine):
-    """A column added to a total at the nodes, by their weights."""
+    """Return a column added to a total at the nodes, by their weights."""
     b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
     total += h * (F0 if fine else G0) * W[R0 + c]
     total += h * F1 * b

@@ -21,7 +21,9 @@ EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
 
 @merged
 def gas_force(phase, x, p):
-    """Gas force (N) with the crosshead at x (m): Eq. 6, isentropic, less the back pressure."""
+    """Return the gas force (N) with the crosshead at x (m): Eq. 6, isentropic, less the back
+    pressure.
+    """
     if phase == 1:
         return p.suction_force - p.back_force
     if phase == 3:
@@ -38,7 +40,7 @@ def gas_force(phase, x, p):
 
 @merged
 def spring_force(phase, x, v, deviation, deviation_rate, p):
-    """Spring force (N) between piston and cam follower: Eq. 8-10, with the cam closed.
+    """Return the spring force (N) between piston and cam follower: Eq. 8-10, with the cam closed.
 
     x (m), v (m/s) of the crosshead and their deviations from the ideal motion. While the follower
     moves with the ideal piston the spring sees the deviation alone.
@@ -57,7 +59,7 @@ def spring_force(phase, x, v, deviation, deviation_rate, p):
 
 @merged
 def piston_force(phase, x, v, deviation, deviation_rate, p):
-    """Piston force (N), positive towards the crank, of the record's load."""
+    """Return the piston force (N), positive towards the crank, of the record's load."""
     if p.load == SPRING:
         return spring_force(phase, x, v, deviation, deviation_rate, p)
     if p.load == GAS:
@@ -66,7 +68,7 @@ def piston_force(phase, x, v, deviation, deviation_rate, p):
 
 
 def static_load(p):
-    """Greatest force (N) of the record's load on a piston that stands still."""
+    """Return the greatest force (N) of the record's load on a piston that stands still."""
     if p["load"] == Load.SPRING:
         return p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
     if p["load"] == Load.GAS:
@@ -75,7 +77,7 @@ def static_load(p):
 
 
 def greatest_load(p):
-    """The load's greatest value in the ideal machine (N), at most."""
+    """Return the load's greatest value in the ideal machine (N), at most."""
     if p["load"] == Load.SPRING:
         return static_load(p) + p["spring_damping"] * p["omega"] * p["crank_radius"]
     if p["load"] == Load.GAS:
@@ -84,12 +86,13 @@ def greatest_load(p):
 
 
 def printed_corners():
-    """Eq. 13's corners (rad): 38.95, 180 and 294.2 degrees."""
+    """Return the Eq. 13's corners (rad): 38.95, 180 and 294.2 degrees."""
     return math.radians(38.95), math.pi, math.radians(294.2)
 
 
 def gas_corners(p, pressure_ratio):
-    """Exact corners of the ideal gas cycle (rad): ends of expansion, suction and compression.
+    """Return the exact corners of the ideal gas cycle (rad): ends of expansion, suction and
+    compression.
 
     `pressure_ratio`: p_d / p_s. Raises ValueError when the gas left in the head clearance never
     expands to the suction pressure within the stroke.
@@ -105,7 +108,8 @@ def gas_corners(p, pressure_ratio):
 
 
 def cam_corners(crank_radius, rod_length, stroke):
-    """Corners of the closed cam (rad): the follower dwells for `stroke` (m) of travel each way.
+    """Return the corners of the closed cam (rad): the follower dwells for `stroke` (m) of travel
+    each way.
 
     84.2608, 180 and 275.7392 degrees in the paper. Raises ValueError unless 0 < stroke < 2R.
     """
@@ -117,7 +121,9 @@ def cam_corners(crank_radius, rod_length, stroke):
 
 
 def load_corners(p, pressure_ratio, printed):
-    """Corners (rad) of the record's load, (3,): Eq. 13's if `printed`, where it is the gas's."""
+    """Return the corners (rad) of the record's load, (3,): Eq. 13's if `printed`, where it is
+    the gas's.
+    """
     if p["load"] == Load.NONE:
         return 0.0, 0.0, 0.0
     if p["load"] == Load.SPRING:
@@ -132,7 +138,7 @@ def complete(p, pressure_ratio, printed):
 
 
 def segments(p, duration):
-    """Cut [0, duration] (s) at every corner of the record's load.
+    """Return the cut [0, duration] (s) at every corner of the record's load.
 
     Returns edges, shape (n + 1,) in s, and phases, shape (n,). A corner closer than a
     billionth of a turn to the end opens no segment of its own.
@@ -151,7 +157,8 @@ def segments(p, duration):
 
 
 def sample_segments(times, edges):
-    """Segment of each sample, shape of times: on a corner the one that begins, at the end the last.
+    """Return the segment of each sample, shape of times: on a corner the one that begins, at the
+    end the last.
 
     A sample within a billionth of a segment of an edge counts as on it.
     """

@@ -82,7 +82,8 @@ def attempt(w, base, h, z, work, atol, size, phase, p):
 
 @merged
 def may_change(rows, p):
-    """Whether contact may begin or end within a step, by the nearness at its ends and middle.
+    """Return whether contact may begin or end within a step, by the nearness at its ends and
+    middle.
 
     Twice their range is allowed for beyond them.
     """
@@ -99,7 +100,7 @@ def may_change(rows, p):
 
 @merged
 def may_touch(rows, p):
-    """Whether contact may begin within a step, by the nearness at its nodes.
+    """Return whether contact may begin within a step, by the nearness at its nodes.
 
     A quartic, as the step's interpolant is, rises above its greatest value at five Lobatto nodes
     by less than a third of their range; a whole range is allowed for here.
@@ -158,7 +159,8 @@ def look_at_step(w, base, h, z, work, phase, p, tally):
 
 @merged
 def onset_ahead(w, h, every, work, phase, p):
-    """Whether contact begins within the step just taken; it is then to be taken again, to there.
+    """Return whether contact begins within the step just taken; it is then to be taken again, to
+    there.
 
     Looked for only where the nodes of the step let it be. The step after the landing is kept
     within the pulse that begins, or to the contact's own time scale.
@@ -241,7 +243,7 @@ def land(w, h, work, phase, p, tally):
 
 @jit
 def finite(new):
-    """Whether every number of a state is finite."""
+    """Return whether every number of a state is finite."""
     total = 0.0
     for i in range(new.size):
         total += new[i]

@@ -86,7 +86,7 @@ class Joints(NamedTuple):
 
 @jit
 def speed_of(y, p):
-    """The crank's speed (rad/s)."""
+    """Return the crank's speed (rad/s)."""
     return p.omega * (1.0 + y[p.at[0]]) if p.driven else p.omega
 
 
@@ -106,7 +106,7 @@ def unpack(y, p, w, rates):
 
 @jit
 def pose_of(motion, w, rates, p):
-    """The `Pose` at a crank angle, whose ideal `Motion` is given."""
+    """Return the `Pose` at a crank angle, whose ideal `Motion` is given."""
     c, s = motion.cos_theta, motion.sin_theta
     length = p.rod_length + w[STRETCH]
     fall = p.crank_radius * s - w[2] + w[4] - w[5]  # from the big end's bore to the small end's
@@ -163,7 +163,7 @@ def fill_bias(pose, rates, p, bias):
 
 @jit
 def oiled(joint, contact, eccentricity, spins, p):
-    """A joint's `Contact` with its film's force and moment on the rod, and the `Film`."""
+    """Return a joint's `Contact` with its film's force and moment on the rod, and the `Film`."""
     if p.viscosity == 0.0:
         return contact, NO_FILM
     fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
@@ -176,7 +176,9 @@ def oiled(joint, contact, eccentricity, spins, p):
 
 @jit
 def bore_axes(slope, modes, pose, p):
-    """Cosine and sine of a bore's angle, counter-clockwise, by the slope of the rod's end there."""
+    """Return the cosine and sine of a bore's angle, counter-clockwise, by the slope of the rod's
+    end there.
+    """
     turned = summed(slope, 0, MODES, modes) / p.rod_length
     c, s = math.cos(turned), math.sin(turned)
     return pose.cos_phi * c + pose.sin_phi * s, pose.cos_phi * s - pose.sin_phi * c
@@ -184,7 +186,7 @@ def bore_axes(slope, modes, pose, p):
 
 @jit
 def touching(joint, eccentricity, axes, spins, carried, p):
-    """A joint's `Contact`, with a round bore or a worn one."""
+    """Return a joint's `Contact`, with a round bore or a worn one."""
     if p.sectors:
         return worn_contact(joint, eccentricity, axes, spins, carried, p)
     bearing = p.pin_radius[joint], p.clearance[joint], p.stiffness[joint]
@@ -193,7 +195,7 @@ def touching(joint, eccentricity, axes, spins, carried, p):
 
 @jit
 def joints_of(phase, y, motion, pose, w, velocity, p):
-    """The `Joints` at a state; w: coordinates, (11,); velocity: of the bodies, (11,)."""
+    """Return the `Joints` at a state; w: coordinates, (11,); velocity: of the bodies, (11,)."""
     n, modes = p.freedoms, velocity[4:8]
     big_spin = pose.spin + summed(BIG_SLOPE, 0, MODES, modes) / p.rod_length
     small_spin = pose.spin + summed(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
@@ -258,7 +260,7 @@ def add_on_rod(pose, big, small, p, force):
 
 @jit
 def motor_torque(pose, p):
-    """Torque (N m) of the motor at the crank's speed: a line."""
+    """Return the torque (N m) of the motor at the crank's speed: a line."""
     # by the slip: of a steep line the difference of two speeds would leave no digits
     return p.torque - p.torque_slope * p.omega * pose.slip
 

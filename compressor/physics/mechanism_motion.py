@@ -87,7 +87,7 @@ def reduce(pose, mass, p, room, matrix):
 
 @jit
 def row_times(row, vector):
-    """Sum of a row's products with a vector, (11,) both."""
+    """Return the sum of a row's products with a vector, (11,) both."""
     total = 0.0
     for i in range(ROWS):
         total += row[i] * vector[i]
@@ -96,7 +96,8 @@ def row_times(row, vector):
 
 @jit
 def reactions_of(pose, joints, needed, velocity, last, p):
-    """`Reactions` that the motion asks for, with the friction that they make where joints rub.
+    """Return `Reactions` that the motion asks for, with the friction that they make where joints
+    rub.
 
     needed: forces on the rod, its moment about the big end's bore, and the crosshead's force along
     x, that the accelerations need beside the bodies' weight, (4,); velocity: of the bodies; last:
@@ -129,7 +130,7 @@ def reactions_of(pose, joints, needed, velocity, last, p):
 
 @jit
 def ideal_torque(turning, fx, fy, pin, p):
-    """Friction torque (N m) on the rod in an ideal joint.
+    """Return the friction torque (N m) on the rod in an ideal joint.
 
     turning: the journal's spin in it (rad/s); pin: the journal's radius (m).
     """
@@ -139,7 +140,7 @@ def ideal_torque(turning, fx, fy, pin, p):
 
 @jit
 def apart(one, other):
-    """Whether the friction of two `Reactions` differs beyond rounding."""
+    """Return whether the friction of two `Reactions` differs beyond rounding."""
     size = abs(other.big_torque) + abs(other.small_torque)
     far = abs(one.big_torque - other.big_torque) + abs(one.small_torque - other.small_torque)
     pushed = abs(one.rubbing - other.rubbing)
@@ -148,7 +149,7 @@ def apart(one, other):
 
 @jit
 def solve(motion, y, phase, p):
-    """The mechanism `Solved` around the ideal motion, in the load's phase.
+    """Return the mechanism `Solved` around the ideal motion, in the load's phase.
 
     Friction of ideal joints and of an ideal guide depends on their forces, and these on it: both
     are found in rounds, of which each leaves some hundredths of the last one's error.
@@ -197,7 +198,7 @@ def solve(motion, y, phase, p):
 
 @jit
 def needed_of(mass, body, own, p):
-    """What `reactions_of` asks for, by the bodies' accelerations and their own forces."""
+    """Return what `reactions_of` asks for, by the bodies' accelerations and their own forces."""
     return (
         row_times(mass[1], body) - own[1],
         row_times(mass[2], body) - own[2],

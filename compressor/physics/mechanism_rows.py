@@ -57,7 +57,7 @@ IMPLAUSIBLE = 0.1  # of half the crosshead, or of the rod: more than any contact
 
 @jit
 def pace_of(now, p):
-    """Time that passes while a steady crank would turn as far, over the steady one's."""
+    """Return the time that passes while a steady crank would turn as far, over the steady one's."""
     return p.omega / now.pose.speed
 
 
@@ -86,14 +86,14 @@ def write_rates(now, y, p, out):
 
 @jit
 def rod_damping_power(now, p):
-    """Power (W) that the rod's material takes."""
+    """Return the power (W) that the rod's material takes."""
     modes = now.rates[7:11]
     return p.rod_damping * material_work(modes, modes, p)
 
 
 @jit
 def crank_torque(now, p):
-    """Torque (N m) that drives the crank against the rod."""
+    """Return the torque (N m) that drives the crank against the rod."""
     pose, forces, big = now.pose, now.reactions, now.joints.big
     torque = p.crank_radius * (pose.cos_theta * forces.big_y - pose.sin_theta * forces.big_x)
     torque += forces.big_torque
@@ -102,7 +102,8 @@ def crank_torque(now, p):
 
 @jit
 def guide_moment(now, p):
-    """Moment (N m) of the crosshead on its guide about the crank's centre, counter-clockwise.
+    """Return the moment (N m) of the crosshead on its guide about the crank's centre,
+    counter-clockwise.
 
     An ideal guide lets no crosshead tilt: it bears the couple on the pin as well.
     """
@@ -154,7 +155,9 @@ def write_energies(now, p, row):
 
 @jit
 def ideal_acceleration(now, p):
-    """Acceleration (m/s^2) of the ideal machine's crosshead, whose crank turns as this one does."""
+    """Return the acceleration (m/s^2) of the ideal machine's crosshead, whose crank turns as
+    this one does.
+    """
     if not p.driven:
         return now.motion.a
     speed = 1.0 + now.pose.slip
@@ -265,7 +268,9 @@ def observe_all(times, states, phases, p, rows):
 
 @jit
 def at_joint(joint, now, p):
-    """A joint's `Contact`, eccentricity with its rate, the axes of its bore and the bore's spin."""
+    """Return a joint's `Contact`, eccentricity with its rate, the axes of its bore and the
+    bore's spin.
+    """
     i = 1 + 2 * joint
     off = now.w[i], now.w[i + 1], now.rates[i], now.rates[i + 1]
     if joint == 0:
@@ -295,7 +300,7 @@ def wear_all(times, states, phases, weights, p, tally):
 
 @jit
 def contact_at(joint, t, y, phase, p):
-    """A joint's `Contact` at a time and state; on a worn bore as it meets the wall."""
+    """Return a joint's `Contact` at a time and state; on a worn bore as it meets the wall."""
     contact, off, axes, spin = at_joint(joint, solve(ideal(t, p), y, phase, p), p)
     return at_the_wall(joint, contact, off, axes, spin, p) if p.sectors else contact
 
@@ -310,8 +315,8 @@ def write_eccentricities(t, y, p, row):
 
 @jit
 def beyond_model(y, p):
-    """What a state has that no machine can: 1 a crank that has all but stopped, 2 a corner of the
-    crosshead deep in its guide, 3 a rod bent or pressed out of shape; 0 nothing.
+    """Return what a state has that no machine can: 1 a crank that has all but stopped, 2 a corner
+    of the crosshead deep in its guide, 3 a rod bent or pressed out of shape; 0 nothing.
     """
     if p.driven and y[p.at[0]] <= STALLED - 1.0:
         return 1

@@ -39,7 +39,9 @@ class Turn(NamedTuple):
 
 @merged
 def turned(motion, eta, eta_rate, p):
-    """`Turn` of the rod from the ideal angle phi by the deviation eta, without cancellation."""
+    """Return `Turn` of the rod from the ideal angle phi by the deviation eta, without
+    cancellation.
+    """
     sin_half, cos_half = small_angle(0.5 * eta, p)
     dc = -2.0 * sin_half * fused(motion.sin_phi, cos_half, motion.cos_phi * sin_half)
     ds = 2.0 * sin_half * fused(motion.cos_phi, cos_half, -(motion.sin_phi * sin_half))
@@ -50,7 +52,9 @@ def turned(motion, eta, eta_rate, p):
 
 @merged
 def eccentricity_big_end(y, turn, p):
-    """Journal centre less bore centre at the big end and its rate, small end ideal (m, m/s)."""
+    """Return the journal centre less bore centre at the big end and its rate, small end ideal
+    (m, m/s).
+    """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
     return fused(length, dc, -y[0]), -length * ds, fused(length, dc_rate, -y[2]), -length * ds_rate
@@ -58,7 +62,9 @@ def eccentricity_big_end(y, turn, p):
 
 @merged
 def eccentricity_small_end(y, turn, p):
-    """Journal centre less bore centre at the small end and its rate, big end ideal (m, m/s)."""
+    """Return the journal centre less bore centre at the small end and its rate, big end ideal
+    (m, m/s).
+    """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
     return fused(-length, dc, y[0]), length * ds, fused(-length, dc_rate, y[2]), length * ds_rate
@@ -66,7 +72,7 @@ def eccentricity_small_end(y, turn, p):
 
 @merged
 def eccentricities_both(y, turn, p):
-    """The same at the big end, then the small end, of a rod that is free in the plane."""
+    """Return the same at the big end, then the small end, of a rod that is free in the plane."""
     dc, ds, dc_rate, ds_rate = turn
     a = p.rod_centre
     b = p.rod_length - a
@@ -87,14 +93,14 @@ def eccentricities_both(y, turn, p):
 
 @merged
 def load_force(phase, y, motion, p):
-    """Piston force (N) in the state y around the ideal motion."""
+    """Return the piston force (N) in the state y around the ideal motion."""
     n = p.freedoms
     return piston_force(phase, motion.x + y[0], motion.v + y[n], y[0], y[n], p)
 
 
 @merged
 def solve_big_end(y, motion, turn, load, contact, p):
-    """Accelerations (x, phi) of the rod hung on the crosshead and struck at the big end."""
+    """Return accelerations (x, phi) of the rod hung on the crosshead and struck at the big end."""
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
     rate = motion.rate + y[3]
@@ -113,7 +119,7 @@ def solve_big_end(y, motion, turn, load, contact, p):
 
 @merged
 def solve_small_end(motion, turn, load, contact, p):
-    """Accelerations (x, phi) of the rod hung on the crankpin and struck at the small end."""
+    """Return accelerations (x, phi) of the rod hung on the crankpin and struck at the small end."""
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
     a = (-load - contact.fx) * p.per_reciprocating_mass
@@ -127,7 +133,7 @@ def solve_small_end(motion, turn, load, contact, p):
 
 @merged
 def solve_both(motion, turn, load, big, small, p):
-    """Accelerations (x, X, Y, phi) of a rod between two clearance joints."""
+    """Return the accelerations (x, X, Y, phi) of a rod between two clearance joints."""
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
     a = (-load - small.fx) * p.per_reciprocating_mass
@@ -142,7 +148,7 @@ def solve_both(motion, turn, load, big, small, p):
 
 @inlined
 def contact_big_end(y, motion, turn, p):
-    """`joint_contact` of the big end in scene big_end."""
+    """Return `joint_contact` of the big end in scene big_end."""
     big = eccentricity_big_end(y, turn, p)
     spins = p.omega, -motion.rate - y[3]
     bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
@@ -151,7 +157,7 @@ def contact_big_end(y, motion, turn, p):
 
 @inlined
 def contact_small_end(y, motion, turn, p):
-    """`joint_contact` of the small end in scene small_end."""
+    """Return `joint_contact` of the small end in scene small_end."""
     small = eccentricity_small_end(y, turn, p)
     spins = 0.0, -motion.rate - y[3]
     bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
@@ -160,7 +166,7 @@ def contact_small_end(y, motion, turn, p):
 
 @inlined
 def contacts_both(y, motion, turn, p):
-    """`joint_contact` of the big end and of the small end in scene both."""
+    """Return `joint_contact` of the big end and of the small end in scene both."""
     big, small = eccentricities_both(y, turn, p)
     spin = -motion.rate - y[7]
     bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
@@ -172,7 +178,7 @@ def contacts_both(y, motion, turn, p):
 
 @merged
 def ideal_centre_acceleration(motion, p):
-    """Acceleration (m/s^2) of the rod's centre in the ideal motion, x and y."""
+    """Return the acceleration (m/s^2) of the rod's centre in the ideal motion, x and y."""
     pin = p.crank_radius * p.omega * p.omega
     inward = motion.rate * motion.rate
     ax = p.rod_centre * (motion.cos_phi * inward + motion.sin_phi * motion.spin_up)
@@ -196,7 +202,7 @@ class Instant(NamedTuple):
 
 @inlined
 def evaluate(motion, y, phase, p):
-    """The `Instant` of a state around the ideal motion, in the load's phase.
+    """Return the `Instant` of a state around the ideal motion, in the load's phase.
 
     motion: `Motion` at the time; y: zeros (4) in the ideal scene.
     """
@@ -223,7 +229,7 @@ def evaluate(motion, y, phase, p):
 
 @inlined
 def deviating(now, p):
-    """Accelerations (x, X, Y, phi) at an evaluated instant less the ideal motion's.
+    """Return the accelerations (x, X, Y, phi) at an evaluated instant less the ideal motion's.
 
     Those of the rod's centre are 0 unless it is an unknown of the scene.
     """
@@ -276,7 +282,7 @@ def derivative(t, y, phase, p, out):
 
 @jit
 def contact_at(joint, t, y, phase, p):
-    """A joint's `Contact` at a time and state."""
+    """Return a joint's `Contact` at a time and state."""
     now = evaluate(ideal(t, p), y, phase, p)
     return now.big if joint == 0 else now.small
 

@@ -99,7 +99,7 @@ def write_eccentricities(t, y, p, row):
 
 @inlined
 def centre_velocity(now, y, p):
-    """Rod centre's velocity (m/s), x and y, and its height (m)."""
+    """Return the rod centre's velocity (m/s), x and y, and its height (m)."""
     motion = now.motion
     sin_phi = motion.sin_phi + now.turn.ds
     cos_phi = motion.cos_phi + now.turn.dc
@@ -121,7 +121,7 @@ def centre_velocity(now, y, p):
 
 @inlined
 def centre_acceleration(now, y, p):
-    """Rod centre's acceleration (m/s^2), x and y, of a rod that hangs on an ideal joint."""
+    """Return rod centre's acceleration (m/s^2), x and y, of a rod that hangs on an ideal joint."""
     motion = now.motion
     sin_phi = motion.sin_phi + now.turn.ds
     cos_phi = motion.cos_phi + now.turn.dc
@@ -138,7 +138,8 @@ def centre_acceleration(now, y, p):
 
 @inlined
 def joint_forces(now, y, p):
-    """Forces on the rod at both joints: the contact's, or by inverse dynamics at an ideal joint.
+    """Return the forces on the rod at both joints: the contact's, or by inverse dynamics at an
+    ideal joint.
 
     Newton-Euler of the rod with the crosshead's x balance; returns (big x, big y, small x, small
     y) in N.
@@ -165,13 +166,15 @@ def joint_forces(now, y, p):
 
 @merged
 def damping_power(contact):
-    """Power (W) a contact loses in its normal direction, the clamp's included; never negative."""
+    """Return the power (W) a contact loses in its normal direction, the clamp's included; never
+    negative.
+    """
     return (contact.normal - contact.elastic) * contact.rate
 
 
 @inlined
 def torque_and_moment(now, y, forces, p):
-    """Torque (N m) that drives the crank, and moment of the crosshead on its guide.
+    """Return the torque (N m) that drives the crank, and moment of the crosshead on its guide.
 
     The guide bears the crosshead's force at its lever and, since the crosshead cannot tilt, the
     couple that the small end's friction puts on the pin.
@@ -188,7 +191,7 @@ def torque_and_moment(now, y, forces, p):
 
 @inlined
 def powers(now, y, forces, p):
-    """The four powers (W): of crank and load, lost to damping and friction."""
+    """Return the four powers (W): of crank and load, lost to damping and friction."""
     motion, big, small = now.motion, now.big, now.small
     crank = p.crank_radius * p.omega
     turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
@@ -207,7 +210,7 @@ def write_powers(now, y, forces, p, out):
 
 @inlined
 def energies(now, y, p):
-    """Kinetic and potential energy (J)."""
+    """Return the kinetic and potential energy (J)."""
     v = now.motion.v + y[p.freedoms]
     rate = now.motion.rate + y[2 * p.freedoms - 1]
     kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
@@ -221,7 +224,7 @@ def energies(now, y, p):
 
 @inlined
 def glanced(now, y, forces, p):
-    """The columns from ACCELERATION to GUIDE_MOMENT."""
+    """Return the columns from ACCELERATION to GUIDE_MOMENT."""
     big, small = now.big, now.small
     torque, moment = torque_and_moment(now, y, forces, p)
     return (

@@ -23,7 +23,9 @@ NEVER = 2.0  # a fraction of the step beyond its end
 
 @jit
 def nearness_at(joint, s, t, h, dense, phase, p, y):
-    """`nearness` of a joint at the fraction s of a step with interpolant `dense`; y: scratch."""
+    """Return `nearness` of a joint at the fraction s of a step with interpolant `dense`; y:
+    scratch.
+    """
     interpolate(s, dense, y)
     contact = contact_at(joint, t + s * h, y, phase, p)
     return nearness(contact, p.stiffness[joint], p.clearance[joint], p)
@@ -31,7 +33,7 @@ def nearness_at(joint, s, t, h, dense, phase, p, y):
 
 @jit
 def crossing(joint, low, high, t, h, dense, phase, p, y):
-    """Fraction at which contact begins, between `low` (apart) and `high` (touching)."""
+    """Return the fraction at which contact begins, between `low` (apart) and `high` (touching)."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         if nearness_at(joint, middle, t, h, dense, phase, p, y) > 0.0:
@@ -43,7 +45,7 @@ def crossing(joint, low, high, t, h, dense, phase, p, y):
 
 @jit
 def touching_between(joint, low, high, t, h, dense, phase, p, y):
-    """A fraction in (low, high) at which there is contact, by golden section; NEVER if none.
+    """Return a fraction in (low, high) at which there is contact, by golden section; NEVER if none.
 
     For a bracket around a local maximum of the nearness whose ends are both apart.
     """
@@ -70,7 +72,7 @@ def touching_between(joint, low, high, t, h, dense, phase, p, y):
 
 @jit
 def place(i):
-    """The fraction of a step at which look i, 0 to LOOKS, is taken."""
+    """Return the fraction of a step at which look i, 0 to LOOKS, is taken."""
     if i <= 1:
         return i * EDGE
     if i >= LOOKS - 1:
@@ -80,7 +82,8 @@ def place(i):
 
 @jit
 def joint_onset(joint, t, h, dense, phase, p, y):
-    """First fraction of a step at which a joint that was apart touches, and until when it does.
+    """Return the first fraction of a step at which a joint that was apart touches, and until when
+    it does.
 
     Returns (begin, end); (NEVER, NEVER) without an onset, end = 1 where contact outlasts the step.
     """
@@ -113,7 +116,7 @@ def joint_onset(joint, t, h, dense, phase, p, y):
 
 @jit
 def first_onset(t, h, dense, phase, p, y):
-    """`joint_onset` of whichever joint with clearance touches first."""
+    """Return `joint_onset` of whichever joint with clearance touches first."""
     begin, end = NEVER, NEVER
     for joint in range(2):
         if p.clearance[joint] > 0.0:
@@ -125,7 +128,7 @@ def first_onset(t, h, dense, phase, p, y):
 
 @jit
 def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
-    """Fraction at which contact begins or ends between two others, to PLACED.
+    """Return the fraction at which contact begins or ends between two others, to PLACED.
 
     at_low, at_high: the nearness at low and high, of different signs. Two looks where the line
     through both ends crosses zero, then one halfway: where contact ends, the nearness has a corner.
@@ -147,7 +150,7 @@ def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
 
 @jit
 def meeting(joint, t, y, phase, p, rates, before):
-    """How near a joint's contact is to its begin, at a time and a state within a hair of it.
+    """Return how near a joint's contact is to its begin, at a time and a state within a hair of it.
 
     Returns its penetration (m) there, and the speed (m/s) at which its gap closes, at the moment
     when it does: two motions that are a little apart meet a little apart in time. rates, before:

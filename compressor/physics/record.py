@@ -196,12 +196,12 @@ FEATURED = np.dtype([*FIELDS, *FILM, *WEAR, *FEATURES, ("laws", "f8", (MECHANISM
 
 
 def zero(kind: np.dtype) -> np.record:
-    """A record of a kind, of zeros, that compiled functions may write."""
+    """Return a record of a kind, of zeros, that compiled functions may write."""
     return np.zeros(1, np.dtype((np.record, kind)))[0]
 
 
 def new_record(chosen: bool = False, featured: bool = False) -> np.record:
-    """A record of zeros, to be filled field by field.
+    """Return a record of zeros, to be filled field by field.
 
     chosen: for laws but the default ones; featured: for a mechanism with `FEATURES` and any laws.
     """
@@ -209,12 +209,14 @@ def new_record(chosen: bool = False, featured: bool = False) -> np.record:
 
 
 def is_featured(p: np.record) -> bool:
-    """Whether a record is that of a mechanism with features."""
+    """Return whether a record is that of a mechanism with features."""
     return bool(p["laws"].size == MECHANISM)
 
 
 def present(p: np.record) -> list[Coordinate]:
-    """The coordinates that a mechanism's features and clearances give it, the crank's left out."""
+    """Return the coordinates that a mechanism's features and clearances give it, the crank's
+    left out.
+    """
     found = []
     if p["clearance"][BIG_END] > 0.0:
         found += [Coordinate.BIG_X, Coordinate.BIG_Y]
@@ -242,7 +244,8 @@ def place_coordinates(p: np.record) -> None:
 
 
 def state_names(p: np.record) -> tuple[str, ...]:
-    """Names of the numbers of a record's state: deviations, their rates, what contacts carry.
+    """Return the names of the numbers of a record's state: deviations, their rates, what contacts
+    carry.
 
     Of a mechanism: its coordinates and their rates in place of deviations, the crank's lag and slip
     and the rod's loss at the end; numbers that are not used fill the state up to whole fours.

@@ -73,7 +73,7 @@ def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, tim
 
 @jit
 def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
-    """One step from (t, z); the state at its end into new, the increments (6, n + 4) into u.
+    """Return one step from (t, z); the state at its end into new, the increments (6, n + 4) into u.
 
     rates: dz/dt at (t, z); size: as in `differentiate`; jacobian: (n + 4, n), written. The last
     increment is the error estimate. Returns False where the linear system is singular.
@@ -141,7 +141,7 @@ def spectral_radius(jacobian, size, v, w):
 
 @jit
 def error_norm(z, new, u, rtol, atol):
-    """Root mean square over the motion of the estimated error over its tolerance."""
+    """Return the root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
     total = 0.0
     for i in range(n):

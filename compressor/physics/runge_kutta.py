@@ -27,7 +27,7 @@ class Pair(IntEnum):
 
 
 def _lower(rows):
-    """A (STAGES, STAGES) strictly lower triangular table from its rows."""
+    """Return a (STAGES, STAGES) strictly lower triangular table from its rows."""
     full = np.zeros((STAGES, STAGES))
     for i, row in enumerate(rows, 1):
         full[i, : len(row)] = row
@@ -133,7 +133,7 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
 
 @merged
 def error_norm(pair, h, z, new, k, rtol, atol):
-    """Root mean square over the motion of the estimated error over its tolerance."""
+    """Return the root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
     total = 0.0
     for i in range(0, n, LANES):

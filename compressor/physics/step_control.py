@@ -43,7 +43,7 @@ AUTO = int(Mode.AUTO)
 
 
 def step_error(w, before, after, step):
-    """Estimated error of each number of an attempted step, flows included, (n + 4,).
+    """Return the estimated error of each number of an attempted step, flows included, (n + 4,).
 
     `w`: the walker before it; `before` and `after`: `Work.k` then and now; `step` (s): its length.
     """
@@ -54,7 +54,9 @@ def step_error(w, before, after, step):
 
 @jit
 def first_step(w, z, work, atol, phase, p, end):
-    """Length (s) of a first step that an order-5 method can take (Hairer, Norsett, Wanner II.4)."""
+    """Return the length (s) of a first step that an order-5 method can take (Hairer, Norsett,
+    Wanner II.4).
+    """
     n = z.size - FLOWS
     rates, trial = work.k[0], work.column
     size = 0.0
@@ -82,7 +84,7 @@ def first_step(w, z, work, atol, phase, p, end):
 
 @merged
 def controlled(w, h, error):
-    """The next step's length after an accepted step (PI control)."""
+    """Return the next step's length after an accepted step (PI control)."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
     now = logarithm(max(error, 1e-10))
     factor = SAFETY * exponential((INTEGRAL * w.error - PROPORTIONAL * now) / order)

@@ -21,7 +21,7 @@ from compressor.physics.record import MECHANISM
 
 @jit
 def within_model(y, p):
-    """`mechanism_rows.beyond_model` of a scene, whose depths the tally watches."""
+    """Return `mechanism_rows.beyond_model` of a scene, whose depths the tally watches."""
     return 0
 
 

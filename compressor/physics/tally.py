@@ -30,7 +30,9 @@ PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
 
 
 def lobatto(n):
-    """Nodes in [0, 1], both ends included, and weights of n-point Gauss-Lobatto quadrature."""
+    """Return the nodes in [0, 1], both ends included, and weights of n-point Gauss-Lobatto
+    quadrature.
+    """
     legendre = np.polynomial.legendre.Legendre.basis(n - 1)
     inner = np.sort(legendre.deriv().roots().real)
     nodes = np.concatenate(([-1.0], inner, [1.0]))
@@ -80,7 +82,7 @@ WORN = np.dtype(
 
 
 def new_tally(p=None):
-    """An empty tally; a joint counts as touching until it is seen apart.
+    """Return an empty tally; a joint counts as touching until it is seen apart.
 
     p: the run's record, where it may be that of a mechanism with features, whose bores may wear.
     """
@@ -93,7 +95,8 @@ def new_tally(p=None):
 
 @jit
 def vertex(left, right, before, here, after):
-    """Top of the parabola through three values, or the middle one if it has none between them.
+    """Return the top of the parabola through three values, or the middle one if it has none between
+    them.
 
     left, right: places of the outer values from the middle one's.
     """
@@ -110,7 +113,7 @@ def vertex(left, right, before, here, after):
 
 @jit
 def peak_of(nodes, rows, every, column, known):
-    """The greater of `known` and the largest |value| of a column over a step.
+    """Return the greater of `known` and the largest |value| of a column over a step.
 
     The step's nodes count, `every` first, second, ... of them, and the parabola through the best.
     """
@@ -128,7 +131,9 @@ def peak_of(nodes, rows, every, column, known):
 
 @jit
 def deepest_of(nodes, rows, every, column, known):
-    """The greater of `known` and a column's largest value over a step, as `peak_of` finds it."""
+    """Return the greater of `known` and a column's largest value over a step, as `peak_of` finds
+    it.
+    """
     last = nodes.size - 1
     best = 0
     for i in range(every, last + 1, every):
@@ -172,7 +177,9 @@ def add_flows(rows, weights, span, flows):
 
 @merged
 def near_record(rows, middle, tally):
-    """Whether a peak may be beaten within a step, by the rows at its ends and in its middle."""
+    """Return whether a peak may be beaten within a step, by the rows at its ends and in its
+    middle.
+    """
     last = rows.shape[0] - 1
     for k in range(PEAKED):
         column = ACCELERATION + k
@@ -189,7 +196,9 @@ def near_record(rows, middle, tally):
 
 @merged
 def share_apart(before, after):
-    """Share of the way from one nearness to another that is without contact, by a straight line."""
+    """Return the share of the way from one nearness to another that is without contact, by a
+    straight line.
+    """
     low, high = min(before, after), max(before, after)
     if high <= 0.0:
         return 1.0
@@ -208,7 +217,7 @@ def shares_apart(nodes, rows, apart):
 
 @jit
 def contact_within(rows, joint):
-    """Whether contact at a joint begins and ends between a step's first and last row."""
+    """Return whether contact at a joint begins and ends between a step's first and last row."""
     last = rows.shape[0] - 1
     ends = in_contact(rows[0, NORMAL + joint]) or in_contact(rows[last, NORMAL + joint])
     inside = False
@@ -240,13 +249,13 @@ def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
 
 @jit
 def steady_pace(rows, i, p):
-    """Time that passes at a node of a step over that of a steady crank: 1."""
+    """Return the time that passes at a node of a step over that of a steady crank: 1."""
     return 1.0
 
 
 @jit
 def crank_pace(rows, i, p):
-    """`steady_pace` of a crank whose speed may give way."""
+    """Return `steady_pace` of a crank whose speed may give way."""
     return rows[i, PACE] if p.driven else 1.0
 
 
@@ -255,13 +264,13 @@ pace_at = by_kind(MECHANISM, crank_pace, steady_pace)
 
 @jit
 def steady_pace_of_step(weights, rows, every, p):
-    """Mean of `pace_at` over a step: 1."""
+    """Return the mean of `pace_at` over a step: 1."""
     return 1.0
 
 
 @jit
 def crank_pace_of_step(weights, rows, every, p):
-    """Mean of `pace_at` over a step; weights: of its nodes."""
+    """Return the mean of `pace_at` over a step; weights: of its nodes."""
     if not p.driven:
         return 1.0
     pace = 0.0

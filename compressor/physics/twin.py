@@ -22,7 +22,7 @@ from compressor.physics.walker import DONE, RUNNING
 
 @jit
 def separation(t, y, other, p, rows):
-    """Greatest distance of two states' eccentricities, over the joint's clearance."""
+    """Return the greatest distance of two states' eccentricities, over the joint's clearance."""
     write_eccentricities(t, y, p, rows[0])
     write_eccentricities(t, other, p, rows[1])
     worst = 0.0

@@ -85,7 +85,7 @@ class Work(NamedTuple):
 
 
 def new_walker(mode):
-    """A walker at the start of its first segment."""
+    """Return a walker at the start of its first segment."""
     walker = zero(WALKER)
     walker["fresh"] = 1
     walker["error"] = LEAST_ERROR
@@ -96,7 +96,7 @@ def new_walker(mode):
 
 
 def new_work(n):
-    """The arrays for a motion of n numbers (positions and rates)."""
+    """Return the arrays for a motion of n numbers (positions and rates)."""
     size = n + FLOWS
     return Work(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),

@@ -31,7 +31,7 @@ ROUNDS, AGREED = 20, 1e-15  # of Newton's method, which has 3 to 5
 
 
 def bore_fields(sectors: int) -> dict:
-    """The fields of a record for bores of so many sectors, unworn.
+    """Return the fields of a record for bores of so many sectors, unworn.
 
     Directions are longer than 1 by what the straight lines between two nodes are short of.
     """
@@ -63,7 +63,7 @@ def unworn(depth, clearance):
 
 @jit
 def depth_of(energy, clearance):
-    """The penetration (m) of an unworn bore whose S is `energy` (m^2), and dS by it (m)."""
+    """Return the penetration (m) of an unworn bore whose S is `energy` (m^2), and dS by it (m)."""
     depth = clearance * (energy / (FULL * clearance * clearance)) ** 0.4
     slope = 0.0
     for _ in range(ROUNDS):
@@ -111,7 +111,9 @@ def foundation(overlap, p):
 
 @jit
 def nearest_wall(overlap, most, p):
-    """Direction of the place on the bore that is nearest to the journal: a parabola's vertex."""
+    """Return the direction of the place on the bore that is nearest to the journal: a parabola's
+    vertex.
+    """
     i = 0
     while overlap[i] < most:
         i += 1
@@ -127,7 +129,9 @@ def nearest_wall(overlap, most, p):
 
 @jit
 def penetration_of(ex, ey, joint, p):
-    """Penetration (m) of a journal, negative: the gap; and its gradient. In the rod's frame."""
+    """Return the penetration (m) of a journal, negative: the gap; and its gradient. In the rod's
+    frame.
+    """
     overlap = np.empty(p.sectors)
     most = overlaps(ex, ey, joint, p, overlap)
     if most <= 0.0:
@@ -140,7 +144,9 @@ def penetration_of(ex, ey, joint, p):
 
 @jit
 def seen_by_rod(eccentricity, axes, rod_spin):
-    """Eccentricity (m) and its rate (m/s) in the frame of the rod's bore: x, y, and their rates."""
+    """Return the eccentricity (m) and its rate (m/s) in the frame of the rod's bore: x, y, and
+    their rates.
+    """
     c, s = axes
     ex, ey = c * eccentricity[0] + s * eccentricity[1], c * eccentricity[1] - s * eccentricity[0]
     vx = c * eccentricity[2] + s * eccentricity[3] + rod_spin * ey
@@ -149,7 +155,7 @@ def seen_by_rod(eccentricity, axes, rod_spin):
 
 @jit
 def at_the_wall(joint, contact, eccentricity, axes, rod_spin, p):
-    """A contact with the overlap of the nearest wall (m) and its rate for penetration's.
+    """Return a contact with the overlap of the nearest wall (m) and its rate for penetration's.
 
     Both meet a wall at the speed at which its overlap begins. The penetration's own rate has a jump
     there: how fast an arc of contact grows depends on how it is curved.
@@ -166,7 +172,7 @@ def at_the_wall(joint, contact, eccentricity, axes, rod_spin, p):
 
 @jit
 def worn_contact(joint, eccentricity, axes, spins, carried, p):
-    """`Contact` between a joint's journal and its worn bore.
+    """Return `Contact` between a joint's journal and its worn bore.
 
     eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); axes: cosine
     and sine of the bore's angle, counter-clockwise; spins of journal and rod (rad/s); carried: as

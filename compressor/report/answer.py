@@ -61,12 +61,12 @@ class Answer:
 
 
 def answer_section(answer: Answer) -> Section:
-    """The section that the page begins with."""
+    """Return the section that the page begins with."""
     return Section("answer", "The answer", "answer.html", answer)
 
 
 def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[Finding]:
-    """What changes most over jobs, each named and with its metrics."""
+    """Return what changes most over jobs, each named and with its metrics."""
     named = [(name, job) for name, job in jobs if str(job["status"].item()) == "ok"]
     known = list(dict.fromkeys(m for _, job in named for m in measures(job)))
     names = [name for name, _ in named]
@@ -75,7 +75,7 @@ def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[Finding]:
 
 
 def study_findings(data: xr.Dataset) -> list[Finding]:
-    """What changes most over the jobs of a study, as `open_study` gives it."""
+    """Return what changes most over the jobs of a study, as `open_study` gives it."""
     rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in measures(data)]
     return ranked(rows, Points(data))
 
@@ -107,7 +107,7 @@ class Points(Sequence[str]):
 
 
 def worded(name: str, value: object, unit: str) -> str:
-    """A swept value in words: clearance 0.2 mm; "" where the job has none."""
+    """Return a swept value in words: clearance 0.2 mm; "" where the job has none."""
     words = name.removesuffix("_" + unit.replace("/", "_per_").replace(" ", "_")).replace("_", " ")
     if isinstance(value, int | float):
         if math.isnan(value):
@@ -117,7 +117,7 @@ def worded(name: str, value: object, unit: str) -> str:
 
 
 def _columns(measure: Measure, jobs: Sequence[xr.Dataset]) -> tuple[np.ndarray, np.ndarray]:
-    """A measure and its bar of each job, nan where it has none."""
+    """Return a measure and its bar of each job, nan where it has none."""
     pairs = [
         (float(measure.of(job)), float(measure.bar(job)))
         if measure.variable in job
@@ -131,7 +131,7 @@ def _columns(measure: Measure, jobs: Sequence[xr.Dataset]) -> tuple[np.ndarray, 
 def ranked(
     rows: Iterable[tuple[Measure, np.ndarray, np.ndarray]], names: Sequence[str]
 ) -> list[Finding]:
-    """The findings of measures over jobs, the greatest change first, one a metric."""
+    """Return the findings of measures over jobs, the greatest change first, one a metric."""
     best: dict[str, Finding] = {}
     for measure, values, bars in rows:
         if METRICS[measure.variable].counted or measure.variable in FROM_IDEAL:
@@ -145,7 +145,7 @@ def ranked(
 def finding(
     measure: Measure, values: np.ndarray, bars: np.ndarray, names: Sequence[str]
 ) -> Finding | None:
-    """What a measure does over jobs, where that is beyond its error bars.
+    """Return what a measure does over jobs, where that is beyond its error bars.
 
     Jobs whose value is not known within its bar, such as a chaotic motion's peak, do not count.
     """

@@ -24,7 +24,7 @@ class Assumptions:
 
 
 def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: bool) -> Section:
-    """What to keep in mind of the studies of a store, and of the claims if they are told."""
+    """Return what to keep in mind of the studies of a store, and of the claims if they are told."""
     default = Case.from_values({}).machine
     cases = [(study, case) for study in studies if (case := last_case(stored, study))]
     ours = [
@@ -46,7 +46,9 @@ def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: 
 
 
 def last_case(stored: Stored, study: StoredStudy) -> Case | None:
-    """The case of a study's last stored job; None where there is none that this version knows."""
+    """Return the case of a study's last stored job; None where there is none that this version
+    knows.
+    """
     for position in stored.rows.find([*study.keys])[::-1]:
         if position >= 0:
             try:

@@ -42,7 +42,7 @@ class DiagnosisContent:
 
 
 def shakings(paper: PaperRuns) -> Shakings:
-    """`shaking` of the healthy machine and all faults; empty unless all are stored."""
+    """Return `shaking` of the healthy machine and all faults; empty unless all are stored."""
     if not paper.usable.keys() >= {*NEEDS}:
         return {}
     return {name: shaking(paper.usable[name]) for name in NEEDS}
@@ -51,7 +51,7 @@ def shakings(paper: PaperRuns) -> Shakings:
 def diagnosis_drawings(
     found: Shakings, paper: PaperRuns
 ) -> Iterator[tuple[str, str, str, Drawing]]:
-    """Names, headings, captions and drawings, where there are `shakings`."""
+    """Yield the names, headings, captions and drawings, where there are `shakings`."""
     if not found:
         return
     drawings = {
@@ -65,14 +65,14 @@ def diagnosis_drawings(
 
 
 def diagnosis_sections(found: Shakings, plates: list[Plate]) -> Iterator[Section]:
-    """The section of the figures that were drawn, and a table of the force above `ORDER`."""
+    """Yield the section of the figures that were drawn, and a table of the force above `ORDER`."""
     if plates:
         content = DiagnosisContent(ORDER, force_table(found), plates)
         yield Section("diagnosis", "Diagnosis", "diagnosis.html", content)
 
 
 def force_table(found: Shakings) -> Table:
-    """rms of X above `ORDER` and its two shares, N, by fault and clearance."""
+    """Return the rms of X above `ORDER` and its two shares, N, by fault and clearance."""
     head = ["clearance at", "mm", "rms (N)", "near changes of direction (N)", "elsewhere (N)"]
     healthy = found["design"]
     rows = [Row([Cell("none"), Cell("0", "number"), *forces(healthy)])]
@@ -84,6 +84,6 @@ def force_table(found: Shakings) -> Table:
 
 
 def forces(one: Shaking) -> list[Cell]:
-    """The whole and its shares, to 0.1 N."""
+    """Return the whole and its shares, to 0.1 N."""
     values = one.spectrum.above, one.near_turns, one.elsewhere
     return [Cell(f"{value:.1f}", "number") for value in values]

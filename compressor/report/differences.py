@@ -24,7 +24,8 @@ class Difference:
 
 
 def differences(case: Case, besides: tuple[str, ...] = ()) -> list[Difference]:
-    """The keys in which a case's physics or span differs from the default case, in a file's order.
+    """Return the keys in which a case's physics or span differs from the default case, in a file's
+    order.
 
     A value that follows from others, such as the inertia of a uniform rod, is none of its own, nor
     is one that means the same as the default. besides: groups or keys at the top to leave out.
@@ -42,7 +43,9 @@ def differences(case: Case, besides: tuple[str, ...] = ()) -> list[Difference]:
 
 
 def leaves(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Dotted keys and values; a group that the default case lacks, or has alone, is one value."""
+    """Yield the dotted keys and values; a group that the default case lacks, or has alone, is
+    one value.
+    """
     for name in dict.fromkeys([*defaults, *values]):
         value, default = values.get(name), defaults.get(name)
         if isinstance(value, Mapping) and isinstance(default, Mapping):
@@ -52,7 +55,9 @@ def leaves(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[t
 
 
 def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
-    """Whether a case is the same without a key: it follows from the others, or is not read."""
+    """Return whether a case is the same without a key: it follows from the others, or is not
+    read.
+    """
     group, _, name = key.rpartition(".")
     rest: dict[str, Any] = {n: item for n, item in values.items() if n != key}
     if group:
@@ -64,7 +69,7 @@ def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
 
 
 def spelt(value: Any, unit: str) -> str:
-    """A value as a case file has it, with its unit."""
+    """Return a value as a case file has it, with its unit."""
     if value is None:
         return "none"
     if isinstance(value, bool):

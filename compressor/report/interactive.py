@@ -35,14 +35,14 @@ def publish_library(folder: Path) -> None:
 
 
 def script(name: str, sheet: Sheet) -> str:
-    """The script of a figure."""
+    """Return the script of a figure."""
     data = json.dumps(content(sheet), separators=(",", ":"), allow_nan=False)
     data = data.replace("<", "\\u003c")
     return f"compsimFigure({json.dumps(name)},{data});\n"
 
 
 def content(sheet: Sheet) -> dict[str, Any]:
-    """What a figure shows, as plain data. Panels with the same `link` are zoomed together.
+    """Return what a figure shows, as plain data. Panels with the same `link` are zoomed together.
 
     `unified`: all curves go from left to right, so that the values at one x are told together.
     """
@@ -76,19 +76,20 @@ def content(sheet: Sheet) -> dict[str, Any]:
 
 
 def titled(sheet: Sheet, panel: Panel) -> str:
-    """The title of a panel's x axis, or of one below it in the same column."""
+    """Return the title of a panel's x axis, or of one below it in the same column."""
     below = [one for one in sheet.panels if one.column == panel.column and one.row >= panel.row]
     return next((one.x.title for one in below if one.x.title), "")
 
 
 def unit(title: str) -> str:
-    """The unit in an axis' title: what stands in the last brackets."""
+    """Return the unit in an axis' title: what stands in the last brackets."""
     found = re.search(r"\(([^()]*)\)[^()]*$", title)
     return found[1] if found else ""
 
 
 def linked(scales: Sequence[Scale], way: str = "x") -> list[int]:
-    """A number for each scale, the same where scales show the same span of the same quantity.
+    """Return a number for each scale, the same where scales show the same span of the same
+    quantity.
 
     In x a title that is left out is that of the panels below.
     """
@@ -100,7 +101,7 @@ def linked(scales: Sequence[Scale], way: str = "x") -> list[int]:
 
 
 def axis(scale: Scale, others: Mapping[float, str] | None = None) -> dict[str, Any]:
-    """An axis as plain data; others: words of the axis that it is like."""
+    """Return an axis as plain data; others: words of the axis that it is like."""
     words = [[place, text] for place, text in (scale.words or others or {}).items()]
     found = {"title": scale.title, "range": [scale.low, scale.high], "log": scale.log}
     more = {"words": words, "step": scale.step, "bare": scale.bare}
@@ -108,13 +109,13 @@ def axis(scale: Scale, others: Mapping[float, str] | None = None) -> dict[str, A
 
 
 def note(one: Note) -> dict[str, Any]:
-    """A text, or a straight line, as plain data."""
+    """Return a text, or a straight line, as plain data."""
     place = {way: value for way in "xy" if not np.isnan(value := getattr(one, way))}
     return {"text": one.text, **place, "color": one.color, "dash": one.dash, "inside": one.inside}
 
 
 def shown(trace: Trace, panel: Panel) -> dict[str, Any]:
-    """A trace as plain data, with the points that its panel can show."""
+    """Return a trace as plain data, with the points that its panel can show."""
     found: dict[str, Any] = {
         "kind": trace.kind, "name": trace.name, "color": trace.color,
         "width": round(float(trace.width), 3), "dash": trace.dash, "marker": trace.marker,
@@ -138,7 +139,8 @@ def shown(trace: Trace, panel: Panel) -> dict[str, Any]:
 
 
 def visible(trace: Trace, panel: Panel) -> Any:
-    """The places of the points to draw: all, or where these are many the extremes of each pixel.
+    """Return the places of the points to draw: all, or where these are many the extremes of each
+    pixel.
 
     Of a curve in x from left to right only what lies in the panel, and a point on either side.
     """
@@ -161,7 +163,9 @@ def every(size: int, count: int) -> np.ndarray:
 
 
 def extremes(y: np.ndarray, count: int) -> np.ndarray:
-    """The places of the least and the greatest value of each of so many parts, and of the ends."""
+    """Return the places of the least and the greatest value of each of so many parts, and of the
+    ends.
+    """
     edges = np.linspace(0, y.size, count + 1).astype(int)[:-1]
     filled = np.where(np.isfinite(y), y, 0.0)
     least, greatest = np.minimum.reduceat(filled, edges), np.maximum.reduceat(filled, edges)
@@ -173,7 +177,7 @@ def extremes(y: np.ndarray, count: int) -> np.ndarray:
 
 
 def numbers(values: np.ndarray) -> Any:
-    """Numbers for the page: `[first, step, count]` where they are even, else base64."""
+    """Return the numbers for the page: `[first, step, count]` where they are even, else base64."""
     values = np.asarray(values, float)
     if values.size > 8 and np.isfinite(values).all():
         step = (values[-1] - values[0]) / (values.size - 1)
@@ -184,7 +188,7 @@ def numbers(values: np.ndarray) -> Any:
 
 
 def described(sheet: Sheet) -> str:
-    """What is seen in a figure, in words: its panels, their axes and curves."""
+    """Return what is seen in a figure, in words: its panels, their axes and curves."""
     told = []
     for panel in sheet.panels:
         names = dict.fromkeys(trace.name or trace.scale_name for trace in panel.traces)

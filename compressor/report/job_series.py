@@ -18,7 +18,7 @@ ACCELERATION, FORCE = "acceleration (m/s²)", "contact force (kN)"
 
 
 def job_scripts(stored: Stored, keys: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Key and script of the first jobs whose time series are kept."""
+    """Yield the key and script of the first jobs whose time series are kept."""
     found = 0
     for key in dict.fromkeys(keys):
         status = stored.status(key)
@@ -35,12 +35,12 @@ def job_scripts(stored: Stored, keys: Iterable[str]) -> Iterator[tuple[str, str]
 
 
 def series_name(key: str) -> str:
-    """The name of a job's script."""
+    """Return the name of a job's script."""
     return f"job-{key}"
 
 
 def job_sheet(run: xr.Dataset) -> Sheet:
-    """A job's acceleration and the size of its contact forces, over the last revolution."""
+    """Return a job's acceleration and the size of its contact forces, over the last revolution."""
     angle, turn = last_revolution(run)
     moved = Trace("line", "acceleration", angle, turn["acceleration"].values, color="#000000")
     sizes = 1e-3 * np.linalg.norm(turn["contact_force"].transpose("joint", "time", "axis"), axis=2)
@@ -57,7 +57,7 @@ def job_sheet(run: xr.Dataset) -> Sheet:
 
 
 def limits(traces: Iterable[Trace]) -> tuple[float, float]:
-    """The least and the greatest value of curves, with some room."""
+    """Return the least and the greatest value of curves, with some room."""
     values = np.concatenate([trace.y for trace in traces])
     low, high = float(values.min()), float(values.max())
     room = 0.05 * (high - low) or 1.0

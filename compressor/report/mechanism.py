@@ -48,7 +48,7 @@ class Mechanism:
 
 
 def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
-    """The mechanism of a case at a crank angle (degrees after top dead centre).
+    """Return the mechanism of a case at a crank angle (degrees after top dead centre).
 
     The slider-crank's closed form: the crosshead is at r cos θ + sqrt(l² - (r sin θ)²) from the
     crank's centre.
@@ -84,13 +84,13 @@ def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
 
 
 def mechanism_svg(case: Case, angle: float = ANGLE) -> Markup:
-    """The picture as SVG that stands in a page; its colours are those of the page."""
+    """Return the picture as SVG that stands in a page; its colours are those of the page."""
     text = templates().get_template("mechanism.svg").render(it=mechanism(case, angle))
     return Markup(text)
 
 
 def mechanism_words(case: Case) -> str:
-    """What the picture does not show: speed, masses and the pin."""
+    """Return what the picture does not show: speed, masses and the pin."""
     machine = case.machine
     pins = " and ".join(dict.fromkeys(f"{machine.pin_radius(joint):g}" for joint in JOINTS))
     return (

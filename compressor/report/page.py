@@ -82,7 +82,7 @@ class Running(NamedTuple):
 
 
 def templates() -> Environment:
-    """The page's templates: they escape what they print, and what they lack is an error."""
+    """Return the page's templates: they escape what they print, and what they lack is an error."""
     return Environment(
         loader=ChoiceLoader([PackageLoader(__package__), FunctionLoader(template_elsewhere)]),
         autoescape=True,
@@ -102,7 +102,7 @@ def template_elsewhere(name: str) -> str | None:
 def document(
     sections: Sequence[Section], jobs: Mapping[str, Any], running: Running | None = None
 ) -> str:
-    """The whole page: the first section, a list of contents, and the other sections.
+    """Return the whole page: the first section, a list of contents, and the other sections.
 
     jobs: by key what a click on a job's point tells, as plain data. running: how the run stands
     that the page is written beside.
@@ -113,6 +113,6 @@ def document(
 
 
 def restated(page: str, before: Running, now: Running) -> str:
-    """A page that was written beside a run, with how the run stands now."""
+    """Return a page that was written beside a run, with how the run stands now."""
     status = templates().get_template("status.html")
     return page.replace(status.render(running=before), status.render(running=now))

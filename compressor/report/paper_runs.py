@@ -24,12 +24,12 @@ class PaperRuns:
 
 
 def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns:
-    """The runs with the physics of the paper's cases."""
+    """Return the runs with the physics of the paper's cases."""
     return find_runs(stored, studies, paper_cases())
 
 
 def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
-    """Whether all stored jobs of a study, and at least one, are cases of the paper."""
+    """Return whether all stored jobs of a study, and at least one, are cases of the paper."""
     there = sum(at >= 0 for at in stored.rows.find([*study.keys]))
     labels = {case.physics_key for case in paper_cases().values()}
     return 0 < there == len(paper_candidates(stored, [study], labels))
@@ -38,7 +38,9 @@ def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
 def find_runs(
     stored: Stored, studies: Sequence[StoredStudy], cases: Mapping[str, Case]
 ) -> PaperRuns:
-    """The studies' runs with the physics of some cases by label; of several, the most exact."""
+    """Return the studies' runs with the physics of some cases by label; of several, the most
+    exact.
+    """
     labels = {case.physics_key: name for name, case in cases.items()}
     found: dict[str, xr.Dataset] = {}
     damaged = set()
@@ -60,7 +62,9 @@ def find_runs(
 def paper_candidates(
     stored: Stored, studies: Sequence[StoredStudy], physics: Collection[str]
 ) -> list[str]:
-    """The keys of the studies' stored jobs that simulate some physics, in the studies' order."""
+    """Return the keys of the studies' stored jobs that simulate some physics, in the studies'
+    order.
+    """
     keys = list(dict.fromkeys(key for study in studies for key in study.keys))
     positions = stored.rows.find(keys)
     wanted = np.array([*physics], "S")
@@ -69,12 +73,12 @@ def paper_candidates(
 
 
 def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
-    """What makes a run better than another of the same physics."""
+    """Return what makes a run better than another of the same physics."""
     return str(run["status"].item()) == "ok", "time" in run.dims, -run.attrs.get("rtol", math.inf)
 
 
 def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
-    """Why a case of the paper cannot be drawn."""
+    """Return why a case of the paper cannot be drawn."""
     if run is None:
         return "its file is damaged" if damaged else "not stored"
     if str(run["status"].item()) != "ok":
@@ -83,7 +87,7 @@ def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
 
 
 def case_files(labels: Collection[str]) -> dict[str, str]:
-    """Case files that give some of the paper's cases: the text of each by its name."""
+    """Return the case files that give some of the paper's cases: the text of each by its name."""
     files = {f"{name}.yaml": f"load: {load}" for name, load in LOADS.items() if name in labels}
     for fault in FAULTS:
         sizes = [f"{c:g}" for c in CLEARANCES if label(fault, c) in labels]
@@ -94,5 +98,5 @@ def case_files(labels: Collection[str]) -> dict[str, str]:
 
 
 def run_command(files: Iterable[str], results: Folder) -> str:
-    """The command that runs case files into a store, for a shell."""
+    """Return the command that runs case files into a store, for a shell."""
     return f"compsim run {' '.join(files)} -o {shlex.quote(str(results))}"

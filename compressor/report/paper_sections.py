@@ -38,7 +38,7 @@ class MissingFigures:
 def paper_sections(
     paper: PaperRuns, plates: Sequence[Plate]
 ) -> tuple[list[Section], list[Section]]:
-    """What there is of the paper: figures; claims, cases, and the load's printed numbers."""
+    """Return what there is of the paper: figures; claims, cases, and the load's printed numbers."""
     figures = [Section("figures", "The paper's figures", "figures.html", plates)] if plates else []
     if not paper.stored:
         return figures, []
@@ -51,7 +51,7 @@ def paper_sections(
 
 
 def cases_table(paper: PaperRuns) -> Table:
-    """A row for each of the paper's cases, stored or not."""
+    """Return a row for each of the paper's cases, stored or not."""
     known = [measures(run) for run in paper.stored.values()]
     shown = [m for m in MEASURES if any(m in some for some in known)]
     head = ["case", "status", *map(column_title, shown), "energy residual", "rtol", "job"]
@@ -74,20 +74,20 @@ def cases_table(paper: PaperRuns) -> Table:
 
 
 def value_of(measure: Measure, run: xr.Dataset) -> tuple[float, float]:
-    """A measure of one run and its error bar; nan where it has none."""
+    """Return a measure of one run and its error bar; nan where it has none."""
     if measure.variable not in run:
         return math.nan, math.nan
     return float(measure.of(run)), float(measure.bar(run))
 
 
 def spoken(name: str) -> str:
-    """A label of `paper_cases` in words."""
+    """Return a label of `paper_cases` in words."""
     fault, _, clearance = name.partition(" ")
     return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
 
 
 def printed_table() -> Table:
-    """The paper's numbers of the spring load beside those that follow from its equations."""
+    """Return the paper's numbers of the spring load beside those that follow from its equations."""
     rows = [
         Row([
             Cell(f"{c.quantity} ({c.unit})"),
@@ -101,7 +101,7 @@ def printed_table() -> Table:
 
 
 def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
-    """The figures that could not be drawn, what they lack, and how to get it."""
+    """Yield the figures that could not be drawn, what they lack, and how to get it."""
     lacking = {
         f"Figure {item.number}, {item.title}": [name for name in item.needs if name in paper.absent]
         for item in FIGURES

@@ -39,7 +39,7 @@ class Plotted:
 
 
 def chosen(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
-    """The figures that are wanted; PlotError where one is none of this thing."""
+    """Return the figures that are wanted; PlotError where one is none of this thing."""
     wrong = [name for name in what if name not in known]
     if wrong:
         raise PlotError(f"{thing} has no figure {wrong[0]!r}: it has {', '.join(known)}")

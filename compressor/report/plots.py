@@ -55,7 +55,7 @@ def write_plots(
 def job_figures(
     stored: Stored, studies: Sequence[StoredStudy], key: str, choice: PlotChoice
 ) -> Iterator[tuple[str, str, Drawing]]:
-    """Names, captions and drawings of a job that has time series."""
+    """Yield the names, captions and drawings of a job that has time series."""
     wanted = chosen(choice.what, [*JOB], f"job {key}")
     if choice.over or choice.at:
         raise PlotError(f"{key} is one job: --over and --at are for studies")
@@ -81,7 +81,7 @@ def job_figures(
 
 
 def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dataset:
-    """The job's Dataset with time series; PlotError says what to do where there are none."""
+    """Return the job's Dataset with time series; PlotError says what to do where there are none."""
     status = stored.status(key)
     if status is None:
         files = " ".join(study.case_file for study in studies if key in study.keys)
@@ -97,7 +97,7 @@ def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dat
 def study_figures(
     stored: Stored, study: StoredStudy, choice: PlotChoice
 ) -> Iterator[tuple[str, str, Drawing]]:
-    """Names, captions and drawings of a study along one axis."""
+    """Yield the names, captions and drawings of a study along one axis."""
     if choice.what and {*choice.what} <= {*JOB}:
         first = study.keys[0][:SHORT]
         raise PlotError(
@@ -122,7 +122,7 @@ def study_figures(
 
 
 def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]) -> str:
-    """Why no job of a study can be drawn, and what to do about it."""
+    """Return why no job of a study can be drawn, and what to do about it."""
     problems = {row.problem for row in rows}
     cures = {
         "failed": f"compsim status -i {stored.folder} tells why",
@@ -135,7 +135,9 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
 
 
 def axis_of(study: StoredStudy, wanted: str) -> str:
-    """The key of the axis that is meant; by default a clearance, then the speed, then the first."""
+    """Return the key of the axis that is meant; by default a clearance, then the speed, then the
+    first.
+    """
     keys = [axis.key for axis in study.axes]
     if not wanted:
         ranked = [key for word in ("clearance", "speed") for key in keys if word in key]
@@ -175,7 +177,7 @@ def selected(study: StoredStudy, over: str, at: Sequence[str]) -> tuple[list[tup
 
 
 def value_of(study: StoredStudy, key: str, text: str) -> Any:
-    """The value of an axis that a text means; PlotError lists them."""
+    """Return the value of an axis that a text means; PlotError lists them."""
     (values,) = (axis.values for axis in study.axes if axis.key == key)
     for value in values:
         if text in (str(value), shown(value)):
@@ -185,7 +187,7 @@ def value_of(study: StoredStudy, key: str, text: str) -> Any:
 
 
 def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
-    """What one job tells, or why it tells nothing."""
+    """Return what one job tells, or why it tells nothing."""
     name, status = shown(value) if value != "" else key[:SHORT], stored.status(key)
     if status is None or status.status != "ok" or not status.samples:
         problem = "not run" if status is None else "failed" if status.reason else "no series"
@@ -204,6 +206,6 @@ def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
 
 
 def shown(value: Any) -> str:
-    """A swept value in few characters."""
+    """Return a swept value in few characters."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return f"{value:g}" if number else str(value)

@@ -28,7 +28,7 @@ class Provenance:
 
 
 def provenance_section(studies: Sequence[StoredStudy], results: Folder, command: str) -> Section:
-    """What made this page now, and the studies it is about."""
+    """Return what made this page now, and the studies it is about."""
     versions = library_versions(*LIBRARIES)
     content = Provenance(
         program=f"{PROGRAM}, model {MODEL}",

@@ -215,7 +215,7 @@ def drawn_study(
 def summarised(
     stored: Stored, own: Sequence[StoredStudy], paper: PaperRuns, drawn: Sequence[DrawnStudy]
 ) -> Answer:
-    """The page's first screen."""
+    """Return the page's first screen."""
     lines = [one.line for one in drawn]
     each: list[tuple[str, Sequence[Finding]]] = [(one.line.name, one.findings) for one in drawn]
     if paper.stored:
@@ -252,7 +252,7 @@ def remove_stale(report: Path, made: Made) -> None:
 
 
 def draw_paper(paper: PaperRuns) -> list[Plate]:
-    """Every figure of the paper whose cases are there."""
+    """Return every figure of the paper whose cases are there."""
     return [
         draw(f"figure-{item.number:02d}", f"Figure {item.number}: {item.title}",
              caption(item.number, paper.usable), item.draw(paper.usable))
@@ -262,7 +262,7 @@ def draw_paper(paper: PaperRuns) -> list[Plate]:
 
 
 def draw(name: str, heading: str, caption: str, drawing: Drawing) -> Plate:
-    """A drawing with what the page and its data tell of it."""
+    """Return a drawing with what the page and its data tell of it."""
     sheet = extract(drawing)
     jobs = dict.fromkeys(key for panel in sheet.panels for t in panel.traces for key in t.jobs)
     return Plate(

@@ -84,13 +84,14 @@ class SecondSetContent:
 def second_sets(
     stored: Stored, studies: Sequence[StoredStudy], paper: PaperRuns
 ) -> dict[str, SecondSet]:
-    """The second set of each study that has one, by the study's name."""
+    """Return the second set of each study that has one, by the study's name."""
     found = {study.name: second_set(stored, study, paper) for study in studies}
     return {name: one for name, one in found.items() if one}
 
 
 def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSet | None:
-    """A study's second set: None unless it holds all nine worn cases of just one other machine.
+    """Return a study's second set: None unless it holds all nine worn cases of just one other
+    machine.
 
     They must be alike in all but the fault, have ended well, and have time series that are
     `comparable`.
@@ -109,7 +110,7 @@ def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSe
 
 
 def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Case]]:
-    """`cases_of` each machine but the default one whose nine worn cases a study holds."""
+    """Yield `cases_of` each machine but the default one whose nine worn cases a study holds."""
     swept = {value for axis in study.axes for value in axis.values}
     if not swept >= {*FAULTS, *CLEARANCES}:
         return
@@ -134,12 +135,12 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
 
 
 def is_other(case: Case) -> bool:
-    """Whether a case is of another machine than the default one, whatever its span."""
+    """Return whether a case is of another machine than the default one, whatever its span."""
     return any(getattr(case, group) != getattr(Case(), group) for group in MACHINE)
 
 
 def comparable(runs: Collection[xr.Dataset]) -> bool:
-    """Whether runs can be drawn and judged together.
+    """Return whether runs can be drawn and judged together.
 
     They settle at one crank angle and have samples at the same ones, for a revolution or more, and
     so close that the lines above `ORDER`, which claim 7 reads, can be told.
@@ -151,7 +152,8 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
 
 
 def borrowed(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]:
-    """The default machine's runs without clearance, where those of a case's machine are the same.
+    """Return the default machine's runs without clearance, where those of a case's machine are the
+    same.
 
     Without clearance masses, contact and friction are not read: the motion is that of equal crank,
     rod, speed and span. loads: whether the loads on the piston are to be the same, too.
@@ -173,7 +175,7 @@ def borrowed(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]
 
 
 def second_drawings(found: SecondSet) -> Iterator[tuple[str, str, str, Drawing]]:
-    """Names, headings, captions and drawings of the figures whose runs there are."""
+    """Yield the names, headings, captions and drawings of the figures whose runs there are."""
     for item in SET:
         if found.drawn.keys() >= {*item.needs}:
             heading = f"Figure {item.number} of {found.study}: {item.title}"
@@ -182,19 +184,19 @@ def second_drawings(found: SecondSet) -> Iterator[tuple[str, str, str, Drawing]]
 
 
 def second_name(study: str, figure: PaperFigure) -> str:
-    """The name of a figure's files in a study's second set."""
+    """Return the name of a figure's files in a study's second set."""
     return file_name(study, f"figure-{figure.number:02d}")
 
 
 def second_anchor(study: str) -> str:
-    """The id of the section of a second set."""
+    """Return the id of the section of a second set."""
     return file_name("figures", study)
 
 
 def second_section(
     found: SecondSet, plates: Sequence[Plate], first: Sequence[Plate], table: str
 ) -> Section:
-    """A second set on the page: how its machine differs, figures, and claims.
+    """Return a second set on the page: how its machine differs, figures, and claims.
 
     plates: of `second_drawings`; first: of the first set; table: the id of the study's section.
     """
@@ -212,5 +214,5 @@ def second_section(
 
 
 def numbered(figures: Sequence[PaperFigure]) -> str:
-    """Figures by their numbers, such as `Figures 8, 11, 14`."""
+    """Return the figures by their numbers, such as `Figures 8, 11, 14`."""
     return f"Figures {', '.join(str(figure.number) for figure in figures)}"

@@ -115,24 +115,25 @@ def study_sections(
 
 
 def table_anchor(study: str) -> str:
-    """The id of the section with a study's table."""
+    """Return the id of the section with a study's table."""
     return file_name("jobs", study)
 
 
 def file_name(*words: str) -> str:
-    """Words as an id or the name of a file."""
+    """Return the words as an id or the name of a file."""
     return re.sub(r"[^A-Za-z0-9._-]", "_", "-".join(words))
 
 
 def job_counts(data: xr.Dataset) -> Counts:
-    """How many jobs of a study are ok, failed or were not run."""
+    """Return how many jobs of a study are ok, failed or were not run."""
     status = data["status"].values
     failed, missing = int((status == "failed").sum()), int((status == "missing").sum())
     return Counts(status.size - failed - missing, failed, missing)
 
 
 def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """What a click on the point of a job tells: where it is in the sweep, how it ended, a command.
+    """Return what a click on the point of a job tells: where it is in the sweep, how it ended, a
+    command.
 
     keys: of the jobs, of which the first MOST_FACTS are told of.
     """
@@ -152,7 +153,7 @@ def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[st
 
 
 def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
-    """Where in the sweep jobs failed, and what is known of each; the first of many."""
+    """Return where in the sweep jobs failed, and what is known of each; the first of many."""
     failed = np.flatnonzero(data["status"].values == "failed")
     swept = swept_values(data)
     told = []
@@ -166,7 +167,7 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
 
 
 def jobs_table(data: xr.Dataset) -> Table:
-    """A row for every job of a study, as far as a page can hold them."""
+    """Return a row for every job of a study, as far as a page can hold them."""
     swept, shown = swept_values(data), measures(data)
     metrics = [(m, ravelled(m.of(data)), ravelled(m.bar(data))) for m in shown]
     words = ("status", "reason", "regime", "key")
@@ -182,12 +183,12 @@ def jobs_table(data: xr.Dataset) -> Table:
 
 
 def ravelled(values: xr.DataArray) -> np.ndarray:
-    """A study's values in a row, a job after the other."""
+    """Return a study's values in a row, a job after the other."""
     return values.values.ravel()
 
 
 def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:
-    """The swept values of a study's jobs, in the order of its `status`, by coordinate."""
+    """Return the swept values of a study's jobs, in the order of its `status`, by coordinate."""
     status = data["status"]
     names = [str(n) for n, c in data.coords.items() if {*c.dims} <= {*status.dims} and n != "key"]
     return {

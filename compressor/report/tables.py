@@ -43,7 +43,7 @@ class Table:
 
 
 def number(value: float) -> str:
-    """A measured number to four significant digits; a dash for nan."""
+    """Return a measured number to four significant digits; a dash for nan."""
     size = abs(value)
     if math.isnan(value):
         return "–"
@@ -55,7 +55,7 @@ def number(value: float) -> str:
 
 
 def number_cell(value: float) -> Cell:
-    """One measured number."""
+    """Return one measured number."""
     return Cell(number(value), "number", None if math.isnan(value) else value)
 
 
@@ -67,19 +67,19 @@ def measured(measure: Measure, value: float, bar: float) -> str:
 
 
 def measured_cell(measure: Measure, value: float, bar: float) -> Cell:
-    """A metric and its error bar."""
+    """Return a metric and its error bar."""
     return Cell(measured(measure, value, bar), "number", None if math.isnan(value) else value)
 
 
 def value_cell(value: Any) -> Cell:
-    """A setting of a job: a number as the case file may give it, or a word."""
+    """Return a setting of a job: a number as the case file may give it, or a word."""
     if isinstance(value, int | float | np.number):
         return Cell(f"{value:.10g}", "number")
     return Cell(str(value))
 
 
 def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> Row:
-    """A job's row, marked where the job failed, is missing, or is chaotic."""
+    """Return a job's row, marked where the job failed, is missing, or is chaotic."""
     if status == "failed":
         return Row(cells, "failed", key)
     if status == "missing":
@@ -88,11 +88,11 @@ def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "")
 
 
 def ending(status: object, reason: object, regime: object = "") -> str:
-    """How a job ended, in words, and how its motion goes, if it is known."""
+    """Return how a job ended, in words, and how its motion goes, if it is known."""
     said = reason or regime
     return f"{status}: {said}" if said else str(status)
 
 
 def column_title(measure: Measure) -> str:
-    """What stands above a measure's column."""
+    """Return what stands above a measure's column."""
     return measure.title + (f" ({measure.unit})" if measure.unit else "")

@@ -81,7 +81,7 @@ class Solution:
     reversal_bars: Metrics = field(default_factory=dict)
 
     def journals_apart(self, other: "Solution") -> float:
-        """Greatest distance of the journals of two runs of a case, over their room."""
+        """Return the greatest distance of the journals of two runs of a case, over their room."""
         return journal_distance(self.p, self.samples, other.samples)
 
 
@@ -93,7 +93,7 @@ def attempt(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
     state: np.ndarray | None = None,
 ) -> Solution:  # fmt: skip
-    """One run of a case at a tolerance, without errors, within a wall time (s).
+    """Return one run of a case at a tolerance, without errors, within a wall time (s).
 
     `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
     without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
@@ -125,7 +125,7 @@ class Times(NamedTuple):
 
 
 def times_of(case: Case, sampled: bool) -> Times:
-    """The times at which a run of a case is sampled."""
+    """Return the times at which a run of a case is sampled."""
     samples = finer(case) * round(case.steps) if sampled else 1
     output = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else output[:0]
@@ -140,7 +140,7 @@ def times_of(case: Case, sampled: bool) -> Times:
 def request(
     case: Case, rtol: float, p: np.record, times: Times, state: np.ndarray | None = None
 ) -> Request:
-    """What `attempt` asks to be integrated, without a limit in wall time."""
+    """Return what `attempt` asks to be integrated, without a limit in wall time."""
     how = case.solve
     if state is None:
         y = initial_state(case, p)
@@ -151,7 +151,7 @@ def request(
 
 
 def concluded(rtol: float, p: np.record, times: Times, trajectory: Trajectory) -> Solution:
-    """What an attempt's trajectory tells."""
+    """Return what an attempt's trajectory tells."""
     loads = np.empty((0, COLUMNS))
     if times.loaded.size:
         stay = np.union1d(times.output, times.compared)
@@ -166,13 +166,16 @@ def concluded(rtol: float, p: np.record, times: Times, trajectory: Trajectory) -
 
 
 def companion_rtol(p: np.record, rtol: float) -> float | None:
-    """The tolerance of a run's `companion`, if that is by the run's own method and tighter."""
+    """Return the tolerance of a run's `companion`, if that is by the run's own method and
+    tighter.
+    """
     fits = rtol >= 0.99 * TIGHTER * TIGHTEST and not overruns_friction(p, rtol)
     return rtol / TIGHTER if fits else None
 
 
 def overruns_friction(p: np.record, rtol: float) -> bool:
-    """Whether explicit steps may run over friction's fast modes, or over the turn of its sign.
+    """Return whether explicit steps may run over friction's fast modes, or over the turn of its
+    sign.
 
     Then two explicit runs may agree on a force that friction never has.
     """
@@ -185,7 +188,8 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
 def companion(
     case: Case, solution: Solution, timeout: float, ahead: Ahead = NOTHING_AHEAD
 ) -> Solution:
-    """The run that a run's errors are estimated by, where no looser one is there: a tighter one.
+    """Return the run that a run's errors are estimated by, where no looser one is there: a tighter
+    one.
 
     At the tightest tolerance, a looser one. Where explicit steps may run over friction, the stiff
     method is asked.
@@ -200,7 +204,7 @@ def companion(
 
 
 def witness(case: Case, solution: Solution, other: Solution, timeout: float) -> Solution | None:
-    """A looser run, by which errors are estimated as well where the motion enlarges them.
+    """Return a looser run, by which errors are estimated as well where the motion enlarges them.
 
     other: its `companion`. None where there is no need, or the run does not reach its end.
     """
@@ -224,6 +228,6 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
 
 
 def by_run(solution: Solution, other: Solution) -> Companion:
-    """What another run that reached its end tells of a run."""
+    """Return what another run that reached its end tells of a run."""
     apart = distances(solution.samples, other.samples)
     return Companion(other.metrics, other.rtol / solution.rtol, apart)

@@ -32,7 +32,7 @@ class Reynolds(NamedTuple):
 
 
 def reynolds(eps: float, ratio: float, squeeze: int = 0, grid: tuple[int, int] = GRID) -> Reynolds:
-    """Sommerfeld numbers of a film at an eccentricity, for B / D = ratio.
+    """Return the Sommerfeld numbers of a film at an eccentricity, for B / D = ratio.
 
     squeeze: 0 of a film that turns, 1 of one that is pressed, -1 of one that is pulled apart.
     """
@@ -53,7 +53,7 @@ def forces(
 def _forces(
     eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int]
 ) -> np.ndarray:
-    """Both numbers on one grid, (2,)."""
+    """Return both numbers on one grid, (2,)."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.linalg import spsolve
 
@@ -99,12 +99,12 @@ def _forces(
 
 @lru_cache(maxsize=64)
 def film_numbers(ratio: float, share: float) -> tuple[float, ...]:
-    """`film_constants` of a bearing's length over its diameter and a film's last share."""
+    """Return `film_constants` of a bearing's length over its diameter and a film's last share."""
     return film_constants(ratio, share, _number)
 
 
 def _number(shape: str, eps: float, ratio: float) -> float:
-    """Reynolds' number in place of a shape's."""
+    """Return Reynolds' number in place of a shape's."""
     if shape == "squeeze":
         way = 1 if eps >= 0.0 else -1
         return way * reynolds(abs(eps), ratio, way).normal

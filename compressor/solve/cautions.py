@@ -62,7 +62,7 @@ class Caution:
 
 
 def remarks(case: Case) -> Iterator[Remark]:
-    """What is odd about a case by itself; nothing about the defaults."""
+    """Yield what is odd about a case by itself; nothing about the defaults."""
     joints = list(contact_scales(case))
     yield from _inertias(case)
     yield from _proportions(case)
@@ -84,7 +84,7 @@ def remarks(case: Case) -> Iterator[Remark]:
 
 
 def _inertias(case: Case) -> Iterator[Remark]:
-    """An inertia that no distribution of the rod's mass between its ends has."""
+    """Yield an inertia that no distribution of the rod's mass between its ends has."""
     machine = case.machine
     most = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2
     if (machine.rod_inertia_kg_m2 or 0.0) > most:
@@ -93,7 +93,7 @@ def _inertias(case: Case) -> Iterator[Remark]:
 
 
 def _proportions(case: Case) -> Iterator[Remark]:
-    """A crank that is long for its rod, as where the stroke is given as the crank radius."""
+    """Yield a crank that is long for its rod, as where the stroke is given as the crank radius."""
     radius, length = case.machine.crank_radius_mm, case.machine.rod_length_mm
     if radius > LONGEST_CRANK * length:
         text = (
@@ -104,13 +104,13 @@ def _proportions(case: Case) -> Iterator[Remark]:
 
 
 def _beyond_judged(case: Case) -> Iterator[Remark]:
-    """Values outside the range that the program was judged on."""
+    """Yield the values outside the range that the program was judged on."""
     for key, text in outside_judged(case.values()).items():
         yield Remark(key, text, "judged")
 
 
 def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
-    """Penetrations for which the contact law is not meant."""
+    """Yield the penetrations for which the contact law is not meant."""
     depth, clearance = 1000 * joint.penetration, 1000 * joint.clearance
     most, limit = greatest_depth(record(case))
     if joint.penetration > most:
@@ -133,7 +133,7 @@ def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
 
 
 def _default_stiffness(case: Case, joint: str) -> Iterator[Remark]:
-    """The paper's stiffness at a pin that is not the paper's."""
+    """Yield the paper's stiffness at a pin that is not the paper's."""
     contact, usual = case.contact, Contact()
     pin, clearance = case.machine.pin_radius(joint), getattr(case.clearance_mm, joint)
     if pin == Machine().pin_radius_mm or contact.law in CYLINDRICAL:
@@ -155,7 +155,7 @@ def _default_stiffness(case: Case, joint: str) -> Iterator[Remark]:
 
 
 def _rod(case: Case) -> Iterator[Remark]:
-    """An elastic rod that would buckle, or whose mass is not that of its section."""
+    """Yield an elastic rod that would buckle, or whose mass is not that of its section."""
     rod, machine = case.rod, case.machine
     if rod is None:
         return
@@ -174,7 +174,7 @@ def _rod(case: Case) -> Iterator[Remark]:
 
 
 def _drive(case: Case) -> Iterator[Remark]:
-    """A motor that cannot bear the load, by the mean torque of the ideal machine."""
+    """Yield a motor that cannot bear the load, by the mean torque of the ideal machine."""
     drive = case.drive
     if drive is None or case.load == "none":
         return
@@ -192,7 +192,7 @@ def _drive(case: Case) -> Iterator[Remark]:
 
 
 def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
-    """Budgets that are likely to run out."""
+    """Yield the budgets that are likely to run out."""
     solve, (steps, seconds) = case.solve, expected_cost(case, joints)
     if steps > SHORT * solve.max_steps:
         text = f"{solve.max_steps} steps, but about {steps:.1g} are expected"
@@ -203,7 +203,7 @@ def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
 
 
 def cautions(study: Study, most: int = MOST_JOBS) -> list[Caution]:
-    """What is odd about the selected jobs of a study, an entry for each oddity.
+    """Return what is odd about the selected jobs of a study, an entry for each oddity.
 
     A key whose values look like another unit's is told of as that alone. Of more than `most` jobs
     as many are looked at, drawn evenly and always the same, so that a large sweep takes no longer.

@@ -13,13 +13,15 @@ RUNGS = 2  # by tens of the tolerance, for a run that fails its audit to be repe
 
 
 def energy_residual(tally: np.record) -> float:
-    """Worst imbalance relative to the contact's losses, floored at 1e-3 of the kinetic energy."""
+    """Return the worst imbalance relative to the contact's losses, floored at 1e-3 of the
+    kinetic energy.
+    """
     lost = tally["damping_loss"] + tally["friction_loss"]
     return float(tally["worst_imbalance"] / max(lost, 1e-3 * tally["peak_kinetic"]))
 
 
 def allowed(rtol: float, revolutions: float) -> float:
-    """The greatest energy residual of a run that can be trusted at a tolerance.
+    """Return the greatest energy residual of a run that can be trusted at a tolerance.
 
     The 200 random cases of tests/random_cases.py leave a quarter of it at most at rtol 1e-4, a
     tenth at tighter ones (tests/results/accuracy.json). Runs beyond it, of extremes of stiffness,

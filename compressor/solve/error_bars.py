@@ -46,12 +46,16 @@ class Companion(NamedTuple):
 
 
 def closeness(ratio: float) -> float:
-    """The share of the error of a run some ratio looser by which a run's own one is bounded."""
+    """Return the share of the error of a run some ratio looser by which a run's own one is
+    bounded.
+    """
     return 1.0 if ratio < 1.0 else LOOSER * (ratio / TEN) ** -FALL
 
 
 def enlarged(rtol: float, apart: Mapping[str, Any]) -> bool:
-    """Whether a motion enlarges errors, by how far a run is apart from one at a like tolerance."""
+    """Return whether a motion enlarges errors, by how far a run is apart from one at a like
+    tolerance.
+    """
     return bool(apart["acceleration"] > ENLARGED * rtol**ORDER)
 
 
@@ -61,7 +65,7 @@ def longest(found: Sequence[Metrics]) -> Metrics:
 
 
 def ratio_of(share: float) -> float:
-    """The ratio of tolerances with a closeness."""
+    """Return the ratio of tolerances with a closeness."""
     return TEN * (LOOSER / share) ** (1.0 / FALL)
 
 
@@ -90,12 +94,12 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
 
 
 def spread(apart: Any, ndim: int) -> np.ndarray:
-    """A number, or one of each joint, in the shape of a metric over joints, and axes."""
+    """Return a number, or one of each joint, in the shape of a metric over joints, and axes."""
     return np.reshape(apart, np.shape(apart) + (1,) * (ndim - np.ndim(apart)))
 
 
 def series_errors(other: Companion | None) -> Metrics:
-    """The relative L2 error of each time series of a run; inf without another run."""
+    """Return the relative L2 error of each time series of a run; inf without another run."""
     if other is None:
         shape = {name: (2,) if "joint" in dims else () for name, (dims, _, _) in SERIES.items()}
         return {name: np.full(shape[name], np.inf) for name in SERIES}
@@ -105,7 +109,8 @@ def series_errors(other: Companion | None) -> Metrics:
 def unmet(
     targets: Sequence[tuple[str, float]], metrics: Mapping[str, Any], error: Mapping[str, Any]
 ) -> list[str]:
-    """What to say of each metric whose relative bar, at its worst joint, is longer than asked for.
+    """Return what to say of each metric whose relative bar, at its worst joint, is longer than
+    asked for.
 
     A metric of 0, such as the penetration of an ideal joint, is met by a bar of 0 alone.
     """
@@ -118,7 +123,7 @@ def unmet(
 
 
 def beyond(metric: Any, bar: Any) -> float:
-    """The relative length of a metric's error bar at its worst joint; 0 where both are 0."""
+    """Return the relative length of a metric's error bar at its worst joint; 0 where both are 0."""
     size, length = np.ravel(np.abs(metric)), np.ravel(bar)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.where(length > 0.0, length / size, 0.0).max())

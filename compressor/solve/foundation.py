@@ -24,7 +24,7 @@ BODY = {  # over time and these dimensions: (dimensions, unit, long name)
 
 
 def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
-    """The body's motion on the output grid, and the sensor's record in time of its own.
+    """Return the body's motion on the output grid, and the sensor's record in time of its own.
 
     rows: observed at the grid that is `finer`, (m, COLUMNS). A steady body is nan before the
     machine has settled; all is nan, and there is no record, of a run that did not reach its end.
@@ -70,7 +70,9 @@ def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
 
 
 def sensor_variables(record: "Record") -> Variables:
-    """A sensor's record: its samples and the tacho's pulses, each with a dimension of its own."""
+    """Return a sensor's record: its samples and the tacho's pulses, each with a dimension of its
+    own.
+    """
     since = "time since the record's begin"
     return {
         "sensor_time": (("sensor_time",), record.times, {"units": "s", "long_name": since}),
@@ -89,7 +91,7 @@ def sensor_variables(record: "Record") -> Variables:
 
 
 def one_way_errors(case: Case, velocities: tuple, step: float) -> list[float]:
-    """The bound by axis, from the spectrum of each velocity at equal steps (s)."""
+    """Return the bound by axis, from the spectrum of each velocity at equal steps (s)."""
     from compressor.vibration import line_amplitudes
 
     found = []

@@ -42,7 +42,7 @@ RTOL = 1e-12  # of the twins, whatever the case asks for
 def predictability_horizon(
     case: Case, timeout: float = math.inf, rtol: float = RTOL, close: float = CLOSE
 ) -> float:
-    """Time (s) until a twin, shifted by 1e-9 of the clearance, is 1 % of the clearance away.
+    """Return time (s) until a twin, shifted by 1e-9 of the clearance, is 1 % of the clearance away.
 
     The journal of each joint with clearance is shifted, as much along x as along y; the distance
     is that of the eccentricities at the worse joint, seen at the end of each step. inf where the

@@ -28,7 +28,7 @@ PIECES_A_LOOK = 256  # of the quadrature between two looks at the clock
 def closed_form(
     p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf
 ) -> Trajectory:
-    """The trajectory of ideal joints over an output grid, without integration.
+    """Return the trajectory of ideal joints over an output grid, without integration.
 
     `pieces`: into which each stretch between load corners, or each revolution in it, is cut;
     `timeout`: wall time (s) that it may take.
@@ -63,7 +63,9 @@ def closed_form(
 
 
 def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
-    """Points that cut every segment of the ideal motion into pieces a quadrature resolves."""
+    """Return the points that cut every segment of the ideal motion into pieces a quadrature
+    resolves.
+    """
     grids = []
     for begin, end in itertools.pairwise(edges):
         count = pieces * math.ceil((end - begin) / turn - 1e-9)

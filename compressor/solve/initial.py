@@ -22,7 +22,9 @@ SHIFT = 1e-7  # m, by which its modes are moved to learn how they answer
 
 
 def initial_state(case: Case, p: np.record, shift: np.ndarray | float = 0.0) -> np.ndarray:
-    """The state at time 0, journals as offset by the case and by a shift (m), (joint, axis)."""
+    """Return the state at time 0, journals as offset by the case and by a shift (m), (joint,
+    axis).
+    """
     y = np.zeros(len(state_names(p)))
     start(offsets(case) + shift, y, p)
     if is_featured(p) and p["elastic"]:

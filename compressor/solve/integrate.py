@@ -25,7 +25,9 @@ from compressor.solve.scipy_driver import step_through
 
 
 def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndarray]:
-    """What a request begins with: an empty trajectory, the load's edges and phases, the motion."""
+    """Return what a request begins with: an empty trajectory, the load's edges and phases, the
+    motion.
+    """
     edges, phases = segments(request.p, float(request.times[-1]))
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)

@@ -24,7 +24,8 @@ LEAST, MOST = 10.0, 1000.0  # times tighter that the next run may be
 
 
 def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
-    """The first run that balances and keeps its promise, or the last whole one as a failed job.
+    """Return the first run that balances and keeps its promise, or the last whole one as a failed
+    job.
 
     A first run is compared with one a little tighter, and with a looser one, too, where the motion
     enlarges errors. Each further one is as much tighter as its errors are expected to need. It is
@@ -106,12 +107,14 @@ def recheck(
 
 
 def promises(case: Case) -> bool:
-    """Whether a case's accuracy promises an error, and not only sets a tolerance."""
+    """Return whether a case's accuracy promises an error, and not only sets a tolerance."""
     return case.wants_bars and case.solve.rtol is None
 
 
 def over_promise(case: Case, solution: Solution) -> float:
-    """The greatest estimated error over what accuracy promises; 0 where it promises nothing."""
+    """Return the greatest estimated error over what accuracy promises; 0 where it promises
+    nothing.
+    """
     if case.targets:
         return max(
             beyond(solution.metrics[name], solution.bars[name]) / target
@@ -121,12 +124,12 @@ def over_promise(case: Case, solution: Solution) -> float:
 
 
 def lost(solution: Solution) -> bool:
-    """Whether a run's acceleration is as far from another's as chaotic motions are."""
+    """Return whether a run's acceleration is as far from another's as chaotic motions are."""
     return solution.series_errors["acceleration"] >= DOUBTFUL
 
 
 def further(excess: float, ratio: float) -> float:
-    """How many times tighter than both of a pair the next run is to be.
+    """Return how many times tighter than both of a pair the next run is to be.
 
     excess: of the pair's estimate over what is promised; ratio: of their tolerances.
     """
@@ -135,19 +138,19 @@ def further(excess: float, ratio: float) -> float:
 
 
 def short(rtol: float) -> float:
-    """A tolerance that is told in two digits."""
+    """Return a tolerance that is told in two digits."""
     return float(f"{rtol:.1e}")
 
 
 def balanced(case: Case, solution: Solution) -> bool:
-    """Whether the energy of a whole run balances as well as the case asks for."""
+    """Return whether the energy of a whole run balances as well as the case asks for."""
     return energy_residual(solution.trajectory.tally) <= allowed(
         case.rtol, case.duration / case.turn
     )
 
 
 def cut_short(case: Case, best: Solution | None, now: Solution, search: Search) -> Solution:
-    """What is left of a case whose present run did not reach its end."""
+    """Return what is left of a case whose present run did not reach its end."""
     if best is None or now.reason not in OUT_OF_BUDGET:
         return now
     detail = f"the next run: {search.limit_of(now.trajectory) or now.detail}"
@@ -157,7 +160,7 @@ def cut_short(case: Case, best: Solution | None, now: Solution, search: Search) 
 
 
 def unbalanced(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
-    """A whole run as a failed job: its series and energies are kept, its metrics are not."""
+    """Return a whole run as a failed job: its series and energies are kept, its metrics are not."""
     residual = energy_residual(best.trajectory.tally)
     most = allowed(case.rtol, case.duration / case.turn)
     best.metrics, best.bars, best.series_errors = {}, {}, {}
@@ -169,7 +172,7 @@ def unbalanced(case: Case, best: Solution, detail: str, reason: str = "") -> Sol
 
 
 def short_of(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
-    """A run with its errors as a failed job, since they are larger than promised."""
+    """Return a run with its errors as a failed job, since they are larger than promised."""
     timed_out = reason == Reason.BUDGET_SECONDS
     best.reason = reason if timed_out else Reason.ACCURACY_NOT_REACHED
     best.detail = "; ".join([*missed(case, best), f"at rtol {best.rtol:.2g}", detail])
@@ -177,7 +180,7 @@ def short_of(case: Case, best: Solution, detail: str, reason: str = "") -> Solut
 
 
 def missed(case: Case, solution: Solution) -> list[str]:
-    """What a run promised and does not keep, a message each."""
+    """Return what a run promised and does not keep, a message each."""
     if case.targets:
         return unmet(case.targets, solution.metrics, solution.bars)
     error = solution.series_errors["acceleration"]

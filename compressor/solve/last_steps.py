@@ -14,7 +14,7 @@ from compressor.solve.request import LAST, History
 
 
 def retrace(before: Standing, after: Standing, march: March) -> History:
-    """The history of a march that stood like `before` and stopped like `after`.
+    """Return the history of a march that stood like `before` and stopped like `after`.
 
     `before` is written.
     """
@@ -38,7 +38,7 @@ def retrace(before: Standing, after: Standing, march: March) -> History:
 
 
 def attempted(now: np.record, then: np.record, end: float) -> float:
-    """Length (s) of the step that was attempted, by the rules of `march`."""
+    """Return the length (s) of the step that was attempted, by the rules of `march`."""
     if then.steps > now.steps:
         return float(then.t - now.t)
     if now.landing > 0.0 or now.h == 0.0:
@@ -50,7 +50,7 @@ def attempted(now: np.record, then: np.record, end: float) -> float:
 def scaled_error(
     now: Standing, then: Standing, step: float, rtol: float, size: np.ndarray
 ) -> np.ndarray:
-    """Estimated error of each number of the motion over its tolerance, (n,)."""
+    """Return the estimated error of each number of the motion over its tolerance, (n,)."""
     n = now.z.size - FLOWS
     error = step_error(now.walker, now.work.k, then.work.k, step)[:n]
     largest = np.maximum(np.abs(now.z[:n]), np.abs(then.work.new[:n]))
@@ -58,13 +58,13 @@ def scaled_error(
 
 
 def dominant(scaled: np.ndarray, new: np.ndarray) -> int:
-    """The number of the state that went bad first, or has the largest error."""
+    """Return the number of the state that went bad first, or has the largest error."""
     bad = np.flatnonzero(~np.isfinite(new) | ~np.isfinite(scaled))
     return int(bad[0]) if bad.size else int(np.abs(scaled).argmax())
 
 
 def described(now: np.record, then: np.record) -> str:
-    """Method of an attempt, and what became of it."""
+    """Return the method of an attempt, and what became of it."""
     method = "RODAS" if now.stiff else Pair(int(now.pair)).name
     if then.steps > now.steps:
         return f"{method} to an onset" if now.landing > 0.0 else f"{method} taken"

@@ -50,11 +50,11 @@ class Leg:
     detail: str = ""
 
     def numbers(self, last: int) -> Metrics:
-        """The metrics of the last so many revolutions together."""
+        """Return the metrics of the last so many revolutions together."""
         return metrics(self.p, merged(self.turns[-last:]))
 
     def rms_error(self, last: int) -> float:
-        """The standard error of rms_acceleration over the last so many revolutions (m/s2).
+        """Return the standard error of rms_acceleration over the last so many revolutions (m/s2).
 
         By batch means (`compressor.solve.statistics`); inf where there are too few.
         """
@@ -119,7 +119,8 @@ def settle(case: Case, state: np.ndarray | None, span: Stretch) -> tuple[Leg, fl
 
 
 def with_samples(case: Case, state: np.ndarray, span: Stretch) -> tuple[Table, str, str]:
-    """A leg as a run with time series on the case's output grid, measured from its second turn on.
+    """Return a leg as a run with time series on the case's output grid, measured from its second
+    turn on.
 
     What its Dataset is made of, and the reason and detail where it did not come to its end.
     """
@@ -130,7 +131,9 @@ def with_samples(case: Case, state: np.ndarray, span: Stretch) -> tuple[Table, s
 
 
 def leg_case(case: Case, count: int) -> Case:
-    """A case over so many revolutions, all of them measured, of which nothing else is wanted."""
+    """Return a case over so many revolutions, all of them measured, of which nothing else is
+    wanted.
+    """
     of = spanned(case, 0.0, 1, float(count))
     how = replace(of.solve, error_bars=False, accuracy="standard", horizon=False)
     return replace(of, solve=how, output=replace(of.output, keep="series", signals=False))
@@ -163,7 +166,7 @@ class Course:
         return self.enough(self.turns, np.array(self.points))
 
     def leg(self, run: Solution) -> Leg:
-        """The leg that a run along it has made."""
+        """Return the leg that a run along it has made."""
         count = len(self.turns)
         shape = (count, len(JOINTS), 2 * len(AXES))
         points = np.array(self.points[:count]).reshape(shape)
@@ -173,7 +176,7 @@ class Course:
 
 
 def eccentricities(p: np.record, at: float, state: np.ndarray) -> np.ndarray:
-    """Eccentricity (m) and its rate (m/s) of both joints at a time (s), (joint, 4).
+    """Return the eccentricity (m) and its rate (m/s) of both joints at a time (s), (joint, 4).
 
     The rate is the central difference of the eccentricity, which is geometry alone, along the
     motion: its error is that of the third derivative over a millionth of a revolution.

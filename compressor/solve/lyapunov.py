@@ -63,7 +63,7 @@ class Exponent(NamedTuple):
 
 
 def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: float) -> Exponent:
-    """The largest Lyapunov exponent of a case's motion from a state on.
+    """Return the largest Lyapunov exponent of a case's motion from a state on.
 
     state: the motion, (2 n,) in m, rad and their rates, at a whole revolution (crank angle 0), as
     `Request.start` takes it; revolutions: how many are counted, after `TURNING` or a quarter as
@@ -100,7 +100,7 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
 def growths(
     follow: Callable[[np.ndarray], np.ndarray], push: np.ndarray, count: int, least: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Growth ln(d / d0) of a difference in each of `count` intervals, and where it was lost.
+    """Return growth ln(d / d0) of a difference in each of `count` intervals, and where it was lost.
 
     follow: takes the difference at the begin of an interval, gives it at the end, and goes on to
     the next one; push: the first difference, whose length d0 all others get; least: a length that
@@ -120,7 +120,8 @@ def growths(
 
 
 def mean_with_error(values: np.ndarray) -> tuple[float, float]:
-    """Mean of values that follow on each other, (n,), and its 95 % half-length by batch means.
+    """Return the mean of values that follow on each other, (n,), and its 95 % half-length by batch
+    means.
 
     Of values that too few batches hold, the first are left out; inf where there is one batch.
     """
@@ -147,7 +148,7 @@ class _Twins:
         self.states = np.empty((ends.size, self.size.size))
 
     def follow(self, difference: np.ndarray) -> np.ndarray:
-        """The difference, in natural sizes, at the end of the next interval. Raises Stop."""
+        """Return the difference, in natural sizes, at the end of the next interval. Raises Stop."""
         request, walker, size, n = self.request, self.walker, self.size, self.size.size
         last = self.ends.pop(0)
         self.twin[:n] = self.z[:n] + difference * size

@@ -36,7 +36,7 @@ class Standing(NamedTuple):
     tally: np.record
 
     def copy(self) -> "Standing":
-        """A copy that a march may go on from."""
+        """Return a copy that a march may go on from."""
         work = Work(*(array.copy() for array in self.work))
         return Standing(self.walker.copy(), self.z.copy(), work, self.tally.copy())
 
@@ -62,7 +62,7 @@ class Snapshot(NamedTuple):
 
     @classmethod
     def of(cls, now: Standing) -> "Snapshot":
-        """A snapshot, in about a microsecond."""
+        """Return a snapshot, in about a microsecond."""
         work = now.work
         return cls(
             now.walker.tobytes(), now.z.copy(), work.k[0].copy(), work.row.copy(),
@@ -70,7 +70,7 @@ class Snapshot(NamedTuple):
         )  # fmt: skip
 
     def standing(self) -> Standing:
-        """A march as it stood then."""
+        """Return a march as it stood then."""
         work = new_work(self.z.size - FLOWS)
         work.k[0], work.row[:] = self.rates, self.row
         return Standing(
@@ -82,7 +82,7 @@ class Snapshot(NamedTuple):
 
 
 def unpacked(data: bytes, kind: np.dtype) -> np.record:
-    """A record of a kind, that compiled code may write, from its bytes."""
+    """Return a record of a kind, that compiled code may write, from its bytes."""
     return np.frombuffer(bytearray(data), kind).view(np.recarray)[0]
 
 
@@ -113,7 +113,7 @@ class March:
 
 
 def ready_walker(request: Request, size: np.ndarray) -> np.record:
-    """A walker at the start of a run by a compiled method; `size` as of `natural_sizes`."""
+    """Return a walker at the start of a run by a compiled method; `size` as of `natural_sizes`."""
     mode, pair = COMPILED[request.method]
     walker = new_walker(mode)
     walker["pair"], walker["rtol"] = pair, request.rtol

@@ -19,7 +19,8 @@ UNCONTROLLED = 1e12
 
 
 def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -> np.ndarray:
-    """Size of each number of a mechanism's state, (n,): deflections under the forces at hand.
+    """Return the size of each number of a mechanism's state, (n,): deflections under the forces at
+    hand.
 
     joints: length (m) and speed (m/s) of the journals in their bores; bristle: of bristles (m).
     """
@@ -58,7 +59,7 @@ def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -
 
 
 def _guide_sizes(p: np.record, force: float) -> tuple[float, float]:
-    """Length (m) and speed (m/s) of the crosshead in its guide, as of a journal."""
+    """Return the length (m) and speed (m/s) of the crosshead in its guide, as of a journal."""
     across = force * p["crank_ratio"] + p["reciprocating_mass"] * p["gravity"]
     stiffness, exponent = p["guide_stiffness"], p["guide_exponent"]
     depth = (across / stiffness) ** (1.0 / exponent)

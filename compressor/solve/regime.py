@@ -100,7 +100,7 @@ class Search:
         )
 
     def look(self, whole: bool) -> bool:
-        """Whether twins part, as far as is known.
+        """Return whether twins part, as far as is known.
 
         A short span is looked at first, of which most chaotic motions need no more, and the whole
         one only if so asked.
@@ -154,7 +154,7 @@ def load_twins(case: Case) -> float:
 
 
 def doubtful(metrics: Metrics, bars: Metrics) -> bool:
-    """Whether a metric's error bar reaches a tenth of it; shares and counts do not tell."""
+    """Return whether a metric's error bar reaches a tenth of it; shares and counts do not tell."""
     return any(
         beyond(metrics[name], bars[name]) >= DOUBTFUL
         for name, row in METRICS.items()
@@ -165,7 +165,7 @@ def doubtful(metrics: Metrics, bars: Metrics) -> bool:
 def repeats(
     case: Case, samples: np.ndarray, errors: Metrics
 ) -> tuple[int, float] | tuple[None, float]:
-    """Period of a motion in revolutions, and the revolution from which on it repeats itself.
+    """Return period of a motion in revolutions, and the revolution from which on it repeats itself.
 
     samples: observed rows at the times of `compressor.solve.series.compared_times`. Revolutions
     are the same if no series is farther apart than both its errors. None and nan where the settled

@@ -91,7 +91,7 @@ class Stop(Exception):
 
 
 def overdue(timeout: float) -> str:
-    """What is wrong with a run that takes longer (s)."""
+    """Return what is wrong with a run that takes longer (s)."""
     return f"more than {timeout:g} s of wall time"
 
 
@@ -117,7 +117,7 @@ def check_state(p: np.record, state: np.ndarray) -> None:
 
 
 def greatest_depth(p: np.record) -> tuple[float, str]:
-    """Penetration (m) beyond which a run stops, and what that is in words."""
+    """Return the penetration (m) beyond which a run stops, and what that is in words."""
     each = zip(p["stiffness"], p["clearance"].tolist(), p["pin_radius"].tolist(), strict=True)
     joints = [joint for joint in each if joint[1] > 0.0]
     tenth = IMPLAUSIBLE * min((pin for *_, pin in joints), default=math.inf)
@@ -128,5 +128,5 @@ def greatest_depth(p: np.record) -> tuple[float, str]:
 
 
 def too_deep(depth: float, p: np.record) -> str:
-    """What is wrong with a penetration (m)."""
+    """Return what is wrong with a penetration (m)."""
     return f"{depth * 1e3:.3g} mm, more than {greatest_depth(p)[1]}"

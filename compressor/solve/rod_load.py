@@ -19,14 +19,16 @@ SMALL_END = Column.FORCE + 2  # of the pin's force along x, positive in tension
 
 
 def reversal_times(case: Case) -> np.ndarray:
-    """The times (s) after settling at which the rod load is sampled; none without signals."""
+    """Return the times (s) after settling at which the rod load is sampled; none without
+    signals.
+    """
     span = case.duration - case.settle
     count = round(min(max(A_TURN * span / case.turn, FEWEST), MOST)) if case.output.signals else 0
     return case.settle + span / max(count, 1) * (np.arange(count) + 0.5)
 
 
 def reversal(rows: np.ndarray) -> Metrics:
-    """The `ROD_LOAD` numbers of observed rows, (m, COLUMNS); none without rows.
+    """Return the `ROD_LOAD` numbers of observed rows, (m, COLUMNS); none without rows.
 
     Each row stands in the middle of one of m equal steps. Between samples the load is a straight
     line, its peaks those of the samples.
@@ -51,7 +53,7 @@ def reversal(rows: np.ndarray) -> Metrics:
 
 
 def reversal_bars(rows: np.ndarray, other: Companion | None, others: np.ndarray) -> Metrics:
-    """The error bar of each number, by another run at the same times; inf without one.
+    """Return the error bar of each number, by another run at the same times; inf without one.
 
     What half as many samples would change stands for what is lost between samples. The bars are as
     careful as those of the metrics that were calibrated (`compressor.metrics.Bar`).

@@ -42,7 +42,7 @@ class JointScales:
 
 
 def greatest_force(p: np.record, joint: str) -> float:
-    """A bound of the force at a joint of the ideal machine (N): inertia and load.
+    """Return a bound of the force at a joint of the ideal machine (N): inertia and load.
 
     m R omega^2 (1 + R / L) of what reciprocates, at the big end m R omega^2 (1 + a R / L^2) of the
     rod as well, and the load's greatest value; in the machine they partly cancel.
@@ -56,7 +56,7 @@ def greatest_force(p: np.record, joint: str) -> float:
 
 
 def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
-    """The scales of a joint with clearance under a force (N).
+    """Return the scales of a joint with clearance under a force (N).
 
     A journal that the force holds against its bore can roll to and fro on the wall, on a circle of
     radius e, clearance and penetration. It swings like a pendulum, at sqrt(F / (m e)); m is what
@@ -87,14 +87,16 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
 
 
 def across(p: np.record, joint: str) -> float:
-    """Mass (kg) that moves with an end of the rod across the rod, the other end being held."""
+    """Return the mass (kg) that moves with an end of the rod across the rod, the other end being
+    held.
+    """
     centre, length = p["rod_centre"].item(), p["rod_length"].item()
     lever = length - centre if joint == "big_end" else centre
     return (p["rod_inertia"].item() + p["rod_mass"].item() * lever**2) / length**2
 
 
 def contact_scales(case: Case) -> Iterator[JointScales]:
-    """The scales of each joint with clearance under its greatest force."""
+    """Yield the scales of each joint with clearance under its greatest force."""
     if scene(case) == Scene.IDEAL:
         return
     p = record(case)

@@ -107,7 +107,9 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
 
 @cache
 def scipy_method(name: str) -> Any:
-    """SciPy's method of a name, loaded when first used: a third of what a short run would take."""
+    """Return SciPy's method of a name, loaded when first used: a third of what a short run would
+    take.
+    """
     from scipy import integrate as scipy_integrate
 
     return getattr(scipy_integrate, name)
@@ -125,7 +127,7 @@ class Segment:
         self.landings = Landings(p, right_hand_side.phase) if needs_landings(p) else None
 
     def run(self, z: np.ndarray) -> np.ndarray:
-        """Step to the segment's end and return state and flows there; raises Stop."""
+        """Return the step to the segment's end and return state and flows there; raises Stop."""
         result, t, bound = self.result, self.begin, self.end
         result.stop_time, result.stop_state = t, z[:-FLOWS]
         while t < self.end:
@@ -135,7 +137,7 @@ class Segment:
         return z
 
     def go(self, t: float, z: np.ndarray, bound: float) -> tuple[float, np.ndarray, float]:
-        """Step from (t, z) to a bound by a fresh solver, or until bodies meet within a step.
+        """Return step from (t, z) to a bound by a fresh solver, or until bodies meet within a step.
 
         Returns where it stands, and the next bound: that step is then to be taken again.
         """

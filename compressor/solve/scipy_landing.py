@@ -15,7 +15,7 @@ LANDED = 1e-3  # of a step: a gap that closes nearer to its end closes at its en
 
 
 def needs_landings(p: np.record) -> bool:
-    """Whether a record's law reads the speed at which bodies met."""
+    """Return whether a record's law reads the speed at which bodies met."""
     return bool(p["hysteresis"] != 0.0)
 
 
@@ -28,13 +28,13 @@ class Landings:
         self.deaf = [-np.inf, -np.inf]  # s up to which a gap's close is one that was landed on
 
     def depths(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Penetrations (m) of both joints, (m, 2), at times (s) and states (m, n)."""
+        """Return the penetrations (m) of both joints, (m, 2), at times (s) and states (m, n)."""
         rows = np.empty((times.size, COLUMNS))
         observe_all(times, states, np.full(times.size, self.phase), self.p, rows)
         return rows[:, Column.PENETRATION : Column.PENETRATION + 2]
 
     def within(self, begin: float, end: float, dense) -> float | None:
-        """When (s) a gap first closes within a step, or None; at its end none does."""
+        """Return when (s) a gap first closes within a step, or None; at its end none does."""
 
         def depths(times: np.ndarray) -> np.ndarray:
             return self.depths(times, np.ascontiguousarray(dense(times)[:-FLOWS].T))

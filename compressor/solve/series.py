@@ -31,7 +31,7 @@ FEWEST, MOST = 64, 20_000  # of these times over a settled part
 
 
 def rows_of(p: np.record, run: Trajectory) -> np.ndarray:
-    """Observed rows of a run at its times, (m, COLUMNS); nan from where it stopped.
+    """Return the observed rows of a run at its times, (m, COLUMNS); nan from where it stopped.
 
     Of a mechanism with features (m, WIDE), with what its guide bears.
     """
@@ -42,7 +42,9 @@ def rows_of(p: np.record, run: Trajectory) -> np.ndarray:
 
 
 def finer(case: Case) -> int:
-    """How many times finer than the output grid forces are sampled for the body and its sensor."""
+    """Return how many times finer than the output grid forces are sampled for the body and its
+    sensor.
+    """
     body = case.body
     if body is None:
         return 1
@@ -56,14 +58,15 @@ def finer(case: Case) -> int:
 
 
 def block(name: str, rows: np.ndarray) -> np.ndarray:
-    """A time series from observed rows, shape (m,), (m, joint) or (m, joint, axis)."""
+    """Return a time series from observed rows, shape (m,), (m, joint) or (m, joint, axis)."""
     shape = tuple(SIZES[dim] for dim in SERIES[name][0])
     column = COLUMN[name]
     return rows[:, column : column + math.prod(shape)].reshape(-1, *shape)
 
 
 def compared_times(case: Case) -> np.ndarray:
-    """The times (s) at which runs of a case are compared, from where it has settled to its end.
+    """Return the times (s) at which runs of a case are compared, from where it has settled to its
+    end.
 
     In each whole revolution at the same angles, so that revolutions can be compared, too.
     """
@@ -75,13 +78,15 @@ def compared_times(case: Case) -> np.ndarray:
 
 
 def a_turn(case: Case) -> int:
-    """How many of these times a revolution has; 0 where the run settles within no whole one."""
+    """Return how many of these times a revolution has; 0 where the run settles within no whole
+    one.
+    """
     revolutions = (case.duration - case.settle) / case.turn
     return round(min(A_TURN, max(1.0, MOST / revolutions))) if revolutions >= 1.0 else 0
 
 
 def take_samples(p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Observed rows at some of a run's times; the run keeps its samples at others.
+    """Return the observed rows at some of a run's times; the run keeps its samples at others.
 
     times, kept: subsets of `run.times`, s.
     """
@@ -99,7 +104,8 @@ def take_samples(p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndar
 
 @cache
 def places() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
-    """Where `distances` finds what it sums: columns, where each sum begins, and sums by name.
+    """Return where `distances` finds what it sums: columns, where each sum begins, and sums by
+    name.
 
     A vector's squares are one sum; a series over joints has two.
     """
@@ -117,7 +123,7 @@ def places() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
 
 
 def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
-    """The relative L2 distance of each time series of two runs, by joint where it has one.
+    """Return the relative L2 distance of each time series of two runs, by joint where it has one.
 
     ours, theirs: observed rows at the same times, (m, COLUMNS). 0 where both are 0.
     """
@@ -130,7 +136,8 @@ def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
-    """Greatest distance of the eccentricities of two runs, over the room; 0 for ideal joints.
+    """Return the greatest distance of the eccentricities of two runs, over the room; 0 for ideal
+    joints.
 
     ours, theirs: observed rows at the same times. A journal's room is its clearance, or how far it
     came if that is more.

@@ -63,7 +63,8 @@ def with_span(case: Case, search: Search) -> Settling:
 
 
 def spanned(case: Case, settle: float, period: int, duration: float | None = None) -> Case:
-    """A case with a number for where it settles (rev), and for its duration where that is a word.
+    """Return a case with a number for where it settles (rev), and for its duration where that is a
+    word.
 
     period (rev): of which whole ones are measured; duration (rev): in place of the case's.
     """
@@ -81,14 +82,18 @@ def spanned(case: Case, settle: float, period: int, duration: float | None = Non
 
 
 def least_promise(case: Case) -> float:
-    """The relative error that a case's accuracy promises; of one that promises none, standard's."""
+    """Return the relative error that a case's accuracy promises; of one that promises none,
+    standard's.
+    """
     if case.targets:
         return min(target for _, target in case.targets)
     return case.promise if math.isfinite(case.promise) else ACCURACY["standard"].promise
 
 
 def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
-    """The first of the last revolutions that agree, and their period; None where they do not."""
+    """Return the first of the last revolutions that agree, and their period; None where they do
+    not.
+    """
     for period in range(1, LONGEST + 1):
         needed = max(AGREEMENTS, period)
         first = len(turns) - needed - period
@@ -100,7 +105,9 @@ def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
 
 
 def agree(one: Metrics, other: Metrics, within: float) -> bool:
-    """Whether the metrics of two revolutions differ by less than a share; forces by the joint's."""
+    """Return whether the metrics of two revolutions differ by less than a share; forces by the
+    joint's.
+    """
     for name, row in METRICS.items():
         if not row.bar.relative:
             continue

@@ -26,19 +26,19 @@ NO_APPROACH = 1000.0  # mm/s: of laws that damp by none, and divide nothing by i
 
 
 def scene(case: Case) -> Scene:
-    """The scene of a case: a joint whose clearance is 0 is ideal, whatever `joint` names."""
+    """Return the scene of a case: a joint whose clearance is 0 is ideal, whatever `joint` names."""
     big, small = case.clearance_mm.big_end > 0, case.clearance_mm.small_end > 0
     return Scene(int(big) * Scene.BIG_END + int(small) * Scene.SMALL_END)
 
 
 def is_ideal(case: Case) -> bool:
-    """Whether nothing is integrated: ideal joints, and nothing else that may move."""
+    """Return whether nothing is integrated: ideal joints, and nothing else that may move."""
     play = case.guide is not None and case.guide.clearance_mm > 0
     return scene(case) == Scene.IDEAL and not (play or case.drive or case.rod)
 
 
 def record(case: Case, worn: np.ndarray | None = None) -> np.record:
-    """The record of a case, every number in SI.
+    """Return the record of a case, every number in SI.
 
     worn: what was worn off both bores (m), (joint, sector); None: they are round.
     """
@@ -65,14 +65,14 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
 
 
 def offsets(case: Case) -> np.ndarray:
-    """Initial offsets of the journals (m), shape (joint, axis)."""
+    """Return the initial offsets of the journals (m), shape (joint, axis)."""
     shift = case.initial_offset_mm
     rows = [[shift.big_end_x, shift.big_end_y], [shift.small_end_x, shift.small_end_y]]
     return np.array(rows) / 1000
 
 
 def stiffness_of(case: Case, joint: str) -> float:
-    """The contact stiffness of a joint, as of `joint_stiffness`."""
+    """Return the contact stiffness of a joint, as of `joint_stiffness`."""
     clearance = getattr(case.clearance_mm, joint)
     return joint_stiffness(case.contact, case.machine.pin_radius(joint), clearance)
 

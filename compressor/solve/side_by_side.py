@@ -45,8 +45,8 @@ class Asked(NamedTuple):
 
 
 def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
-    """The first attempts of each case, as far as lanes can make them: of scenes for which they
-    are compiled.
+    """Return the first attempts of each case, as far as lanes can make them: of scenes for which
+    they are compiled.
     """
     asked: dict[int, list[Asked]] = {number: [] for number in scenes}
     for number, case in enumerate(cases):
@@ -67,7 +67,7 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
 
 
 def suits(case: Case) -> bool:
-    """Whether a case may be simulated in lanes, by what it says of its solution."""
+    """Return whether a case may be simulated in lanes, by what it says of its solution."""
     how = case.solve
     ready = case.is_plain and not case.problems and how.method in LANE_METHODS
     ready = ready and how.settle_rev != "auto"
@@ -75,7 +75,7 @@ def suits(case: Case) -> bool:
 
 
 def attempts_of(number: int, case: Case) -> list[Asked]:
-    """What a case's first attempt needs, and its companion's."""
+    """Return what a case's first attempt needs, and its companion's."""
     case = spanned(case, float(case.solve.settle_rev), 1)
     p, sampled = record(case), case.output.keep == "series"
     found = [asked(number, case, case.rtol, p, times_of(case, sampled))]
@@ -88,7 +88,7 @@ def attempts_of(number: int, case: Case) -> list[Asked]:
 
 
 def tightened(one: Asked, rtol: float) -> Asked:
-    """The same attempt at another tolerance."""
+    """Return the same attempt at another tolerance."""
     walker = one.run.walker.copy()
     walker["rtol"] = rtol
     run, trajectory = one.run._replace(walker=walker), replace(one.trajectory)
@@ -96,7 +96,7 @@ def tightened(one: Asked, rtol: float) -> Asked:
 
 
 def asked(number: int, case: Case, rtol: float, p: np.record, times: Times) -> Asked:
-    """An attempt made ready."""
+    """Return an attempt made ready."""
     wanted = request(case, rtol, p, times)
     trajectory, edges, phases, z = ready(wanted)
     size = natural_sizes(p)
@@ -107,7 +107,7 @@ def asked(number: int, case: Case, rtol: float, p: np.record, times: Times) -> A
 
 
 def made(one: Asked, run: Run, each: float) -> Solution:
-    """An attempt whose run has reached its end; each: wall time (s) of an evaluation."""
+    """Return an attempt whose run has reached its end; each: wall time (s) of an evaluation."""
     walker, trajectory = run.walker, one.trajectory
     trajectory.states, trajectory.tally = run.states, run.tally
     trajectory.steps, trajectory.rejected = int(walker["steps"]), int(walker["rejected"])

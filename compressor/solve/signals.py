@@ -50,7 +50,7 @@ FEATURES: dict[str, tuple[Coordinate, str, str]] = {
 def features(
     p: np.record, states: np.ndarray, rows: np.ndarray
 ) -> dict[str, tuple[np.ndarray, str, str]]:
-    """The series that a mechanism's features add, by name: values (m,), unit, long name.
+    """Return the series that a mechanism's features add, by name: values (m,), unit, long name.
 
     states: (m, n); rows: observed there, (m, WIDE).
     """
@@ -68,7 +68,7 @@ def features(
 
 
 def passed(p: np.record, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Time (s) that has passed when the crank is where a steady one were at these times."""
+    """Return time (s) that has passed when the crank is where a steady one were at these times."""
     driven = is_featured(p) and p["driven"]
     return times + states[:, p["at"][Coordinate.CRANK] - 1] if driven else times
 

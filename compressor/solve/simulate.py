@@ -64,7 +64,8 @@ def simulate(case: Case) -> "xr.Dataset":
 
 
 def as_dataset(table: Table) -> "xr.Dataset":
-    """The Dataset of a table: the last one's like with other values, where shapes are the same.
+    """Return the Dataset of a table: the last one's like with other values, where shapes are the
+    same.
 
     To make one anew takes xarray three times as long: it compares each variable with all others.
     """
@@ -100,7 +101,7 @@ def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, Table]:
 
 
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
-    """The `Outcome` of a solution and what its Dataset is made of."""
+    """Return the `Outcome` of a solution and what its Dataset is made of."""
     kept = case.output.keep == "series"
     found = outcome(case, solution)
     more = series(case, solution) if kept else {}
@@ -115,13 +116,15 @@ def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
 
 
 def refused(case: Case) -> Outcome:
-    """The outcome of a case that no case file could ask for."""
+    """Return the outcome of a case that no case file could ask for."""
     detail = "; ".join(map(str, case.problems))
     return without_run(case.attributes(), Reason.INVALID_INPUT, detail)
 
 
 def series(case: Case, solution: Solution) -> dict[str, tuple]:
-    """The time series as xarray variables, with signals, body and sensor where they are wanted."""
+    """Return the time series as xarray variables, with signals, body and sensor where they are
+    wanted.
+    """
     p, every = solution.p, finer(case)
     whole = rows_of(p, solution.trajectory)
     rows, times = whole[::every], solution.trajectory.times[::every]
@@ -146,7 +149,7 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
 
 
 def outcome(case: Case, solution: Solution) -> Outcome:
-    """What is kept of a solution without its series."""
+    """Return what is kept of a solution without its series."""
     numbers = row()
     known = solution.metrics | solution.reversal | ledger(solution.p, solution.trajectory)
     errors = solution.bars | solution.series_errors | solution.reversal_bars
@@ -164,7 +167,7 @@ def outcome(case: Case, solution: Solution) -> Outcome:
 
 
 def attributes(case: Case, solution: Solution) -> dict[str, object]:
-    """What a reader of the file needs to know of the case and the program."""
+    """Return what a reader of the file needs to know of the case and the program."""
     trajectory = solution.trajectory
     attrs: dict[str, object] = {
         "Conventions": "SI units; forces act on the rod; the frame of the README",
@@ -207,7 +210,7 @@ def stop_time(p: np.record, run: Trajectory) -> float:
 
 
 def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:
-    """Where a run stopped, in which state, and how its last steps went."""
+    """Return where a run stopped, in which state, and how its last steps went."""
     trajectory = solution.trajectory
     history, names = trajectory.history, state_names(solution.p)
     flows = ("energy flow, J",) * FLOWS
@@ -226,6 +229,6 @@ def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:
 
 @cache
 def libraries() -> str:
-    """The libraries that results depend on, with their versions."""
+    """Return the libraries that results depend on, with their versions."""
     versions = library_versions("numpy", "scipy", "numba")
     return ", ".join(f"{name} {version}" for name, version in versions.items())

@@ -15,7 +15,7 @@ from compressor.solve.mechanism_sizes import mechanism_sizes
 
 
 def length_and_speed(p: np.record) -> tuple[float, float]:
-    """Length (m) and speed (m/s) that absolute tolerances are relative to.
+    """Return the length (m) and speed (m/s) that absolute tolerances are relative to.
 
     The length is the smaller of the clearance and the penetration under the forces at hand, but
     not below a thousandth of the latter; the speed is that length at the contact's frequency, or
@@ -36,7 +36,7 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
 
 
 def film_damping(p: np.record) -> float:
-    """Damping (N s/m) of a film that is pressed against the wall; 0 of dry joints.
+    """Return the damping (N s/m) of a film that is pressed against the wall; 0 of dry joints.
 
     Of the joint with the smaller clearance, whose film is the stiffer one.
     """
@@ -48,7 +48,8 @@ def film_damping(p: np.record) -> float:
 
 
 def natural_sizes(p: np.record) -> np.ndarray:
-    """Size of each number of the state: deviations (m, rad), their rates (per s), shape (2 n,).
+    """Return the size of each number of the state: deviations (m, rad), their rates (per s), shape
+    (2 n,).
 
     With chosen laws also of what contacts carry (`state_names`): speeds, bristles as they slide.
     """
@@ -68,13 +69,14 @@ def natural_sizes(p: np.record) -> np.ndarray:
 
 
 def bristle_size(p: np.record, length: float) -> float:
-    """Deflection (m) of bristles that slide; a length where there are none."""
+    """Return the deflection (m) of bristles that slide; a length where there are none."""
     stiffness = float(p["bristle_stiffness"])
     return float(p["dynamic"]) / stiffness if stiffness and p["dynamic"] else length
 
 
 def contact_sizes(p: np.record, sizes: np.ndarray) -> tuple[float, float]:
-    """Length (m) and speed (m/s) of the journals in their bores, of sizes by `natural_sizes`.
+    """Return the length (m) and speed (m/s) of the journals in their bores, of sizes by
+    `natural_sizes`.
 
     Of a mechanism with ideal joints no step need be as short as theirs.
     """
@@ -84,6 +86,6 @@ def contact_sizes(p: np.record, sizes: np.ndarray) -> tuple[float, float]:
 
 
 def absolute_tolerances(p: np.record, rtol: float) -> np.ndarray:
-    """SciPy's atol, for the numbers of the state, and energy flows."""
+    """Return SciPy's atol, for the numbers of the state, and energy flows."""
     energy = (p.reciprocating_mass + p.rod_mass) * (p.crank_radius * p.omega) ** 2 / 2
     return rtol * np.concatenate((natural_sizes(p), np.full(FLOWS, energy)))

@@ -19,7 +19,7 @@ CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 
 
 def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
-    """A case's motion, with errors, regime and horizon as far as they are wanted.
+    """Return a case's motion, with errors, regime and horizon as far as they are wanted.
 
     ahead: of its attempts those that `side_by_side` has made.
     """
@@ -54,7 +54,7 @@ def find_horizon(case: Case, solution: Solution, search: Search) -> None:
 
 
 def in_doubt(case: Case, solution: Solution) -> bool:
-    """Whether a motion may be chaotic, by its errors.
+    """Return whether a motion may be chaotic, by its errors.
 
     Not where the promise of a word is kept: two motions, a tolerance apart, stayed together.
     """
@@ -78,7 +78,7 @@ def name_regime(case: Case, solution: Solution, search: Search) -> None:
 
 
 def chaotic(case: Case, solution: Solution, search: Search) -> Solution:
-    """A motion that cannot be foretold: one more run, for statistics over its revolutions.
+    """Return a motion that cannot be foretold: one more run, for statistics over its revolutions.
 
     No error of a single course is claimed; averages have their statistical one.
     """

@@ -23,7 +23,7 @@ AIM = 0.01  # of rms_acceleration: its standard error that revolutions are count
 
 
 def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
-    """Statistics by name (`compressor.metrics.STATISTICS`) from the tallies of revolutions.
+    """Return statistics by name (`compressor.metrics.STATISTICS`) from the tallies of revolutions.
 
     A standard error is inf where there are too few revolutions to tell.
     """
@@ -49,7 +49,9 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
 
 
 def of_peaks(name: str, values: np.ndarray) -> Metrics:
-    """Mean and quantiles of the revolutions' greatest values, (n, ...), with standard errors."""
+    """Return the mean and quantiles of the revolutions' greatest values, (n, ...), with standard
+    errors.
+    """
     means = np.array([part.mean(axis=0) for part in parts(values, MOST_BATCHES, 1)])
     sections = parts(values, MOST_BATCHES, LEAST_SECTION)
     own = np.array([quantiles(part) for part in sections])
@@ -62,7 +64,7 @@ def of_peaks(name: str, values: np.ndarray) -> Metrics:
 
 
 def quantiles(values: np.ndarray) -> np.ndarray:
-    """The `QUANTILES` over the first axis, as the last one."""
+    """Return the `QUANTILES` over the first axis, as the last one."""
     return np.moveaxis(np.quantile(values, QUANTILES, axis=0), 0, -1)
 
 
@@ -75,14 +77,14 @@ def parts(items: Sequence | np.ndarray, most: int, least: int) -> list:
 
 
 def standard_error(means: np.ndarray) -> np.ndarray:
-    """The standard error of the mean of batches, (batches, ...); inf of a single one."""
+    """Return the standard error of the mean of batches, (batches, ...); inf of a single one."""
     if len(means) < 2:
         return np.full(means.shape[1:], math.inf)
     return means.std(axis=0, ddof=1) / math.sqrt(len(means))
 
 
 def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
-    """Half the length of the interval that holds in 95 % of cases, by Student's t."""
+    """Return half the length of the interval that holds in 95 % of cases, by Student's t."""
     batches = len(parts(range(revolutions), MOST_BATCHES, 1))
     from scipy.special import stdtrit  # takes a tenth of a second, of chaotic motions alone
 
@@ -90,7 +92,8 @@ def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
 
 
 def mean_bar(values: np.ndarray) -> float:
-    """Half of the 95 % interval of the mean of revolutions' values in a row, (n,), by batch means.
+    """Return half of the 95 % interval of the mean of revolutions' values in a row, (n,), by batch
+    means.
 
     inf of a single one.
     """
@@ -99,7 +102,9 @@ def mean_bar(values: np.ndarray) -> float:
 
 
 def chaotic_bars(found: Metrics, numbers: Metrics) -> Metrics:
-    """The error bars of a chaotic run's metrics: of averages; a greatest value is not known."""
+    """Return the error bars of a chaotic run's metrics: of averages; a greatest value is not
+    known.
+    """
     bars = {}
     for name, row in METRICS.items():
         if row.kind == "greatest":

@@ -13,7 +13,7 @@ ROUNDING = 1e-12
 
 
 def metrics(p: np.record, tally: np.record) -> Metrics:
-    """The metrics by name, from what was tallied after settling."""
+    """Return the metrics by name, from what was tallied after settling."""
     ideal = p["clearance"] == 0
     seconds = tally["seconds"] or math.nan
     axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
@@ -39,7 +39,7 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
 
 
 def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
-    """Energy flows and counts by name."""
+    """Return the energy flows and counts by name."""
     tally, state = trajectory.tally, last_state(trajectory)
     elastic = is_featured(p) and p["elastic"]
     lost = float(state[p["rod_loss"]]) if elastic else 0.0

@@ -47,17 +47,17 @@ class Cuts:
 
 
 def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
-    """The ends (s) of the whole revolutions from one time to another."""
+    """Return the ends (s) of the whole revolutions from one time to another."""
     return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
 
 
 def worn_sums(tally: np.record) -> tuple[str, ...]:
-    """The sums that a tally has beside `SUMS`."""
+    """Return the sums that a tally has beside `SUMS`."""
     return WORN if "worn" in (tally.dtype.names or ()) else ()
 
 
 def merged(turns: Sequence[np.record]) -> np.record:
-    """One tally of several revolutions in a row."""
+    """Return one tally of several revolutions in a row."""
     whole = turns[-1].copy()
     for name in (*SUMS, *worn_sums(whole)):
         whole[name] = sum(turn[name] for turn in turns)
@@ -69,7 +69,9 @@ def merged(turns: Sequence[np.record]) -> np.record:
 def with_cuts(
     edges: np.ndarray, phases: np.ndarray, cuts: Cuts | None
 ) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Segments that end at all cuts as well, and how many of them there are up to each cut."""
+    """Return the segments that end at all cuts as well, and how many of them there are up to
+    each cut.
+    """
     times = []
     for time in cuts.times if cuts else ():
         edges, phases, near = with_edge(edges, phases, time)
@@ -80,7 +82,9 @@ def with_cuts(
 def with_edge(
     edges: np.ndarray, phases: np.ndarray, time: float
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Segments that end at a time as well, and that time: of an edge that lies there already."""
+    """Return the segments that end at a time as well, and that time: of an edge that lies there
+    already.
+    """
     near = edges[np.abs(edges - time).argmin()]
     if abs(near - time) <= SAME_TIME * edges[-1]:
         return edges, phases, float(near)

@@ -24,7 +24,7 @@ class Usual(NamedTuple):
     units: dict[str, float]
 
     def holds(self, value: float) -> bool:
-        """Whether a value is usual; limits may come from a conversion, and count."""
+        """Return whether a value is usual; limits may come from a conversion, and count."""
         return self.low * (1 - 1e-9) <= value <= self.high * (1 + 1e-9)
 
 
@@ -65,7 +65,7 @@ class Slip(NamedTuple):
 
 
 def slips(cases: Sequence[Case]) -> list[Slip]:
-    """The keys of a study's cases of which all values look like another unit's."""
+    """Return the keys of a study's cases of which all values look like another unit's."""
     found = []
     for key, usual in USUAL.items():
         read = [values for case in cases if (values := values_of(case, key))]
@@ -77,7 +77,9 @@ def slips(cases: Sequence[Case]) -> list[Slip]:
 
 
 def values_of(case: Case, key: str) -> list[float]:
-    """The values of a key that a case's simulation reads; of clearances, those of worn joints."""
+    """Return the values of a key that a case's simulation reads; of clearances, those of worn
+    joints.
+    """
     group, _, name = key.partition(".")
     if not reads(case, key):
         return []
@@ -92,7 +94,7 @@ def values_of(case: Case, key: str) -> list[float]:
 
 
 def other_unit(key: str, usual: Usual, values: Iterable[float]) -> str:
-    """The unit in which unusual values would all be usual, "" where there is none.
+    """Return the unit in which unusual values would all be usual, "" where there is none.
 
     Of several, the one that brings them nearest to the key's default.
     """
@@ -113,7 +115,7 @@ def other_unit(key: str, usual: Usual, values: Iterable[float]) -> str:
 
 
 def said(key: str, usual: Usual, values: Sequence[float], other: str) -> str:
-    """What is said of values that look like another unit's."""
+    """Return what is said of values that look like another unit's."""
     row, factor = row_of(key), usual.units[other]
     unit = (row.unit if row else "").replace("^p", "^1.5")
     low, high = values[0], values[-1]

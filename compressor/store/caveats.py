@@ -97,7 +97,7 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
 
 
 def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
-    """What is said of motions that did not repeat, and of those that did too late."""
+    """Yield what is said of motions that did not repeat, and of those that did too late."""
     parts = [f"{unrepeated} of {jobs} jobs were not seen to repeat"] if unrepeated else []
     if late:
         start = "" if unrepeated else f" of {jobs} jobs"
@@ -109,7 +109,7 @@ def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
 
 
 def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
-    """What is said of sensor records of which a thousandth or more is clipped."""
+    """Yield what is said of sensor records of which a thousandth or more is clipped."""
     known = fractions[~np.isnan(fractions)]
     clipped = known[known >= Sensor.REPORTED]
     if clipped.size:
@@ -120,14 +120,18 @@ def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
 
 
 def _settle_revs(study: StoredStudy) -> list[float]:
-    """The revolution at which metrics of each job begin to count; nan where that is `auto`."""
+    """Return the revolution at which metrics of each job begin to count; nan where that is
+    `auto`.
+    """
     fixed = value_in(study.fixed, "solve.settle_rev")
     given = (point.get("solve.settle_rev", fixed) for point in points(study))
     return [float(v) if isinstance(v, int | float) else math.nan for v in given]
 
 
 def _outside_of_study(study: StoredStudy) -> dict[str, str]:
-    """The judged keys that a study leaves, each with a sentence: of fixed values and axes' ends."""
+    """Return the judged keys that a study leaves, each with a sentence: of fixed values and
+    axes' ends.
+    """
     base = copy.deepcopy(study.fixed)
     ends: list[tuple[str, Any]] = []
     for axis in study.axes:

@@ -50,7 +50,7 @@ def _word(value: Any) -> str:
 
 
 def grid(study: StoredStudy) -> Layout:
-    """One study: a dimension for every axis."""
+    """Return one study: a dimension for every axis."""
     names = coordinate_names([axis.key for axis in study.axes])
     coordinates = {
         names[axis.key]: _coordinate((names[axis.key],), axis.key, axis.values, axis.units)
@@ -61,7 +61,7 @@ def grid(study: StoredStudy) -> Layout:
 
 
 def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
-    """Several studies, or one that is no grid: one dimension, `job`."""
+    """Return several studies, or one that is no grid: one dimension, `job`."""
     units = {"joint": "", "load": ""} | {a.key: a.units for s in studies for a in s.axes}
     rows = [(study, point) for study in studies for point in points(study)]
     coordinates = {"study": xr.Variable("job", [study.name for study, _ in rows])}
@@ -78,13 +78,13 @@ def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
 
 
 def _fixed(study: StoredStudy, key: str, missing: Any) -> Any:
-    """The value of a key in all jobs of a study; `missing` where it has no single one."""
+    """Return the value of a key in all jobs of a study; `missing` where it has no single one."""
     value = value_in(study.fixed, key)
     return missing if value is None else value
 
 
 def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
-    """The Dataset of a layout from the rows of a store, without time series."""
+    """Return the Dataset of a layout from the rows of a store, without time series."""
     positions = rows.find(layout.keys)
     variables = _outcomes(layout, rows, positions)
     found = positions[positions >= 0]
@@ -98,7 +98,7 @@ def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
 def labelled(
     layout: Layout, rows: Rows, job: Callable[[str], xr.Dataset], values: Values
 ) -> xr.Dataset:
-    """The Dataset of a layout, from the rows of a store and its jobs with time series."""
+    """Return the Dataset of a layout, from the rows of a store and its jobs with time series."""
     dataset = outcomes(layout, rows)
     positions = rows.find(layout.keys)
     found = np.unique(positions[positions >= 0])
@@ -110,7 +110,8 @@ def labelled(
 
 
 def trusted(dataset: xr.Dataset) -> xr.Dataset:
-    """A Dataset of jobs in which metrics are nan where their error bars do not vouch for them.
+    """Return a Dataset of jobs in which metrics are nan where their error bars do not vouch for
+    them.
 
     So are those of jobs that are not ok, and of runs without error bars.
     """
@@ -133,7 +134,7 @@ def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
 
 
 def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """Key, status, reason, promise and regime of every job."""
+    """Return the key, status, reason, promise and regime of every job."""
     there = positions >= 0
 
     def words(name: str, otherwise: str) -> np.ndarray:
@@ -153,12 +154,14 @@ def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr
 
 
 def _taken(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Values at positions; anything where a position is -1."""
+    """Return the values at positions; anything where a position is -1."""
     return values[positions] if values.size else np.full(positions.shape, "")
 
 
 def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """All numbers of the rows; nan where a job has none. Statistics where a job is chaotic."""
+    """Return all numbers of the rows; nan where a job has none. Statistics where a job is
+    chaotic.
+    """
     found = {}
     for name, (dims, unit, phrase) in NUMBERS.items():
         values = np.array(rows.numbers[name][positions])
@@ -178,7 +181,7 @@ def _series(
     job: Callable[[str], xr.Dataset],
     values: Values,
 ) -> dict[str, xr.Variable]:
-    """The time series of all jobs; none but one of the longest is read yet."""
+    """Return the time series of all jobs; none but one of the longest is read yet."""
     samples, ends = rows.columns["samples"], rows.columns["end"]
     template = _first_readable(rows.columns["key"][whole[np.argsort(-samples[whole])]], job)
     if not template:
@@ -195,7 +198,7 @@ def _series(
 
 
 def _first_readable(keys: np.ndarray, job: Callable[[str], xr.Dataset]) -> xr.Dataset:
-    """The first of some jobs that is not damaged; who reads the others is told."""
+    """Return the first of some jobs that is not damaged; who reads the others is told."""
     for key in keys:
         try:
             return job(key.decode())
@@ -225,7 +228,7 @@ class StudySeries(BackendArray):
         return np.array(blocks).reshape((*keys.shape, *inner))
 
     def _block(self, key: str) -> np.ndarray:
-        """A job's series, nan beyond its end."""
+        """Return a job's series, nan beyond its end."""
         block = np.full(self.longest, np.nan)
         if key:
             values = self.values(key, [self.name])[self.name]

@@ -119,7 +119,9 @@ def export(
 def _named(
     folder: Folder, names: Sequence[str], stored: Stored, known: Sequence[StoredStudy]
 ) -> tuple[list[StoredStudy], list[str]]:
-    """The studies and the keys of the jobs that are named, each once; all studies by default."""
+    """Return the studies and the keys of the jobs that are named, each once; all studies by
+    default.
+    """
     by_name = {study.name for study in known}
     if not names:
         return [study for study in known if not study.former_of], []
@@ -168,7 +170,7 @@ def _files(
     keys: Sequence[str],
     series: bool,
 ) -> Iterator[_Task]:
-    """A file for each study and each job, and those of the studies' time series."""
+    """Yield a file for each study and each job, and those of the studies' time series."""
     for study in studies:
         yield _Task(target / f"{study.name}{suffix}", (study,))
         if series:
@@ -187,7 +189,9 @@ def _refuse_existing(tasks: Iterable[_Task]) -> None:
 
 
 def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
-    """The numbers of all jobs of studies as one table; in netCDF a lone grid keeps its axes."""
+    """Return the numbers of all jobs of studies as one table; in netCDF a lone grid keeps its
+    axes.
+    """
     from compressor.store.dataset import (  # loads xarray: half a second
         grid,
         outcomes,
@@ -211,7 +215,7 @@ def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
 
 
 def _series(task: _Task, stored: Stored, form: str) -> Exported:
-    """The time series of one job. In netCDF it is the stored file, to the byte."""
+    """Return the time series of one job. In netCDF it is the stored file, to the byte."""
     position = stored.position(task.key)
     if position is None:
         raise WrongName(stored.folder, f"job {task.key} is not stored", "run its case file first")
@@ -230,7 +234,7 @@ def _series(task: _Task, stored: Stored, form: str) -> Exported:
 
 
 def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
-    """The variables along a dimension by header, a column for each joint, axis and so on."""
+    """Return the variables along a dimension by header, a column for each joint, axis and so on."""
     found = {}
     leading = [name for name in table.coords if table[name].dims == (dim,)]
     for name in dict.fromkeys([*leading, *table.data_vars]):
@@ -283,7 +287,7 @@ def write_csv(path: Path, table: dict[str, np.ndarray]) -> int:
 
 
 def _cells(values: np.ndarray) -> list[Any]:
-    """Values as csv takes them: floats are written to the last digit, nan as nothing."""
+    """Return the values as csv takes them: floats are written to the last digit, nan as nothing."""
     if values.dtype.kind != "f":
         return values.tolist()
     cells = values.astype(float).astype(object)
@@ -292,7 +296,7 @@ def _cells(values: np.ndarray) -> list[Any]:
 
 
 def _linked(table: "xr.Dataset") -> "xr.Dataset":
-    """A table whose variables name their coordinates, as netCDF's readers expect."""
+    """Return a table whose variables name their coordinates, as netCDF's readers expect."""
     others = [name for name in table.coords if name not in table.dims]
     linked = table.copy()
     for name in table.data_vars:
@@ -302,7 +306,7 @@ def _linked(table: "xr.Dataset") -> "xr.Dataset":
 
 
 def _attributes(studies: Sequence[StoredStudy]) -> dict[str, str]:
-    """Where the numbers of a file come from."""
+    """Return where the numbers of a file come from."""
     told = ("name", "case_file", "fixed", "command", "versions", "written")
     origin = [{name: getattr(study, name) for name in told} for study in studies]
     return {

@@ -87,7 +87,7 @@ class StoreWarning(CompsimWarning):
 
 
 def system_error(path: Folder, error: OSError) -> StoreError:
-    """The StoreError that says what the file system refused."""
+    """Return the StoreError that says what the file system refused."""
     remedy = REMEDIES.get(error.errno or 0, "check the disk, then run the same command again")
     return StoreError(path, os.strerror(error.errno) if error.errno else str(error), remedy)
 
@@ -174,7 +174,7 @@ def name_pending(paths: Iterable[Path]) -> None:
 
 
 def is_locked(place: Path) -> bool:
-    """Whether a `Writer` is at work in a place; what one that was killed left is no lock."""
+    """Return whether a `Writer` is at work in a place; what one that was killed left is no lock."""
     try:
         import fcntl
     except ImportError:  # Windows: nothing is run there

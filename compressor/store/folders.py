@@ -16,7 +16,7 @@ MAKE = "make one: compsim run CONFIG..."
 
 
 def holds_results(folder: Folder) -> bool:
-    """Whether a folder holds a study, of jobs or of regimes, or a machine's wear."""
+    """Return whether a folder holds a study, of jobs or of regimes, or a machine's wear."""
     place = Path(folder)
     try:
         return any(any(place.glob(one)) for one in HELD)
@@ -25,7 +25,7 @@ def holds_results(folder: Folder) -> bool:
 
 
 def no_results(folder: Folder) -> WrongName:
-    """The error about a folder that holds no study of jobs, with what was probably meant."""
+    """Return the error about a folder that holds no study of jobs, with what was probably meant."""
     place = Path(folder)
     if place.is_file():
         if place.suffix in (".yaml", ".yml"):
@@ -47,7 +47,9 @@ def no_results(folder: Folder) -> WrongName:
 
 
 def remedy_for(place: Path) -> str:
-    """What to do instead of naming this folder: name one near by that holds results, or run."""
+    """Return what to do instead of naming this folder: name one near by that holds results, or
+    run.
+    """
     above = place.absolute().parent
     if place.name in PARTS and holds_results(above):
         return f"did you mean {place.parent}?"
@@ -66,7 +68,7 @@ def remedy_for(place: Path) -> str:
 
 
 def found_in(folder: Path) -> Iterator[Path]:
-    """The folders in a folder that hold results, in their order."""
+    """Yield the folders in a folder that hold results, in their order."""
     try:
         entries = sorted(islice(folder.iterdir(), MOST_LOOKED_AT))
     except OSError:
@@ -80,5 +82,5 @@ def models_file(folder: Folder, study: str) -> Path:
 
 
 def listed(names: list[str]) -> str:
-    """A few names, and whether there are more."""
+    """Return a few names, and whether there are more."""
     return ", ".join(names[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")

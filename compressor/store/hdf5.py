@@ -57,17 +57,17 @@ class DamagedJob(StoreError):
 
 
 def digest(data: bytes) -> str:
-    """The checksum of a stored file: 20 hexadecimal digits (BLAKE2b)."""
+    """Return the checksum of a stored file: 20 hexadecimal digits (BLAKE2b)."""
     return hashlib.blake2b(data, digest_size=DIGITS // 2).hexdigest()
 
 
 def sealed(data: bytes) -> bytes:
-    """A file's bytes with their digest behind them, which HDF5 does not look at."""
+    """Return a file's bytes with their digest behind them, which HDF5 does not look at."""
     return data + SEAL + digest(data).encode()
 
 
 def unsealed(data: bytes, path: Folder, remedy: str = REMEDY) -> bytes:
-    """What `sealed` was given; files of former versions have no seal. Raises DamagedJob."""
+    """Return what `sealed` was given; files of former versions have no seal. Raises DamagedJob."""
     at = data.rfind(SEAL, -len(SEAL) - DIGITS)
     if at < 0:
         return data
@@ -79,7 +79,7 @@ def unsealed(data: bytes, path: Folder, remedy: str = REMEDY) -> bytes:
 def image(
     variables: Variables, attributes: Mapping[str, Any], deflated: Collection[str] = ()
 ) -> bytes:
-    """Variables, (dims, values, attributes) by name, as the bytes of a netCDF-4 file.
+    """Return the variables, (dims, values, attributes) by name, as the bytes of a netCDF-4 file.
 
     A variable with the name of its one dimension is that dimension's coordinate. `deflated` ones
     are shuffled and compressed.
@@ -116,7 +116,7 @@ def _set_attributes(stored: Any, attributes: Mapping[str, Any]) -> None:
 
 
 def storable(text: str) -> str:
-    """Text as HDF5 can hold it: without NUL and lone surrogates."""
+    """Return the text as HDF5 can hold it: without NUL and lone surrogates."""
     return text.encode(errors="replace").decode().replace("\0", "\ufffd")
 
 
@@ -150,7 +150,9 @@ def opened(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.Fil
 
 
 def _texts_are_there(entry: h5d.DatasetID, data: bytes) -> bool:
-    """Whether texts of any length are where a dataset says; HDF5 believes it whatever it says."""
+    """Return whether texts of any length are where a dataset says; HDF5 believes it whatever it
+    says.
+    """
     offset, count = entry.get_offset(), math.prod(entry.shape)
     if offset is None or offset + count * TEXT_PLACE.itemsize > len(data):
         return False
@@ -160,7 +162,9 @@ def _texts_are_there(entry: h5d.DatasetID, data: bytes) -> bool:
 
 
 def _items(data: bytes, heap: int) -> dict[int, int]:
-    """The sizes of a global heap's items by number; none where they do not fill it exactly."""
+    """Return the sizes of a global heap's items by number; none where they do not fill it
+    exactly.
+    """
     if heap + HEAP_HEAD.size > len(data):
         return {}
     signature, size = HEAP_HEAD.unpack_from(data, heap)
@@ -176,7 +180,7 @@ def _items(data: bytes, heap: int) -> dict[int, int]:
 
 
 def _objection(file: h5py.File, name: str, data: bytes) -> str:
-    """What is wrong with an entry of the file that `data` is, or ""."""
+    """Return what is wrong with an entry of the file that `data` is, or ""."""
     encoded = name.encode(errors="surrogateescape")
     if file.id.links.get_info(encoded).type != h5l.TYPE_HARD:
         return "is a link"
@@ -199,13 +203,13 @@ def _objection(file: h5py.File, name: str, data: bytes) -> str:
 
 
 def attributes(stored: Any) -> dict[str, Any]:
-    """The attributes that are no business of HDF5's or netCDF's: text and numbers."""
+    """Return the attributes that are no business of HDF5's or netCDF's: text and numbers."""
     names = (n for n in stored.attrs if n not in OF_NETCDF and not n.startswith("_"))
     return {name: _attribute(stored, name) for name in names}
 
 
 def _attribute(stored: Any, name: str) -> Any:
-    """An attribute. Raises ValueError where HDF5 could read more than its type tells."""
+    """Return an attribute. Raises ValueError where HDF5 could read more than its type tells."""
     found = stored.attrs.get_id(name)
     dtype = found.dtype
     plain = dtype.kind in "fiuS"
@@ -219,7 +223,7 @@ def _attribute(stored: Any, name: str) -> Any:
 
 
 def variables(file: h5py.File) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
-    """All variables of a file, as `image` takes them."""
+    """Return all variables of a file, as `image` takes them."""
     found, dims = {}, _dimensions(file)
     for name, stored in file.items():
         if "NAME" in stored.attrs and str(_attribute(stored, "NAME")).startswith(BARE):
@@ -233,7 +237,9 @@ def variables(file: h5py.File) -> dict[str, tuple[tuple[str, ...], np.ndarray, d
 
 
 def _dimensions(file: h5py.File) -> dict[str, tuple[str, ...]]:
-    """The names of the dimensions of each variable, from the coordinates that tell of them."""
+    """Return the names of the dimensions of each variable, from the coordinates that tell of
+    them.
+    """
     found = {name: [""] * stored.ndim for name, stored in file.items()}
     for name, stored in file.items():
         if "CLASS" in stored.attrs and _attribute(stored, "CLASS") == "DIMENSION_SCALE":

@@ -23,7 +23,8 @@ CLOSE = 1e-9  # relative; the decimal fractions of a case file are not meant to 
 def find_study(
     folder: Folder, name: str | None = None, known: Sequence[StoredStudy] | None = None
 ) -> StoredStudy:
-    """The study of a name, or the only one; `known`: the folder's studies, where they were read.
+    """Return the study of a name, or the only one; `known`: the folder's studies, where they were
+    read.
 
     Raises WrongName with the nearest names where there is none, or without a name several.
     """
@@ -44,7 +45,7 @@ def find_study(
 def find_job(
     folder: Folder, words: Sequence[str], studies: Sequence[StoredStudy], stored: set[str]
 ) -> str:
-    """The key of the job that words name; stored: the keys of the jobs that are stored.
+    """Return the key of the job that words name; stored: the keys of the jobs that are stored.
 
     words: the beginning of a key; or a study, and `axis=value` until one job is left. Raises
     WrongName with what is near.
@@ -58,7 +59,9 @@ def find_job(
 def whole_key(
     folder: Folder, beginning: str, studies: Sequence[StoredStudy], stored: set[str]
 ) -> str:
-    """The one key, of a stored or a planned job, that begins so; WrongName where that is none."""
+    """Return the one key, of a stored or a planned job, that begins so; WrongName where that is
+    none.
+    """
     known = sorted(stored.union(*(study.keys for study in studies)))
     like = [key for key in known if key.startswith(beginning)]
     if len(like) == 1:
@@ -75,7 +78,9 @@ def whole_key(
 
 
 def _near_keys(beginning: str, known: Sequence[str]) -> str:
-    """The sorted keys that have most of a beginning in common; "" where that is not its half."""
+    """Return the sorted keys that have most of a beginning in common; "" where that is not its
+    half.
+    """
     at = bisect.bisect(known, beginning)
     shared = {key: _in_common(key, beginning) for key in known[max(at - 1, 0) : at + 1]}
     most = max(shared.values(), default=0)
@@ -90,7 +95,7 @@ def _in_common(one: str, other: str) -> int:
 
 
 def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
-    """The one job of a study at some values of its axes."""
+    """Return the one job of a study at some values of its axes."""
     wanted = dict(_value_at(folder, study, word) for word in words)
     jobs = [
         (key, point)
@@ -114,7 +119,7 @@ def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
 
 
 def _value_at(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
-    """The axis and the value that `axis=value` means."""
+    """Return the axis and the value that `axis=value` means."""
     name, equals, text = word.partition("=")
     if not equals or not text:
         raise WrongName(folder, f"{word!r} is no AXIS=VALUE of {study.name}", _axes(study))
@@ -139,7 +144,7 @@ def _value_at(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
 
 
 def _equal(text: str, value: Any) -> bool:
-    """Whether a text is the number of an axis."""
+    """Return whether a text is the number of an axis."""
     number = _number(text)
     return (
         not isinstance(value, str | tuple | bool | None)
@@ -156,7 +161,7 @@ def _number(text: str) -> float | None:
 
 
 def _axes(study: StoredStudy) -> str:
-    """What a study's jobs are told apart by."""
+    """Return what a study's jobs are told apart by."""
     axes = [f"{axis.key}={in_words(axis.values[0])}" for axis in study.axes]
     return (
         f"its axes are {listed([axis.key for axis in study.axes])}, as in {axes[0]}"
@@ -166,14 +171,14 @@ def _axes(study: StoredStudy) -> str:
 
 
 def _varied(jobs: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
-    """The axes in which jobs differ, and their values."""
+    """Return the axes in which jobs differ, and their values."""
     keys = dict.fromkeys(key for point in jobs for key in point)
     values = {key: [*dict.fromkeys(point.get(key) for point in jobs)] for key in keys}
     return {key: found for key, found in values.items() if len(found) > 1}
 
 
 def _some(values: Sequence[Any], near: str = "") -> str:
-    """A few values of an axis, those next to a number where one is given."""
+    """Return a few values of an axis, those next to a number where one is given."""
     found = [value for value in dict.fromkeys(values) if value is not None]
     number = _number(near)
     numeric = all(isinstance(value, int | float) for value in found)

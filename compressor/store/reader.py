@@ -73,7 +73,7 @@ class JobStatus:
         return self.rows.numbers[self.position]
 
     def serves(self, case: Case) -> bool:
-        """Whether a case needs no new run.
+        """Return whether a case needs no new run.
 
         The one place that knows of what a case may ask for without it being in its key.
         """
@@ -94,7 +94,7 @@ class JobStatus:
         return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
 
     def kept_by(self, case: Case) -> Case:
-        """A case that, run again, has the time series of this job, as exact as they are.
+        """Return a case that, run again, has the time series of this job, as exact as they are.
 
         Where the job is ok, it has its error bars and its horizon as well.
         """
@@ -118,7 +118,7 @@ class Stored:
         self.rows = Rows.of(segments, _usable)
 
     def warned(self) -> "Stored":
-        """The same, after warnings of the damage: its readers go on without some jobs."""
+        """Return the same, after warnings of the damage: its readers go on without some jobs."""
         for damage in self.damaged:
             text = f"{damage}: its jobs count as missing"
             warnings.warn(text, StoreWarning, stacklevel=3)
@@ -129,25 +129,25 @@ class Stored:
         return stale(self.rows, keys)
 
     def keys(self) -> set[str]:
-        """The keys of all stored jobs, failed ones included."""
+        """Return the keys of all stored jobs, failed ones included."""
         return {key.decode() for key in self.rows.columns["key"]}
 
     def position(self, key: str) -> int | None:
-        """Where a job stands in `rows`; None where it is not stored."""
+        """Return where a job stands in `rows`; None where it is not stored."""
         position = int(self.rows.find([key])[0])
         return position if position >= 0 else None
 
     def physics_key(self, key: str) -> str:
-        """What a stored job simulates, by its hash."""
+        """Return what a stored job simulates, by its hash."""
         return bytes(self.rows.columns["physics_key"][self.position(key)]).decode()
 
     def status(self, key: str) -> JobStatus | None:
-        """How a stored job ended; None where it is not stored."""
+        """Return how a stored job ended; None where it is not stored."""
         position = self.position(key)
         return None if position is None else self.status_at(position)
 
     def status_at(self, position: int) -> JobStatus:
-        """How the job at a position of `rows` ended."""
+        """Return how the job at a position of `rows` ended."""
         rows = self.rows
         words = {name: str(values[position]) for name, values in rows.words.items()}
         return JobStatus(
@@ -165,7 +165,7 @@ class Stored:
         )
 
     def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
-        """Whether each of the jobs at some positions needs no new run for a case, boolean.
+        """Return whether each of the jobs at some positions needs no new run for a case, boolean.
 
         Jobs of one kind, in all that `JobStatus.serves` reads, are asked once.
         """
@@ -187,13 +187,15 @@ class Stored:
         return first, kinds
 
     def outcome(self, position: int) -> Outcome:
-        """The outcome of the job at a position of `rows`."""
+        """Return the outcome of the job at a position of `rows`."""
         words = {name: str(values[position]) for name, values in self.rows.words.items()}
         attributes = self.rows.attributes(position)
         return Outcome(words["status"], words["reason"], self.rows.numbers[position], attributes)
 
     def job(self, key: str) -> "xr.Dataset":
-        """A stored job's Dataset. Raises StoreError where there is none, or a damaged one."""
+        """Return a stored job's Dataset. Raises StoreError where there is none, or a damaged
+        one.
+        """
         if not KEY.fullmatch(key):
             raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
         position = self.position(key)
@@ -209,14 +211,14 @@ class Stored:
         return xr.Dataset(table.variables, attrs=table.attrs)
 
     def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Some variables of a stored job's time series."""
+        """Return some variables of a stored job's time series."""
         position = self.position(key)
         path = None if position is None else self.rows.path(position)
         return {} if path is None else read_values(path, names)
 
 
 def _usable(segment: Segment) -> np.ndarray:
-    """Which rows of a segment count: not those whose time series are gone."""
+    """Return which rows of a segment count: not those whose time series are gone."""
     columns = segment.columns
     kept = columns["samples"] > 0
     if not kept.any():
@@ -232,7 +234,7 @@ def _usable(segment: Segment) -> np.ndarray:
 
 
 def _names(folder: Path) -> list[str]:
-    """The files of a folder that may not be there."""
+    """Return the files of a folder that may not be there."""
     try:
         return os.listdir(folder)
     except FileNotFoundError:
@@ -265,12 +267,14 @@ def places(folder: Folder) -> list[Path]:
 
 
 def segment_paths(place: Path) -> list[Path]:
-    """The segments of one place, in the order of their numbers."""
+    """Return the segments of one place, in the order of their numbers."""
     return [place / "rows" / n for n in sorted(_names(place / "rows")) if NAME.fullmatch(n)]
 
 
 def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
-    """What a folder holds. Damage that is `bearable` is kept in `damaged`, other is raised."""
+    """Return what a folder holds. Damage that is `bearable` is kept in `damaged`, other is
+    raised.
+    """
     folder = Path(os.path.abspath(folder))
     for _ in range(ATTEMPTS):
         segments, damaged = [], []
@@ -289,7 +293,8 @@ def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
 
 
 def read_job(folder: Folder, key: str) -> "xr.Dataset":
-    """A stored job's Dataset: what `simulate` gives of its case, time series where they were kept.
+    """Return a stored job's Dataset: what `simulate` gives of its case, time series where they were
+    kept.
 
     folder: of results; key: 20 hexadecimal digits, as `Case.key` and the coordinate `key` of a
     study have them. Raises StoreError where there is no such job, or a damaged one.
@@ -306,17 +311,17 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
 
 
 def job_status(folder: Folder, key: str) -> JobStatus | None:
-    """How a stored job ended (`Stored.status`); None where it is not stored."""
+    """Return how a stored job ended (`Stored.status`); None where it is not stored."""
     return read_store(folder).status(key)
 
 
 def finished_keys(folder: Folder) -> set[str]:
-    """The keys of all stored jobs, failed ones included."""
+    """Return the keys of all stored jobs, failed ones included."""
     return read_store(folder).keys()
 
 
 def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
-    """A study as one Dataset, labelled by its axes; series are read when they are used.
+    """Return a study as one Dataset, labelled by its axes; series are read when they are used.
 
     folder: of results; name: of the study, all studies without. Variables and SI units are those
     of `simulate`.

@@ -30,7 +30,7 @@ from compressor.store.series_file import intact, series_path
 
 
 def merge(segments: Sequence[Segment]) -> Segment:
-    """One segment with the rows that count of several segments, without a path."""
+    """Return one segment with the rows that count of several segments, without a path."""
     rows = Rows.of(segments)
     chosen = [*zip(rows.source.tolist(), rows.row.tolist(), strict=True)]
     texts = [unpacked(segment.texts, segment) for segment in segments]
@@ -45,12 +45,13 @@ def merge(segments: Sequence[Segment]) -> Segment:
 
 @lru_cache(maxsize=4)
 def _lines(segment: Segment) -> list[bytes]:
-    """The attributes of each row of a segment, as JSON."""
+    """Return the attributes of each row of a segment, as JSON."""
     return unpacked(segment.texts, segment)
 
 
 def worth(columns: dict[str, np.ndarray]) -> np.ndarray:
-    """How much rows of one job tell: failed 0, ok 1, with time series 3, in double precision 5.
+    """Return how much rows of one job tell: failed 0, ok 1, with time series 3, in double precision
+    5.
 
     One more with signals.
     """
@@ -125,7 +126,7 @@ class Rows:
         return np.empty(0, ROW) if found is None else found
 
     def find(self, keys: np.ndarray | Sequence[str]) -> np.ndarray:
-        """Where jobs stand, by key, in an array of the shape of `keys`; -1: nowhere."""
+        """Return where jobs stand, by key, in an array of the shape of `keys`; -1: nowhere."""
         wanted = np.asarray(keys).astype("S20")
         if not len(self):
             return np.full(wanted.shape, -1)
@@ -139,16 +140,18 @@ class Rows:
         return {name: np.char.decode(self.columns[name], "utf-8", "replace") for name in names}
 
     def detail(self, position: int) -> str:
-        """What is known of a job's failure."""
+        """Return what is known of a job's failure."""
         segment = self.segments[self.source[position]]
         return read_line(segment.details[self.row[position]], str, segment)
 
     def text(self, position: int) -> bytes:
-        """A job's attributes as JSON; quick for jobs of the same segment one after the other."""
+        """Return a job's attributes as JSON; quick for jobs of the same segment one after the
+        other.
+        """
         return _lines(self.segments[self.source[position]])[self.row[position]]
 
     def attributes(self, position: int) -> dict[str, Any]:
-        """A job's attributes; quick for jobs of the same segment one after the other."""
+        """Return a job's attributes; quick for jobs of the same segment one after the other."""
         segment = self.segments[self.source[position]]
         found = read_line(self.text(position), dict, segment)
         try:
@@ -157,7 +160,9 @@ class Rows:
             raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY) from error
 
     def path(self, position: int) -> Path | None:
-        """The file with a job's time series, which may wait for its name; None without any."""
+        """Return the file with a job's time series, which may wait for its name; None without
+        any.
+        """
         if not self.columns["samples"][position]:
             return None
         key, checksum = (self.columns[name][position].decode() for name in ("key", "digest"))
@@ -166,6 +171,8 @@ class Rows:
         return waiting if not path.exists() and waiting.exists() else path
 
     def intact(self, position: int) -> bool:
-        """Whether the file with a job's time series, if there is one, is what was written."""
+        """Return whether the file with a job's time series, if there is one, is what was
+        written.
+        """
         path = self.path(position)
         return path is None or intact(path)

@@ -73,7 +73,7 @@ class Segment:
         return len(self.columns["key"])
 
     def numbers(self, *names: str) -> np.ndarray:
-        """Numbers of the rows, dtype ROW or those fields of it that are named, (rows,).
+        """Return the numbers of the rows, dtype ROW or those fields of it that are named, (rows,).
 
         They are read each time: few ask for them, and they are a kilobyte a row.
         """
@@ -99,12 +99,12 @@ class Segment:
 
 
 def segment_name(number: int, data: bytes) -> str:
-    """The name of a segment's file."""
+    """Return the name of a segment's file."""
     return f"{number:09}-{digest(data)}.h5"
 
 
 def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
-    """A segment of new rows, without a path."""
+    """Return a segment of new rows, without a path."""
     outcomes = list(outcomes)
     series = [outcome.series or SeriesFile(0, 0.0, "", "") for outcome in outcomes]
     words = {
@@ -129,7 +129,7 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
 
 
 def has_signals(outcome: Outcome) -> bool:
-    """Whether signals are kept of a job."""
+    """Return whether signals are kept of a job."""
     return outcome.series is not None and bool(outcome.attributes.get("signals"))
 
 
@@ -146,7 +146,7 @@ def packed(lines: Iterable[bytes]) -> bytes:
 
 
 def unpacked(packed: bytes, segment: Segment) -> list[bytes]:
-    """A line for each row of a segment. Raises DamagedJob."""
+    """Return a line for each row of a segment. Raises DamagedJob."""
     try:
         inflater = zlib.decompressobj()
         lines = inflater.decompress(packed, MOST_LINE * (len(segment) + 1)).split(b"\n")
@@ -158,7 +158,7 @@ def unpacked(packed: bytes, segment: Segment) -> list[bytes]:
 
 
 def read_line(line: bytes, kind: type, segment: Segment) -> Any:
-    """A line of a segment, of a kind of values. Raises DamagedJob."""
+    """Return a line of a segment, of a kind of values. Raises DamagedJob."""
     try:
         value = json.loads(line)
         if isinstance(value, kind):
@@ -169,7 +169,7 @@ def read_line(line: bytes, kind: type, segment: Segment) -> Any:
 
 
 def encode(segment: Segment) -> bytes:
-    """The bytes of a segment's file.
+    """Return the bytes of a segment's file.
 
     The keys stand in it twice, first and last, so that damage can be told by the job's name.
     """
@@ -194,7 +194,7 @@ def encode(segment: Segment) -> bytes:
 
 
 def decode(data: bytes, path: Path) -> Segment:
-    """The segment that a file's bytes hold; a number that it does not have is nan.
+    """Return the segment that a file's bytes hold; a number that it does not have is nan.
 
     Raises DamagedJob for what is no segment.
     """
@@ -221,7 +221,9 @@ def decode(data: bytes, path: Path) -> Segment:
 
 
 def read_segment(path: Path) -> Segment:
-    """A segment from its file. Raises Cut where its bytes are not those that were written."""
+    """Return a segment from its file. Raises Cut where its bytes are not those that were
+    written.
+    """
     data = path.read_bytes()
     named = NAME.fullmatch(path.name)
     if named is None or digest(data) != named[2]:
@@ -237,7 +239,7 @@ class Cut(DamagedJob):
         self.data = data
 
     def possible_keys(self) -> set[bytes]:
-        """What may have been the keys of its jobs: every 20 hexadecimal digits in a row."""
+        """Return what may have been the keys of its jobs: every 20 hexadecimal digits in a row."""
         return {
             run[0][start : start + 20]
             for run in DIGITS.finditer(self.data)

@@ -40,7 +40,7 @@ ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
 
 
 def series_path(place: Path, key: str, checksum: str) -> Path:
-    """Where a job's time series stand; `place` is the folder that holds `jobs`."""
+    """Return where a job's time series stand; `place` is the folder that holds `jobs`."""
     if not KEY.fullmatch(key):
         raise StoreError(place, f"{key!r} is no job's key", "a key is 20 hexadecimal digits")
     return place / "jobs" / f"{key}-{checksum}.h5"
@@ -54,7 +54,7 @@ def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> 
 
 
 def series_file(dataset: "Table | xr.Dataset", output: Output) -> tuple[SeriesFile, bytes]:
-    """The file that a job's Dataset makes, and its bytes."""
+    """Return the file that a job's Dataset makes, and its bytes."""
     data, times = series_image(dataset, output), dataset.variables["time"].values
     return SeriesFile(times.size, float(times[-1]), output.precision, digest(data)), data
 
@@ -65,7 +65,7 @@ def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
 
 
 def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:
-    """A job's Dataset as the bytes of its file."""
+    """Return a job's Dataset as the bytes of its file."""
     series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
     rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
     return image_of(dataset, rounded, series if output.compress else ())
@@ -78,7 +78,9 @@ def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
 
 
 def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
-    """What `write_dataset` stored. Raises StoreError where a file is no such thing, or damaged."""
+    """Return what `write_dataset` stored. Raises StoreError where a file is no such thing, or
+    damaged.
+    """
     import xarray as xr
 
     with opened(unsealed(path.read_bytes(), path, remedy), path, remedy) as file:
@@ -88,7 +90,7 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
 def image_of(
     dataset: "Table | xr.Dataset", rounded: Collection[str] = (), deflated: Collection[str] = ()
 ) -> bytes:
-    """A Dataset as the bytes of a file; `rounded` variables in single precision."""
+    """Return a Dataset as the bytes of a file; `rounded` variables in single precision."""
     variables = {
         str(name): (
             tuple(map(str, item.dims)),
@@ -102,7 +104,7 @@ def image_of(
 
 
 def intact(path: Path) -> bool:
-    """Whether a file is there, and its bytes, as far as the disk gives them, as written.
+    """Return whether a file is there, and its bytes, as far as the disk gives them, as written.
 
     Raises StoreError where it may not be read.
     """
@@ -124,7 +126,7 @@ def _read_file(path: Path) -> bytes:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The bytes of a job's file, compared with their digest. Raises DamagedJob."""
+    """Return the bytes of a job's file, compared with their digest. Raises DamagedJob."""
     named = NAME.fullmatch(path.name)
     try:
         data = _read_file(path)
@@ -138,7 +140,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_series(path: Path) -> "xr.Dataset":
-    """A job's Dataset, from a file. Raises DamagedJob."""
+    """Return a job's Dataset, from a file. Raises DamagedJob."""
     import xarray as xr
 
     with opened(read_bytes(path), path) as file:
@@ -157,6 +159,6 @@ def read_series(path: Path) -> "xr.Dataset":
 
 
 def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Some variables of a job's file by name, without those that it does not have."""
+    """Return some variables of a job's file by name, without those that it does not have."""
     with opened(read_bytes(path), path) as file:
         return {name: file[name][()] for name in names if name in file}

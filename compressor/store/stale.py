@@ -40,7 +40,7 @@ def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
 
 
 def _changed(rows: Rows, position: int) -> list[str]:
-    """What a revision of the model has changed since a job was stored."""
+    """Return what a revision of the model has changed since a job was stored."""
     if not SUSPECT.search(rows.text(position)):
         return []
     attributes = rows.attributes(position)
@@ -52,7 +52,7 @@ def _changed(rows: Rows, position: int) -> list[str]:
 
 
 def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
-    """Which rows lack what any run of this version gives that ends well, by name."""
+    """Return which rows lack what any run of this version gives that ends well, by name."""
     good = rows.words["status"][positions] == "ok"
     signals = rows.words["signals"][positions] == "yes"
     found = {}

@@ -71,7 +71,7 @@ class JobReport:
 
 
 def standings(folder: Folder) -> list[Standing]:
-    """How each study of a folder stands. Raises WrongName where there is none.
+    """Return how each study of a folder stands. Raises WrongName where there is none.
 
     Former studies come last, those that have finished jobs which the present one lacks.
     """
@@ -105,7 +105,7 @@ def standings(folder: Folder) -> list[Standing]:
 
 
 def report_job(folder: Folder, *words: str) -> JobReport:
-    """What is known of one job.
+    """Return what is known of one job.
 
     words: the beginning of its key; or its study, and values of axes such as `clearance_mm=0.2`
     until one job is left. Raises WrongName where they name none or several.
@@ -136,11 +136,15 @@ def report_job(folder: Folder, *words: str) -> JobReport:
 
 
 def _hides_clipping(numbers: dict[str, Any], attributes: dict[str, Any]) -> bool:
-    """Whether an older version kept how much of a sensor's record is clipped in its file alone."""
+    """Return whether an older version kept how much of a sensor's record is clipped in its file
+    alone.
+    """
     return math.isnan(numbers["clipped_fraction"]) and '"sensor"' in attributes.get("case", "")
 
 
 def changes(folder: Folder, studies: "Sequence[Study]") -> list[Change]:
-    """What a run of studies would take out of the stored ones of their names. Raises StoreError."""
+    """Return what a run of studies would take out of the stored ones of their names. Raises
+    StoreError.
+    """
     found = (change_of(folder, study, lambda: read_store(folder).keys()) for study in studies)
     return [change for change in found if change]

@@ -96,7 +96,7 @@ class Again(NamedTuple):
 
 
 def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[str, str]]:
-    """The values of a swept key as a coordinate, and its attributes.
+    """Return the values of a swept key as a coordinate, and its attributes.
 
     Numbers, nan where a job has none, have a unit; others are words, "" where there is none.
     """
@@ -111,14 +111,14 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
 
 
 def in_words(value: Any) -> str:
-    """A swept value as it is told: 0.2, big_end, true; several with commas, "" for none."""
+    """Return a swept value as it is told: 0.2, big_end, true; several with commas, "" for none."""
     if isinstance(value, tuple | list):
         return ", ".join(map(in_words, value))
     return "" if value is None else str(value).lower()
 
 
 def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
-    """What swept keys are called as coordinates: their last part, where that is enough."""
+    """Return what swept keys are called as coordinates: their last part, where that is enough."""
     last = [key.rpartition(".")[2] for key in keys]
     return {
         key: RENAMED.get(key, short)
@@ -131,7 +131,9 @@ def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
 def owners(
     studies: "Iterable[StoredStudy]", keys: Iterable[str]
 ) -> dict[str, dict[str, dict[str, Any]]]:
-    """The studies that each of some jobs belongs to, by name, with its swept values there."""
+    """Return the studies that each of some jobs belongs to, by name, with its swept values
+    there.
+    """
     found: dict[str, dict[str, dict[str, Any]]] = {key: {} for key in keys}
     for study in studies:
         if not found.keys().isdisjoint(study.keys):
@@ -159,7 +161,7 @@ class Change(NamedTuple):
 
 
 def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) -> Change | None:
-    """What writing a study would take out of the stored one; None where nothing.
+    """Return what writing a study would take out of the stored one; None where nothing.
 
     stored: gives the keys of all stored jobs, where it is asked.
     """
@@ -177,14 +179,16 @@ def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) ->
 
 
 def _present(folder: Folder, name: str) -> StoredStudy | None:
-    """The stored study of a name; None where there is none, or a damaged one."""
+    """Return the stored study of a name; None where there is none, or a damaged one."""
     with contextlib.suppress(StoreError, FileNotFoundError):
         return read_study(Path(folder) / "studies" / f"{name}.json")
     return None
 
 
 def _former_name(folder: Folder, old: StoredStudy) -> str:
-    """Where a study that is replaced stays: under a new name, or one that has the same jobs."""
+    """Return where a study that is replaced stays: under a new name, or one that has the same
+    jobs.
+    """
     mine = [study for study in former_studies(folder) if study.former_of == old.name]
     for study in mine:
         if (study.axes, study.keys) == (old.axes, old.keys):
@@ -231,7 +235,7 @@ def write_study(
 
 
 def encode(study: StoredStudy) -> bytes:
-    """The text of a study's file; its last entry is the digest of what stands before it."""
+    """Return the text of a study's file; its last entry is the digest of what stands before it."""
     plain = vars(study) | {"axes": [vars(axis) for axis in study.axes]}
     if study.is_grid:  # as in files that are older than other studies
         del plain["is_grid"]
@@ -241,13 +245,15 @@ def encode(study: StoredStudy) -> bytes:
 
 
 def study_paths(folder: Folder, where: str = "studies") -> list[Path]:
-    """The files of all studies of a store, or of the `former` ones. Raises StoreError."""
+    """Return the files of all studies of a store, or of the `former` ones. Raises StoreError."""
     with refusals(folder):
         return sorted(Path(folder).glob(f"{where}/*.json"))
 
 
 def former_studies(folder: Folder) -> list[StoredStudy]:
-    """The studies that others of their names have replaced, by name; damaged ones are told of."""
+    """Return the studies that others of their names have replaced, by name; damaged ones are
+    told of.
+    """
     found = []
     for path in study_paths(folder, "former"):
         try:
@@ -259,7 +265,7 @@ def former_studies(folder: Folder) -> list[StoredStudy]:
 
 
 def read_studies(folder: Folder, former: bool = False) -> list[StoredStudy]:
-    """All studies of a store, by name; with `former`, then those that others have replaced.
+    """Return all studies of a store, by name; with `former`, then those that others have replaced.
 
     Raises WrongName where there is none.
     """
@@ -270,7 +276,7 @@ def read_studies(folder: Folder, former: bool = False) -> list[StoredStudy]:
 
 
 def read_study(path: Path) -> StoredStudy:
-    """A study from its file. Raises StoreError where the file is not what was written."""
+    """Return a study from its file. Raises StoreError where the file is not what was written."""
     try:
         data = path.read_bytes()
         plain = json.loads(data)
@@ -311,7 +317,9 @@ def _in_present_words(study: StoredStudy) -> StoredStudy:
 
 
 def _is_sound(study: StoredStudy, path: Path) -> bool:
-    """Whether a study's entries are of the kinds that we write, and its name that of its file."""
+    """Return whether a study's entries are of the kinds that we write, and its name that of its
+    file.
+    """
     swept = {key for name in table() for key in (name, name.rpartition(".")[0])}
     texts = (study.case_file, study.command, study.written, *study.versions.values())
     return (
@@ -328,7 +336,7 @@ def _is_sound(study: StoredStudy, path: Path) -> bool:
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether a value is one that a case file can sweep: a number, a word, none, or some."""
+    """Return whether a value is one that a case file can sweep: a number, a word, none, or some."""
     if isinstance(value, tuple):
         return all(map(_is_plain, value))
     if isinstance(value, str):
@@ -337,11 +345,11 @@ def _is_plain(value: Any) -> bool:
 
 
 def _frozen(values: Sequence[Any]) -> tuple[Any, ...]:
-    """Values as a case holds them; JSON makes lists of tuples."""
+    """Return the values as a case holds them; JSON makes lists of tuples."""
     return tuple(_frozen(value) if isinstance(value, list) else value for value in values)
 
 
 def _unit(key: str) -> str:
-    """The unit of a swept key, "" for words."""
+    """Return the unit of a swept key, "" for words."""
     row = row_of(key)
     return (row.unit or "1") if row and row.kind in ("number", "integer") else ""

@@ -133,7 +133,7 @@ def _gone(
 
 
 def _owned(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:
-    """Damage with the studies of its jobs."""
+    """Return the damage with the studies of its jobs."""
     belong = owners(studies, (key for damage in found for key in damage.keys))
     owned = []
     for damage in found:

@@ -169,7 +169,7 @@ class Writer:
         return [path for place in places(self.folder) for path in segment_paths(place)]
 
     def _damaged(self, place: Path) -> list[Path]:
-        """The segments of a place that were damaged when this writer began."""
+        """Return the segments of a place that were damaged when this writer began."""
         paths = [Path(damage.path) for damage in self.found.damaged]
         return [path for path in paths if path.parent.parent == place]
 
@@ -224,12 +224,12 @@ def _set_aside(paths: Iterable[Path]) -> None:
 
 
 def _number(path: Path) -> int:
-    """The number of a segment, from its name."""
+    """Return the number of a segment, from its name."""
     return int(path.name.partition("-")[0])
 
 
 def _holder(descriptor: int) -> str:
-    """Who holds a lock, from its file; who took it just now is about to say so."""
+    """Return who holds a lock, from its file; who took it just now is about to say so."""
     deadline = time.monotonic() + PATIENCE
     while not (text := os.pread(descriptor, 1000, 0)) and time.monotonic() < deadline:
         time.sleep(0.01)

@@ -65,7 +65,7 @@ class Batches:
         self.decode: Callable[[bytes], Any] = pickle.loads
 
     def ends(self, pulse: Callable[[], object]) -> Generator[End, None, None]:
-        """How each job ended; workers end with the iterator."""
+        """Yield how each job ended; workers end with the iterator."""
         try:
             yield from self.done(pulse)
         except GeneratorExit:
@@ -80,7 +80,7 @@ class Batches:
             self.stop()
 
     def done(self, pulse: Callable[[], object]) -> Iterator[End]:
-        """How each job ended; workers stay."""
+        """Yield how each job ended; workers stay."""
         while self.round or self.begin() or not self.arrived.empty():
             item: Any = ()
             with contextlib.suppress(queue.Empty):
@@ -133,7 +133,9 @@ class Batches:
         self.arrived.put((self.out.pop(number), found))
 
     def next_batch(self) -> list[Job]:
-        """Jobs for about `target_seconds`: few at first, and towards the end; none: that is all."""
+        """Return the jobs for about `target_seconds`: few at first, and towards the end; none:
+        that is all.
+        """
         size = self.target_seconds / max(self.mean, 1e-9) if self.weight else 1.0
         if self.left:
             size = min(size, (self.left + len(self.waiting)) / (2 * self.width))
@@ -148,7 +150,7 @@ class Batches:
         return batch
 
     def issue(self) -> Job | None:
-        """The next job of the source, None at its end."""
+        """Return the next job of the source, None at its end."""
         for name, payload, timeout in self.source:
             self.left = max(self.left - 1, 0)
             try:
@@ -159,7 +161,7 @@ class Batches:
         return None
 
     def finish(self, batch: list[Job], found: Any) -> Iterator[End]:
-        """How the jobs of a batch ended; a rest that was given back waits again."""
+        """Yield how the jobs of a batch ended; a rest that was given back waits again."""
         self.waiting.extendleft(reversed(batch[len(found) :]))
         for job, end in zip(batch, found, strict=False):
             if isinstance(end, Lost):
@@ -175,7 +177,7 @@ class Batches:
             yield end
 
     def lose(self, job: Job, end: Lost, again: bool) -> Iterator[Lost]:
-        """A job is lost, or tried again, once and alone."""
+        """Yield a job is lost, or tried again, once and alone."""
         if again and not job.retried:
             self.suspects.append([job._replace(retried=True)])
         else:

@@ -91,7 +91,7 @@ class Cluster:
 
 
 def within(seconds: float, call: Callable[[], Any]) -> Any:
-    """What a call gives that may wait for ever. Raises what it raises, and TimeoutError."""
+    """Return what a call gives that may wait for ever. Raises what it raises, and TimeoutError."""
     told: list[Any] = []
 
     def noted() -> None:

@@ -96,7 +96,7 @@ class Remote(Batches):
         return super().begin()
 
     def parallel(self) -> Parallel:
-        """joblib's for a round: as many batches as the workers have threads for."""
+        """Return joblib's for a round: as many batches as the workers have threads for."""
         self.backend = Dask(self.client, self.hand_over)
         ahead = A_THREAD * self.width
         return Parallel(-1, self.backend, "generator_unordered", batch_size=1, pre_dispatch=ahead)
@@ -138,7 +138,7 @@ class Remote(Batches):
             yield from self.lost_batch(batch, found)
 
     def lost_batch(self, batch: list[Job], error: BaseException) -> Iterator[Lost]:
-        """A batch has lost its workers: it is tried alone, then each of its jobs."""
+        """Yield a batch has lost its workers: it is tried alone, then each of its jobs."""
         from distributed import KilledWorker
 
         if not isinstance(error, KilledWorker):
@@ -167,6 +167,6 @@ class Remote(Batches):
 
 
 def lost(client: Any) -> ClusterError:
-    """The scheduler has gone."""
+    """Return the scheduler has gone."""
     address = client.scheduler.address if client.scheduler else "the scheduler"
     return ClusterError(f"{address}: the scheduler was lost; the same command goes on with another")

@@ -138,7 +138,7 @@ class Local(Batches):
         self.discard()
 
     def parallel(self) -> Parallel:
-        """The pool; a new one after a death, and for a suspect: in the thread.
+        """Return the pool; a new one after a death, and for a suspect: in the thread.
 
         joblib would do a single job at a time in this process: it is told of two, loky of one.
         """
@@ -166,7 +166,9 @@ class Local(Batches):
         self.free.append(number)
 
     def note(self, place: int) -> tuple[int, int, float]:
-        """Process and job of a batch; since when the job runs, or minus its end; 0: none yet."""
+        """Return the process and job of a batch; since when the job runs, or minus its end; 0:
+        none yet.
+        """
         pid, position, since = NOTE.unpack_from(self.notes, place * NOTE.size)
         return int(pid), int(position), since
 
@@ -204,7 +206,9 @@ class Local(Batches):
                 os.dup2(nobody.fileno(), results._writer.fileno())
 
     def fail(self, error: BaseException) -> Iterator[Lost]:
-        """The pool has broken: see to its jobs. The one that ran in a dead process may be why."""
+        """Yield the pool has broken: see to its jobs. The one that ran in a dead process may be
+        why.
+        """
         if not isinstance(error, BROKEN):
             if isinstance(error, OSError) and not self.processes:
                 raise WorkersFailed(f"no worker process can be started: {error}") from error
@@ -232,7 +236,7 @@ class Local(Batches):
         self.discard()
 
     def blame(self, job: Job, late: bool, code: int | None) -> Iterator[Lost]:
-        """A job was at work in a process that died, or was killed since it took too long."""
+        """Yield a job was at work in a process that died, or was killed since it took too long."""
         reason, text = Reason.WORKER_DIED, f"its worker ended by {ending(code)}"
         if late:
             reason = Reason.BUDGET_SECONDS
@@ -267,7 +271,8 @@ class Local(Batches):
 
 
 def shared_file(size: int) -> tuple[int, str]:
-    """A file that workers can map, and its path: where it can be one in memory, which ends with us.
+    """Return a file that workers can map, and its path: where it can be one in memory, which ends
+    with us.
 
     Python's own shared memory is removed by whichever process of it ends first, once the process
     that keeps count of it has been killed.
@@ -304,7 +309,7 @@ def revive_tracker() -> None:
 
 
 def children() -> list[Any]:
-    """The processes that loky has started and that run."""
+    """Return the processes that loky has started and that run."""
     return [c for c in multiprocessing.active_children() if isinstance(c, LokyProcess)]
 
 
@@ -316,7 +321,7 @@ def kill(pids: Iterable[int]) -> None:
 
 
 def ending(code: int | None) -> str:
-    """How a process ended, from its exit code (less the signal's number)."""
+    """Return how a process ended, from its exit code (less the signal's number)."""
     if code is None or code >= 0:
         return "an unknown cause" if code is None else f"exit code {code}"
     if code == -signal.SIGKILL:
@@ -325,12 +330,14 @@ def ending(code: int | None) -> str:
 
 
 def cores() -> int:
-    """How many cores this process may use, by its affinity and its container's quota."""
+    """Return how many cores this process may use, by its affinity and its container's quota."""
     return cpu_count()
 
 
 def memory_share(count: int) -> int:
-    """Bytes for each of `count` workers: three quarters of the machine's, or the container's."""
+    """Return the bytes for each of `count` workers: three quarters of the machine's, or the
+    container's.
+    """
     most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     for path in MEMORY_LIMITS:
         with contextlib.suppress(OSError, ValueError):  # absent, or "max"

@@ -87,7 +87,7 @@ class Ahead:
         self.cases = cases  # of some of them, by key
 
     def timed(self, workers: int, remark: Callable[[str], None]) -> Forecast:
-        """The whole forecast, for so many processes; `remark` is told of compiling."""
+        """Return the whole forecast, for so many processes; `remark` is told of compiling."""
         if not self.counts.missing:
             return self.counts
         looked_at = list(self.cases.values())
@@ -114,7 +114,7 @@ class Ahead:
         )
 
     def expected(self, part: Part, costs: "Sequence[Cost]") -> Part:
-        """A study's part with what its missing jobs will take, by some of them."""
+        """Return a study's part with what its missing jobs will take, by some of them."""
         keys = self.missing[part.study]
         looked_at = [self.cases[key] for key in keys if key in self.cases]
         share = len(keys) / len(looked_at)
@@ -130,7 +130,7 @@ class Ahead:
 
 
 def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
-    """What `sweep` would do with the selected jobs of some studies, `first` of them by name.
+    """Return what `sweep` would do with the selected jobs of some studies, `first` of them by name.
 
     Nothing is stored. Raises StoreError where the folder cannot be read.
     """
@@ -156,7 +156,7 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
 
 
 def next_of(study: Study, keys: set[str], most: int) -> Iterator[Next]:
-    """The first of a study's jobs with some keys."""
+    """Yield the first of a study's jobs with some keys."""
     left = keys if most > 0 else set()
     for number, point in enumerate(points(study)):
         if not left or most == 0:
@@ -189,7 +189,9 @@ def drawn_from(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
 
 
 def timed_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[str, list[Cost]]:
-    """Time jobs of each study in turn, at least one of each, until so many seconds are over."""
+    """Return the time jobs of each study in turn, at least one of each, until so many seconds
+    are over.
+    """
     end = time.perf_counter() + seconds
     costs: dict[str, list[Cost]] = {study: [] for study in drawn}
     for number in range(DRAWN):
@@ -218,7 +220,9 @@ def mean_with_range(values: Sequence[float], of: int) -> tuple[float, float, flo
 
 
 def measured(case: Case) -> Cost:
-    """What a job costs. It runs again where its search for chaos had to load machine code first."""
+    """Return what a job costs. It runs again where its search for chaos had to load machine code
+    first.
+    """
     took, size, searched = ran(case)
     if searched and not SEARCHED:
         SEARCHED.append(case.key)

@@ -43,7 +43,9 @@ def run_job(place: Path | None, case: Case, ahead: Any = None) -> Outcome | Carr
 
 
 def run_ahead(scenes: tuple[int, ...], cases: list[Case]) -> list[Any]:
-    """What can be made of several cases at once: the first attempts of those of some scenes."""
+    """Return what can be made of several cases at once: the first attempts of those of some
+    scenes.
+    """
     from compressor.solve import side_by_side
 
     return side_by_side(cases, scenes)

@@ -19,7 +19,7 @@ def run_near(place: Path, token: Path, text: str, case: Case) -> Outcome | Carri
 
 
 def sees(token: Path, text: str) -> bool:
-    """Whether a file of the run's is there, and others may be written beside it."""
+    """Return whether a file of the run's is there, and others may be written beside it."""
     try:
         return token.read_text() == text and os.access(token.parent, os.W_OK)
     except OSError:
@@ -40,7 +40,7 @@ def visible(place: Path) -> Iterator[tuple[Path, str]]:
 
 
 def received(place: Path, result: Any) -> Any:
-    """A result from a worker, its time series stored if they came with it."""
+    """Return a result from a worker, its time series stored if they came with it."""
     if not isinstance(result, Carried):
         return result
     outcome, data = result

@@ -212,7 +212,7 @@ def run_missing(
 
 
 def local(workers: int) -> Backend:
-    """Worker processes of this machine."""
+    """Return the worker processes of this machine."""
 
     def run(
         place: Path,
@@ -234,7 +234,7 @@ def run_here(
     remark: Callable[[str], None],
     pulse: Callable[[], object] = lambda: None,
 ) -> Generator[Done | Lost, None, None]:
-    """`run_batches` in processes that load the equations, compiled before if there is a job.
+    """Return `run_batches` in processes that load the equations, compiled before if there is a job.
 
     Where the needs name scenes for lanes, jobs are cases, and `work` takes what `run_ahead` gives.
     """
@@ -264,7 +264,7 @@ class Jobs(Sequence[Any]):
 def endings(
     studies: Sequence[Study], ends: dict[str, End]
 ) -> tuple[tuple[Count, ...], tuple[Failure, ...]]:
-    """How the selected jobs of each study ended, and every one that failed."""
+    """Return how the selected jobs of each study ended, and every one that failed."""
     counts, failures = [], []
     for study in studies:
         selected = {*study.selected}
@@ -279,7 +279,7 @@ def endings(
 
 
 def outcome_of(end: Done | Lost) -> Outcome:
-    """The outcome of a job, also of one that raised an exception or lost its worker."""
+    """Return the outcome of a job, also of one that raised an exception or lost its worker."""
     if isinstance(end, Done):
         if isinstance(end.result, StoreError):
             raise end.result

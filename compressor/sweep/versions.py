@@ -24,7 +24,7 @@ class Unfit(Exception):
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """What decides the bits of a result: the programs here, and their versions."""
+    """Return what decides the bits of a result: the programs here, and their versions."""
     return {
         "compsim": VERSION,
         "model": MODEL,
@@ -37,7 +37,7 @@ def versions() -> dict[str, str]:
 
 
 def differences(ours: dict[str, str], theirs: dict[str, str]) -> str:
-    """Where versions differ, and what to do about it; empty if they agree."""
+    """Return where versions differ, and what to do about it; empty if they agree."""
     different = ", ".join(
         f"{name} {theirs.get(name, 'unknown')} in place of {ours.get(name, 'unknown')}"
         for name in ours | theirs
@@ -47,7 +47,7 @@ def differences(ours: dict[str, str], theirs: dict[str, str]) -> str:
 
 
 def unfitness(error: BaseException) -> str:
-    """Why a worker's error means that none of its jobs can run; empty if it does not."""
+    """Return why a worker's error means that none of its jobs can run; empty if it does not."""
     if isinstance(error, Unfit):
         return str(error).removeprefix("worker ")
     if isinstance(error, ImportError | AttributeError):

@@ -58,7 +58,9 @@ class Wanted(Mapping[str, Case]):
         return len(self.places)
 
     def alike(self) -> Iterator[tuple[Case, list[str]]]:
-        """The keys of jobs whose cases ask for the same beside their results, with one of them."""
+        """Yield the keys of jobs whose cases ask for the same beside their results, with one of
+        them.
+        """
         found: dict[Hashable, list[str]] = {}
         for key, (study, number) in self.places.items():
             kind = key if key in self.own else (study.name, study.sheet_of(number))
@@ -87,7 +89,7 @@ class Missing(Sequence[Case]):
 
 
 def serving_both(first: Case, second: Case) -> Case:
-    """A case with all that two cases of one key ask for beside it."""
+    """Return a case with all that two cases of one key ask for beside it."""
     keeping = [case.output for case in (first, second) if case.output.keep == "series"]
     output = first.output
     if keeping:
@@ -106,7 +108,7 @@ def serving_both(first: Case, second: Case) -> Case:
 
 
 def stored(store: Stored, wanted: Wanted) -> dict[str, End]:
-    """How the jobs ended that need no new run: stored ones that serve, with intact files.
+    """Return how the jobs ended that need no new run: stored ones that serve, with intact files.
 
     A case whose job is to be run again goes on keeping the time series that its job has, as exact
     as they are.

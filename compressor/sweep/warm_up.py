@@ -139,18 +139,18 @@ def load_telling(needs: Needs, told: str, remark: Callable[[str], None]) -> None
 
 
 def named(part: str) -> tuple[str, int]:
-    """What a part of the equations is, in words, and the seconds that compiling it takes."""
+    """Return what a part of the equations is, in words, and the seconds that compiling it takes."""
     what, seconds = WHAT.get(part, WHAT[METHOD])
     return what.format(part), seconds
 
 
 def compile_seconds(needs: Needs) -> int:
-    """Seconds of compiling that are ahead of a run with these needs, on an idle machine."""
+    """Return seconds of compiling that are ahead of a run with these needs, on an idle machine."""
     return sum(named(part)[1] for part in needs.uncompiled)
 
 
 def marker(part: str) -> Path:
-    """The file that says that a part of the equations has been compiled on this machine."""
+    """Return the file that says that a part of the equations has been compiled on this machine."""
     # numba keeps machine code by the path of its sources: a copied folder brings none of use
     what = f"{library_versions(*LIBRARIES)} {COMPILED}"
     known = hashlib.sha256(what.encode()).hexdigest()[:8]

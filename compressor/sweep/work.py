@@ -66,7 +66,7 @@ class Work:
         self.behind[of] = known + turns, took + end.seconds
 
     def left(self) -> Left | None:
-        """What is left to do; None as long as too little is known to say."""
+        """Return what is left to do; None as long as too little is known to say."""
         elapsed = self.last - self.began
         if self.ends < FEWEST or elapsed < SOONEST or not self.seconds:
             return None
@@ -84,11 +84,11 @@ class Work:
 
 
 def kind(case: Case) -> Hashable:
-    """What jobs that take about the same time for a revolution have in common."""
+    """Return what jobs that take about the same time for a revolution have in common."""
     how = case.solve
     return case.joint, how.method, how.accuracy, how.rtol, case.wants_bars, how.horizon
 
 
 def revolutions(case: Case) -> float:
-    """How many revolutions a run of a case is, at most."""
+    """Return how many revolutions a run of a case is, at most."""
     return case.duration / case.turn

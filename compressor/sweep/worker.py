@@ -151,7 +151,7 @@ def look_ahead(payloads: Sequence[bytes]) -> Sequence[Callable[[], tuple[Any, ..
 
 
 def only(payload: bytes) -> tuple[Any]:
-    """The single argument of a job's work."""
+    """Return the single argument of a job's work."""
     return (pickle.loads(payload),)
 
 
@@ -168,6 +168,6 @@ def perform(job: Callable[[], tuple[Any, ...]], start: float) -> Done | Lost:
 
 
 def described(error: BaseException) -> tuple[str, str]:
-    """An exception in a line, and its traceback."""
+    """Return an exception in a line, and its traceback."""
     what = traceback.format_exception_only(error)[-1].strip()
     return what[:MOST_TEXT], "".join(traceback.format_exception(error))[-MOST_TEXT:]

@@ -32,13 +32,15 @@ class Record:
 
 
 def analogue_rate(body: Body, sensor: Sensor) -> float:
-    """The least rate (Hz) at which forces are to be known for a record."""
+    """Return the least rate (Hz) at which forces are to be known for a record."""
     casing = body.casing_frequency_Hz if body.casing else 0.0
     return FINER * max(sensor.rate_Hz, sensor.mounting_Hz, casing)
 
 
 def point_of(body: Body, sensor: Sensor, guide: float) -> tuple[float, float]:
-    """Where a sensor sits, m from the body's mass centre; guide: mid-stroke from the crank, m."""
+    """Return where a sensor sits, m from the body's mass centre; guide: mid-stroke from the
+    crank, m.
+    """
     x, y = centre(body)
     return {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]
 
@@ -51,7 +53,7 @@ def listen(
     guide: float,
     motion: BodyMotion | None = None,
 ) -> Record:
-    """The record of a sensor.
+    """Return the record of a sensor.
 
     forces: with a first and last sample a whole number of revolutions of `turn` s apart where the
     body is steady, in any case from top dead centre on; guide: mid-stroke from the crank, m;
@@ -80,14 +82,15 @@ def listen(
 
 
 def repeated(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
-    """A sampled curve that repeats itself at any times (s), by a cubic spline."""
+    """Return a sampled curve that repeats itself at any times (s), by a cubic spline."""
     where = step * np.arange(len(values))
     spline = CubicSpline(where, np.append(values[:-1], values[0]), bc_type="periodic")
     return spline(times % where[-1])
 
 
 def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: float) -> np.ndarray:
-    """The time (s) of the undisturbed course at which the crank is as far as at each of `times`.
+    """Return the time (s) of the undisturbed course at which the crank is as far as at each of
+    `times`.
 
     The speed's deviation is a cubic spline through a Gaussian draw of `speed_jitter` rms for each
     revolution. Between these points it is smaller: 0.93 of that rms over all times, and 0.81 of it
@@ -108,7 +111,7 @@ def recorded(
     turns: np.ndarray,
     rng: np.random.Generator,
 ) -> Record:
-    """The chain from the acceleration at a sensor's foot to its samples.
+    """Return the chain from the acceleration at a sensor's foot to its samples.
 
     heard: m/s2 at `times`, s, (n,), the record being what is not before 0; turns: revolutions.
     """

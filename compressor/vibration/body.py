@@ -37,7 +37,7 @@ class BodyMotion:
     rocking: Motion
 
     def acceleration(self, axis: str, point: tuple[float, float]) -> np.ndarray:
-        """Acceleration (m/s2, (n,)) along an axis of a point, in m from the mass centre.
+        """Return the acceleration (m/s2, (n,)) along an axis of a point, in m from the mass centre.
 
         Small angles: what rocking adds by its rate squared is left out, as in the equations.
         """
@@ -47,12 +47,12 @@ class BodyMotion:
 
 
 def centre(body: Body) -> tuple[float, float]:
-    """The mass centre from the crank's, m."""
+    """Return the mass centre from the crank's, m."""
     return body.centre_x_mm / 1e3, body.centre_y_mm / 1e3
 
 
 def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
-    """The rigid body's motion under forces, from rest or `steady` (`oscillate`)."""
+    """Return the rigid body's motion under forces, from rest or `steady` (`oscillate`)."""
     x, y = centre(body)
     shaking = forces.shaking
     moment = forces.moment - x * shaking[:, 1] + y * shaking[:, 0]
@@ -73,7 +73,8 @@ def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
 
 
 def casing_acceleration(body: Body, force: np.ndarray, step: float) -> np.ndarray:
-    """Acceleration (m/s2, (n,)) of a casing mode against the body, by the force (N) at its place.
+    """Return the acceleration (m/s2, (n,)) of a casing mode against the body, by the force (N) at
+    its place.
 
     A mode of some hundred Hz and more forgets its start within a revolution; it starts at rest.
     """

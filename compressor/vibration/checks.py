@@ -15,7 +15,9 @@ class SignalError(CompsimError):
 
 
 def checked_signal(values: np.ndarray, what: str = "the signal") -> np.ndarray:
-    """The values as floats, (m,); raises SignalError unless they are finite, real and in a row."""
+    """Return the values as floats, (m,); raises SignalError unless they are finite, real and in
+    a row.
+    """
     found = np.asarray(values)
     if found.ndim != 1 or found.size == 0:
         shape = f"{what} has shape {found.shape}"
@@ -31,7 +33,7 @@ def checked_signal(values: np.ndarray, what: str = "the signal") -> np.ndarray:
 
 
 def checked_angle(angle: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (rad) and values as floats, (m,) each; raises SignalError.
+    """Return the angles (rad) and values as floats, (m,) each; raises SignalError.
 
     The angles must increase from sample to sample.
     """
@@ -48,7 +50,7 @@ def checked_angle(angle: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def checked_count(value: int, least: int, what: str) -> int:
-    """A whole number of at least `least`; raises SignalError."""
+    """Return a whole number of at least `least`; raises SignalError."""
     try:
         found = operator.index(value)
     except TypeError:
@@ -59,14 +61,14 @@ def checked_count(value: int, least: int, what: str) -> int:
 
 
 def checked_positive(value: float, what: str) -> float:
-    """A finite number above zero; raises SignalError."""
+    """Return a finite number above zero; raises SignalError."""
     if not (math.isfinite(value) and value > 0.0):
         raise SignalError(f"{what} is {value}: pass a finite number above 0")
     return float(value)
 
 
 def whole_revolutions(count: int, a_turn: int) -> int:
-    """How many revolutions of a_turn samples count samples are; raises SignalError."""
+    """Return how many revolutions of a_turn samples count samples are; raises SignalError."""
     a_turn = checked_count(a_turn, 2, "the number of samples a revolution")
     if count % a_turn:
         rest = f"{count} samples are no whole number of revolutions of {a_turn} samples"

@@ -45,7 +45,7 @@ class Kurtogram:
 
 
 def band_envelope(values: np.ndarray, rate: float, band: tuple[float, float]) -> np.ndarray:
-    """The magnitude of the analytic signal in a band, (m,), in the unit of the signal.
+    """Return the magnitude of the analytic signal in a band, (m,), in the unit of the signal.
 
     values: (m,) at a rate of samples a second (or a revolution); band: lower and upper edge in Hz
     (or orders), both included. Lines outside are removed without a shift of phase; then Hilbert's
@@ -73,7 +73,7 @@ def envelope_spectrum(
     speed: float | None = None,
     window: str = "rectangular",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Amplitude spectrum of the envelope in a band: (frequencies, amplitudes).
+    """Return the amplitude spectrum of the envelope in a band: (frequencies, amplitudes).
 
     values: (m,) at a rate of samples a second, band in Hz (`band_envelope`). Frequencies are in Hz,
     or orders if a speed in revolutions a second is given; with a rate of samples a revolution, band
@@ -93,7 +93,7 @@ def envelope_spectrum(
 
 
 def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
-    """Spectral kurtosis over the bands of a 1/3-binary tree.
+    """Return the spectral kurtosis over the bands of a 1/3-binary tree.
 
     values: (m,) at a rate of samples a second, or a revolution. The range from 0 to rate / 2 is
     divided by 1, 2, 3, 4, 6, 8, 12, ... 2^levels, as by Antoni's fast kurtogram (Mechanical Systems
@@ -130,7 +130,7 @@ def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
 
 
 def _kurtosis_of_parts(lines: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
-    """Kurtosis and its scatter of as many equal bands, (parts,) each; lines: (k,)."""
+    """Return the kurtosis and its scatter of as many equal bands, (parts,) each; lines: (k,)."""
     width = (lines.size - 1) / parts
     reach = math.ceil(width * (0.5 + EDGE)) + 1
     centre = ((np.arange(parts) + 0.5) * width)[:, None]

@@ -23,12 +23,14 @@ class Shape(NamedTuple):
 
 
 def shape(values: np.ndarray) -> Shape:
-    """The `Shape` of samples at equal intervals, (m,). Raises SignalError as its functions do."""
+    """Return the `Shape` of samples at equal intervals, (m,). Raises SignalError as its
+    functions do.
+    """
     return Shape(rms(values), crest_factor(values), kurtosis(values), gini(values))
 
 
 def rms(values: np.ndarray) -> float:
-    """Root mean square of samples at equal intervals, (m,), in the unit of the signal.
+    """Return the root mean square of samples at equal intervals, (m,), in the unit of the signal.
 
     The measure of severity of ISO 20816-1 (and 10816-1) for the vibration of housings, of what a
     band-pass filter has left: for reciprocating compressors of displacement, velocity and
@@ -39,13 +41,14 @@ def rms(values: np.ndarray) -> float:
 
 
 def crest_factor(values: np.ndarray) -> float:
-    """Greatest magnitude over rms of samples (m,): sqrt(2) of a sine, 1 of a square wave."""
+    """Return greatest magnitude over rms of samples (m,): sqrt(2) of a sine, 1 of a square wave."""
     found, size = _scaled(values)
     return 1.0 / math.sqrt(float(np.mean(found**2))) if size else math.nan
 
 
 def kurtosis(values: np.ndarray) -> float:
-    """Pearson's kurtosis of samples (m,): fourth central moment over the square of the second.
+    """Return Pearson's kurtosis of samples (m,): fourth central moment over the square of the
+    second.
 
     3 of Gaussian noise, 1.5 of a sine, 1 of a square wave. Moments of the samples themselves,
     without correction of bias; nan of a constant.
@@ -58,7 +61,8 @@ def kurtosis(values: np.ndarray) -> float:
 
 
 def gini(values: np.ndarray) -> float:
-    """Gini index of magnitudes (m,): 0 of a constant, 1 - 1/m of a single one that is not zero.
+    """Return the Gini index of magnitudes (m,): 0 of a constant, 1 - 1/m of a single one that is
+    not zero.
 
     1 - 2 sum_k (x_k / sum x) (m - k + 1/2) / m, x_1 <= ... <= x_m (Hurley and Rickard, IEEE
     Transactions on Information Theory 55, 2009, Eq. 1). For impulses pass the squared envelope
@@ -73,7 +77,7 @@ def gini(values: np.ndarray) -> float:
 
 
 def energy_angle(values: np.ndarray, share: float = 0.9) -> float:
-    """The smallest share of crank angle, 0 to 1, that holds a share of the energy.
+    """Return the smallest share of crank angle, 0 to 1, that holds a share of the energy.
 
     values: (m,) at equal crank angles over whole revolutions, mostly what `high_pass_orders` left.
     The energy is the sum of squares; the angles need not be neighbours, and the last sample counts
@@ -94,7 +98,7 @@ def energy_angle(values: np.ndarray, share: float = 0.9) -> float:
 
 
 def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarray:
-    """The signal without the orders up to and with this one, (m,).
+    """Return the signal without the orders up to and with this one, (m,).
 
     values: (m,) at a_turn equal crank angles a revolution, whole revolutions. The lines of the
     spectrum of the whole signal are removed, exactly and without a shift of phase. Raises
@@ -112,7 +116,9 @@ def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarra
 
 
 def _scaled(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """The checked signal over its greatest magnitude, so that no power overflows, and that."""
+    """Return the checked signal over its greatest magnitude, so that no power overflows, and
+    that.
+    """
     found = checked_signal(values)
     size = float(np.max(np.abs(found)))
     return (found / size if size else found), size

@@ -25,7 +25,7 @@ class Motion(NamedTuple):
 def oscillate(
     force: np.ndarray, step: float, frequency: float, damping_ratio: float, steady: bool = False
 ) -> Motion:
-    """The motion q'' + 2 zeta w q' + w^2 q = f of an oscillator.
+    """Return the motion q'' + 2 zeta w q' + w^2 q = f of an oscillator.
 
     force: f, per unit of modal mass, at n >= 4 equal steps, (n,); step: s; frequency: w / 2 pi, Hz;
     damping_ratio: zeta, between 0 and 1. From rest at the first sample; `steady`: instead the
@@ -58,7 +58,7 @@ def oscillate(
 
 
 def pieces(force: np.ndarray, step: float, periodic: bool) -> np.ndarray:
-    """The cubic between each two samples: its coefficients of 1, s, s^2, s^3, (4, n - 1)."""
+    """Return the cubic between each two samples: its coefficients of 1, s, s^2, s^3, (4, n - 1)."""
     if periodic:
         force = np.append(force[:-1], force[0])
     times = step * np.arange(len(force))
@@ -67,7 +67,7 @@ def pieces(force: np.ndarray, step: float, periodic: bool) -> np.ndarray:
 
 
 def one_step(root: complex, step: float) -> tuple[complex, np.ndarray]:
-    """exp(s h), and the integrals of exp(s (h - t)) t^j over a step, (4,)."""
+    """Return the exp(s h), and the integrals of exp(s (h - t)) t^j over a step, (4,)."""
     matrix = np.zeros((DEGREE + 2, DEGREE + 2), complex)
     matrix[0, 0], matrix[0, 1] = root * step, step
     for power in range(1, DEGREE + 1):
@@ -77,5 +77,5 @@ def one_step(root: complex, step: float) -> tuple[complex, np.ndarray]:
 
 
 def final(whole: complex, driven: np.ndarray) -> complex:
-    """Where an oscillator is after all steps, from rest."""
+    """Return where an oscillator is after all steps, from rest."""
     return lfilter([1.0], [1.0, -whole], driven)[-1]

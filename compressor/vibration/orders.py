@@ -39,12 +39,14 @@ class AngleWindow:
 
 
 def samples_a_turn(angle: np.ndarray) -> int:
-    """Samples a revolution at the median interval of angles (rad), (m,), rounded up to be even."""
+    """Return the samples a revolution at the median interval of angles (rad), (m,), rounded up
+    to be even.
+    """
     return 2 * math.ceil(round(TURN / float(np.median(np.diff(angle)))) / 2)
 
 
 def resampled(angle: np.ndarray, values: np.ndarray, a_turn: int) -> np.ndarray:
-    """The signal at equal crank angles, whole revolutions only: (revolutions * a_turn,).
+    """Return the signal at equal crank angles, whole revolutions only: (revolutions * a_turn,).
 
     angle (rad) and values: (m,), at any increasing angles. Sample i is at angle[0] + 2 pi i /
     a_turn. By a cubic spline (not-a-knot), which passes through the samples. Of a sine with s
@@ -101,7 +103,7 @@ def order_spectrum(
 def rms_above(
     orders: np.ndarray, rms_amplitudes: np.ndarray, order: float, window: str = "rectangular"
 ) -> float:
-    """Root mean square of what lies above an order, the order itself left out (Parseval).
+    """Return root mean square of what lies above an order, the order itself left out (Parseval).
 
     orders and rms_amplitudes: (k,), of a spectrum with `rms` set and this window, whose noise
     bandwidth the sum of squares is divided by. That is exact without leakage for the rectangular
@@ -118,7 +120,7 @@ def rms_above(
 def synchronous_average(
     angle: np.ndarray, values: np.ndarray, a_turn: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The mean revolution, (a_turn,), and what is left: (revolutions * a_turn,).
+    """Return the mean revolution, (a_turn,), and what is left: (revolutions * a_turn,).
 
     angle (rad) and values: (m,). Both are at the points of `resampled`, so that sample 0 of the
     mean revolution is at angle[0]. What is left is the resampled signal less the mean revolution.
@@ -132,7 +134,7 @@ def synchronous_average(
 
 
 def angle_window(angle: np.ndarray, values: np.ndarray, begin: float, end: float) -> AngleWindow:
-    """What falls into a window of crank angle in each revolution.
+    """Return what falls into a window of crank angle in each revolution.
 
     angle (rad) and values: (m,). begin, end: degrees, begin included and end not; a window whose
     end is not above its begin goes across 360. Only windows that the samples wholly reach over

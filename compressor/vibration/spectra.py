@@ -17,14 +17,14 @@ LONG = 4096  # samples, by which a noise bandwidth no longer depends on their nu
 
 
 def scipy_window(window: str) -> str:
-    """SciPy's name of one of the `WINDOWS`; raises SignalError."""
+    """Return SciPy's name of one of the `WINDOWS`; raises SignalError."""
     if window not in WINDOWS:
         raise SignalError(f"no window is called {window!r}: choose one of {', '.join(WINDOWS)}")
     return WINDOWS[window]
 
 
 def noise_bandwidth(window: str) -> float:
-    """Equivalent noise bandwidth of a window, in lines of the spectrum; raises SignalError.
+    """Return equivalent noise bandwidth of a window, in lines of the spectrum; raises SignalError.
 
     n sum(w^2) / sum(w)^2: 1 for rectangular, 1.5 for hann, 3.77 for flattop (Harris, Proceedings
     of the IEEE 66, 1978, Eq. 11). White noise raises each line of a mean square by as much.

@@ -20,19 +20,19 @@ class Template(NamedTuple):
     next: str
 
     def commands(self, file: Path) -> str:
-        """The commands that follow where the template was written to another file."""
+        """Return the commands that follow where the template was written to another file."""
         own = rf"(?<!compsim ){re.escape(self.name)}(\.yaml)?\b"
         quoted = shlex.quote(str(file))
         return re.sub(own, lambda found: quoted if found[1] else shlex.quote(file.stem), self.next)
 
     def text(self, file: Path) -> str:
-        """Its text for another file."""
+        """Return its text for another file."""
         written = self.path.read_text(encoding="utf-8")
         return written.replace(f"{NEXT}{self.next}", f"{NEXT}{self.commands(file)}", 1)
 
 
 def templates() -> dict[str, Template]:
-    """All templates by name, those to begin with first.
+    """Return all templates by name, those to begin with first.
 
     The first lines of each are comments: the question that it answers, how many jobs that takes,
     and `next:` with commands.
@@ -43,14 +43,14 @@ def templates() -> dict[str, Template]:
 
 
 def _header(path: Path) -> tuple[str, str, str]:
-    """The comments at the head of a template: question, jobs, commands."""
+    """Return the comments at the head of a template: question, jobs, commands."""
     lines = path.read_text(encoding="utf-8").splitlines()
     words = [line.removeprefix("#").strip() for line in lines[:3]]
     return words[0], words[1], words[2].removeprefix(NEXT)
 
 
 def example(name: str) -> Path:
-    """The path of an example case file, such as `consistent`.
+    """Return the path of an example case file, such as `consistent`.
 
     Raises ValueError, which names all examples, where there is none of this name.
     """

@@ -28,7 +28,7 @@ class Figure:
 
 
 def sizes(fault: str) -> tuple[str, ...]:
-    """The labels of a fault's three clearances."""
+    """Return the labels of a fault's three clearances."""
     return tuple(label(fault, clearance) for clearance in CLEARANCES)
 
 

@@ -41,7 +41,7 @@ def look(artist: Any) -> tuple[str, str, str]:
 
 
 def legend_names(figure: Figure) -> Names:
-    """The names in all legends of a figure, by how their entries look."""
+    """Return the names in all legends of a figure, by how their entries look."""
     legends = [*figure.legends, *(own for a in figure.axes if (own := a.get_legend()))]
     found: Names = {}
     for legend in legends:
@@ -52,7 +52,7 @@ def legend_names(figure: Figure) -> Names:
 
 
 def every_trace(axes: Axes, named: Names) -> Iterator[Trace]:
-    """What the artists of a panel show, in the order in which they were drawn."""
+    """Yield what the artists of a panel show, in the order in which they were drawn."""
     inside: set[Artist] = set()  # parts of a container, which tells of them
     for container in axes.containers:
         inside |= {*flat(container)}
@@ -72,7 +72,7 @@ def every_trace(axes: Axes, named: Names) -> Iterator[Trace]:
 
 
 def flat(container: Any) -> Iterator[Artist]:
-    """All artists of a container."""
+    """Yield all artists of a container."""
     for item in container:
         if isinstance(item, Artist):
             yield item
@@ -81,14 +81,14 @@ def flat(container: Any) -> Iterator[Artist]:
 
 
 def name_of(artist: Any, named: Names) -> str:
-    """What an artist is called: its label, or the legend's entry that looks alike."""
+    """Return what an artist is called: its label, or the legend's entry that looks alike."""
     return label_of(artist) or (
         named.get(look(artist), "") if isinstance(artist, Line2D | Patch) else ""
     )
 
 
 def label_of(artist: Any) -> str:
-    """An artist's own label; "" where matplotlib gave it one."""
+    """Return an artist's own label; "" where matplotlib gave it one."""
     label = str(artist.get_label())
     return "" if label.startswith("_") else label
 
@@ -98,18 +98,20 @@ def jobs_of(artist: object) -> tuple[str, ...]:
 
 
 def pattern(line: Line2D) -> tuple[float, ...]:
-    """A line's dashes in points: lengths of strokes and gaps; none if it is solid."""
+    """Return a line's dashes in points: lengths of strokes and gaps; none if it is solid."""
     dashes = line._dash_pattern[1]  # type: ignore[attr-defined]
     return tuple(round(float(d), 2) for d in dashes) if dashes else ()
 
 
 def in_data(axes: Axes, artist: Artist) -> bool:
-    """Whether an artist's coordinates are those of the axes."""
+    """Return whether an artist's coordinates are those of the axes."""
     return bool(artist.get_transform().contains_branch(axes.transData))
 
 
 def curve(axes: Axes, line: Any, named: Names) -> Trace | None:
-    """A line or its markers; None for a straight line across the panel, which `notes` has."""
+    """Return a line or its markers; None for a straight line across the panel, which `notes`
+    has.
+    """
     if line.get_transform().contains_branch_seperately(axes.transData) != (True, True):
         return None
     x = np.asarray(np.ma.filled(line.get_xdata(orig=False), np.nan), float)
@@ -133,7 +135,7 @@ def curve(axes: Axes, line: Any, named: Names) -> Trace | None:
 
 
 def errorbar(axes: Axes, container: ErrorbarContainer, named: Names) -> Iterator[Trace]:
-    """Points, or a line, with error bars in y or in x."""
+    """Yield the points, or a line, with error bars in y or in x."""
     line, _, collections = container.lines
     label = str(container.get_label())
     if line is None:  # bars without points: lines, where something else has the points
@@ -164,7 +166,9 @@ def errorbar(axes: Axes, container: ErrorbarContainer, named: Names) -> Iterator
 
 
 def bars(container: BarContainer, named: Names) -> Trace:
-    """Bars, lying (x: where they end, y: where they stand) or standing (x and y exchanged)."""
+    """Return the bars, lying (x: where they end, y: where they stand) or standing (x and y
+    exchanged).
+    """
     patches = container.patches
     lying = container.orientation == "horizontal"
     middles = [
@@ -189,7 +193,7 @@ def bars(container: BarContainer, named: Names) -> Trace:
 
 
 def mesh(axes: Axes, artist: Any, named: Names) -> Trace:
-    """A map of coloured cells."""
+    """Return a map of coloured cells."""
     corners = artist.get_coordinates()
     values = np.ma.filled(artist.get_array().astype(float), np.nan)
     values = values.reshape(corners.shape[0] - 1, corners.shape[1] - 1)
@@ -209,7 +213,7 @@ def mesh(axes: Axes, artist: Any, named: Names) -> Trace:
 
 
 def scatter(axes: Axes, artist: Any, named: Names) -> Trace | None:
-    """Points of a scatter diagram."""
+    """Return the points of a scatter diagram."""
     points = np.ma.filled(artist.get_offsets().astype(float), np.nan)
     colors = artist.get_facecolor()
     width = float(np.sqrt(artist.get_sizes()[0])) if len(artist.get_sizes()) else 4.0
@@ -218,7 +222,7 @@ def scatter(axes: Axes, artist: Any, named: Names) -> Trace | None:
 
 
 def outline(axes: Axes, artist: Any, named: Names) -> Trace | None:
-    """A filled area between curves."""
+    """Return a filled area between curves."""
     if not in_data(axes, artist) or not artist.get_paths():
         return None
     rings = [path.vertices for path in artist.get_paths() if len(path.vertices)]
@@ -230,7 +234,7 @@ def outline(axes: Axes, artist: Any, named: Names) -> Trace | None:
 
 
 def segments(axes: Axes, artist: Any, named: Names) -> Trace | None:
-    """Many straight lines, such as those of an impact's time and speed."""
+    """Return many straight lines, such as those of an impact's time and speed."""
     if artist.get_transform().contains_branch_seperately(axes.transData) != (True, True):
         return None
     joined = broken([np.asarray(s, float) for s in artist.get_segments()])
@@ -240,7 +244,9 @@ def segments(axes: Axes, artist: Any, named: Names) -> Trace | None:
 
 
 def contour(axes: Axes, artist: Any, named: Names) -> Trace | None:
-    """The lines of equal value, without a name: they follow from the map that they lie on."""
+    """Return the lines of equal value, without a name: they follow from the map that they lie
+    on.
+    """
     parts = [part for path in artist.get_paths() for part in path.to_polygons(closed_only=False)]
     joined = broken([np.asarray(part, float) for part in parts])
     colors = artist.get_edgecolor()
@@ -248,7 +254,7 @@ def contour(axes: Axes, artist: Any, named: Names) -> Trace | None:
 
 
 def shape(axes: Axes, artist: Any, named: Names) -> Trace | None:
-    """The outline of a rectangle, a circle or another shape."""
+    """Return the outline of a rectangle, a circle or another shape."""
     if artist is axes.patch or not in_data(axes, artist):
         return None
     transform = artist.get_transform() - axes.transData
@@ -262,7 +268,7 @@ def shape(axes: Axes, artist: Any, named: Names) -> Trace | None:
 
 
 def broken(parts: list[np.ndarray]) -> np.ndarray:
-    """Lines one after the other with a gap of nan between them, shape (n, 2)."""
+    """Return the lines one after the other with a gap of nan between them, shape (n, 2)."""
     gap = np.full((1, 2), np.nan)
     joined = [array for part in parts for array in (part, gap)][:-1]
     return np.concatenate(joined) if joined else np.empty((0, 2))

@@ -44,7 +44,9 @@ MICROMETRE = 1e6
 
 @styled
 def draw_orbits(run: xr.Dataset) -> Figure:
-    """The journal's centre in the bore of each joint with clearance, over the last revolution."""
+    """Return the journal's centre in the bore of each joint with clearance, over the last
+    revolution.
+    """
     joints = joints_with_clearance(run)
     figure, panels = sheet(1, len(joints), 5.4)
     for panel, joint in zip(panels.flat, joints, strict=True):
@@ -74,14 +76,14 @@ def plot_orbit(panel: Axes, run: xr.Dataset, joint: str) -> None:
 
 
 def corner(shape: str) -> dict[str, Any]:
-    """How a mark on an orbit looks."""
+    """Return how a mark on an orbit looks."""
     return {"marker": shape, "markersize": 7, "color": GOLD, "markeredgecolor": BLACK,
             "linestyle": "none", "zorder": 4}  # fmt: skip
 
 
 @styled
 def draw_modes(run: xr.Dataset) -> Figure:
-    """Contact modes over the crank angle, as shares of the revolutions, and penetration."""
+    """Return contact modes over the crank angle, as shares of the revolutions, and penetration."""
     joints = joints_with_clearance(run)
     shares = angle_modes(run)
     ratios = (1.0, 2.2) * len(joints)
@@ -118,7 +120,7 @@ def plot_strip(panel: Axes, shares: xr.Dataset, joint: str) -> None:
 
 
 def mode_handles() -> list[Patch]:
-    """The modes' colours, for a legend."""
+    """Return the modes' colours, for a legend."""
     return [
         Patch(facecolor=color, edgecolor=BLACK, linewidth=0.4, label=mode)
         for mode, color in MODE_COLORS.items()
@@ -127,7 +129,7 @@ def mode_handles() -> list[Patch]:
 
 @styled
 def draw_impacts(run: xr.Dataset) -> Figure:
-    """Approach speed of the impacts of all settled revolutions over the crank angle."""
+    """Return the approach speed of the impacts of all settled revolutions over the crank angle."""
     found = impacts(run)
     figure, panels = sheet(1, 1, 3.6)
     (panel,) = panels.flat

@@ -46,7 +46,7 @@ class Quantity:
     where: tuple[tuple[str, str], ...] = ()  # joint and axis of a force
 
     def values(self, run: xr.Dataset) -> np.ndarray:
-        """A run's samples in the unit of the axis."""
+        """Return a run's samples in the unit of the axis."""
         return run[self.series].sel(dict(self.where)).values * self.factor
 
 
@@ -59,29 +59,33 @@ class Curve:
     line: Line
 
     def handle(self) -> Line2D:
-        """The curve's entry in a legend."""
+        """Return the curve's entry in a legend."""
         return Line2D([], [], label=self.name, **self.line.properties())
 
 
 def degrees(run: xr.Dataset) -> np.ndarray:
-    """Crank angle (°) of a run's samples, counted from the top dead centre before they begin."""
+    """Return the crank angle (°) of a run's samples, counted from the top dead centre before
+    they begin.
+    """
     angle = np.degrees(run["crank_angle"].values)
     return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9)
 
 
 def fault_curves(runs: Runs, fault: str, ideal: bool) -> list[Curve]:
-    """The curves of 0.1, 0.2 and 0.3 mm, and that of no clearance before them."""
+    """Return the curves of 0.1, 0.2 and 0.3 mm, and that of no clearance before them."""
     curves = [Curve(f"{c:g} mm", turn(runs[label(fault, c)]), BY_CLEARANCE[c]) for c in CLEARANCES]
     return [Curve("no clearance", turn(runs["design"]), IDEAL), *curves] if ideal else curves
 
 
 def load_curves(runs: Runs) -> list[Curve]:
-    """The curves of the typical and the design model, without clearance."""
+    """Return the curves of the typical and the design model, without clearance."""
     return [Curve(name, turn(runs[load]), BY_LOAD[load]) for load, name in LOADS.items()]
 
 
 def turn(run: xr.Dataset) -> xr.Dataset:
-    """The last revolution of a run; of one that has none after settling, all that has settled."""
+    """Return the last revolution of a run; of one that has none after settling, all that has
+    settled.
+    """
     try:
         return last_revolution(run)[1]
     except NoSeriesError:
@@ -144,7 +148,8 @@ def plot_enlarged(
 
 
 def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:
-    """The samples of the window in which a quantity differs most, and whether it differs at all.
+    """Return the samples of the window in which a quantity differs most, and whether it differs at
+    all.
 
     The window lies around the greatest distance between the outermost curves; for a steep
     quantity it is the one with the greatest mean distance over the height that it needs. Where all
@@ -171,6 +176,8 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
 
 
 def first_peak(score: np.ndarray, nearly: float, reach: int) -> int:
-    """Where the first maximum that is nearly the greatest lies: equal turns give one place."""
+    """Return where the first maximum that is nearly the greatest lies: equal turns give one
+    place.
+    """
     first = int(np.argmax(score >= nearly * score.max()))
     return first + int(np.argmax(score[first : first + reach + 1]))

@@ -50,7 +50,9 @@ NEAR = "#f2ead9"
 
 @styled
 def draw_diagnosis_spectra(found: Shakings) -> Figure:
-    """X over orders: healthy, and each joint at the greatest clearance; rms over clearance."""
+    """Return X over orders: healthy, and each joint at the greatest clearance; rms over
+    clearance.
+    """
     figure, panels = sheet(1, 2, 4.6, width_ratios=(2.3, 1))
     lines, trend = panels.flat
     for fault in ALONE:
@@ -82,7 +84,7 @@ def draw_diagnosis_spectra(found: Shakings) -> Figure:
 
 @styled
 def draw_diagnosis_orbits(runs: Runs) -> Figure:
-    """The journals' orbits of each joint at three clearances, all to one scale."""
+    """Return the journals' orbits of each joint at three clearances, all to one scale."""
     figure, panels = sheet(len(ALONE), len(CLEARANCES), 7.2, sharex=True, sharey=True)
     for row, joint in zip(panels, ALONE, strict=True):
         for panel, clearance in zip(row, CLEARANCES, strict=True):
@@ -98,7 +100,7 @@ def draw_diagnosis_orbits(runs: Runs) -> Figure:
 
 @styled
 def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Figure:
-    """When X has its high orders, and the joints' contact modes, over the crank angle."""
+    """Return when X has its high orders, and the joints' contact modes, over the crank angle."""
     figure, panels = sheet(2 * len(ALONE), 1, 8.4, sharex=True, height_ratios=(2.6, 1) * 2)
     for joint, profile, strip in zip(ALONE, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)

@@ -16,7 +16,7 @@ from compressor.report.figures.shown import Note, Panel, Scale, Sheet
 
 
 def extract(figure: Figure) -> Sheet:
-    """The numbers that a figure shows."""
+    """Return the numbers that a figure shows."""
     named = legend_names(figure)
     scales = {bar.ax: bar for bar in colorbars(figure)}
     panels = [axes for axes in figure.axes if axes not in scales and axes.get_visible()]
@@ -32,7 +32,7 @@ def extract(figure: Figure) -> Sheet:
 
 
 def ratios(grid: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The heights of a grid's rows and the widths of its columns."""
+    """Return the heights of a grid's rows and the widths of its columns."""
     rows, columns = grid.get_geometry()
     heights, widths = grid.get_height_ratios(), grid.get_width_ratios()
     return (
@@ -42,7 +42,7 @@ def ratios(grid: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def colorbars(figure: Figure) -> Iterator[Any]:
-    """The colour bars of a figure."""
+    """Yield the colour bars of a figure."""
     for axes in figure.axes:
         bar = getattr(axes, "_colorbar", None)
         if bar is not None:
@@ -50,7 +50,7 @@ def colorbars(figure: Figure) -> Iterator[Any]:
 
 
 def panel(axes: Axes, named: Names, shared: list[str]) -> Panel:
-    """One of a figure's axes; shared: titles of the figure's x and y axes, "" without."""
+    """Return one of a figure's axes; shared: titles of the figure's x and y axes, "" without."""
     spec = axes.get_subplotspec()
     row, column = (spec.rowspan, spec.colspan) if spec else (range(1), range(1))
     traces = tuple(trace for trace in every_trace(axes, named))
@@ -68,7 +68,7 @@ def panel(axes: Axes, named: Names, shared: list[str]) -> Panel:
 
 
 def scale(axis: Any, title: str, limits: tuple[float, float], kind: str) -> Scale:
-    """An axis; words at its ticks where these are no numbers."""
+    """Return an axis; words at its ticks where these are no numbers."""
     words = {}
     if axis.get_major_formatter().__class__.__name__ in ("FixedFormatter", "FuncFormatter"):
         places = axis.get_majorticklocs()
@@ -90,7 +90,7 @@ def scale(axis: Any, title: str, limits: tuple[float, float], kind: str) -> Scal
 
 
 def plain(title: str) -> str:
-    """A title in one line, without the marks of mathematical letters."""
+    """Return a title in one line, without the marks of mathematical letters."""
     return " ".join(title.replace("$", "").split())
 
 
@@ -103,7 +103,7 @@ def is_number(text: str) -> bool:
 
 
 def notes(axes: Axes) -> Iterator[Note]:
-    """Texts in a panel, and straight lines across it."""
+    """Yield the texts in a panel, and straight lines across it."""
     for text in axes.texts:
         words = " ".join(text.get_text().split())
         if words and text.get_visible():

@@ -22,7 +22,7 @@ PISTON = Quantity("piston_force", "", "force on the piston, towards the crank (k
 
 @styled
 def draw_piston_force(runs: Runs) -> Figure:
-    """Figure 7: the piston force of the design and the typical model."""
+    """Return the figure 7: the piston force of the design and the typical model."""
     figure, panels = sheet(1, 1, 4.2)
     (panel,) = panels.flat
     curves = load_curves(runs)
@@ -35,7 +35,7 @@ def draw_piston_force(runs: Runs) -> Figure:
 
 @styled
 def draw_contact_force(runs: Runs, fault: str, joint: str) -> Figure:
-    """Figures 9, 12, 15, 16: contact force at one joint, both ways, a row a clearance.
+    """Return the figures 9, 12, 15, 16: contact force at one joint, both ways, a row a clearance.
 
     All enlarged views show the window in which the horizontal forces at the fault's first joint
     differ most, so that those of both joints show the same angles.
@@ -56,12 +56,12 @@ def draw_contact_force(runs: Runs, fault: str, joint: str) -> Figure:
 
 
 def first_joint(fault: str) -> str:
-    """The joint whose forces choose the enlarged view."""
+    """Return the joint whose forces choose the enlarged view."""
     return "small_end" if fault == "small_end" else "big_end"
 
 
 def contact_force(joint: str, axis: str) -> Quantity:
-    """The force on the rod at a joint along an axis, kN."""
+    """Return the force on the rod at a joint along an axis, kN."""
     title = {"x": "horizontal force on the rod", "y": "vertical force on the rod"}[axis]
     where = (("joint", joint), ("axis", axis))
     return Quantity("contact_force", title, "force (kN)", KILONEWTON, where=where)

@@ -59,7 +59,9 @@ SIGNALS = (
 
 @styled
 def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
-    """The last settled revolution of a run, and of its machine without clearance, six panels."""
+    """Return the last settled revolution of a run, and of its machine without clearance, six
+    panels.
+    """
     figure, panels = sheet(3, 2, 8.6, sharex=True)
     drawn = {"twin": (twin, TWIN), "this": (run, THIS)}
     for name, (one, line) in drawn.items():
@@ -82,14 +84,16 @@ def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
 
 
 def legend() -> list[Line2D]:
-    """This job and its twin."""
+    """Return this job and its twin."""
     pairs = ((NAMES["this"], THIS), (NAMES["twin"], TWIN))
     return [Line2D([], [], label=name, **line.properties()) for name, line in pairs]
 
 
 @styled
 def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
-    """Order spectra of X and of the crosshead's deviation; with a sensor, of its envelope."""
+    """Return the order spectra of X and of the crosshead's deviation; with a sensor, of its
+    envelope.
+    """
     envelope = sensor_envelope(run)
     rows = 2 if envelope is None else 3
     figure, panels = sheet(rows, 1, 2.7 * rows + 0.5)

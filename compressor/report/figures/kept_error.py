@@ -19,7 +19,8 @@ SHOWN = {
 
 @styled
 def draw_kept_error(cases: xr.Dataset) -> Figure:
-    """Error of acceleration against the time that its run took with its check, a colour a word.
+    """Return the error of acceleration against the time that its run took with its check, a colour
+    a word.
 
     Dims (word, case): `seconds`, and `error`, relative L2 after settling, nan where a run did not
     say `kept`; `promise` (word). Large: both medians. Dashed: the promise.

@@ -20,7 +20,7 @@ RUNGS = {
 
 @styled
 def draw_tolerance_ladder(ladder: xr.Dataset) -> Figure:
-    """Relative errors and the energy residual against rtol, a line a scene.
+    """Return the relative errors and the energy residual against rtol, a line a scene.
 
     Dims (scene, tolerance); `RUNGS` are its variables, with `reference_uncertainty` (scene): the
     error of acceleration below which the references themselves disagree. Dotted: as the tolerance;
@@ -47,7 +47,7 @@ def draw_tolerance_ladder(ladder: xr.Dataset) -> Figure:
 
 @styled
 def draw_scaled_limit(limit: xr.Dataset) -> Figure:
-    """Greatest |x - x_ideal| against clearance, the contact scaled along; a line a scene.
+    """Return greatest |x - x_ideal| against clearance, the contact scaled along; a line a scene.
 
     Dims (scene, clearance), m; variable `deviation`, m. Right: the same over the clearance.
     """
@@ -82,7 +82,7 @@ def plot_line(panel: Axes, number: int, x: np.ndarray, y: np.ndarray) -> None:
 
 
 def scene_handles(data: xr.Dataset) -> list[Line2D]:
-    """What the lines of the scenes mean."""
+    """Return what the lines of the scenes mean."""
     return [
         Line2D([], [], label=str(name).replace("_", " "), marker=MARKERS[i % len(MARKERS)],
                markersize=4.5, **CYCLE[i % len(CYCLE)].properties())
@@ -91,5 +91,5 @@ def scene_handles(data: xr.Dataset) -> list[Line2D]:
 
 
 def line_handles(meanings: dict[str, Line]) -> list[Line2D]:
-    """What guiding lines mean."""
+    """Return what guiding lines mean."""
     return [Line2D([], [], label=text, **line.properties()) for text, line in meanings.items()]

@@ -23,7 +23,7 @@ BASE = Line("#707070", (0, (1, 1.2)), 1.2, 2.1)
 
 @styled
 def draw_pressure_volume(runs: Runs) -> Figure:
-    """Figure 3: cylinder pressure over volume, phases named, with their direction."""
+    """Return the figure 3: cylinder pressure over volume, phases named, with their direction."""
     run = settled(runs["typical"])
     volume, pressure = gas_state(run)
     figure, panels = sheet(1, 1, 5.2)
@@ -38,7 +38,7 @@ def draw_pressure_volume(runs: Runs) -> Figure:
 
 
 def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Volume (litres) and absolute pressure (MPa) of a run of the gas load."""
+    """Return the volume (litres) and absolute pressure (MPa) of a run of the gas load."""
     case = case_of(run)
     machine, gas = case.machine, case.gas
     area = math.pi * gas.piston_radius_mm**2  # mm^2
@@ -75,7 +75,9 @@ def name_phases(panel: Axes, run: xr.Dataset, volume: np.ndarray, pressure: np.n
 
 @styled
 def draw_cam(runs: Runs) -> Figure:
-    """Figure 4: the cam's contour, and its follower's displacement beside the printed one."""
+    """Return the figure 4: the cam's contour, and its follower's displacement beside the printed
+    one.
+    """
     cam = Cam(runs["design"])
     angles = np.radians(np.linspace(0, 360, 1441))
     figure, panels = sheet(1, 2, 4.9, width_ratios=(1, 1.25))

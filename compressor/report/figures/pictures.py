@@ -21,7 +21,7 @@ _inherited: dict[str, Figure] = {}  # what a process finds that was forked while
 
 
 def pictures(figures: Mapping[str, Figure], headings: Mapping[str, str]) -> dict[str, bytes]:
-    """PNG and SVG of each figure by the names of their files; tells on stderr what is drawn.
+    """Return PNG and SVG of each figure by the names of their files; tells on stderr what is drawn.
 
     A forked process takes figures from the first on, this one from the last on until they meet: a
     figure need not be sent then, which matplotlib's formatters often forbid. Where threads run,
@@ -37,21 +37,21 @@ def pictures(figures: Mapping[str, Figure], headings: Mapping[str, str]) -> dict
 
 
 def can_fork() -> bool:
-    """Whether the system can copy a process, and has a core for the copy."""
+    """Return whether the system can copy a process, and has a core for the copy."""
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     return cores > 1 and "fork" in multiprocessing.get_all_start_methods()
 
 
 def both(figure: Figure) -> tuple[bytes, ...]:
-    """A figure as PNG and as SVG."""
+    """Return a figure as PNG and as SVG."""
     return tuple(render(figure, kind) for kind in KINDS)
 
 
 def one_by_one(
     figures: Mapping[str, Figure], headings: Mapping[str, str]
 ) -> dict[str, tuple[bytes, ...]]:
-    """All figures in this process."""
+    """Return all figures in this process."""
     made = {}
     for name, figure in figures.items():
         tell(headings[name])
@@ -62,7 +62,7 @@ def one_by_one(
 def by_two(
     figures: Mapping[str, Figure], headings: Mapping[str, str]
 ) -> dict[str, tuple[bytes, ...]]:
-    """All figures in this process and a copy of it."""
+    """Return all figures in this process and a copy of it."""
     made, sent, waiting = {}, {}, deque(figures)
     _inherited.update(figures)
     context = multiprocessing.get_context("fork")
@@ -93,7 +93,7 @@ def by_two(
 
 
 def inherited(name: str, heading: str) -> tuple[bytes, ...]:
-    """The pictures of a figure, in the copied process."""
+    """Return the pictures of a figure, in the copied process."""
     tell(heading)
     return both(_inherited[name])
 

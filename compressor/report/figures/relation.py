@@ -15,7 +15,7 @@ from compressor.report.figures.style import BLACK, BY_CLEARANCE, sheet, styled
 
 @styled
 def draw_relation(runs: Runs, joint: str) -> Figure:
-    """One panel a clearance: every stored sample, the regression line, r and r²."""
+    """Return one panel a clearance: every stored sample, the regression line, r and r²."""
     figure, panels = sheet(1, 3, 4.0, sharex=True, sharey=True)
     for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
         run = runs[label(joint, clearance)]

@@ -29,7 +29,7 @@ MOTION = (
 
 @styled
 def draw_load_response(runs: Runs) -> Figure:
-    """Figure 6: the design and the typical model without clearance."""
+    """Return the figure 6: the design and the typical model without clearance."""
     curves = load_curves(runs)
     figure, panels = sheet(3, 2, 9.6)
     for (full, enlarged), quantity, letters in zip(panels, MOTION, ("ab", "cd", "ef"), strict=True):
@@ -40,7 +40,7 @@ def draw_load_response(runs: Runs) -> Figure:
 
 @styled
 def draw_fault_response(runs: Runs, fault: str) -> Figure:
-    """Figures 8, 11, 14: no clearance and three clearances of one fault.
+    """Return the figures 8, 11, 14: no clearance and three clearances of one fault.
 
     Acceleration oscillates fast: it has a row a clearance.
     """
@@ -56,7 +56,7 @@ def draw_fault_response(runs: Runs, fault: str) -> Figure:
 
 
 def beside(figure: Figure, panels: np.ndarray, rows: slice) -> Axes:
-    """One panel in place of those in the second column of some rows."""
+    """Return one panel in place of those in the second column of some rows."""
     grid = panels[0, 0].get_gridspec()
     for _, panel in panels[rows]:
         panel.remove()
@@ -81,7 +81,7 @@ def enlarge(
 def finished(
     figure: Figure, lowest: Sequence[Axes] | np.ndarray, curves: Sequence[Curve]
 ) -> Figure:
-    """The figure with the titles of its lowest axes and a legend."""
+    """Return the figure with the titles of its lowest axes and a legend."""
     for panel in lowest:
         panel.set_xlabel(ANGLE_AXIS)
     legend_above(figure, [curve.handle() for curve in curves])

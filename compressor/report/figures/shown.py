@@ -94,7 +94,7 @@ class Sheet:
 
 
 def as_csv(sheet: Sheet) -> str:
-    """All numbers of a figure. Curves over the same x share a column of it, and stand once.
+    """Return all numbers of a figure. Curves over the same x share a column of it, and stand once.
 
     A column is headed "panel: curve: title of the axis", with " below" and " above" for the ends
     of error bars, counted from the value. A map has a row a cell, x and y in its middle.
@@ -136,5 +136,5 @@ def points(trace: Trace) -> tuple[np.ndarray, np.ndarray, *tuple[tuple[str, np.n
 
 
 def texts(values: np.ndarray) -> list[str]:
-    """Numbers as text, nan as nothing."""
+    """Return the numbers as text, nan as nothing."""
     return ["" if text == "nan" else text for text in np.char.mod("%.8g", values).tolist()]

@@ -23,7 +23,7 @@ ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
 @styled
 def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
-    """Order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
+    """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
     figure, panels = sheet(1, 2, height(len(rows)) + 0.9, width_ratios=(3, 1), sharey=True)
     image, beside = panels.flat
     found = [row.shaking for row in rows]
@@ -55,7 +55,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
 
 @styled
 def draw_map(rows: Sequence[SweptRow], title: str) -> Figure:
-    """The most frequent contact mode over the crank angle, a row a value, for each joint."""
+    """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)
     figure, panels = sheet(1, len(modes), height(len(rows)) + 0.9, sharey=True)
     for panel, (joint, table) in zip(panels.flat, modes.items(), strict=True):
@@ -96,5 +96,5 @@ def label_rows(panel: Axes, rows: Sequence[SweptRow], title: str) -> None:
 
 
 def height(rows: int) -> float:
-    """The height (inches) of so many rows."""
+    """Return the height (inches) of so many rows."""
     return min(9.0, max(LEAST, ROW * rows))

@@ -57,7 +57,7 @@ class Line:
     zorder: float = 2.0
 
     def properties(self) -> dict[str, Any]:
-        """The keywords of `Axes.plot`."""
+        """Return the keywords of `Axes.plot`."""
         return asdict(self)
 
 
@@ -99,7 +99,7 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
 
 
 def sheet(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, np.ndarray]:
-    """A figure of the common width and its axes, shape (rows, columns); height in inches."""
+    """Return a figure of the common width and its axes, shape (rows, columns); height in inches."""
     layout = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.06, wspace=0.03)
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
@@ -115,7 +115,8 @@ def legend_above(figure: Figure, handles: list[Any]) -> None:
 
 @styled
 def render(figure: Figure, kind: str) -> bytes:
-    """A figure as the bytes of a `png` or `svg` file, which tell nothing of when they were made.
+    """Return a figure as the bytes of a `png` or `svg` file, which tell nothing of when they were
+    made.
 
     Its layout is found once, and without drawing: matplotlib draws all once more to find it.
     """

@@ -40,7 +40,8 @@ class SweepFigure(NamedTuple):
 
 
 def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
-    """The drawings of a study, as `open_study` gives it; none where nothing is swept or measured.
+    """Return the drawings of a study, as `open_study` gives it; none where nothing is swept or
+    measured.
 
     What is the same at every job is said in a caption, and not drawn.
     """
@@ -65,7 +66,8 @@ def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
 def several(
     sweep: Sweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
-    """A grid of two or more axes: a ranking, all metrics, and of three or more axes some closer.
+    """Yield a grid of two or more axes: a ranking, all metrics, and of three or more axes some
+    closer.
 
     Two axes of numbers, or of words, are a map.
     """
@@ -98,7 +100,9 @@ def several(
 def sampled(
     sweep: Sweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
-    """A list of jobs: a ranking, each metric against its strongest key, and some against all."""
+    """Yield a list of jobs: a ranking, each metric against its strongest key, and some against
+    all.
+    """
     found = ranking(sweep, shown)
     yield from ranked(sweep, found, shown)
     order = overall(found) if found else [*range(len(sweep.axes))]
@@ -120,7 +124,7 @@ def sampled(
 
 
 def ranked(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> Iterator[SweepFigure]:
-    """The ranking of the axes, if enough is known for one."""
+    """Yield the ranking of the axes, if enough is known for one."""
     if found and len(sweep.axes) > 1:
         caption = captions.ranking(sweep, found, shown)
         yield SweepFigure("ranking", "which key matters for which metric", caption,

@@ -38,25 +38,25 @@ TREND = (
 
 
 def joined(*parts: str) -> str:
-    """Sentences one after the other."""
+    """Return the sentences one after the other."""
     return " ".join(part for part in parts if part)
 
 
 def parted(sweep: Sweep, known: Sequence[Measure]) -> tuple[list[Measure], list[Measure]]:
-    """The measures that differ between jobs, and those that do not."""
+    """Return the measures that differ between jobs, and those that do not."""
     varied = [bool(np.ptp(v[np.isfinite(v)])) for v in (sweep.values(m) for m in known)]
     both = [*zip(known, varied, strict=True)]
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
 
 
 def marks_told(sweep: Sweep) -> str:
-    """What marks mean, where there are any."""
+    """Return what marks mean, where there are any."""
     status, chaotic = sweep.status, sweep.chaotic
     return MARKS if chaotic.any() or np.isin(status, ("failed", "missing")).any() else ""
 
 
 def same_told(sweep: Sweep, same: Sequence[Measure]) -> str:
-    """The measures that are the same at every job, with their values."""
+    """Return the measures that are the same at every job, with their values."""
     if not same:
         return ""
     parts = [
@@ -67,7 +67,7 @@ def same_told(sweep: Sweep, same: Sequence[Measure]) -> str:
 
 
 def curves(sweep: Sweep) -> str:
-    """A sweep along one axis."""
+    """Return a sweep along one axis."""
     return joined(
         f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
         "is long enough to be seen.",
@@ -76,7 +76,7 @@ def curves(sweep: Sweep) -> str:
 
 
 def maps(sweep: Sweep) -> str:
-    """A sweep along two axes."""
+    """Return a sweep along two axes."""
     return joined(
         "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
         *(thinned_told(axis, MOST_CELLS) for axis in sweep.axes),
@@ -84,13 +84,13 @@ def maps(sweep: Sweep) -> str:
 
 
 def thinned_told(axis: Axis, most: int) -> str:
-    """How many of an axis' values are shown, if not all are."""
+    """Return how many of an axis' values are shown, if not all are."""
     count = axis.values.size
     return "" if count <= most else f"Of {count} values of {axis.phrase} {most} are shown."
 
 
 def points_told(sweep: Sweep, role: Roles) -> str:
-    """What a point is: a job, with what its marks mean, or a mean over which axes."""
+    """Return what a point is: a job, with what its marks mean, or a mean over which axes."""
     others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
     if not others:
         return joined("A point a job.", marks_told(sweep))
@@ -103,7 +103,7 @@ def points_told(sweep: Sweep, role: Roles) -> str:
 
 
 def overview(sweep: Sweep, role: Roles) -> str:
-    """Every metric over two of the axes."""
+    """Return every metric over two of the axes."""
     color = sweep.axes[role.color]
     return joined(
         f"Every metric over {sweep.axes[role.x].phrase}, a colour for each value of "
@@ -117,7 +117,7 @@ def overview(sweep: Sweep, role: Roles) -> str:
 
 
 def multiples(sweep: Sweep, role: Roles) -> str:
-    """Panels for the values of an axis, or of two."""
+    """Return the panels for the values of an axis, or of two."""
     places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
     limits = zip(role, (MOST_PLACES, MOST_LINES, MOST_COLUMNS, MOST_ROWS), strict=True)
     return joined(
@@ -129,19 +129,19 @@ def multiples(sweep: Sweep, role: Roles) -> str:
 
 
 def points(sweep: Sweep, is_ranked: bool) -> str:
-    """Each metric of a list of jobs over a key."""
+    """Return each metric of a list of jobs over a key."""
     which = "the key that matters most for it" if is_ranked else "a key"
     return joined(f"Every metric over {which}, a point a job.", *fitted(sweep))
 
 
 def scatter(sweep: Sweep, columns: Sequence[int], keys: int) -> str:
-    """Some metrics of a list of jobs over several keys."""
+    """Return some metrics of a list of jobs over several keys."""
     some = f"the {len(columns)} strongest of {keys} keys" if keys > len(columns) else "each key"
     return joined(f"The metrics that change most over {some}, a point a job.", *fitted(sweep))
 
 
 def fitted(sweep: Sweep) -> Iterator[str]:
-    """What is said of trends and of colours, and how many points are drawn."""
+    """Yield what is said of trends and of colours, and how many points are drawn."""
     yield TREND
     phrase, _, _ = grouping(sweep)
     if phrase:
@@ -154,7 +154,7 @@ def fitted(sweep: Sweep) -> Iterator[str]:
 
 
 def ranking(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> str:
-    """Which axis matters for which of the metrics that are shown."""
+    """Return which axis matters for which of the metrics that are shown."""
     left = [measure.title for measure in shown if measure not in found]
     kind = next(iter(found.values())).kind
     unit = "the correlation" if kind == "rank" else "its total effect"

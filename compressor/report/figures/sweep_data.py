@@ -56,7 +56,7 @@ class Axis:
         return f"{self.phrase} ({self.unit})" if self.unit not in ("", "1") else self.phrase
 
     def told(self, number: int) -> str:
-        """One of its values in words, such as `rod mass 3 kg`."""
+        """Return one of its values in words, such as `rod mass 3 kg`."""
         value = self.values[number]
         if self.is_words:
             return named(self.phrase, spoken(value))
@@ -77,7 +77,9 @@ class Sweep:
     is_grid: bool
 
     def of(self, values: xr.DataArray) -> np.ndarray:
-        """A variable of the study's jobs at the points; nan, or no word, where there is no job."""
+        """Return a variable of the study's jobs at the points; nan, or no word, where there is
+        no job.
+        """
         flat = values.transpose(*self.data["status"].dims).values.ravel()
         found = flat[self.place]
         if (self.place < 0).any():
@@ -85,15 +87,15 @@ class Sweep:
         return found
 
     def values(self, measure: Measure) -> np.ndarray:
-        """A measure at the points, in its unit."""
+        """Return a measure at the points, in its unit."""
         return self.of(measure.of(self.data))
 
     def bars(self, measure: Measure) -> np.ndarray:
-        """The error bars of a measure at the points; nan where there is none."""
+        """Return the error bars of a measure at the points; nan where there is none."""
         return self.of(measure.bar(self.data))
 
     def known(self, measure: Measure) -> np.ndarray:
-        """A measure at the points, nan where it is not known within its error bar.
+        """Return a measure at the points, nan where it is not known within its error bar.
 
         A chaotic motion's greatest value is not.
         """
@@ -122,7 +124,8 @@ class Sweep:
 
 
 def sweep_of(data: xr.Dataset) -> Sweep:
-    """The sweep of a study, as `open_study` gives it; a list of jobs is a grid where it fills one.
+    """Return the sweep of a study, as `open_study` gives it; a list of jobs is a grid where it
+    fills one.
 
     Axes that advance together are one, which is named after both. Numbers of a grid are sorted.
     """
@@ -142,7 +145,7 @@ def sweep_of(data: xr.Dataset) -> Sweep:
 
 
 def coarse(sweep: Sweep, axis: int, most: int) -> Sweep:
-    """A grid with at most so many values of an axis, evenly chosen, the ends among them."""
+    """Return a grid with at most so many values of an axis, evenly chosen, the ends among them."""
     size = sweep.axes[axis].values.size
     if size <= most:
         return sweep
@@ -155,7 +158,7 @@ def coarse(sweep: Sweep, axis: int, most: int) -> Sweep:
 
 
 def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:
-    """An axis of a study with its phrase and unit."""
+    """Return an axis of a study with its phrase and unit."""
     attrs = data[name].attrs
     unit, key = str(attrs.get("units", "")), str(attrs.get("case_key", name))
     own = (name if unit else key.rpartition(".")[2]).removesuffix(
@@ -168,7 +171,7 @@ def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:
 
 
 def gridded(data: xr.Dataset, columns: Sequence[Axis]) -> Sweep | None:
-    """A list of jobs as a grid; None where it leaves out too much of it, as samples do."""
+    """Return a list of jobs as a grid; None where it leaves out too much of it, as samples do."""
     if any(has_gaps(axis) for axis in columns) or not columns:
         return None
     axes: list[Axis] = []
@@ -195,19 +198,21 @@ def gridded(data: xr.Dataset, columns: Sequence[Axis]) -> Sweep | None:
 
 
 def has_gaps(axis: Axis) -> bool:
-    """Whether some jobs have no value of a key."""
+    """Return whether some jobs have no value of a key."""
     return bool((axis.values == "").any() if axis.is_words else np.isnan(axis.places).any())
 
 
 def levels(axis: Axis) -> tuple[np.ndarray, np.ndarray]:
-    """The different values of a column, numbers in order, and which of them each job has."""
+    """Return the different values of a column, numbers in order, and which of them each job has."""
     if not axis.is_words:
         return np.unique(axis.values, return_inverse=True)
     return np.array([*dict.fromkeys(axis.values.tolist())]), axis.places.astype(int)
 
 
 def advance_together(one: np.ndarray, other: np.ndarray, has_words: bool) -> bool:
-    """Whether each value of a column has one of another's, and of numbers the order is the same."""
+    """Return whether each value of a column has one of another's, and of numbers the order is
+    the same.
+    """
     pairs = np.unique(np.stack([one, other]), axis=1)
     size = pairs.shape[1]
     if not size == np.unique(one).size == np.unique(other).size:
@@ -216,18 +221,20 @@ def advance_together(one: np.ndarray, other: np.ndarray, has_words: bool) -> boo
 
 
 def spans_decades(values: np.ndarray) -> bool:
-    """Whether numbers are all above 0 and span more than LOG_RATIO."""
+    """Return whether numbers are all above 0 and span more than LOG_RATIO."""
     finite = values[np.isfinite(values)]
     return bool(finite.size and finite.min() > 0.0 and finite.max() >= LOG_RATIO * finite.min())
 
 
 def named(phrase: str, word: str) -> str:
-    """A word with what it is a value of, unless it says that: `load design`, but `both joints`."""
+    """Return a word with what it is a value of, unless it says that: `load design`, but `both
+    joints`.
+    """
     return word if phrase in word else f"{phrase} {word}"
 
 
 def spoken(value: object) -> str:
-    """A swept value in few characters."""
+    """Return a swept value in few characters."""
     return SPOKEN.get(value, shown_value(value).replace("_", " ")) if isinstance(value, str) else (
         shown_value(value)
     )  # fmt: skip

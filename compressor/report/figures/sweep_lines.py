@@ -25,7 +25,7 @@ MOST_POINTS = 1000
 
 @styled
 def draw_curves(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
-    """Every measure over the one axis of a grid, a point a job; over words without a line.
+    """Return every measure over the one axis of a grid, a point a job; over words without a line.
 
     Of more than MOST_POINTS jobs as many are drawn.
     """

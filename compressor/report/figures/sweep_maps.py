@@ -33,7 +33,9 @@ NOTHING: dict[str, Any] = {"facecolor": "#f2f2f2", "edgecolor": GREY, "hatch": "
 
 
 def across(sweep: Sweep) -> tuple[int, int]:
-    """Which of two axes lies in x and which in y: words in y, else the one with fewer values."""
+    """Return which of two axes lies in x and which in y: words in y, else the one with fewer
+    values.
+    """
     first, second = sweep.axes
     rank = [(not axis.is_words, axis.values.size) for axis in (first, second)]
     return (0, 1) if rank[0] >= rank[1] else (1, 0)
@@ -49,7 +51,9 @@ class Cells(NamedTuple):
 
 @styled
 def draw_maps(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
-    """Every measure over both axes of a grid, a cell a job, at most MOST_CELLS along an axis."""
+    """Return every measure over both axes of a grid, a cell a job, at most MOST_CELLS along an
+    axis.
+    """
     in_x, in_y = across(sweep)
     x, y = sweep.axes[in_x], sweep.axes[in_y]
     chosen = [thinned(axis.values.size, MOST_CELLS) for axis in (y, x)]
@@ -107,7 +111,9 @@ def plot_map(
 
 
 def has_lines(table: np.ndarray, axes: tuple[Axis, Axis]) -> bool:
-    """Whether lines of equal value tell something: over numbers, and not around a few cells."""
+    """Return whether lines of equal value tell something: over numbers, and not around a few
+    cells.
+    """
     rising = np.nansum(table > np.nanmin(table)) >= FEWEST_RISEN * table.size
     return min(table.shape) >= 3 and not any(axis.is_words for axis in axes) and bool(rising)
 
@@ -132,7 +138,9 @@ def scale_way(panel: Axes, way: str, axis: Axis) -> None:
 
 
 def edges_of(centres: np.ndarray, axis: Axis) -> np.ndarray:
-    """The edges between cells: halfway, on a log scale by ratio; outer cells are symmetric."""
+    """Return the edges between cells: halfway, on a log scale by ratio; outer cells are
+    symmetric.
+    """
     at = np.log(centres) if axis.is_log else centres
     middle = 0.5 * (at[1:] + at[:-1])
     ends = [2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]

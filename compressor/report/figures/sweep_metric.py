@@ -37,20 +37,21 @@ class Measure:
         return METRICS[self.variable].bar.relative
 
     def of(self, data: xr.Dataset) -> xr.DataArray:
-        """The metric of a job or of a study's jobs, in the unit; nan for contact in ideal joints.
+        """Return the metric of a job or of a study's jobs, in the unit; nan for contact in ideal
+        joints.
 
         An ideal joint has a penetration of exactly 0.
         """
         return self.scaled(data, self.variable)
 
     def bar(self, data: xr.Dataset) -> xr.DataArray:
-        """Its error bar, as `of`; nan where there is none."""
+        """Return its error bar, as `of`; nan where there is none."""
         if f"{self.variable}_error" not in data:
             return self.of(data) * math.nan
         return self.scaled(data, f"{self.variable}_error")
 
     def scaled(self, data: xr.Dataset, name: str) -> xr.DataArray:
-        """A variable of the metric in the measure's unit."""
+        """Return a variable of the metric in the measure's unit."""
         values = data[name]
         if METRICS[self.variable].contact:
             values = values.where(data["max_penetration"] != 0)
@@ -58,7 +59,7 @@ class Measure:
 
 
 def shown(name: str) -> Iterator[Measure]:
-    """A metric as the report draws it, if it does: of each joint apart."""
+    """Yield a metric as the report draws it, if it does: of each joint apart."""
     metric = METRICS[name]
     if metric.shown and not metric.dims:
         yield Measure(name, *metric.shown)
@@ -72,13 +73,15 @@ MEASURES = tuple(measure for name in METRICS for measure in shown(name))
 
 
 def measures(data: xr.Dataset) -> list[Measure]:
-    """The measures of which a dataset has any value."""
+    """Return the measures of which a dataset has any value."""
     there = (measure for measure in MEASURES if measure.variable in data)
     return [measure for measure in there if measure.of(data).notnull().any()]
 
 
 def swept(study: xr.Dataset) -> list[str]:
-    """The axes of a study that have more than one value; of a list of jobs, the coordinates."""
+    """Return the axes of a study that have more than one value; of a list of jobs, the
+    coordinates.
+    """
     if study["status"].dims != ("job",):
         return [str(dim) for dim in study["status"].dims if study.sizes[dim] > 1]
     columns = (str(n) for n, c in study.coords.items() if c.dims == ("job",) and n != "key")
@@ -86,7 +89,9 @@ def swept(study: xr.Dataset) -> list[str]:
 
 
 def positions(data: xr.Dataset, axis: str) -> np.ndarray:
-    """Where the values of an axis stand: at their numbers, different words one after the other."""
+    """Return where the values of an axis stand: at their numbers, different words one after the
+    other.
+    """
     values = data[axis].values
     if values.dtype.kind in "fiu":
         return values.astype(float)
@@ -95,5 +100,5 @@ def positions(data: xr.Dataset, axis: str) -> np.ndarray:
 
 
 def shown_value(value: Any) -> str:
-    """A swept value in few characters."""
+    """Return a swept value in few characters."""
     return f"{value:g}" if isinstance(value, float | int | np.number) else str(value)

@@ -58,7 +58,7 @@ class Part:
 
 
 def roles_of(sweep: Sweep, order: Sequence[int], detailed: bool) -> Roles:
-    """Which axis does what. order: the axes' numbers, the strongest first.
+    """Return which axis does what. order: the axes' numbers, the strongest first.
 
     In x lies the one of the two strongest axes of numbers that has more values, in colours the
     strongest of the others; with `detailed` the next two make columns and rows.
@@ -70,13 +70,13 @@ def roles_of(sweep: Sweep, order: Sequence[int], detailed: bool) -> Roles:
 
 
 def chosen_of(axis: Axis, most: int) -> np.ndarray:
-    """The numbers of an axis' values that are shown."""
+    """Return the numbers of an axis' values that are shown."""
     return thinned(axis.values.size, most)
 
 
 @styled
 def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
-    """Every measure over two axes, as lines; means over the others, if there are any.
+    """Return every measure over two axes, as lines; means over the others, if there are any.
 
     What is not known within its error bar is no part of a mean.
     """
@@ -95,18 +95,18 @@ def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Fig
 
 
 def is_averaged(sweep: Sweep, role: Roles) -> bool:
-    """Whether lines are means over some axes."""
+    """Return whether lines are means over some axes."""
     return any(n not in role for n in range(len(sweep.axes)))
 
 
 def marks_of(sweep: Sweep, role: Roles) -> list[Line2D]:
-    """The legend's entries of marks: means have none."""
+    """Return the legend's entries of marks: means have none."""
     return [] if is_averaged(sweep, role) else marks_shown(sweep.status, sweep.chaotic)
 
 
 @styled
 def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
-    """A panel for each value of one axis and, in rows, of another, or for each measure."""
+    """Return a panel for each value of one axis and, in rows, of another, or for each measure."""
     sweep = coarse(sweep, role.x, MOST_PLACES)
     columns = chosen_of(sweep.axes[role.column], MOST_COLUMNS)
     has_rows = role.row >= 0
@@ -134,13 +134,15 @@ def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Fi
 
 
 def whole_part(sweep: Sweep, measure: Measure, role: Roles) -> Part:
-    """A measure over a sweep; where lines are means, what is known of it within its error bar."""
+    """Return a measure over a sweep; where lines are means, what is known of it within its error
+    bar.
+    """
     values = sweep.known(measure) if is_averaged(sweep, role) else sweep.values(measure)
     return Part(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
 
 
 def line_part(whole: Part, role: Roles, at: dict[int, int]) -> Part:
-    """What a line shows: the points over x at a value of some axes, numbers by number."""
+    """Return what a line shows: the points over x at a value of some axes, numbers by number."""
 
     def part(values: np.ndarray) -> np.ndarray:
         index = tuple(at.get(n, slice(None)) for n in range(values.ndim))
@@ -156,7 +158,7 @@ def line_part(whole: Part, role: Roles, at: dict[int, int]) -> Part:
 def plot_parts(
     panel: Axes, sweep: Sweep, role: Roles, parts: Sequence[Part], whole: Part
 ) -> dict[str, Line2D]:
-    """A panel's lines and marks; gives the legend's entries by name."""
+    """Return a panel's lines and marks; gives the legend's entries by name."""
     axis, color = sweep.axes[role.x], sweep.axes[role.color]
     x, chosen = axis.places, chosen_of(color, MOST_LINES)
     scale_x(panel, axis)
@@ -196,7 +198,7 @@ def plot_part(
 
 
 def mean_of(values: np.ndarray) -> np.ndarray:
-    """Means over the last axis of what is known; nan where nothing is."""
+    """Return the means over the last axis of what is known; nan where nothing is."""
     known = np.isfinite(values)
     count = known.sum(axis=-1)
     return np.where(count, np.where(known, values, 0.0).sum(axis=-1) / np.maximum(count, 1), np.nan)

@@ -31,7 +31,7 @@ Keys = np.ndarray | None
 
 
 def metric_panels(measures: Sequence[Measure], height: float) -> tuple[Figure, list[Axes]]:
-    """A figure with a panel for each measure, titled; height of a row in inches."""
+    """Return a figure with a panel for each measure, titled; height of a row in inches."""
     rows = math.ceil(len(measures) / COLUMNS)
     columns = min(COLUMNS, len(measures))
     figure, grid = sheet(rows, columns, max(3.2, height * rows + 0.8))
@@ -83,7 +83,7 @@ def mark_feet(panel: Axes, x: np.ndarray, status: np.ndarray, keys: Keys) -> Non
 
 
 def marks_shown(status: np.ndarray, chaotic: np.ndarray) -> list[Line2D]:
-    """The legend's entries of the marks that are there."""
+    """Return the legend's entries of the marks that are there."""
     found = [Line2D([], [], label=NAMES[s], **mark) for s, mark in MARKS.items() if s in status]
     return found + ([Line2D([], [], label=CHAOTIC, **RING)] if chaotic.any() else [])
 
@@ -105,12 +105,12 @@ def scale_x(panel: Axes, axis: Axis) -> None:
 
 
 def in_lines(words: Sequence[str]) -> list[str]:
-    """Words as they stand below each other, so that neighbours do not overlap."""
+    """Return the words as they stand below each other, so that neighbours do not overlap."""
     return [word.replace(" ", "\n") for word in words]
 
 
 def scale_y(panel: Axes, values: np.ndarray) -> float:
-    """Room at the foot for marks, and a log scale over decades; gives the span of the panel.
+    """Return room at the foot for marks, and a log scale over decades; gives the span of the panel.
 
     Values that are all the same stand in the middle.
     """
@@ -127,7 +127,7 @@ def scale_y(panel: Axes, values: np.ndarray) -> float:
 
 
 def lines_for(axis: Axis, chosen: Iterable[int]) -> list[Line]:
-    """A line for each of an axis' values, from dark to light where they are numbers.
+    """Return a line for each of an axis' values, from dark to light where they are numbers.
 
     chosen: the numbers of the values. Colours are those of viridis, which the colour-blind tell
     apart by lightness.

@@ -23,7 +23,9 @@ Ranking = dict[Measure, Effects]
 
 
 def ranking(sweep: Sweep, measures: Sequence[Measure]) -> Ranking:
-    """The effects of a sweep's axes on each measure of which enough is known; all of one kind."""
+    """Return the effects of a sweep's axes on each measure of which enough is known; all of one
+    kind.
+    """
     columns = [axis.values for axis in sweep.axes]
     found = {}
     for measure in measures:
@@ -37,12 +39,12 @@ def ranking(sweep: Sweep, measures: Sequence[Measure]) -> Ranking:
 
 
 def order_of(effects: Effects) -> list[int]:
-    """The numbers of the axes, the strongest first; what is unknown is last."""
+    """Return the numbers of the axes, the strongest first; what is unknown is last."""
     return np.argsort(-np.nan_to_num(effects.strength), kind="stable").tolist()
 
 
 def leading(sweep: Sweep, measures: Sequence[Measure], most: int) -> list[Measure]:
-    """The measures that change most over a sweep, as the greatest over the least value.
+    """Return the measures that change most over a sweep, as the greatest over the least value.
 
     One a metric; none that is a count, or is 0 without clearance by its meaning.
     """
@@ -60,14 +62,18 @@ def leading(sweep: Sweep, measures: Sequence[Measure], most: int) -> list[Measur
 
 
 def overall(found: Ranking) -> list[int]:
-    """The numbers of the axes, the one that is strongest on the mean of the measures first."""
+    """Return the numbers of the axes, the one that is strongest on the mean of the measures
+    first.
+    """
     strengths = [np.nan_to_num(effects.strength) for effects in found.values()]
     return np.argsort(-np.mean(strengths, axis=0), kind="stable").tolist()
 
 
 @styled
 def draw_ranking(sweep: Sweep, found: Ranking) -> Figure:
-    """A panel an axis, the strongest first, with a row a measure; bars with 95 % intervals."""
+    """Return a panel an axis, the strongest first, with a row a measure; bars with 95 %
+    intervals.
+    """
     order = overall(found)
     rows, columns = math.ceil(len(order) / COLUMNS), min(COLUMNS, len(order))
     each = 0.26 * len(found) + 0.75
@@ -105,7 +111,7 @@ def plot_bars(panel: Axes, found: Sequence[Effects], axis: int) -> None:
 
 
 def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
-    """An effect and the ends of its interval: a share in %, or a correlation."""
+    """Return an effect and the ends of its interval: a share in %, or a correlation."""
     values, ends = (
         (effects.main, effects.main_ends) if name != TOTAL else (effects.total, effects.total_ends)
     )
@@ -117,7 +123,9 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
 
 
 def told(sweep: Sweep, found: Ranking) -> str:
-    """The strongest axis of each measure, a sentence an axis; or axes that are not told apart."""
+    """Return the strongest axis of each measure, a sentence an axis; or axes that are not told
+    apart.
+    """
     groups: dict[tuple[int, ...], list[str]] = {}
     for measure, effects in found.items():
         words = f"{measure.title} ({strength_told(effects)})"
@@ -131,13 +139,13 @@ def told(sweep: Sweep, found: Ranking) -> str:
 
 
 def first_ones(effects: Effects) -> list[int]:
-    """The strongest axis, and those whose intervals reach its own."""
+    """Return the strongest axis, and those whose intervals reach its own."""
     first, *others = order_of(effects)
     return [first, *(n for n in others if reaches(effects, n, first))]
 
 
 def reaches(effects: Effects, weaker: int, stronger: int) -> bool:
-    """Whether the interval of an axis' strength overlaps that of a stronger one."""
+    """Return whether the interval of an axis' strength overlaps that of a stronger one."""
     ends = effects.main_ends if effects.total is None else effects.total_ends
     if ends is None or np.isnan(ends[:, [weaker, stronger]]).any():
         return False
@@ -147,7 +155,7 @@ def reaches(effects: Effects, weaker: int, stronger: int) -> bool:
 
 
 def strength_told(effects: Effects) -> str:
-    """The strongest axis' share of the variance, or its correlation, in words."""
+    """Return the strongest axis' share of the variance, or its correlation, in words."""
     first = order_of(effects)[0]
     if effects.total is None:
         return f"{effects.main[first]:.2f}".replace("-", "−")
@@ -155,5 +163,5 @@ def strength_told(effects: Effects) -> str:
 
 
 def share(value: float) -> str:
-    """A share in percent; what is below 0 or above 1 by sampling is cut."""
+    """Return a share in percent; what is below 0 or above 1 by sampling is cut."""
     return f"{100.0 * min(max(value, 0.0), 1.0):.0f} %"

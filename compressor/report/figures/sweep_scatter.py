@@ -33,7 +33,9 @@ PLACES = 60  # of a trend
 
 @styled
 def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
-    """Every measure over the axis that matters most for it; axes: their numbers, one a measure."""
+    """Return every measure over the axis that matters most for it; axes: their numbers, one a
+    measure.
+    """
     figure, panels = metric_panels(measures, 2.35)
     for panel, axis, measure in zip(panels, axes, measures, strict=True):
         plot_points(panel, sweep, axis, measure)
@@ -45,7 +47,7 @@ def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) 
 
 @styled
 def draw_scatter(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
-    """Measures in rows over axes in columns."""
+    """Return the measures in rows over axes in columns."""
     figure, grid = sheet(
         len(measures), len(axes), 2.3 * len(measures) + 0.9, sharex="col", sharey="row"
     )
@@ -61,7 +63,7 @@ def draw_scatter(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure])
 
 
 def grouping(sweep: Sweep) -> tuple[str, list[Any], np.ndarray]:
-    """The words that have a colour: their axis' phrase, the words, and each job's number.
+    """Return the words that have a colour: their axis' phrase, the words, and each job's number.
 
     The first axis of words with no more of them than there are lines to tell apart.
     """
@@ -116,7 +118,7 @@ def plot_trend(panel: Axes, x: np.ndarray, y: np.ndarray, color: str, name: str)
 
 
 def entries(sweep: Sweep) -> list[Any]:
-    """The legend of a scatter diagram."""
+    """Return the legend of a scatter diagram."""
     return [*_entries(sweep), *marks_shown(sweep.status, sweep.chaotic)]
 
 

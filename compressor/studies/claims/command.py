@@ -116,7 +116,7 @@ def tell(found: "list[xr.Dataset]", as_json: bool) -> None:
 
 
 def sentences(found: "xr.Dataset") -> Iterator[str]:
-    """What a file of judged machines says."""
+    """Yield what a file of judged machines says."""
     from compressor.studies.claims.findings import (
         change,
         consistency,

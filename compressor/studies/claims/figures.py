@@ -16,7 +16,7 @@ OF_MASSES = (3, 4, 5, 6, 7, 8)  # claims that masses can decide
 
 @styled
 def draw_claims_map(found: xr.Dataset, place: tuple[float, float]) -> Figure:
-    """Each claim's margin over rod and reciprocating mass, and how many claims hold.
+    """Return each claim's margin over rod and reciprocating mass, and how many claims hold.
 
     place: rod mass and reciprocating mass (kg) of the defaults, which are marked.
     """
@@ -73,7 +73,7 @@ def border(panel: Axes, found: xr.Dataset, inside: np.ndarray, color: str) -> No
 
 @styled
 def draw_sensitivity(table: xr.Dataset, names: list[str]) -> Figure:
-    """Main and total effect of each assumption on each claim's margin, with 95 % intervals.
+    """Return main and total effect of each assumption on each claim's margin, with 95 % intervals.
 
     table: of `compressor.studies.claims.sensitivity`; names: of its assumptions, in words.
     """

@@ -34,7 +34,7 @@ class Flips(NamedTuple):
 
 
 def flips(found: xr.Dataset, claim: int) -> Flips:
-    """The `Flips` of a claim over a grid of machines."""
+    """Return the `Flips` of a claim over a grid of machines."""
     one = found.sel(claim=claim)
     margin, error = one["margin"], one["error"]
     counts, jumps = [0, 0, 0], []
@@ -53,13 +53,15 @@ def flips(found: xr.Dataset, claim: int) -> Flips:
 
 
 def is_mass_plane(found: xr.Dataset) -> bool:
-    """Whether machines are a grid over rod mass and reciprocating mass alone."""
+    """Return whether machines are a grid over rod mass and reciprocating mass alone."""
     keys = [found[dim].attrs.get("case_key") for dim in found["status"].dims if dim in found.coords]
     return {*keys} == {*MASSES} and len(keys) == found["status"].ndim
 
 
 def counted(found: xr.Dataset) -> tuple[int, dict[int, int], int]:
-    """How many machines were judged, in how many each claim holds, and in how many all do."""
+    """Return how many machines were judged, in how many each claim holds, and in how many all
+    do.
+    """
     held = found["held"].transpose("claim", ...).values.reshape(len(CLAIMS), -1)
     judged = held[:, (held >= 0).all(axis=0)]
     each = dict(zip(CLAIMS, (judged == 1).sum(axis=1).tolist(), strict=True))
@@ -67,7 +69,7 @@ def counted(found: xr.Dataset) -> tuple[int, dict[int, int], int]:
 
 
 def summary(found: xr.Dataset) -> Iterator[str]:
-    """What machines say: how many hold which claims, where, and what claim 7 lacks."""
+    """Yield what machines say: how many hold which claims, where, and what claim 7 lacks."""
     judged, each, whole = counted(found)
     failed = int((found["status"] == "failed").sum())
     some = ", ".join(f"{claim} in {count}" for claim, count in each.items())
@@ -91,7 +93,7 @@ def summary(found: xr.Dataset) -> Iterator[str]:
 
 
 def region(found: xr.Dataset) -> Iterator[str]:
-    """Where all claims hold, or all but claim 7, as ranges of what is swept."""
+    """Yield where all claims hold, or all but claim 7, as ranges of what is swept."""
     held = found["held"] == 1
     for name, claims in (("All eight", CLAIMS), ("All but claim 7", (1, 2, 3, 4, 5, 6, 8))):
         there = held.sel(claim=[*claims]).all("claim")
@@ -120,7 +122,8 @@ class Consistent(NamedTuple):
 
 
 def most_consistent(found: xr.Dataset) -> Consistent:
-    """Where on a mass plane most claims hold by the greatest least margin, at all neighbours too.
+    """Return where on a mass plane most claims hold by the greatest least margin, at all neighbours
+    too.
 
     Claims 1 and 2, which do not depend on masses, are left aside, and so are claims that hold at
     no machine. Machines at the plane's edge are not chosen.
@@ -137,7 +140,7 @@ def most_consistent(found: xr.Dataset) -> Consistent:
 
 
 def consistency(found: xr.Dataset) -> str:
-    """The most consistent machine of a mass plane, in words."""
+    """Return the most consistent machine of a mass plane, in words."""
     best = most_consistent(found)
     said = ", ".join(map(str, best.claims))
     where = (
@@ -152,7 +155,7 @@ def consistency(found: xr.Dataset) -> str:
 
 
 def deciding(table: xr.Dataset) -> Iterator[str]:
-    """Which assumption has most of each margin's variance, of `sensitivity`."""
+    """Yield which assumption has most of each margin's variance, of `sensitivity`."""
     names = [spoken(str(name)) for name in table["assumption"].values]
     for claim in table["claim"].values.tolist():
         one = table.sel(claim=claim)
@@ -172,7 +175,7 @@ def deciding(table: xr.Dataset) -> Iterator[str]:
 
 
 def share(one: xr.Dataset, place: int) -> str:
-    """A total index with its interval."""
+    """Return a total index with its interval."""
     value, low, high = (
         float(one[f"total_order{end}"].values[place]) for end in ("", "_low", "_high")
     )
@@ -180,7 +183,7 @@ def share(one: xr.Dataset, place: int) -> str:
 
 
 def change(found: xr.Dataset) -> Iterator[str]:
-    """Whether a search found a machine at which all claims hold, as of `least_change`."""
+    """Yield whether a search found a machine at which all claims hold, as of `least_change`."""
     best = found.isel(machine=0)
     margin, sure = best["margin"].values, best["margin"].values - best["error"].values
     holding, known = int((margin >= 0.0).sum()), int((sure >= 0.0).sum())
@@ -210,7 +213,7 @@ def change(found: xr.Dataset) -> Iterator[str]:
 
 
 def changes(machine: xr.Dataset) -> str:
-    """What is not as by default at a machine."""
+    """Return what is not as by default at a machine."""
     defaults = Case.from_values({}).values()
     parts = []
     for name, coordinate in machine.coords.items():
@@ -226,7 +229,7 @@ def changes(machine: xr.Dataset) -> str:
 
 
 def spoken(name: str) -> str:
-    """A coordinate's name in words, without its unit."""
+    """Return a coordinate's name in words, without its unit."""
     words = name.split("_")
     units = {"kg", "mm", "per", "s", "N", "MPa", "rpm", "mm15"}
     while len(words) > 1 and words[-1] in units:

@@ -68,7 +68,7 @@ def cases_judged(machine: Case) -> Iterable[Case]:
 
 
 def simulated(case: Case) -> xr.Dataset:
-    """A case's run; a solver's remarks are left aside."""
+    """Return a case's run; a solver's remarks are left aside."""
     from compressor.solve import simulate  # needs numba: only to simulate
 
     with ignore_warnings():
@@ -76,7 +76,9 @@ def simulated(case: Case) -> xr.Dataset:
 
 
 def ideal_text(machine: Case) -> str:
-    """What the ideal machines' motion and load depend on: not the masses, nor what joints do."""
+    """Return what the ideal machines' motion and load depend on: not the masses, nor what joints
+    do.
+    """
     values: dict[str, Any] = machine.values()
     kept = {key: values[key] for key in ("gas", "spring", "solve")}
     lengths = ("crank_radius_mm", "rod_length_mm", "speed_rpm")
@@ -86,6 +88,6 @@ def ideal_text(machine: Case) -> str:
 
 @lru_cache(maxsize=8)
 def ideal_runs(text: str) -> dict[str, xr.Dataset]:
-    """Both ideal machines' runs, which most machines of a study share."""
+    """Return both ideal machines' runs, which most machines of a study share."""
     cases = cases_of(Case.resolve(json.loads(text)))
     return {name: simulated(cases[name]) for name in IDEAL}

@@ -45,7 +45,8 @@ class Part:
 
 
 def machine_files(folder: Folder) -> dict[str, xr.Dataset]:
-    """The files of judged machines in a folder by name, mass planes first; none without a folder.
+    """Return the files of judged machines in a folder by name, mass planes first; none without a
+    folder.
 
     The machines that a search looked at are left out: what it found has a file of its own. Raises
     StoreError for a file that is something else.
@@ -59,7 +60,7 @@ def machine_files(folder: Folder) -> dict[str, xr.Dataset]:
 def machine_drawings(
     files: dict[str, xr.Dataset],
 ) -> Iterator[tuple[str, list[str], str, str, Drawing | None]]:
-    """Name, sentences, heading, caption and drawing of each file."""
+    """Yield the name, sentences, heading, caption and drawing of each file."""
     for name, found in files.items():
         if "looked" in found.attrs:
             yield name, [*change(found)], *NO_FIGURE
@@ -78,7 +79,7 @@ def machine_drawings(
 
 
 def plane(found: xr.Dataset) -> tuple[str, str, Drawing]:
-    """The heading, the caption and the map of a mass plane."""
+    """Return the heading, the caption and the map of a mass plane."""
     default = Case.from_values({}).machine
     place = default.rod_mass_kg, default.reciprocating_mass_kg
     held = counted(found)
@@ -87,7 +88,7 @@ def plane(found: xr.Dataset) -> tuple[str, str, Drawing]:
 
 
 def borders(found: xr.Dataset) -> str:
-    """How often neighbours on the map differ, in words."""
+    """Return how often neighbours on the map differ, in words."""
     parts = []
     for claim in OF_MASSES:
         one = flips(found, claim)

@@ -48,7 +48,7 @@ class Span(NamedTuple):
     default: float
 
     def value(self, share: float) -> float:
-        """The value at a share of the range, 0 to 1."""
+        """Return the value at a share of the range, 0 to 1."""
         return float(f"{self.spread(share):.{DIGITS}g}")
 
     @property
@@ -57,7 +57,9 @@ class Span(NamedTuple):
         return self.share(self.default)
 
     def share(self, value: float) -> float:
-        """The share of the range at which a value lies; the nearest end where it is outside."""
+        """Return the share of the range at which a value lies; the nearest end where it is
+        outside.
+        """
         from scipy.optimize import brentq  # takes a quarter of a second
 
         low, high = self.spread(0.0), self.spread(1.0)
@@ -93,7 +95,7 @@ class Search:
         self.asked: list[tuple[float, ...]] = []  # in this search
 
     def stored(self) -> dict[tuple[float, ...], Judged]:
-        """The machines of earlier searches in this folder. Raises StoreError."""
+        """Return the machines of earlier searches in this folder. Raises StoreError."""
         path = Path(self.folder) / f"{self.name}.nc"
         if not path.exists():
             return {}
@@ -119,18 +121,20 @@ class Search:
         return np.array([span.home for span in self.spans])
 
     def values(self, shares: Sequence[float]) -> tuple[float, ...]:
-        """The assumptions' values at shares of their ranges; the default where it is that near."""
+        """Return the assumptions' values at shares of their ranges; the default where it is that
+        near.
+        """
         return tuple(
             span.default if abs(share - span.home) < 1e-9 else span.value(share)
             for span, share in zip(self.spans, shares, strict=True)
         )
 
     def judge(self, many: Sequence[Sequence[float]]) -> list[Judged]:
-        """The verdicts of machines at shares of the ranges."""
+        """Return the verdicts of machines at shares of the ranges."""
         return self.ask([self.values(shares) for shares in many])
 
     def ask(self, wanted: Sequence[tuple[float, ...]]) -> list[Judged]:
-        """The verdicts of machines with these values of the assumptions."""
+        """Return the verdicts of machines with these values of the assumptions."""
         self.asked += wanted
         new = [point for point in dict.fromkeys(wanted) if point not in self.points]
         if new:
@@ -140,7 +144,7 @@ class Search:
         return [self.points[point] for point in wanted]
 
     def judged(self, new: Sequence[tuple[float, ...]] = ()) -> xr.Dataset:
-        """All machines that are known, and new ones behind them."""
+        """Return all machines that are known, and new ones behind them."""
         points = [*self.points, *new]
         cases = [self.case(point) for point in points]
         columns = zip(*points, strict=True)
@@ -151,17 +155,17 @@ class Search:
         return judge_machines(study, self.folder, self.workers, self.progress)
 
     def cost(self, point: Sequence[float]) -> float:
-        """What the search makes small, of a machine that is known."""
+        """Return what the search makes small, of a machine that is known."""
         verdict = self.points[tuple(point)]
         return cost(verdict, self.distance(point) / len(self.spans), self.longer > 1)
 
     def distance(self, point: Sequence[float]) -> float:
-        """The sum of changes from the defaults, each as a share of its range."""
+        """Return the sum of changes from the defaults, each as a share of its range."""
         pairs = zip(self.spans, point, strict=True)
         return math.fsum(abs(span.share(value) - span.home) for span, value in pairs)
 
     def case(self, point: Sequence[float]) -> Case:
-        """The machine with these values."""
+        """Return the machine with these values."""
         values: dict[str, Any] = {"name": self.study.name, **copy.deepcopy(self.study.fixed[0])}
         for span, value in zip(self.spans, point, strict=True):
             group, _, name = span.key.rpartition(".")
@@ -174,7 +178,8 @@ class Search:
 
 
 def cost(verdict: Judged, distance: float, sure: bool = False) -> float:
-    """What a search makes small: 1 and what the least margin lacks, or else the distance below 1.
+    """Return what a search makes small: 1 and what the least margin lacks, or else the distance
+    below 1.
 
     distance: over its greatest. sure: a margin counts less its error.
     """
@@ -192,7 +197,8 @@ def least_change(
     generations: int,
     progress: Progress = lambda done, total, remark: None,
 ) -> xr.Dataset:
-    """The machine nearest to the defaults at which all claims hold, or the one that lacks least.
+    """Return the machine nearest to the defaults at which all claims hold, or the one that lacks
+    least.
 
     As `judge_machines` gives it, alone, and stored in FOLDER/NAME-best.nc. The attribute `distance`
     is how far it is from the defaults, the sum of changes, each as a share of its range; `looked`
@@ -242,7 +248,8 @@ def least_change(
 
 
 def beginning(search: Search) -> np.ndarray:
-    """The first generation: the defaults, the study's best machines, and draws where these are few.
+    """Return the first generation: the defaults, the study's best machines, and draws where these
+    are few.
 
     (machines, k), shares of the ranges. No machines of earlier searches, so that the same call
     takes the same way.
@@ -262,7 +269,8 @@ def beginning(search: Search) -> np.ndarray:
 
 
 def descended(search: Search, best: tuple[float, ...], step: float) -> tuple[float, ...]:
-    """The best machine of a compass search that begins at one; until claims hold, or steps end.
+    """Return the best machine of a compass search that begins at one; until claims hold, or steps
+    end.
 
     All neighbours of a round, one up and one down in each assumption, are judged side by side
     (Kolda, Lewis and Torczon, SIAM Review 45, 2003, 385-482).

@@ -11,7 +11,8 @@ ORDERS = ("first_order", "total_order")
 
 
 def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
-    """Sobol's indices of each claim's margin over the swept assumptions; None without the design.
+    """Return Sobol's indices of each claim's margin over the swept assumptions; None without the
+    design.
 
     found: of `judge_machines` on a study drawn by `saltelli`. `first_order` and `total_order` over
     (claim, assumption), with `_low` and `_high`, the ends of the 95 % bootstrap interval, by
@@ -53,7 +54,7 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
 
 
 def phrase(name: str) -> str:
-    """What an index or an end of its interval is, in words."""
+    """Return what an index or an end of its interval is, in words."""
     order, _, end = name.partition("_order")
     how = {"first": "by this assumption alone", "total": "with this assumption's interactions"}
     text = f"share of the margin's variance {how[order]}"

@@ -43,7 +43,9 @@ class ClaimsError(CompsimError, ValueError):
 
 
 def machines(study: Study) -> list[Case]:
-    """The machines of a study. Raises ClaimsError where it gives what the paper's cases decide."""
+    """Return the machines of a study. Raises ClaimsError where it gives what the paper's cases
+    decide.
+    """
     swept = [axis.key for axis in study.axes if axis.key.partition(".")[0] in ROLES]
     given = swept or [key for key in ROLES if is_given(study.cases[0], key)]
     if given:
@@ -55,7 +57,9 @@ def machines(study: Study) -> list[Case]:
 
 
 def is_given(case: Case, key: str) -> bool:
-    """Whether a case says something else of a key than an ideal machine with its default load."""
+    """Return whether a case says something else of a key than an ideal machine with its default
+    load.
+    """
     default = Case.from_values({})
     return getattr(case, key) != getattr(default, key)
 
@@ -101,18 +105,19 @@ def judge_machines(
 
 
 def machine_key(case: Case) -> str:
-    """What a machine's verdict depends on: all of its case, and how claims are measured."""
+    """Return what a machine's verdict depends on: all of its case, and how claims are measured."""
     rules = "\n".join(f"{rule.statement} {rule.threshold}" for rule in RULES)
     return hashlib.sha256(f"{case.key} {rules}".encode()).hexdigest()[:20]
 
 
 def judged(end: Done | Lost) -> Judged:
-    """What a job says of its machine, also one that took its worker with it."""
+    """Return what a job says of its machine, also one that took its worker with it."""
     return end.result if isinstance(end, Done) else Judged(failed=f"{end.reason}: {end.detail}")
 
 
 def dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr.Dataset:
-    """The machines of a study by their assumptions: `margin`, `held` and more over (claim, ...).
+    """Return the machines of a study by their assumptions: `margin`, `held` and more over (claim,
+    ...).
 
     A grid has a dimension for each swept key, any other study the dimension machine; the keys are
     coordinates, in the case file's unit. `margin` and `error` are relative to the threshold; `held`
@@ -171,14 +176,14 @@ def dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr
 
 
 def kept(path: Path) -> dict[str, Judged]:
-    """The machines of a file by key; none where there is no file. Raises StoreError."""
+    """Return the machines of a file by key; none where there is no file. Raises StoreError."""
     if not path.exists():
         return {}
     return rows_of(read_machines(path))
 
 
 def read_machines(path: Path) -> xr.Dataset:
-    """The machines of a file, as `dataset` made them. Raises StoreError where it is none."""
+    """Return the machines of a file, as `dataset` made them. Raises StoreError where it is none."""
     found = read_dataset(path, REMEDY)
     if "share_margin" not in found or "key" not in found:
         raise StoreError(path, "is no file of judged machines", REMEDY)
@@ -186,7 +191,7 @@ def read_machines(path: Path) -> xr.Dataset:
 
 
 def rows_of(found: xr.Dataset) -> dict[str, Judged]:
-    """What is known of machines, by key."""
+    """Return what is known of machines, by key."""
     flat = found.stack(all_machines=found["key"].dims, create_index=False)
     flat = flat.transpose("all_machines", ...)
     columns = [flat[name].values.tolist() for name in Judged._fields]

@@ -60,7 +60,7 @@ class Posterior:
         return cls(regression, clearances, widening(beyond), covered)
 
     def intervals(self, point: np.ndarray) -> list[Interval]:
-        """Median and interval of each clearance at scaled features (F,).
+        """Return the median and interval of each clearance at scaled features (F,).
 
         Ends are cut at the study's least and greatest clearance: nothing is known beyond.
         """
@@ -78,7 +78,8 @@ class Posterior:
 
 
 def quantiles(summary: np.ndarray, summaries: np.ndarray, logs: np.ndarray) -> np.ndarray:
-    """Lower end, median and upper end of each log clearance, (k, 3), by rejection and adjustment.
+    """Return the lower end, median and upper end of each log clearance, (k, 3), by rejection and
+    adjustment.
 
     summary: the record's, (k,); summaries, logs: the jobs', (n, k).
     """
@@ -100,7 +101,7 @@ def quantiles(summary: np.ndarray, summaries: np.ndarray, logs: np.ndarray) -> n
 def weighted_quantiles(
     values: np.ndarray, weights: np.ndarray, shares: tuple[float, ...]
 ) -> np.ndarray:
-    """Quantiles of weighted values, linear between the middles of their weights."""
+    """Return the quantiles of weighted values, linear between the middles of their weights."""
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     middles = (total - 0.5 * weights[order]) / total[-1]
@@ -108,7 +109,7 @@ def weighted_quantiles(
 
 
 def misses(told: np.ndarray, logs: np.ndarray) -> np.ndarray:
-    """How many times as wide an interval's half would have to be to hold the truth, (n, k).
+    """Return how many times as wide an interval's half would have to be to hold the truth, (n, k).
 
     told: (n, k, 3) of `quantiles`; logs: the true log clearances, (n, k).
     """
@@ -119,7 +120,9 @@ def misses(told: np.ndarray, logs: np.ndarray) -> np.ndarray:
 
 
 def widening(beyond: np.ndarray) -> np.ndarray:
-    """The least widening, (k,), by which as many of `misses` (n, k) are held as LEVEL asks."""
+    """Return the least widening, (k,), by which as many of `misses` (n, k) are held as LEVEL
+    asks.
+    """
     count = len(beyond)
     rank = min(count, int(np.ceil((count + 1) * LEVEL)))
     return np.sort(beyond, axis=0)[rank - 1]

@@ -37,7 +37,9 @@ ABSENT = (
 
 
 def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
-    """The card of a data set (`make_data_set`) as Markdown; parquet: whether that is written."""
+    """Return the card of a data set (`make_data_set`) as Markdown; parquet: whether that is
+    written.
+    """
     fixed, models = (json.loads(dataset.attrs[name]) for name in ("fixed", "models"))
     parts = [
         f"# {dataset.attrs['title'].removeprefix('compsim: ').capitalize()}",
@@ -57,18 +59,18 @@ def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A table of Markdown."""
+    """Return a table of Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(escaped(cell) for cell in line)} |" for line in lines)
 
 
 def escaped(cell: Any) -> str:
-    """A cell's text: whatever it holds does not end the cell."""
+    """Return a cell's text: whatever it holds does not end the cell."""
     return str(cell).replace("|", r"\|").replace("\n", " ")
 
 
 def made_by(dataset: "xr.Dataset") -> str:
-    """Program, versions and case file."""
+    """Return the program, versions and case file."""
     told = json.loads(dataset.attrs["versions"])
     versions = ", ".join(f"{name} {version}" for name, version in told.items())
     return (
@@ -78,7 +80,7 @@ def made_by(dataset: "xr.Dataset") -> str:
 
 
 def simulated(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
-    """How many jobs and machines, what was swept, how the motions are, what was left out."""
+    """Return how many jobs and machines, what was swept, how the motions are, what was left out."""
     machines = len({*dataset["machine"].values.tolist()})
     jobs = len({*dataset["key"].values.tolist()})
     first = (
@@ -124,7 +126,7 @@ def _meaning(reason: str) -> str:
 
 
 def cut(dataset: "xr.Dataset") -> str:
-    """How records were cut, disturbed and split."""
+    """Return how records were cut, disturbed and split."""
     attrs = dataset.attrs
     levels = ", ".join(f"{rms:g}" for rms in dataset["noise"].values)
     apart = "one after the other" if attrs["hop"] >= attrs["revolutions"] else "overlapping"
@@ -143,12 +145,12 @@ def cut(dataset: "xr.Dataset") -> str:
 
 
 def counted(dataset: "xr.Dataset") -> list[tuple[str, str, str, str]]:
-    """Rows of machines and windows by joint and split."""
+    """Return the rows of machines and windows by joint and split."""
     return [(a, b, f"{m:,}", f"{w:,}") for a, b, m, w in counts(dataset)]
 
 
 def counts(dataset: "xr.Dataset") -> list[tuple[str, str, int, int]]:
-    """Machines and windows by joint and split: (joint, split, machines, windows)."""
+    """Return the machines and windows by joint and split: (joint, split, machines, windows)."""
     joints, splits, machines = (dataset[n].values for n in ("joint", "split", "machine"))
     found = []
     for joint in sorted({*joints.tolist()}):
@@ -159,7 +161,7 @@ def counts(dataset: "xr.Dataset") -> list[tuple[str, str, int, int]]:
 
 
 def groups(fixed: dict[str, Any]) -> str:
-    """The body and the sensor of the first job, as a case file has them."""
+    """Return the body and the sensor of the first job, as a case file has them."""
     rows = [
         (f"`{group}.{name}`", value)
         for group in ("body", "sensor")
@@ -170,7 +172,7 @@ def groups(fixed: dict[str, Any]) -> str:
 
 
 def labels(dataset: "xr.Dataset") -> str:
-    """What a window is labelled with, and over which range."""
+    """Return what a window is labelled with, and over which range."""
     rows = [(f"`{name}`", "", phrase, _words(dataset, name)) for name, phrase in WORDS.items()]
     for name, (unit, phrase, _) in LABELS.items():
         values = dataset[name].values
@@ -184,14 +186,14 @@ def _words(dataset: "xr.Dataset", name: str) -> str:
 
 
 def feature_table(dataset: "xr.Dataset") -> str:
-    """Names, units and phrases."""
+    """Return the names, units and phrases."""
     columns = (dataset[name].values for name in ("feature", "feature_unit", "feature_phrase"))
     rows = [(f"`{name}`", unit, phrase) for name, unit, phrase in zip(*columns, strict=True)]
     return table(("feature", "unit", "what it is"), rows)
 
 
 def files(dataset: "xr.Dataset", parquet: bool) -> str:
-    """What the files hold and how they are opened."""
+    """Return what the files hold and how they are opened."""
     signal = "their samples, " if "signal" in dataset else ""
     lines = [
         f"- `windows.nc` (netCDF-4, which is HDF5): the windows, {signal}labels and features; "
@@ -243,7 +245,7 @@ def unmodelled(models: dict[str, dict[str, int]]) -> Iterator[str]:
 
 
 def absent(fixed: dict[str, Any], models: dict[str, dict[str, int]]) -> list[str]:
-    """What the data set does not have."""
+    """Return what the data set does not have."""
     body, sensor = fixed.get("body") or {}, fixed.get("sensor") or {}
     found = [*ABSENT, *unmodelled(models)]
     if body:

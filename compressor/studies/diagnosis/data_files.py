@@ -83,7 +83,9 @@ def refuse_foreign(folder: Folder) -> None:
 
 
 def columns(dataset: "xr.Dataset") -> dict[str, np.ndarray]:
-    """A data set as a table by column: a row for each window and noise level, labels first."""
+    """Return a data set as a table by column: a row for each window and noise level, labels
+    first.
+    """
     levels = dataset.sizes["noise"]
     found: dict[str, np.ndarray] = {
         name: np.repeat(dataset[name].values, levels)
@@ -95,7 +97,9 @@ def columns(dataset: "xr.Dataset") -> dict[str, np.ndarray]:
 
 
 def parquet(table: dict[str, np.ndarray]) -> bytes | None:
-    """A table by column as the bytes of a Parquet file; None where pyarrow is not installed."""
+    """Return a table by column as the bytes of a Parquet file; None where pyarrow is not
+    installed.
+    """
     try:
         import pyarrow
         from pyarrow import parquet as format_

@@ -108,13 +108,17 @@ class Window:
     tacho: np.ndarray
 
     def slim(self, signals: bool) -> "Window":
-        """What a data set keeps: no view of the record, two times, and samples where asked for."""
+        """Return what a data set keeps: no view of the record, two times, and samples where
+        asked for.
+        """
         values = self.values.astype(np.float32) if signals else np.empty(0, np.float32)
         return Window(self.first, self.times[:2].copy(), values, self.tacho.copy())
 
 
 def windows(record: dict[str, np.ndarray], revolutions: int, hop: int) -> Iterator[Window]:
-    """The windows of a record, by the names of `RECORD` (`features`); `hop` revolutions apart."""
+    """Yield the windows of a record, by the names of `RECORD` (`features`); `hop` revolutions
+    apart.
+    """
     times, values, tacho = (record[name] for name in RECORD)
     for first in range(0, len(tacho) - revolutions, hop):
         pulses = tacho[first : first + revolutions + 1]
@@ -125,14 +129,17 @@ def windows(record: dict[str, np.ndarray], revolutions: int, hop: int) -> Iterat
 
 
 def machine_of(case: Case) -> str:
-    """A name for the machine of a case, 12 hexadecimal digits: the same at any load and speed."""
+    """Return a name for the machine of a case, 12 hexadecimal digits: the same at any load and
+    speed.
+    """
     built = {name: value for name, value in case.values().items() if name not in NOT_BUILT}
     built["machine"] = {k: v for k, v in built["machine"].items() if k != "speed_rpm"}
     return hashlib.sha256(json.dumps(built, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
-    """A window's samples (m/s2, (n,)) with white noise, by numpy's default generator of a seed.
+    """Return a window's samples (m/s2, (n,)) with white noise, by numpy's default generator of a
+    seed.
 
     In a data set the seed is [its seed, the job's key as a number, the window's first pulse, the
     number of the noise level], so that anyone can add the same noise to the stored samples.
@@ -145,7 +152,7 @@ def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
 def split_by_machine(
     machines: Sequence[str], strata: Sequence[str], share: float, seed: int
 ) -> np.ndarray:
-    """Which windows are for testing, (n,): all of a machine or none.
+    """Return which windows are for testing, (n,): all of a machine or none.
 
     machines, strata: of each window. Of the machines of each stratum a share is drawn, to the
     nearest number, and at least one of two; a single one is for training. The order of windows
@@ -167,7 +174,7 @@ def make_data_set(
     options: DataSetOptions | None = None,
     progress: Progress = lambda done, total, remark: None,
 ) -> "xr.Dataset":
-    """The labelled windows of a stored study; None: the store's only one.
+    """Return the labelled windows of a stored study; None: the store's only one.
 
     Dimensions: `window`, `noise` (m/s2), `feature`; with signals also `sample` and `pulse`.
     Variables: `features` (window, noise, feature); labels by window: the `WORDS`, the `LABELS`,
@@ -219,19 +226,19 @@ def make_data_set(
 
 
 def without_sensor(study: StoredStudy) -> DataSetError:
-    """What to write into the case file of a study without records."""
+    """Return what to write into the case file of a study without records."""
     text = f"study {study.name} has no sensor's record: write {RECORD_NEEDED} into"
     return DataSetError(f"{text} {study.case_file}, keep series, and run it again")
 
 
 def _record(stored: Stored, key: str) -> dict[str, np.ndarray]:
-    """A job's record by the names of `RECORD`, and `CLIPPED`; nothing where it has none."""
+    """Return a job's record by the names of `RECORD`, and `CLIPPED`; nothing where it has none."""
     found = stored.values(key, (*RECORD, CLIPPED))
     return found if found.keys() >= {*RECORD} else {}
 
 
 def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str, Any]] | str:
-    """The windows of a job, each with labels and features; or why there are none."""
+    """Return the windows of a job, each with labels and features; or why there are none."""
     position = stored.position(key)
     if position is None:
         return "missing"
@@ -279,7 +286,7 @@ def models_of(case: Case) -> dict[str, str]:
 
 
 def labels_of(case: Case) -> dict[str, float]:
-    """The `LABELS` of a case; the clearance of an ideal joint is 0."""
+    """Return the `LABELS` of a case; the clearance of an ideal joint is 0."""
     values = case.values()
     clearance = values.get("clearance_mm", {})
     found = {f"clearance_mm_{joint}": clearance.get(joint) for joint in ("big_end", "small_end")}
@@ -291,7 +298,7 @@ def labels_of(case: Case) -> dict[str, float]:
 
 
 def features_by_noise(window: Window, key: int, options: DataSetOptions) -> np.ndarray:
-    """The features of a window at each noise level, (levels, features)."""
+    """Return the features of a window at each noise level, (levels, features)."""
     found = np.empty((len(options.noise), len(FEATURES)))
     for level, rms in enumerate(options.noise):
         values = noisy(window.values, rms, [options.seed, key, window.first, level])
@@ -300,7 +307,7 @@ def features_by_noise(window: Window, key: int, options: DataSetOptions) -> np.n
 
 
 def labelled(rows: Sequence[dict[str, Any]], options: DataSetOptions) -> "xr.Dataset":
-    """Rows of `job_rows` as a Dataset."""
+    """Return the rows of `job_rows` as a Dataset."""
     import xarray as xr
 
     dim = ("window",)
@@ -331,7 +338,7 @@ def labelled(rows: Sequence[dict[str, Any]], options: DataSetOptions) -> "xr.Dat
 
 
 def signals(found: Sequence[Window]) -> dict[str, tuple]:
-    """The samples of windows, without added noise."""
+    """Return the samples of windows, without added noise."""
     sizes = np.array([one.values.size for one in found])
     values = np.full((len(found), sizes.max()), np.nan, np.float32)
     for row, one in zip(values, found, strict=True):
@@ -352,7 +359,9 @@ def signals(found: Sequence[Window]) -> dict[str, tuple]:
 
 
 def _reach(values: Sequence[Any]) -> list[Any]:
-    """The least and the greatest of a swept key's values, or its words; and how many differ."""
+    """Return the least and the greatest of a swept key's values, or its words; and how many
+    differ.
+    """
     known = [value for value in values if value is not None]
     numbers = all(isinstance(value, int | float) for value in known)
     kinds = {json.dumps(value) for value in known}

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
-    """The numbers of a list with commas."""
+    """Return the numbers of a list with commas."""
     try:
         return tuple(float(word) for word in text.split(","))
     except ValueError as error:
@@ -81,7 +81,7 @@ def dataset(
 
 
 def told(made: "xr.Dataset") -> list[str]:
-    """What was made: windows and machines by joint and split, and what was left out."""
+    """Return what was made: windows and machines by joint and split, and what was left out."""
     from compressor.studies.diagnosis.data_card import counts
 
     rows = counts(made)

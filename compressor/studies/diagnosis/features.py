@@ -77,7 +77,7 @@ FEATURES = _table()
 
 
 def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[str, float]:
-    """The `FEATURES` of a record by name.
+    """Return the `FEATURES` of a record by name.
 
     times: s, (m,), equally spaced; values: m/s2, (m,); tacho: times (s) of top dead centre, (k,)
     with k - 1 whole revolutions. A crank angle is known to a sample. Raises RecordError for fewer
@@ -113,7 +113,7 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
 
 
 def checked(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
-    """The whole revolutions of a record. Raises RecordError for one that tells nothing."""
+    """Return the whole revolutions of a record. Raises RecordError for one that tells nothing."""
     whole = len(tacho) - 1
     if whole < FEWEST:
         text = f"{len(tacho)} tacho pulses are too few: at least {FEWEST + 1}"
@@ -132,14 +132,16 @@ def checked(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
 
 
 def turned(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
-    """Revolutions since the first pulse at each time, at the nearest one's pace beyond pulses."""
+    """Return the revolutions since the first pulse at each time, at the nearest one's pace
+    beyond pulses.
+    """
     turns = np.interp(times, tacho, np.arange(len(tacho)))
     turns += np.minimum(times - tacho[0], 0.0) / (tacho[1] - tacho[0])
     return turns + np.maximum(times - tacho[-1], 0.0) / (tacho[-1] - tacho[-2])
 
 
 def bands(values: np.ndarray, rate: float) -> dict[str, float]:
-    """The log10 of each band's share of the energy."""
+    """Return the log10 of each band's share of the energy."""
     amplitudes = line_amplitudes(values - values.mean(), values.size, "rectangular", True)
     frequency = np.arange(amplitudes.size) * rate / values.size
     power = amplitudes**2
@@ -152,7 +154,7 @@ def bands(values: np.ndarray, rate: float) -> dict[str, float]:
 
 
 def envelope(even: np.ndarray, a_turn: int, speed: float) -> dict[str, float]:
-    """Amplitudes of the envelope's first orders over its mean, in the `ENVELOPE` band."""
+    """Return amplitudes of the envelope's first orders over its mean, in the `ENVELOPE` band."""
     top = a_turn / 2.0
     low, high = (min(edge / speed, top) for edge in ENVELOPE)
     if not low < high:
@@ -163,5 +165,5 @@ def envelope(even: np.ndarray, a_turn: int, speed: float) -> dict[str, float]:
 
 
 def log_share(part: float, whole: float) -> float:
-    """log10 of a share of an energy, at least of `SMALLEST`."""
+    """Return the log10 of a share of an energy, at least of `SMALLEST`."""
     return math.log10(max(part / whole, SMALLEST)) if whole > 0.0 else math.nan

@@ -132,7 +132,7 @@ class Identifier:
         )  # fmt: skip
 
     def identify(self, row: np.ndarray) -> Answer:
-        """What explains a record with these features, (FEATURES,)."""
+        """Return what explains a record with these features, (FEATURES,)."""
         filled = np.where(np.isnan(row), self.middle, row)
         plain = (filled - self.middle) / self.scale
         point = np.clip(plain, -FARTHEST, FARTHEST)
@@ -154,7 +154,9 @@ class Identifier:
 
 
 def _ends(joint: str, equal: bool) -> list[int]:
-    """The columns of clearances that are told of a joint; one where both are always equal."""
+    """Return the columns of clearances that are told of a joint; one where both are always
+    equal.
+    """
     return list(SHARES[joint][:1] if equal else SHARES[joint])
 
 
@@ -163,7 +165,7 @@ def _sides(joint: str) -> list[str]:
 
 
 def find_record(name: str, folder: Folder, steady: SteadySpeed | None) -> tuple[str, Record]:
-    """A record by the name of its CSV file, or by the beginning of a stored job's key.
+    """Return a record by the name of its CSV file, or by the beginning of a stored job's key.
 
     With the job's key, "" of a file; steady: of a file without tacho. Raises RecordError and
     StoreError, RecordError also where a job is given a speed.
@@ -178,7 +180,8 @@ def find_record(name: str, folder: Folder, steady: SteadySpeed | None) -> tuple[
 def explain_record(
     record: Record, folder: Folder, study: str, key: str, progress: Progress
 ) -> tuple[Identifier, Answer]:
-    """What a stored study tells of a record, and the identifier that does; key: a job left out.
+    """Return what a stored study tells of a record, and the identifier that does; key: a job left
+    out.
 
     Raises RecordError, StoreError, and StudyError where the study cannot tell.
     """

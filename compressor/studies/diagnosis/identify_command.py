@@ -77,7 +77,7 @@ def identify(
 
 
 def verdict(answer: "Answer") -> Iterator[str]:
-    """That nothing fits, and what may be done; nothing where something does."""
+    """Yield that nothing fits, and what may be done; nothing where something does."""
     if answer.fits:
         return
     yield (f"NOTHING IN THIS STUDY FITS: {answer.p_value:.2%} of its own jobs are as strange "
@@ -90,14 +90,14 @@ def verdict(answer: "Answer") -> Iterator[str]:
 
 
 def ranking(answer: "Answer") -> Iterator[str]:
-    """The table of joints."""
+    """Yield the table of joints."""
     yield f"{'rank':<5} {'joint':<10} {'probability':>11}  clearance, mm: median [90 % interval]"
     for rank, one in enumerate(answer.candidates, 1):
         yield f"{rank:<5} {one.joint:<10} {one.probability:>11.3f}  {ends(one.clearances)}".rstrip()
 
 
 def ends(clearances: dict[str, Any]) -> str:
-    """Clearances with their intervals, by end."""
+    """Return the clearances with their intervals, by end."""
     return "; ".join(
         f"{side} {found.median:.3f} [{found.low:.3f}, {found.high:.3f}]"
         for side, found in clearances.items()
@@ -105,7 +105,7 @@ def ends(clearances: dict[str, Any]) -> str:
 
 
 def grounds(fitted: "Identifier", answer: "Answer", folder: str) -> Iterator[str]:
-    """What an answer rests on, and its cautions."""
+    """Yield what an answer rests on, and its cautions."""
     library = fitted.library
     yield (f"rests on {len(library.keys)} of {plural(library.jobs)} of study {library.study} in "
            f"{folder}; the nearest one is {answer.nearest}")  # fmt: skip
@@ -131,14 +131,14 @@ def grounds(fitted: "Identifier", answer: "Answer", folder: str) -> Iterator[str
 
 
 def span(values: "np.ndarray") -> str:
-    """The reach of a swept key's values."""
+    """Return the reach of a swept key's values."""
     if values.dtype.kind in "iuf":
         return f"{values.min():.4g} to {values.max():.4g}"
     return ", ".join(sorted({str(value) for value in values.tolist()}))
 
 
 def plain(record: str, fitted: "Identifier", answer: "Answer") -> dict[str, Any]:
-    """An answer as JSON says it."""
+    """Return an answer as JSON says it."""
     library = fitted.library
     return {
         "record": record, "study": library.study, "jobs": len(library.keys),

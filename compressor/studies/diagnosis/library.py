@@ -53,11 +53,11 @@ class Library:
     swept: dict[str, np.ndarray]
 
     def without(self, key: str) -> "Library":
-        """The same but for a job, since a job must not explain itself."""
+        """Return the same but for a job, since a job must not explain itself."""
         return self.only(self.keys != key)
 
     def only(self, kept: np.ndarray) -> "Library":
-        """The jobs that a mask (n,) keeps."""
+        """Return the jobs that a mask (n,) keeps."""
         swept = {name: values[kept] for name, values in self.swept.items()}
         own = {n: getattr(self, n)[kept] for n in ("keys", "joints", "clearances", "features")}
         return replace(self, swept=swept, **own)
@@ -66,7 +66,7 @@ class Library:
 def open_library(
     folder: Folder, name: str, progress: Progress = lambda done, total, remark: None
 ) -> Library:
-    """The library of a stored study.
+    """Return the library of a stored study.
 
     Features are kept in `<folder>/features/<study>.nc` and made again when jobs, or how features
     are made, have changed. Raises StoreError where there is no such study or no record in it.
@@ -93,7 +93,7 @@ def open_library(
 
 
 def job_record(stored: Stored, key: str) -> Record | None:
-    """The sensor's record of a stored job; None where it has none."""
+    """Return the sensor's record of a stored job; None where it has none."""
     found = stored.values(key, SERIES)
     if set(found) != set(SERIES):
         return None
@@ -102,13 +102,13 @@ def job_record(stored: Stored, key: str) -> Record | None:
 
 
 def vector(record: Record) -> np.ndarray:
-    """The features of a record as a row of a library, (FEATURES,). Raises RecordError."""
+    """Return the features of a record as a row of a library, (FEATURES,). Raises RecordError."""
     found = features(record.times, record.values, record.tacho)
     return np.array([found[name] for name in FEATURES])
 
 
 def _place(stored: Stored, key: str) -> int | None:
-    """Where a job that is ok and has series stands in the rows of a store."""
+    """Return where a job that is ok and has series stands in the rows of a store."""
     place = stored.position(key)
     if place is None or stored.rows.words["status"][place] != "ok":
         return None
@@ -116,7 +116,7 @@ def _place(stored: Stored, key: str) -> int | None:
 
 
 def _digest(stored: Stored, positions: dict[str, int]) -> str:
-    """What features are made of: files by their digests, and the code that makes them."""
+    """Return what features are made of: files by their digests, and the code that makes them."""
     parts = (stored.rows.columns[name] for name in ("key", "digest"))
     keys, digests = (column[[*positions.values()]].tolist() for column in parts)
     names = [f"{k.decode()}-{d.decode()}.h5" for k, d in zip(keys, digests, strict=True)]
@@ -124,7 +124,7 @@ def _digest(stored: Stored, positions: dict[str, int]) -> str:
 
 
 def _kept(path: Path, made_of: str) -> xr.Dataset | None:
-    """The features that are kept, unless they are stale, damaged or absent."""
+    """Return the features that are kept, unless they are stale, damaged or absent."""
     try:
         found = read_dataset(path)
         return found if found.attrs.get("made_of") == made_of else None
@@ -133,7 +133,9 @@ def _kept(path: Path, made_of: str) -> xr.Dataset | None:
 
 
 def _made(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.Dataset:
-    """The features of all jobs with a record; those whose record tells nothing are left out."""
+    """Return the features of all jobs with a record; those whose record tells nothing are left
+    out.
+    """
     rows: list[tuple[str, str, list[float], np.ndarray]] = []
     for number, (key, place) in enumerate(positions.items()):
         progress(number, len(positions), "")
@@ -159,14 +161,14 @@ def _made(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.D
 
 
 def _swept(study: StoredStudy, keys: np.ndarray) -> dict[str, np.ndarray]:
-    """Values of the swept keys other than joint and clearance, by key, (n,) each."""
+    """Return the values of the swept keys other than joint and clearance, by key, (n,) each."""
     own: dict[str, dict[str, Any]] = dict(zip(study.keys, points(study), strict=True))
     others = [axis.key for axis in study.axes if axis.key.partition(".")[0] not in TOLD]
     return {name: np.array([own[key].get(name) for key in keys.tolist()]) for name in others}
 
 
 def stored_record(folder: Folder, beginning: str) -> tuple[str, Record]:
-    """The key that begins so, and the sensor's record of that job.
+    """Return the key that begins so, and the sensor's record of that job.
 
     Raises StoreError where there is no such job, or it has no record.
     """

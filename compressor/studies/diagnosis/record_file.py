@@ -26,7 +26,7 @@ class SteadySpeed:
     tdc: float
 
     def pulses(self, times: np.ndarray) -> np.ndarray:
-        """The times of top dead centre within a record, (k,)."""
+        """Return the times of top dead centre within a record, (k,)."""
         if not (math.isfinite(self.rpm) and self.rpm > 0.0 and math.isfinite(self.tdc)):
             text = f"a speed of {self.rpm:g} rpm with top dead centre at {self.tdc:g} s"
             raise RecordError(f"{text}: give a finite speed above 0, and a finite time")
@@ -36,7 +36,7 @@ class SteadySpeed:
 
 
 def read_record(path: str | Path, steady: SteadySpeed | None = None) -> Record:
-    """The record of a CSV file with the columns time_s, acceleration_m_per_s2 and tacho.
+    """Return the record of a CSV file with the columns time_s, acceleration_m_per_s2 and tacho.
 
     The tacho is any voltage that rises once a revolution, at top dead centre, through the middle of
     its range: a sine, a square or a short pulse. Pulses are interpolated between samples, and then
@@ -67,7 +67,7 @@ def read_record(path: str | Path, steady: SteadySpeed | None = None) -> Record:
 
 
 def _columns(path: Path, needed: list[str], also: list[str]) -> dict[str, np.ndarray]:
-    """Columns of a CSV file by the names in its first line."""
+    """Return the columns of a CSV file by the names in its first line."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             lines = csv.reader(file)
@@ -112,7 +112,7 @@ def _number(text: str, where: str) -> float:
 
 
 def _even(path: str | Path, times: np.ndarray) -> np.ndarray:
-    """Equally spaced times, as nearly equal ones that were rounded mean them."""
+    """Return the equally spaced times, as nearly equal ones that were rounded mean them."""
     if times.size < 2:
         raise RecordError(f"{path}: {times.size} samples are no record")
     step = (times[-1] - times[0]) / (times.size - 1)

@@ -34,7 +34,9 @@ class KernelRidge:
 
     @classmethod
     def fit(cls, points: np.ndarray, targets: np.ndarray) -> "KernelRidge":
-        """The regression of the width and ridge with the least squares of errors left out."""
+        """Return the regression of the width and ridge with the least squares of errors left
+        out.
+        """
         some = slice(None, None, -(-len(points) // SAMPLE))
         scale = targets.var(axis=0) + 1e-300
         width, ridge = _chosen(points[some], targets[some] / np.sqrt(scale))
@@ -47,18 +49,18 @@ class KernelRidge:
         return cls(points, width, ridge, mean, weights, left_out)
 
     def predict(self, points: np.ndarray) -> np.ndarray:
-        """Predictions at points (m, F): (m, t)."""
+        """Return the predictions at points (m, F): (m, t)."""
         kernel = np.exp(-_squares(points, self.points) / (2.0 * self.width**2))
         return self.mean + kernel @ self.weights
 
 
 def _squares(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Mean squared difference of each pair of points."""
+    """Return the mean squared difference of each pair of points."""
     return cdist(one, other, "sqeuclidean") / one.shape[1]
 
 
 def _chosen(points: np.ndarray, targets: np.ndarray) -> tuple[float, float]:
-    """The width and ridge with the least squares of errors left out."""
+    """Return the width and ridge with the least squares of errors left out."""
     squares = _squares(points, points)
     centred = targets - targets.mean(axis=0)
     least, best = np.inf, (WIDTHS[0], RIDGES[0])

@@ -75,7 +75,7 @@ class Strangeness:
         )
 
     def judge(self, point: np.ndarray) -> tuple[float, Distance, Distance]:
-        """The p-value of scaled features (F,), and both distances.
+        """Return the p-value of scaled features (F,), and both distances.
 
         The p-value is twice the smaller of the two shares of jobs that lie at least as far off
         (Bonferroni), and is 2 / (n + 1) at least.
@@ -89,26 +89,28 @@ class Strangeness:
         return min(1.0, 2.0 * chance), Distance(near, usual[0]), Distance(apart, usual[1])
 
     def nearest(self, point: np.ndarray) -> int:
-        """The index of the nearest job."""
+        """Return the index of the nearest job."""
         return int(cdist(((point - self.middle) @ self.turn)[None], self.white)[0].argmin())
 
     def off(self, point: np.ndarray) -> np.ndarray:
-        """How far each feature is from what others foretell, in standard deviations, (F,)."""
+        """Return how far each feature is from what others foretell, in standard deviations,
+        (F,).
+        """
         left = self._left((point - self.middle) @ self.turn)
         return left @ self.back[-left.size :] / self.spread
 
     def _left(self, white: np.ndarray) -> np.ndarray:
-        """What the strongest components do not foretell of the others."""
+        """Return what the strongest components do not foretell of the others."""
         strong = self.regression.points.shape[1]
         return white[strong:] - self.regression.predict(white[None, :strong])[0]
 
 
 def _whitening(residuals: np.ndarray) -> np.ndarray:
-    """What turns residuals (n, c) into uncorrelated ones of variance 1, (c, c)."""
+    """Return what turns residuals (n, c) into uncorrelated ones of variance 1, (c, c)."""
     values, vectors = np.linalg.eigh(np.atleast_2d(np.cov(residuals.T)))
     return vectors / np.sqrt(np.maximum(values, WEAKEST * values.max()))
 
 
 def _share(distance: float, own: np.ndarray) -> float:
-    """Share of sorted distances, with the record's, that are at least as great."""
+    """Return the share of sorted distances, with the record's, that are at least as great."""
     return float((1 + len(own) - np.searchsorted(own, distance)) / (1 + len(own)))

@@ -33,7 +33,7 @@ class Seen(NamedTuple):
 
 
 def way(chain: xr.Dataset) -> list[Seen]:
-    """What one direction saw, in the order it went; values that failed are left out."""
+    """Return what one direction saw, in the order it went; values that failed are left out."""
     over, found = chain.attrs["over"], []
     for i in np.argsort(chain[over].values, kind="stable"):
         one = chain.isel({over: i})
@@ -45,7 +45,9 @@ def way(chain: xr.Dataset) -> list[Seen]:
 
 
 def regime_of(one: xr.Dataset) -> str:
-    """The regime at one value in words: period n, chaotic, undecided; "" where there is none."""
+    """Return the regime at one value in words: period n, chaotic, undecided; "" where there is
+    none.
+    """
     word = str(one["regime"].values)
     if str(one["status"].values) != "ok" or word != "periodic":
         return word if str(one["status"].values) == "ok" else ""
@@ -72,7 +74,7 @@ def bifurcation(pair: xr.Dataset) -> str:
 
 
 def course(seen: Sequence[Seen], unit: str) -> str:
-    """Where period 1 is lost and comes back, and how often each regime was found."""
+    """Return where period 1 is lost and comes back, and how often each regime was found."""
     regimes = [one.regime for one in seen]
     if not seen:
         return "no value has a result."
@@ -98,7 +100,9 @@ def course(seen: Sequence[Seen], unit: str) -> str:
 
 
 def parting(seen: Sequence[Seen], unit: str) -> str:
-    """Where the largest exponent is first above 0 by more than its error, or how near it came."""
+    """Return where the largest exponent is first above 0 by more than its error, or how near it
+    came.
+    """
     known = [one for one in seen if np.isfinite(one.exponent)]
     if not known:
         return "No Lyapunov exponent is known."
@@ -113,7 +117,7 @@ def parting(seen: Sequence[Seen], unit: str) -> str:
 
 
 def directions(pair: xr.Dataset) -> list[str]:
-    """Whether up and down differ, where, and whether second attractors were confirmed."""
+    """Return whether up and down differ, where, and whether second attractors were confirmed."""
     if pair.sizes["direction"] < 2 or "differs" not in pair:
         return []
     over, unit = pair.attrs["over"], unit_of(pair)
@@ -138,7 +142,7 @@ def directions(pair: xr.Dataset) -> list[str]:
 
 
 def failures(pair: xr.Dataset) -> list[str]:
-    """How many values failed, and why."""
+    """Return how many values failed, and why."""
     failed = pair["status"].values == "failed"
     if not failed.any():
         return []
@@ -188,7 +192,7 @@ def periods(plane: xr.Dataset, other: str) -> str:
 
 
 def spans(values: np.ndarray, marked: np.ndarray) -> str:
-    """Marked values as spans of neighbours, in rising order: 0.1, 0.3 to 0.5."""
+    """Return the marked values as spans of neighbours, in rising order: 0.1, 0.3 to 0.5."""
     order = np.argsort(values, kind="stable")
     values, marked = values[order], marked[order]
     edges = np.flatnonzero(np.diff(np.concatenate(([0], marked.astype(int), [0]))))
@@ -201,7 +205,7 @@ def spans(values: np.ndarray, marked: np.ndarray) -> str:
 
 
 def rate(one: Seen) -> str:
-    """An exponent with its error, where that is known."""
+    """Return an exponent with its error, where that is known."""
     if not (np.isfinite(one.error) and one.error > 0.0):
         return f"{one.exponent:.3g} a revolution"
     places = max(0, 1 - math.floor(math.log10(one.error)))
@@ -209,18 +213,18 @@ def rate(one: Seen) -> str:
 
 
 def said_of(data: xr.Dataset, name: str) -> str:
-    """What a coordinate is called in a sentence."""
+    """Return what a coordinate is called in a sentence."""
     return str(data[name].attrs.get("long_name") or data[name].attrs.get("case_key", name))
 
 
 def unit_of(data: xr.Dataset) -> str:
-    """The unit of the followed parameter with a space before it, "" where it has none."""
+    """Return the unit of the followed parameter with a space before it, "" where it has none."""
     unit = data[data.attrs["over"]].attrs.get("units", "")
     return f" {unit}" if unit not in ("", "1") else ""
 
 
 def number(value: float) -> str:
-    """A parameter's value in few digits."""
+    """Return a parameter's value in few digits."""
     return f"{value:.4g}"
 
 

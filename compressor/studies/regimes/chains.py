@@ -43,7 +43,7 @@ class Chain:
 
     @classmethod
     def of(cls, study: str, asked: Regimes, direction: str, cases: Sequence[Case]) -> "Chain":
-        """The chain of cases that are given going up."""
+        """Return the chain of cases that are given going up."""
         ordered = cases if direction == "up" else cases[::-1]
         return cls(study, asked, direction, tuple(ordered))
 
@@ -62,7 +62,7 @@ class Chain:
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
-        """Where it is stored."""
+        """Return where it is stored."""
         return Path(folder) / FOLDER / self.study / f"{self.key}.nc"
 
 
@@ -105,25 +105,25 @@ def run_chain(task: Task) -> Ended | StoreError:
 
 
 def first_failed(rows: Sequence[Row]) -> int:
-    """The number of the first failed row; how many there are where none failed."""
+    """Return the number of the first failed row; how many there are where none failed."""
     return next((n for n, row in enumerate(rows) if row["status"] != "ok"), len(rows))
 
 
 def ended(chain: Chain, rows: Sequence[Row]) -> Ended:
-    """How far a chain has come."""
+    """Return how far a chain has come."""
     paired = zip(chain.values, rows, strict=False)
     bad = [(v, row["reason"], row["detail"]) for v, row in paired if row["status"] != "ok"]
     return Ended(len(rows), tuple(bad))
 
 
 def last_state(rows: Sequence[Row]) -> np.ndarray | None:
-    """The state that the next value begins from; None: from its own start."""
+    """Return the state that the next value begins from; None: from its own start."""
     state = rows[-1]["end_state"] if rows else None
     return None if state is None or np.isnan(state).any() else state
 
 
 def dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
-    """The rows of a chain, with the dimension `value` in the order of running."""
+    """Return the rows of a chain, with the dimension `value` in the order of running."""
     found: dict[str, tuple] = {}
     for name, phrase in TEXTS.items():
         texts = np.array([row[name] for row in rows], object)
@@ -147,7 +147,7 @@ def dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
 
 
 def labels() -> dict[str, tuple]:
-    """The coordinates of the dimensions that every chain has."""
+    """Return the coordinates of the dimensions that every chain has."""
     return {
         "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
         "coordinate": ("coordinate", list(COORDINATES), {"long_name": "of a Poincaré point"}),
@@ -156,12 +156,12 @@ def labels() -> dict[str, tuple]:
 
 
 def read_chain(chain_path: Path) -> xr.Dataset:
-    """A stored chain. Raises StoreError where the file is none."""
+    """Return a stored chain. Raises StoreError where the file is none."""
     return read_dataset(chain_path, REMEDY)
 
 
 def kept(chain: Chain, path: Path) -> list[Row]:
-    """The rows of an earlier run, none where there is no file. Raises StoreError."""
+    """Return the rows of an earlier run, none where there is no file. Raises StoreError."""
     if not path.exists():
         return []
     found = read_chain(path)

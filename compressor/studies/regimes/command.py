@@ -70,7 +70,7 @@ def ahead_lines(standings: "list[Standing]") -> Iterator[str]:
 
 
 def regimes_of(folder: str, study: str) -> str:
-    """How many values of a study are in which regime."""
+    """Return how many values of a study are in which regime."""
     from compressor.studies.regimes.dataset import open_regimes
 
     found = open_regimes(folder, study)

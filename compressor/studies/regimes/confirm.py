@@ -58,7 +58,7 @@ class Seen(NamedTuple):
 
 
 def differ(one: Seen, other: Seen, within: float) -> bool:
-    """Whether two motions of a machine are different ones.
+    """Return whether two motions of a machine are different ones.
 
     Two that repeat themselves: by sets of Poincaré places that are farther apart than three times
     the tolerance `within`, of the clearance; sets of other periods are, unless a period is doubled
@@ -76,7 +76,7 @@ def differ(one: Seen, other: Seen, within: float) -> bool:
 
 
 def seen_in_row(row: Row, case: Case) -> Seen:
-    """What a stored value says of its motion."""
+    """Return what a stored value says of its motion."""
     count = 0 if row["status"] != "ok" else int(row["revolutions"])
     period = float(row["period"])
     points = row["section"][: count if math.isnan(period) else int(period)]
@@ -86,7 +86,7 @@ def seen_in_row(row: Row, case: Case) -> Seen:
 
 
 def seen_in_motion(motion: Motion, case: Case) -> Seen:
-    """The same of a motion that was followed now."""
+    """Return the same of a motion that was followed now."""
     found = places(motion.points, record(case)["clearance"])
     if motion.reason:
         return Seen("", math.nan, found, math.nan, math.nan)
@@ -108,7 +108,7 @@ class Pair:
         return hashlib.sha256(what.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
-        """Where its verdicts are stored."""
+        """Return where its verdicts are stored."""
         return Path(folder) / FOLDER / self.up.study / f"pair-{self.key}.nc"
 
 
@@ -136,7 +136,7 @@ AGREED = Verdict(0, 0, 0, 0, 0)
 
 
 def doubts(pair: Pair, folder: Folder) -> list[Doubt]:
-    """The values at which the stored chains of a pair differ."""
+    """Return the values at which the stored chains of a pair differ."""
     up = kept(pair.up, pair.up.path(folder))
     down = kept(pair.down, pair.down.path(folder))
     if min(len(up), len(down)) < len(pair.up.cases):
@@ -172,7 +172,9 @@ def confirm(doubt: Doubt) -> Verdict:
 
 
 def later(case: Case, state: np.ndarray | None, chain: Chain) -> Seen:
-    """The motion after many more revolutions from a state on, or from the case's own start."""
+    """Return the motion after many more revolutions from a state on, or from the case's own
+    start.
+    """
     clock = Clock(case.solve.timeout_s)
     leg = follow(case, state, stretch(chain.asked, FURTHER, clock))
     if leg.reason:
@@ -181,7 +183,9 @@ def later(case: Case, state: np.ndarray | None, chain: Chain) -> Seen:
 
 
 def other_starts(case: Case) -> list[Case]:
-    """The case with its journals starting elsewhere: evenly over a disk within each clearance."""
+    """Return the case with its journals starting elsewhere: evenly over a disk within each
+    clearance.
+    """
     rng = np.random.default_rng(SEED)
     found = []
     for _ in range(STARTS):
@@ -196,7 +200,9 @@ def other_starts(case: Case) -> list[Case]:
 
 
 def read_verdicts(pair: Pair, folder: Folder) -> dict[int, Verdict]:
-    """The stored verdicts by the number of the value, going up; none where there is no file."""
+    """Return the stored verdicts by the number of the value, going up; none where there is no
+    file.
+    """
     path = pair.path(folder)
     if not path.exists():
         return {}
@@ -224,7 +230,7 @@ def write_verdicts(pair: Pair, folder: Folder, known: Mapping[int, Verdict]) -> 
 
 
 def verdict_attrs() -> dict[str, dict[str, str]]:
-    """Units and long names of the verdicts."""
+    """Return the units and long names of the verdicts."""
     return {name: {"units": "1", "long_name": phrase} for name, phrase in VERDICTS.items()}
 
 

@@ -22,7 +22,7 @@ MISSING = "missing"  # status of a value that was not run
 
 
 def open_regimes(results: Folder, study: str) -> xr.Dataset:
-    """A study's chains in a folder of results, as far as they were run.
+    """Return a study's chains in a folder of results, as far as they were run.
 
     Dims: the study's own axes (or `job`, where it is no grid), `direction` (up, down), the followed
     key by its coordinate's name, which stands in the attribute `over`, going up, and those of the
@@ -78,12 +78,12 @@ def of_joint(over: str, chains: Sequence[Sequence[xr.Dataset | None]]) -> str:
 
 
 def followed_studies(results: Folder) -> list[str]:
-    """The names of the regimes studies in a folder of results."""
+    """Return the names of the regimes studies in a folder of results."""
     return sorted(path.parent.name for path in (Path(results) / FOLDER).glob(f"*/{FILE}"))
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Which chains a study has. Raises StoreError."""
+    """Return which chains a study has. Raises StoreError."""
     path = folder / FILE
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
@@ -95,7 +95,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def stored(path: Path) -> xr.Dataset | None:
-    """A stored chain or pair; None where there is none."""
+    """Return a stored chain or pair; None where there is none."""
     if not path.exists():
         return None
     return read_chain(path) if not path.name.startswith("pair-") else read_dataset(path, REMEDY)
@@ -104,7 +104,9 @@ def stored(path: Path) -> xr.Dataset | None:
 def layout(
     manifest: dict[str, Any], names: dict[str, str]
 ) -> tuple[dict[str, tuple], tuple[int, ...]]:
-    """The coordinates of a study's own axes, and the shape that its machines are laid out in."""
+    """Return the coordinates of a study's own axes, and the shape that its machines are laid out
+    in.
+    """
     found: dict[str, tuple] = {}
     for axis in manifest["axes"]:
         name = names[axis["key"]]
@@ -121,7 +123,7 @@ def stacked(
     name: str,
     inner: tuple[str, ...] = (),
 ) -> np.ndarray:
-    """A variable of all chains, (machine, direction, value going up, ...).
+    """Return a variable of all chains, (machine, direction, value going up, ...).
 
     Missing values are nan, or of texts empty; where states have other lengths, so are their ends.
     """
@@ -149,7 +151,7 @@ def stacked(
 def verdicts(
     pairs: Sequence[xr.Dataset | None], dims: tuple[str, ...], shape: tuple[int, ...]
 ) -> dict[str, tuple]:
-    """Where up and down differ, over machine and value; 0 where it is not known yet."""
+    """Return where up and down differ, over machine and value; 0 where it is not known yet."""
     found = {}
     for name, attrs in verdict_attrs().items():
         columns = [np.zeros(shape[-1], int) if p is None else p[name].values for p in pairs]

@@ -13,7 +13,7 @@ COUNTED = 16  # rev of a motion that repeats itself
 def exponent(
     case: Case, state: np.ndarray, repeats: bool, most: int, timeout: float
 ) -> tuple[float, float]:
-    """The largest Lyapunov exponent and its error (1/rev) from a state on; nan: not known.
+    """Return the largest Lyapunov exponent and its error (1/rev) from a state on; nan: not known.
 
     Over up to `most` revolutions, few of which tell where the motion repeats itself. The error is
     nan where the motion contracts so fast that the exponent is at most this. timeout: wall time (s)

@@ -44,7 +44,7 @@ HATCH: dict[str, Any] = {"facecolor": UNSEEN, "edgecolor": GREY, "hatch": "////"
 
 @styled
 def draw_bifurcation(pair: xr.Dataset) -> Figure:
-    """One machine along a parameter: Poincaré points, period, exponent, contact modes.
+    """Return one machine along a parameter: Poincaré points, period, exponent, contact modes.
 
     pair: dims direction, the followed one, and the variables' own; some value has a result.
     """
@@ -100,7 +100,7 @@ def plot_periods(panel: Axes, pair: xr.Dataset) -> None:
 
 
 def period_rows(chain: xr.Dataset) -> np.ndarray:
-    """Where the period of each value stands; nan where it has no result."""
+    """Return where the period of each value stands; nan where it has no result."""
     words, ok = chain["regime"].values, chain["status"].values == "ok"
     repeats = (words == "periodic") & np.isfinite(chain["period"].values)
     period = np.where(repeats, chain["period"].values, 1.0)
@@ -144,7 +144,8 @@ def plot_shares(panel: Axes, pair: xr.Dataset, joint: str) -> None:
 
 @styled
 def draw_sections(shown: xr.Dataset) -> Figure:
-    """Poincaré sections, one panel a value: the journal's place along the cylinder, and its rate.
+    """Return the Poincaré sections, one panel a value: the journal's place along the cylinder, and
+    its rate.
 
     shown: as for `draw_bifurcation`, at the values that are to be drawn.
     """
@@ -197,7 +198,7 @@ def spread_alike(panels: list[Axes]) -> None:
 
 
 def regimes_of(one: xr.Dataset) -> str:
-    """The regime at one value, of each direction where they differ."""
+    """Return the regime at one value, of each direction where they differ."""
     found = {}
     for direction in one["direction"].values:
         chain = one.sel(direction=direction)
@@ -210,19 +211,19 @@ def regimes_of(one: xr.Dataset) -> str:
 
 
 def worn(data: xr.Dataset) -> list[str]:
-    """The joints that have Poincaré points."""
+    """Return the joints that have Poincaré points."""
     others = [dim for dim in data["section"].dims if dim != "joint"]
     there = data["section"].notnull().any(others).values
     return [str(joint) for joint, seen in zip(data["joint"].values, there, strict=True) if seen]
 
 
 def looks(data: xr.Dataset) -> dict[str, tuple[str, float, float]]:
-    """Colour, size and height of the directions that a dataset has."""
+    """Return the colour, size and height of the directions that a dataset has."""
     return {str(name): BY_DIRECTION[str(name)] for name in data["direction"].values}
 
 
 def edges_of(x: np.ndarray, log: bool) -> np.ndarray:
-    """Edges halfway between values, in the scale of the axis, in rising order."""
+    """Return the edges halfway between values, in the scale of the axis, in rising order."""
     values = np.log(np.sort(x)) if log else np.sort(x)
     middle = (values[1:] + values[:-1]) / 2
     if values.size == 1:
@@ -265,14 +266,14 @@ def mark_failed(panel: Axes, pair: xr.Dataset) -> None:
 
 
 def failed_handles(pair: xr.Dataset) -> list[Line2D]:
-    """The mark of failed runs, if there are any."""
+    """Return the mark of failed runs, if there are any."""
     if not (pair["status"] == "failed").any():
         return []
     return [Line2D([], [], label="a run failed here", **FAILED)]
 
 
 def direction_handles(data: xr.Dataset) -> list[Line2D]:
-    """The directions' colours, for a legend."""
+    """Return the directions' colours, for a legend."""
     look: dict[str, Any] = {"marker": "o", "linestyle": "none", "markeredgewidth": 0}
     return [
         Line2D([], [], label=name, color=color, markersize=1.6 * size, **look)
@@ -281,7 +282,7 @@ def direction_handles(data: xr.Dataset) -> list[Line2D]:
 
 
 def axis_words(data: xr.Dataset, name: str) -> str:
-    """A coordinate's phrase with its unit."""
+    """Return a coordinate's phrase with its unit."""
     attrs = data[name].attrs
     unit = attrs.get("units", "")
     phrase = attrs.get("long_name") or attrs.get("case_key", name)
@@ -289,6 +290,6 @@ def axis_words(data: xr.Dataset, name: str) -> str:
 
 
 def unit_of(data: xr.Dataset) -> str:
-    """The unit of the followed parameter with a space before it, "" where it has none."""
+    """Return the unit of the followed parameter with a space before it, "" where it has none."""
     unit = data[data.attrs["over"]].attrs.get("units", "")
     return f" {unit}" if unit not in ("", "1") else ""

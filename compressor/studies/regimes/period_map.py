@@ -30,7 +30,7 @@ CLASSES = {
 
 @styled
 def draw_periods(plane: xr.Dataset, other: str) -> Figure:
-    """The regime over the followed parameter and another one, a panel a direction.
+    """Return the regime over the followed parameter and another one, a panel a direction.
 
     plane: dims direction, the followed one, `other`, and the variables' own.
     """
@@ -76,7 +76,7 @@ def plot_classes(panel: Axes, chain: xr.Dataset, x: np.ndarray, y: np.ndarray) -
 
 
 def period_classes(data: xr.Dataset) -> np.ndarray:
-    """The place in `CLASSES` of each value's regime; -1 where it was not run."""
+    """Return the place in `CLASSES` of each value's regime; -1 where it was not run."""
     names, status = [*CLASSES], data["status"].values
     words, period = data["regime"].values, data["period"].values
     known = (words == "periodic") & np.isfinite(period)

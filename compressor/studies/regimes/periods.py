@@ -19,7 +19,7 @@ MORE = 4  # revolutions, beyond two periods, in which points are to repeat
 
 
 def tolerance(case: Case) -> float:
-    """How near (of the clearance) two Poincaré points of a case are one.
+    """Return how near (of the clearance) two Poincaré points of a case are one.
 
     At accuracy standard or better a thousandth: five times what the steps' own errors were seen to
     scatter them by, at both joints.
@@ -28,7 +28,7 @@ def tolerance(case: Case) -> float:
 
 
 def places(points: np.ndarray, clearance: np.ndarray) -> np.ndarray:
-    """Eccentricities in units of the clearance, (k, joint, 2); 0 at an ideal joint.
+    """Return the eccentricities in units of the clearance, (k, joint, 2); 0 at an ideal joint.
 
     points: (k, joint, 4), m and m/s; clearance: (joint,), m.
     """
@@ -38,7 +38,7 @@ def places(points: np.ndarray, clearance: np.ndarray) -> np.ndarray:
 
 
 def period_of(found: np.ndarray, within: float) -> int | None:
-    """Period (rev) of the last of some places, (k, joint, 2); None where there is none.
+    """Return the period (rev) of the last of some places, (k, joint, 2); None where there is none.
 
     The shortest one, up to 16, of which the last two periods and four revolutions are the same,
     each to the last place of its phase.
@@ -55,12 +55,12 @@ def period_of(found: np.ndarray, within: float) -> int | None:
 
 
 def distances(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Distance of every place from every other, (k, l), at the worse joint."""
+    """Return the distance of every place from every other, (k, l), at the worse joint."""
     away = one[:, None] - other[None, :]
     return np.linalg.norm(away, axis=-1).max(axis=-1)
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
-    """Hausdorff distance of two sets of places, (k, joint, 2) and (l, joint, 2)."""
+    """Return the Hausdorff distance of two sets of places, (k, joint, 2) and (l, joint, 2)."""
     away = distances(one, other)
     return float(max(away.min(axis=1).max(), away.min(axis=0).max()))

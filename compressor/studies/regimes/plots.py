@@ -40,7 +40,7 @@ def write(results: Folder, name: str, output: Folder, choice: PlotChoice) -> Ite
 
 
 def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[str, str, Drawing]]:
-    """Names, captions and drawings of a regimes study: bifurcation, sections, periods.
+    """Yield the names, captions and drawings of a regimes study: bifurcation, sections, periods.
 
     dataset: dims of the study's other axes, `direction`, the followed one and the variables' own.
     Bifurcation and sections are of one machine: other axes have their first values, or those of
@@ -73,13 +73,13 @@ def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[st
 
 
 def other_axes(dataset: xr.Dataset) -> list[str]:
-    """The dims of a study's other axes."""
+    """Return the dims of a study's other axes."""
     own = ("direction", dataset.attrs["over"])
     return [str(dim) for dim in dataset["status"].dims if dim not in own]
 
 
 def axis_of(dataset: xr.Dataset, axes: Sequence[str], wanted: str) -> str:
-    """The dim of an axis that is meant by its name, key, or the end of its key."""
+    """Return the dim of an axis that is meant by its name, key, or the end of its key."""
     keys = {axis: str(dataset[axis].attrs.get("case_key", axis)) for axis in axes}
     found = [
         axis for axis, key in keys.items() if wanted in (axis, key) or key.endswith(f".{wanted}")
@@ -92,7 +92,7 @@ def axis_of(dataset: xr.Dataset, axes: Sequence[str], wanted: str) -> str:
 
 
 def fixed_values(dataset: xr.Dataset, axes: Sequence[str], chosen_at: Sequence[str]) -> dict:
-    """The value of each other axis: the first, or as chosen by `key=value`."""
+    """Return the value of each other axis: the first, or as chosen by `key=value`."""
     fixed = {axis: dataset[axis].values[0] for axis in axes}
     for text in chosen_at:
         name, _, word = text.partition("=")
@@ -107,7 +107,7 @@ def fixed_values(dataset: xr.Dataset, axes: Sequence[str], chosen_at: Sequence[s
 
 
 def mapped(dataset: xr.Dataset, axes: Sequence[str], choice: PlotChoice, study: str) -> str:
-    """The second axis of the period map."""
+    """Return the second axis of the period map."""
     if not axes:
         raise PlotError(f"{study} follows one parameter: a period map needs another, swept")
     if not choice.over:
@@ -117,14 +117,14 @@ def mapped(dataset: xr.Dataset, axes: Sequence[str], choice: PlotChoice, study: 
 
 
 def at(dataset: xr.Dataset, fixed: dict) -> xr.Dataset:
-    """The chains at some values of other axes."""
+    """Return the chains at some values of other axes."""
     over = dataset.attrs["over"]
     place = {axis: int(np.argmax(dataset[axis].values == value)) for axis, value in fixed.items()}
     return dataset.isel(place).transpose("direction", over, ...)
 
 
 def told(fixed: dict, leave: str = "") -> str:
-    """What other axes a figure is of, in words."""
+    """Return what other axes a figure is of, in words."""
     words = [f"{axis} {shown_value(value)}" for axis, value in fixed.items() if axis != leave]
     return f" Here {', '.join(words)}." if words else ""
 
@@ -167,5 +167,5 @@ def chosen_values(pair: xr.Dataset) -> list[int]:
 
 
 def spread(size: int, count: int) -> list[int]:
-    """Some of so many places, evenly: the middles of equal parts."""
+    """Return some of so many places, evenly: the middles of equal parts."""
     return [(2 * i + 1) * size // (2 * count) for i in range(count)]

@@ -112,7 +112,7 @@ def run_regimes(
 
 
 def machines_of(study: Study) -> list[Machine]:
-    """The selected machines of a study with their chains."""
+    """Return the selected machines of a study with their chains."""
     found, selected = [], {*study.selected}
     for number, point in enumerate(points(study)):
         if number in selected:
@@ -121,7 +121,7 @@ def machines_of(study: Study) -> list[Machine]:
 
 
 def chains_of(study: Study, number: int) -> tuple[Chain, ...]:
-    """The chains of one case of a study."""
+    """Return the chains of one case of a study."""
     asked = study.regimes
     assert asked
     cases = study.chains[number]
@@ -149,7 +149,7 @@ def write_manifest(folder: Path, study: Study) -> None:
 
 
 def done(chain: Chain, folder: Path) -> int:
-    """How many values of a chain are stored. Raises StoreError."""
+    """Return how many values of a chain are stored. Raises StoreError."""
     path = chain.path(folder)
     return read_chain(path).sizes.get("value", 0) if path.exists() else 0
 
@@ -186,7 +186,7 @@ class Watch:
 
 
 def run_chains(tasks: Sequence[Task], workers: int, watch: Watch) -> dict[str, Ended | Lost]:
-    """How each chain ended, by its key."""
+    """Return how each chain ended, by its key."""
     missing = [task for task in tasks if task.rerun or not complete(task)]
     cases = [case for task in missing for case in task.chain.cases[:1]]
     jobs = [(task.chain.key, task, seconds(task.chain)) for task in missing]
@@ -206,17 +206,17 @@ def run_chains(tasks: Sequence[Task], workers: int, watch: Watch) -> dict[str, E
 
 
 def complete(task: Task) -> bool:
-    """Whether all values of a chain are stored."""
+    """Return whether all values of a chain are stored."""
     return done(task.chain, Path(task.folder)) == len(task.chain.cases)
 
 
 def seconds(chain: Chain) -> float:
-    """The wall time that a chain may take, s."""
+    """Return the wall time that a chain may take, s."""
     return LEGS * sum(case.solve.timeout_s for case in chain.cases)
 
 
 def result(end: Done | Lost) -> Any:
-    """What a job gave, or how it was lost; raises the StoreError that one gave."""
+    """Return what a job gave, or how it was lost; raises the StoreError that one gave."""
     if isinstance(end, Done) and isinstance(end.result, StoreError):
         raise end.result
     return end.result if isinstance(end, Done) else end
@@ -229,7 +229,7 @@ def look_again(
     workers: int,
     progress: Progress,
 ) -> dict[str, Book]:
-    """The verdicts of all pairs of chains, by the pair's key; what is missing is run."""
+    """Return the verdicts of all pairs of chains, by the pair's key; what is missing is run."""
     pairs = [
         machine.pair
         for machine in machines
@@ -269,7 +269,7 @@ def told(
     ends: dict[str, Ended | Lost],
     books: dict[str, Book],
 ) -> tuple[tuple[Count, ...], tuple[Failure, ...]]:
-    """What each study has now, and every failed value."""
+    """Return what each study has now, and every failed value."""
     counts, failures = [], []
     for study in studies:
         own = [machine for machine in machines if machine.study == study.name]
@@ -286,7 +286,9 @@ def told(
 
 
 def failed(machine: Machine, ends: dict[str, Ended | Lost]) -> Iterator[Failure]:
-    """The failed values of a machine; of a chain that was lost, its first value without a run."""
+    """Yield the failed values of a machine; of a chain that was lost, its first value without a
+    run.
+    """
     for chain in machine.chains:
         end = ends[chain.key]
         where = machine.study, machine.point, chain.direction
@@ -307,7 +309,7 @@ class Standing(NamedTuple):
 
 
 def standing(studies: Sequence[Study], folder: Folder) -> list[Standing]:
-    """How far the chains of studies are in a folder; runs nothing. Raises StoreError."""
+    """Return how far the chains of studies are in a folder; runs nothing. Raises StoreError."""
     place: Callable[[Chain], int] = partial(done, folder=Path(folder))
     found = []
     for study in studies:

@@ -85,7 +85,7 @@ class Clock:
 
 
 def sizes(asked: Regimes, case: Case) -> dict[str, int]:
-    """The lengths of the dimensions of a chain's variables."""
+    """Return the lengths of the dimensions of a chain's variables."""
     return {
         "revolution": asked.measure_rev,
         "joint": len(JOINTS),
@@ -96,7 +96,7 @@ def sizes(asked: Regimes, case: Case) -> dict[str, int]:
 
 
 def empty(asked: Regimes, case: Case) -> Row:
-    """A row of which nothing is known."""
+    """Return a row of which nothing is known."""
     lengths = sizes(asked, case)
     row: Row = dict.fromkeys(TEXTS, "")
     for name, (dims, _, _) in NUMBERS.items():
@@ -141,7 +141,7 @@ def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
 
 
 def failed(row: Row, reason: str, detail: str) -> Row:
-    """A row of a value whose run stopped."""
+    """Return a row of a value whose run stopped."""
     return row | {"status": "failed", "reason": str(reason), "detail": detail}
 
 
@@ -151,7 +151,9 @@ def stretch(asked: Regimes, revolutions: int, clock: Clock) -> Stretch:
 
 
 def measured(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> Motion:
-    """The motion from a settled state on, followed until its Poincaré points repeat or suffice."""
+    """Return the motion from a settled state on, followed until its Poincaré points repeat or
+    suffice.
+    """
     within, clearance = tolerance(case), record(case)["clearance"].copy()
 
     def period(points: np.ndarray) -> int | None:

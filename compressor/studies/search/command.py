@@ -94,7 +94,7 @@ def find(
 
 
 def asked_for(config: str, asked: dict[str, Any]) -> "Question":
-    """The question of the options; a usage error where it is none, or more than one."""
+    """Return the question of the options; a usage error where it is none, or more than one."""
     from compressor.studies.search.question import Question
 
     given = [kind for kind in KINDS if asked[kind] is not None]
@@ -105,7 +105,7 @@ def asked_for(config: str, asked: dict[str, Any]) -> "Question":
 
 
 def lines(question: "Question", answer: "Answer", folder: str) -> Iterator[str]:
-    """An answer as it is printed."""
+    """Yield an answer as it is printed."""
     told = comparison_lines if answer.best is None else extremum_lines
     yield from told(question, answer)
     for point in answer.blind[:MOST_TOLD]:
@@ -121,7 +121,7 @@ def lines(question: "Question", answer: "Answer", folder: str) -> Iterator[str]:
 
 
 def comparison_lines(question: "Question", answer: "Answer") -> Iterator[str]:
-    """Where a comparison first becomes true."""
+    """Yield where a comparison first becomes true."""
     goal = question.goal
     text = f"{goal.name} {goal.sign} {goal.limit:g} {goal.unit}".rstrip()
     low, high = answer.low, answer.high
@@ -143,12 +143,12 @@ def comparison_lines(question: "Question", answer: "Answer") -> Iterator[str]:
 
 
 def doubt(answer: "Answer") -> str:
-    """What points do whose error bars reach the limit."""
+    """Return what points do whose error bars reach the limit."""
     return "does not decide" if len(answer.blind) == 1 else "do not decide"
 
 
 def extremum_lines(question: "Question", answer: "Answer") -> Iterator[str]:
-    """Where a metric is greatest or least."""
+    """Yield where a metric is greatest or least."""
     best = answer.best
     assert best is not None
     yield (f"{question.goal.name} is {question.goal.sign} at {at(question, best)}: "
@@ -166,12 +166,12 @@ def extremum_lines(question: "Question", answer: "Answer") -> Iterator[str]:
 
 
 def at(question: "Question", point: Any) -> str:
-    """A point's place."""
+    """Return a point's place."""
     return f"{question.key} = {point.argument:.9g}"
 
 
 def number(question: "Question", point: Any) -> str:
-    """A point's number with its error bar."""
+    """Return a point's number with its error bar."""
     from compressor.digits import by_bar
 
     told = point.told
@@ -181,12 +181,12 @@ def number(question: "Question", point: Any) -> str:
 
 
 def undecided(question: "Question", point: Any) -> str:
-    """Why a point does not decide."""
+    """Return why a point does not decide."""
     return point.told.reason or f"{number(question, point)}: within its error bar of the limit"
 
 
 def spacing(question: "Question") -> str:
-    """How far the points of a scan are apart."""
+    """Return how far the points of a scan are apart."""
     steps = question.scan - 1
     if question.logarithmic:
         factor = (question.high / question.low) ** (1 / steps)
@@ -195,6 +195,6 @@ def spacing(question: "Question") -> str:
 
 
 def plain(question: "Question", answer: "Answer") -> dict[str, Any]:
-    """A question and its answer as JSON says them."""
+    """Return a question and its answer as JSON says them."""
     asked = dataclasses.asdict(question)
     return sayable(asked | {"unit": question.goal.unit} | dataclasses.asdict(answer))

@@ -70,7 +70,7 @@ class Answer:
 def first(
     evaluate: Evaluate, holds: Holds, shares: Sequence[float], tolerance: float, at_once: int = 1
 ) -> Answer:
-    """The interval in which a comparison first becomes true, going up from share 0.
+    """Return the interval in which a comparison first becomes true, going up from share 0.
 
     Its ends are decided points, less than `tolerance` (a share) apart, or less than that from the
     points between them that are not decided. at_once: points of one call to evaluate.
@@ -85,7 +85,7 @@ def first(
 
 
 def interval(points: Sequence[Point], holds: Holds) -> Answer:
-    """What some points, in their order, say of where a comparison first becomes true."""
+    """Return what some points, in their order, say of where a comparison first becomes true."""
     low: Point | None = None
     blind: list[Point] = []
     for point in points:
@@ -103,7 +103,9 @@ def interval(points: Sequence[Point], holds: Holds) -> Answer:
 
 
 def sections(answer: Answer, tolerance: float, at_once: int) -> list[float]:
-    """The shares that narrow an interval: of it, or of what is left and right of blind points."""
+    """Return the shares that narrow an interval: of it, or of what is left and right of blind
+    points.
+    """
     if answer.high is None or answer.kind == "at_low":
         return []
     chain = [point for point in (answer.low, *answer.blind, answer.high) if point is not None]
@@ -123,7 +125,7 @@ def sections(answer: Answer, tolerance: float, at_once: int) -> list[float]:
 def extremum(
     evaluate: Evaluate, greatest: bool, shares: Sequence[float], tolerance: float
 ) -> Answer:
-    """Where a metric is greatest or least: near the best of the points at `shares`.
+    """Return where a metric is greatest or least: near the best of the points at `shares`.
 
     Between the two neighbours of that, minimize_scalar(method="bounded") goes on until its argument
     is known to `tolerance`, a share. Points that say nothing count as the worst one that is known.
@@ -151,7 +153,8 @@ def extremum(
 
 
 def around(known: Iterable[Point], factor: float) -> Answer:
-    """The best of some points, those that may be as good, and the surely worse ones around them.
+    """Return the best of some points, those that may be as good, and the surely worse ones around
+    them.
 
     factor: 1 where the least is best, -1 where the greatest is.
     """
@@ -173,7 +176,7 @@ def around(known: Iterable[Point], factor: float) -> Answer:
 
 
 def place(point: Point) -> float:
-    """Where on the range a point lies."""
+    """Return where on the range a point lies."""
     return point.share
 
 
@@ -209,7 +212,7 @@ class Jobs:
         self.values = self.earlier()
 
     def earlier(self) -> set[float]:
-        """The key's values in the stored study of this name whose jobs are of this case."""
+        """Return the key's values in the stored study of this name whose jobs are of this case."""
         with contextlib.suppress(StoreError):  # no study yet
             for study in read_studies(self.folder):
                 if study.name == self.name and [a.key for a in study.axes] == [self.question.key]:
@@ -221,7 +224,7 @@ class Jobs:
         return set()
 
     def __call__(self, shares: Sequence[float]) -> list[Point]:
-        """The points of some shares of the range, each a stored job."""
+        """Return the points of some shares of the range, each a stored job."""
         question = self.question
         wanted = {share: question.argument(share) for share in shares}
         self.values |= {*wanted.values()}

@@ -71,13 +71,15 @@ class Goal:
         return "" if NUMBERS[self.metric][1] == "1" else NUMBERS[self.metric][1]
 
     def holds(self, told: Reading) -> bool | None:
-        """Whether the comparison holds; None where the error bar does not let that be told."""
+        """Return whether the comparison holds; None where the error bar does not let that be
+        told.
+        """
         compare = SIGNS[self.sign]
         ends = {bool(compare(told.value + side, self.limit)) for side in (-told.bar, told.bar)}
         return ends.pop() if not told.reason and len(ends) == 1 else None
 
     def read(self, numbers: np.void, regime: str) -> Reading:
-        """What the numbers (dtype ROW) of a job that is ok say, moving in a regime.
+        """Return what the numbers (dtype ROW) of a job that is ok say, moving in a regime.
 
         A single peak of a chaotic motion has no meaning: the mean over revolutions of each one's
         counts, with the 95 % interval that its standard error and Student's t give. The bars of
@@ -110,7 +112,7 @@ class Goal:
 
 
 def comparison(text: str) -> Goal:
-    """The goal of a comparison such as `peak_acceleration > 600`. Raises QuestionError."""
+    """Return the goal of a comparison such as `peak_acceleration > 600`. Raises QuestionError."""
     parts = COMPARISON.fullmatch(text)
     limit = _number(parts[3]) if parts else math.nan
     if parts is None or math.isnan(limit):
@@ -121,7 +123,7 @@ def comparison(text: str) -> Goal:
 
 
 def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:
-    """The goal of a metric's name, METRIC or METRIC.JOINT. Raises QuestionError."""
+    """Return the goal of a metric's name, METRIC or METRIC.JOINT. Raises QuestionError."""
     known = METRICS | ROD_LOAD
     metric, *place = text.strip().split(".")
     if metric not in known:
@@ -159,7 +161,8 @@ class Question:
     def written(
         cls, path: str, over: str, goal: str, which: str = "first", **more: Any
     ) -> "Question":
-        """The question of texts: over KEY=LOW:HIGH, a comparison or, of greatest | least, a metric.
+        """Return the question of texts: over KEY=LOW:HIGH, a comparison or, of greatest | least, a
+        metric.
 
         more: other fields. Raises QuestionError.
         """
@@ -177,7 +180,7 @@ class Question:
         return [number / (self.scan - 1) for number in range(self.scan)]
 
     def argument(self, share: float) -> float:
-        """The key's value at a share of the range."""
+        """Return the key's value at a share of the range."""
         if share in (0.0, 1.0):
             return self.high if share else self.low
         if self.logarithmic:
@@ -187,7 +190,7 @@ class Question:
         return float(f"{value:.{DIGITS}g}")
 
     def checked(self) -> Study:
-        """The study of the first look, after a check that the file makes one case a value.
+        """Return the study of the first look, after a check that the file makes one case a value.
 
         Raises QuestionError, and CaseFileError with what is wrong in the file.
         """
@@ -215,12 +218,14 @@ class Question:
         return self.study([self.argument(share) for share in self.shares])
 
     def settings(self, values: Sequence[float]) -> list[str]:
-        """The overrides that make the study of some values of the key; the caller sorts them."""
+        """Return the overrides that make the study of some values of the key; the caller sorts
+        them.
+        """
         listed = ", ".join(map(repr, values))
         return [*self.overrides, f"name={self._name()}", f"{self.key}=[{listed}]"]
 
     def study(self, values: Sequence[float]) -> Study:
-        """The study of some values of the key, its one axis."""
+        """Return the study of some values of the key, its one axis."""
         (found,) = load_studies(self.path, overrides=self.settings(values), follow=False)
         return found
 
@@ -235,7 +240,7 @@ class Question:
 
 
 def _number(text: str) -> float:
-    """A finite number, or nan."""
+    """Return a finite number, or nan."""
     try:
         value = float(text)
     except ValueError:

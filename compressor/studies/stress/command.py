@@ -91,7 +91,7 @@ def stress(
 
 
 def repeated(number: int, seed: int, drawn: str) -> Iterator[str]:
-    """A scene as a case file, and below it, as comments, how it ends."""
+    """Yield a scene as a case file, and below it, as comments, how it ends."""
     from compressor.studies.stress.stress import repeat
 
     made, row = repeat(number, seed, drawn)
@@ -102,7 +102,7 @@ def repeated(number: int, seed: int, drawn: str) -> Iterator[str]:
 
 
 def summary(study: "xr.Dataset") -> Iterator[str]:
-    """Shares, the worst scenes with the command that repeats each, and the slowest one."""
+    """Yield shares, the worst scenes with the command that repeats each, and the slowest one."""
     from compressor.studies.stress.stress import counts, slowest, worst
 
     for kind, ends in counts(study).items():
@@ -132,6 +132,6 @@ def summary(study: "xr.Dataset") -> Iterator[str]:
 
 
 def command(row: "xr.Dataset", attrs: dict[str, Any]) -> str:
-    """What repeats a scene of a campaign."""
+    """Return what repeats a scene of a campaign."""
     drawn = f" --{attrs['drawn']}" if attrs.get("drawn") else ""
     return f"compsim stress --scene {row['scene'].item()} --seed {attrs['seed']}{drawn}"

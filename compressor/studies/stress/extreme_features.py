@@ -38,7 +38,9 @@ LUGRE = "lugre"
 
 
 def features(made: dict[str, Any], draw: random.Random, inside: bool) -> dict[str, Any]:
-    """The groups that a scene has besides, as far as they are drawn; made: the scene so far."""
+    """Return the groups that a scene has besides, as far as they are drawn; made: the scene so
+    far.
+    """
     found: dict[str, Any] = {}
     for group, keys in RANGES.items():
         if draw.random() < SHARE:
@@ -56,6 +58,6 @@ def features(made: dict[str, Any], draw: random.Random, inside: bool) -> dict[st
 def _drawn(
     spans: tuple[tuple[float, float], tuple[float, float]], draw: random.Random, inside: bool
 ) -> float:
-    """A number, evenly in its logarithm."""
+    """Return a number, evenly in its logarithm."""
     low, high = spans[inside]
     return float(low * (high / low) ** draw.random())

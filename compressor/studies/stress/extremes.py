@@ -26,7 +26,9 @@ Span = tuple[float, float]
 
 
 def _judged(key: str, factor: float = 1.0) -> Span:
-    """The supported range of a key: the one that the table of parameters has, times a factor."""
+    """Return the supported range of a key: the one that the table of parameters has, times a
+    factor.
+    """
     low, high = judged_range(key)
     return low * factor, high * factor
 
@@ -92,12 +94,12 @@ class Budget:
 
 
 def supported(number: int) -> bool:
-    """Whether a scene lies inside the range that is documented as supported."""
+    """Return whether a scene lies inside the range that is documented as supported."""
     return number % 2 == 0
 
 
 def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
-    """Scene `number` of a seed as the values of a case file."""
+    """Return the scene `number` of a seed as the values of a case file."""
     point = iter(_points(seed, number % 2, 1 << (number // 2).bit_length())[number // 2])
     found = _numbers(point, supported(number))
     ratio, load, joint = next(point), LOADS[_which(point)], SCENES[_which(point)]
@@ -158,7 +160,9 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
 
 
 def chosen(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
-    """A law of contact or friction, and all that any law reads beside the default one's numbers."""
+    """Return a law of contact or friction, and all that any law reads beside the default one's
+    numbers.
+    """
     found: dict[str, Any] = {"law": draw.choice(table()[f"{group}.law"].choices)}
     for key, (whole, narrow) in OF_LAWS.items():
         low, high = narrow if inside else whole
@@ -171,7 +175,7 @@ def chosen(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
 
 
 def place(case: Case) -> dict[str, float]:
-    """Where a scene lies on the axes of `SPANS`; the clearance of an ideal joint is nan."""
+    """Return where a scene lies on the axes of `SPANS`; the clearance of an ideal joint is nan."""
     exponent = case.contact.exponent
     stiffness = (case.contact.stiffness_N_per_mm15 or math.nan) * 1000.0**exponent
     friction = case.friction
@@ -199,7 +203,7 @@ def _points(seed: int, kind: int, count: int) -> list[list[float]]:
 
 
 def _numbers(point: Iterator[float], inside: bool) -> dict[str, float]:
-    """The numbers of `SPANS` at a point of the unit cube."""
+    """Return the numbers of `SPANS` at a point of the unit cube."""
     found = {}
     for name, (_, whole, narrow, log) in SPANS.items():
         low, high = narrow if inside and narrow else whole
@@ -216,14 +220,16 @@ def _numbers(point: Iterator[float], inside: bool) -> dict[str, float]:
 
 
 def _which(point: Iterator[float]) -> int:
-    """One of three."""
+    """Return one of three."""
     return int(3 * next(point))
 
 
 def _start(
     joint: str, drawn: tuple[float, float, float], clearance: float, deepest: float
 ) -> dict[str, float]:
-    """A journal's initial offset (mm): none, within the clearance, or sunk into the bearing."""
+    """Return a journal's initial offset (mm): none, within the clearance, or sunk into the
+    bearing.
+    """
     kind, size, turn = drawn
     if kind < 1 / 3:
         return {}
@@ -234,7 +240,7 @@ def _start(
 
 
 def _rounded(made: Any) -> Any:
-    """Numbers to five digits, so that a case can be written into a file."""
+    """Return the numbers to five digits, so that a case can be written into a file."""
     if isinstance(made, dict):
         return {key: _rounded(value) for key, value in made.items()}
     return float(f"{made:.5g}") if isinstance(made, float) else made

@@ -45,7 +45,7 @@ UNDAMPED = 5e-3  # where scenes without damping are drawn
 
 @styled
 def draw_outcomes(study: xr.Dataset) -> Figure:
-    """A panel a plane of parameters, a mark a scene; the supported range is framed."""
+    """Return a panel a plane of parameters, a mark a scene; the supported range is framed."""
     ends = np.array([*outcomes(study)], object)
     figure, grid = sheet(2, 3, 6.6)
     for panel, (first, second) in zip(grid.flat, PLANES, strict=True):
@@ -66,7 +66,7 @@ def draw_outcomes(study: xr.Dataset) -> Figure:
 
 
 def outcomes(study: xr.Dataset) -> Iterator[str]:
-    """The name in `LOOKS` of each scene's end."""
+    """Yield the name in `LOOKS` of each scene's end."""
     for verdict, reason in zip(study["verdict"].values, study["reason"].values, strict=True):
         name = str(reason) if verdict == "failed" else str(verdict)
         if name.startswith("budget_"):
@@ -75,7 +75,7 @@ def outcomes(study: xr.Dataset) -> Iterator[str]:
 
 
 def coordinate(study: xr.Dataset, name: str) -> np.ndarray:
-    """A parameter of the scenes; of two clearances the smaller one."""
+    """Return a parameter of the scenes; of two clearances the smaller one."""
     if name == "clearance":
         return np.fmin(study["clearance_big_end"].values, study["clearance_small_end"].values)
     values = study[name].values
@@ -83,12 +83,12 @@ def coordinate(study: xr.Dataset, name: str) -> np.ndarray:
 
 
 def drawn(study: xr.Dataset, name: str) -> Mapping[str, Any]:
-    """How a parameter was drawn: the attributes of its variable in a campaign."""
+    """Return how a parameter was drawn: the attributes of its variable in a campaign."""
     return study["clearance_big_end" if name == "clearance" else name].attrs
 
 
 def worded(study: xr.Dataset, name: str) -> str:
-    """A parameter's name and unit on an axis."""
+    """Return a parameter's name and unit on an axis."""
     unit = {"damping": "times the paper's"}.get(name, drawn(study, name)["units"])
     return name.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
 
@@ -103,7 +103,7 @@ def frame(panel: Axes, first: Mapping[str, Any], second: Mapping[str, Any]) -> N
 
 
 def handle(name: str, count: int) -> Line2D:
-    """What a mark means, and how many there are."""
+    """Return what a mark means, and how many there are."""
     color, marker, size, _ = LOOKS[name]
     label = f"{name.replace('_', ' ')} ({count})"
     return Line2D([], [], color=color, marker=marker, linestyle="none", label=label,

@@ -147,7 +147,9 @@ def by_statistics(case: Case, result: Finding) -> None:
 def agreed_verdict(
     claim: Case, found: Solution, measured: Compare, result: Finding
 ) -> tuple[str, Excess, Solution | None]:
-    """What the judges of a run say together, by how much, and the run of the one that counts."""
+    """Return what the judges of a run say together, by how much, and the run of the one that
+    counts.
+    """
     agreed: list[tuple[Excess, Solution]] = []
     dissent: list[tuple[Excess, Solution]] = []
     statistics = measured is compare_statistics
@@ -168,7 +170,7 @@ def agreed_verdict(
 
 
 def judges(found: Solution, statistics: bool = False) -> tuple[str, ...]:
-    """Methods to judge a run by, those that are least like its own first.
+    """Return the methods to judge a run by, those that are least like its own first.
 
     Compiled ones share our step loop, SciPy's only the equations.
     """
@@ -181,12 +183,12 @@ def judges(found: Solution, statistics: bool = False) -> tuple[str, ...]:
 
 
 def tolerance(rtol: float, share: float = TIGHTER) -> float:
-    """The tolerance of who judges a run."""
+    """Return the tolerance of who judges a run."""
     return max(share * rtol, TIGHTEST)
 
 
 def asked(case: Case, method: str, rtol: float, result: Finding) -> Solution | None:
-    """A judge's run of a case, if it reaches its end."""
+    """Return a judge's run of a case, if it reaches its end."""
     seconds = SECONDS if method in COMPILED else SCIPY_SECONDS
     how = replace(
         case.solve, method=method, rtol=rtol, accuracy="standard",
@@ -198,25 +200,26 @@ def asked(case: Case, method: str, rtol: float, result: Finding) -> Solution | N
 
 
 def shortened(case: Case, parts: int) -> Case:
-    """A case over the first parts of its span."""
+    """Return a case over the first parts of its span."""
     whole = float(case.solve.duration_rev or 0.0)
     return replace(case, solve=replace(case.solve, duration_rev=whole * parts / PARTS))
 
 
 def compare(found: Solution, other: Solution) -> Excess:
-    """The metric whose error is farthest beyond what the run states."""
+    """Return the metric whose error is farthest beyond what the run states."""
     expected = min(EXPECTED * found.rtol, MOST_EXPECTED)
     least = {name: max(expected, RESOLVED if name in ABSOLUTE else 0.0) for name in JUDGED}
     return max(excess(name, found, other, least[name]) for name in JUDGED)
 
 
 def compare_statistics(found: Solution, other: Solution) -> Excess:
-    """The statistic whose error is farthest beyond its bound."""
+    """Return the statistic whose error is farthest beyond its bound."""
     return max(excess(name, found, other, bound) for name, bound in STATISTICS.items())
 
 
 def excess(name: str, found: Solution, other: Solution, least: float) -> Excess:
-    """How far a metric is from a judge's, over ten bars or the least that counts if that is more.
+    """Return how far a metric is from a judge's, over ten bars or the least that counts if that is
+    more.
 
     Error and bar are relative to the judge's size of the metric.
     """
@@ -227,12 +230,12 @@ def excess(name: str, found: Solution, other: Solution, least: float) -> Excess:
 
 
 def size(name: str, metrics: dict[str, Any]) -> float:
-    """What errors of a metric are relative to: its greatest value over joints and axes."""
+    """Return what errors of a metric are relative to: its greatest value over joints and axes."""
     return 1.0 if name in ABSOLUTE else float(np.abs(metrics[name]).max()) or 1.0
 
 
 def horizon(case: Case) -> int:
-    """Parts of the span in which a twin stays close, as far as that is found out."""
+    """Return the parts of the span in which a twin stays close, as far as that is found out."""
     patient = replace(case, solve=replace(case.solve, max_steps=MORE_STEPS * case.solve.max_steps))
     seconds = predictability_horizon(patient, SECONDS)
     return PARTS if seconds == math.inf else int(PARTS * seconds / case.duration)

@@ -115,7 +115,7 @@ DRAWN = {
 
 
 def repeat(number: int, seed: int, drawn: str = "") -> tuple[dict[str, Any], Row]:
-    """The values of a scene's case, by key, and its row, from another run."""
+    """Return the values of a scene's case, by key, and its row, from another run."""
     budget = Budget(drawn)
     return extremes.values(number, seed, budget), run_scene((number, seed, budget))
 
@@ -128,7 +128,8 @@ def campaign(
     progress: Progress = lambda done, total, remark: None,
     budget: Budget = FULL,
 ) -> xr.Dataset:
-    """The first `count` scenes of a seed, of which those are run that the folder does not hold.
+    """Return the first `count` scenes of a seed, of which those are run that the folder does not
+    hold.
 
     Raises StoreError where it holds other scenes.
     """
@@ -159,7 +160,7 @@ def campaign(
 
 
 def ended(end: Done | Lost) -> Row:
-    """The row of a scene, also of one that took its worker with it."""
+    """Return the row of a scene, also of one that took its worker with it."""
     if isinstance(end, Done):
         return dict(end.result)
     row = {"scene": end.id, "verdict": "failed", "reason": str(end.reason), "detail": end.detail}
@@ -167,7 +168,9 @@ def ended(end: Done | Lost) -> Row:
 
 
 def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset:
-    """Rows as a Dataset with the dimension scene, in order; numbers that there are not are nan."""
+    """Return the rows as a Dataset with the dimension scene, in order; numbers that there are
+    not are nan.
+    """
     rows = sorted(rows, key=lambda row: row["scene"])
     numbers = [row["scene"] for row in rows]
     found: dict[str, tuple] = {}
@@ -195,7 +198,7 @@ def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset
 
 
 def drawn_ranges() -> dict[str, dict[str, Any]]:
-    """The attributes of each drawn parameter: its unit, the ranges that it is drawn from.
+    """Return the attributes of each drawn parameter: its unit, the ranges that it is drawn from.
 
     `range` is that of all scenes, `supported_range` that of the supported half; `logarithmic`: 1
     where it is drawn evenly in its logarithm.
@@ -213,7 +216,7 @@ def drawn_ranges() -> dict[str, dict[str, Any]]:
 
 
 def settings(budget: Budget) -> str:
-    """What scenes and verdicts depend on beside the seed."""
+    """Return what scenes and verdicts depend on beside the seed."""
     return (
         f"model {MODEL}; {budget.revolutions:g} revolutions, "
         f"{budget.max_steps} steps or {budget.seconds:g} s{DRAWN[budget.drawn]}"
@@ -221,7 +224,7 @@ def settings(budget: Budget) -> str:
 
 
 def kept(path: Path, seed: int, budget: Budget) -> list[Row]:
-    """The rows of an earlier run. Raises StoreError if they are of other scenes."""
+    """Return the rows of an earlier run. Raises StoreError if they are of other scenes."""
     if not path.exists():
         return []
     found = read_dataset(path, REMEDY)
@@ -235,7 +238,9 @@ def kept(path: Path, seed: int, budget: Budget) -> list[Row]:
 
 
 def counts(study: xr.Dataset) -> dict[str, dict[str, int]]:
-    """How many scenes ended how, in the supported range and in the whole: by verdict or reason."""
+    """Return how many scenes ended how, in the supported range and in the whole: by verdict or
+    reason.
+    """
     table = {}
     for kind, inside in (("supported", 1), ("whole", 0)):
         some = study.isel(scene=study["supported"].values == inside)
@@ -247,7 +252,9 @@ def counts(study: xr.Dataset) -> dict[str, dict[str, int]]:
 
 
 def worst(study: xr.Dataset, most: int = 10) -> xr.Dataset:
-    """The scenes of which most is wrong: wrong or unjudged ones, then ok ones by their excess."""
+    """Return the scenes of which most is wrong: wrong or unjudged ones, then ok ones by their
+    excess.
+    """
     study = study.isel(scene=study["verdict"].values != "failed")
     ranks = {"silent_wrong": 2.0, "unjudged": 1.0, "ok": 0.0}
     rank = np.array([ranks[verdict] for verdict in study["verdict"].values])
@@ -257,6 +264,6 @@ def worst(study: xr.Dataset, most: int = 10) -> xr.Dataset:
 
 
 def slowest(study: xr.Dataset) -> xr.Dataset | None:
-    """The ok scene whose run took the most time, if any is ok."""
+    """Return the ok scene whose run took the most time, if any is ok."""
     good = study.isel(scene=study["verdict"].values == "ok")
     return good.isel(scene=int(np.argmax(good["seconds"].values))) if good.sizes["scene"] else None

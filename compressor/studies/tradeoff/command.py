@@ -86,7 +86,7 @@ def write_study(folder: Path, study: "xr.Dataset") -> None:
 
 
 def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, Case]":
-    """The cases to be studied, by label; each needs a joint with clearance."""
+    """Return the cases to be studied, by label; each needs a joint with clearance."""
     from compressor.cases import load_studies, points
     from compressor.studies.tradeoff.work_precision import default_cases, faulty
 
@@ -108,12 +108,12 @@ def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, C
 
 
 def plain(value: object) -> str:
-    """A swept value in few characters."""
+    """Return a swept value in few characters."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
-    """The fastest method for each decade of error, and the paper's numerics."""
+    """Yield the fastest method for each decade of error, and the paper's numerics."""
     from compressor.studies.tradeoff.work_precision import fastest
 
     width = max(len(name) for name in study["scene"].values)
@@ -133,7 +133,9 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
 
 
 def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
-    """What each change of the model does to each scene; those that do not apply are left out."""
+    """Yield what each change of the model does to each scene; those that do not apply are left
+    out.
+    """
     from compressor.studies.tradeoff.page import model_table
 
     for scene in trade["scene"].values:

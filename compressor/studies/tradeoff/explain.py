@@ -137,7 +137,9 @@ def explain(
 
 
 def unknowns(case: Case) -> tuple[str, ...]:
-    """Names of what is integrated: freedoms, bristles where friction has them, the crank's own."""
+    """Return the names of what is integrated: freedoms, bristles where friction has them, the
+    crank's own.
+    """
     p = record(case)
     names, n = state_names(p), int(p["freedoms"])
     bristles = names[2 * n + 2 : 2 * n + 4] if p["bristle_stiffness"] > 0.0 else ()
@@ -171,14 +173,14 @@ def other_work(case: Case) -> tuple[str, ...]:
 
 
 def asked(case: Case) -> str:
-    """Accuracy as the case file asks for it; "" where it gives a tolerance."""
+    """Return the accuracy as the case file asks for it; "" where it gives a tolerance."""
     if case.targets:
         return ", ".join(f"{name} to {target:g}" for name, target in case.targets)
     return "" if case.solve.rtol is not None else str(case.solve.accuracy)
 
 
 def promise(case: Case) -> float:
-    """The relative error that a case may have: asked for by number, or of its word.
+    """Return the relative error that a case may have: asked for by number, or of its word.
 
     With an rtol in place of a word it is that of the word it is as tight as, and no less than
     draft's.
@@ -190,7 +192,7 @@ def promise(case: Case) -> float:
 
 
 def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
-    """What a case computes, in words by term, and what it leaves out at no cost."""
+    """Return what a case computes, in words by term, and what it leaves out at no cost."""
     ideal = not faulty(case)
     told = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
     shown = [feature for feature in FEATURES if not feature.key.startswith(told)]
@@ -236,7 +238,7 @@ def contact_words(case: Case) -> str:
 
 
 def spoken(case: Case, feature: Feature) -> str:
-    """The value by which a case pays for a feature."""
+    """Return the value by which a case pays for a feature."""
     group, dot, name = feature.key.partition(".")
     if feature.key == "friction" and case.friction:
         law = f"{case.friction.law}, " if case.friction.law else ""
@@ -248,7 +250,7 @@ def spoken(case: Case, feature: Feature) -> str:
 
 
 def ideal_scales(case: Case) -> Iterator[JointScales]:
-    """The natural scales of each joint with clearance, under its greatest force when ideal.
+    """Yield the natural scales of each joint with clearance, under its greatest force when ideal.
 
     The ideal machine has none of a case's features: its guide, drive and rod are ideal, too.
     """
@@ -260,7 +262,7 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
 
 
 def advise(case: Case, repeats: int, progress: Progress) -> Iterator[Advice]:
-    """What each feature that a case pays for changes, and whether it could be left out."""
+    """Yield what each feature that a case pays for changes, and whether it could be left out."""
     paid = [feature for feature in FEATURES if feature.paid(case)]
     if not paid:
         return

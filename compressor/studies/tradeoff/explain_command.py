@@ -120,12 +120,12 @@ def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
 
 
 def heading(word: str, text: str) -> str:
-    """A line under a heading."""
+    """Return a line under a heading."""
     return f"  {word:<{INDENT}}{text}"
 
 
 def lines(told: "Explanation") -> Iterator[str]:
-    """An explanation as it is printed."""
+    """Yield an explanation as it is printed."""
     point = ", ".join(f"{key} = {value}" for key, value in told.point.items())
     yield f"{told.study}: {plural(told.jobs)}" + (f"; explained: {point}" if point else "")
     count = len(told.unknowns)
@@ -151,7 +151,7 @@ def lines(told: "Explanation") -> Iterator[str]:
 
 
 def scale_lines(joint: "JointScales") -> Iterator[str]:
-    """The natural scales of a joint."""
+    """Yield the natural scales of a joint."""
     name = joint.joint.replace("_", " ")
     yield (
         f"{name}: {joint.force:.0f} N at most in the ideal machine press "
@@ -170,7 +170,7 @@ def scale_lines(joint: "JointScales") -> Iterator[str]:
 
 
 def cost_lines(told: "Explanation") -> Iterator[str]:
-    """What a job and the sweep cost."""
+    """Yield what a job and the sweep cost."""
     work = f" ({told.steps} steps, {told.evaluations} evaluations)" if told.steps else ""
     yield heading("cost", f"{1e3 * told.seconds:.3g} ms a job{work}")
     solved = f"{1e3 * told.solution_seconds:.3g} ms of it for the solution (`seconds` in show)"
@@ -186,7 +186,9 @@ def cost_lines(told: "Explanation") -> Iterator[str]:
 
 
 def advised(told: "Explanation", number: int) -> str:
-    """What leaving a feature out does, and whether it is worth while: of one of the advice."""
+    """Return what leaving a feature out does, and whether it is worth while: of one of the
+    advice.
+    """
     advice = told.advice[number]
     effect = advice.effect
     if effect.reason:
@@ -205,5 +207,5 @@ def advised(told: "Explanation", number: int) -> str:
 
 
 def percent(share: float, sign: str = "") -> str:
-    """A share in per cent, to two digits."""
+    """Return a share in per cent, to two digits."""
     return f"{100 * share:{sign}z.2g} %"

@@ -54,14 +54,14 @@ class Feature:
 
 
 def without_clearance(case: Case, joint: str) -> Case:
-    """A case of two faulty joints with one of them ideal, and concentric at the start."""
+    """Return a case of two faulty joints with one of them ideal, and concentric at the start."""
     other = next(name for name in JOINTS if name != joint)
     centred = {f"{joint}_x": 0.0, f"{joint}_y": 0.0}
     return replace(case, joint=other, initial_offset_mm=replace(case.initial_offset_mm, **centred))
 
 
 def with_clearance(case: Case, joint: str) -> Case | None:
-    """A case of one faulty joint with a small clearance in the other, `joint`."""
+    """Return a case of one faulty joint with a small clearance in the other, `joint`."""
     if len(faulty(case)) != 1 or faulty(case) == [joint]:
         return None
     widths = replace(case.clearance_mm, **{joint: SMALL_CLEARANCE})
@@ -69,7 +69,7 @@ def with_clearance(case: Case, joint: str) -> Case | None:
 
 
 def clearance_feature(joint: str) -> Feature:
-    """A second joint's clearance, which doubles the freedoms."""
+    """Return a second joint's clearance, which doubles the freedoms."""
     return Feature(
         f"clearance of the {joint.replace('_', ' ')}",
         f"clearance_mm.{joint}",
@@ -83,12 +83,12 @@ def clearance_feature(joint: str) -> Feature:
 
 
 def changed(case: Case, group: str, **values: Any) -> Case:
-    """A case with some values of a group replaced."""
+    """Return a case with some values of a group replaced."""
     return replace(case, **{group: replace(getattr(case, group), **values)})
 
 
 def contact_feature(law: str) -> Feature:
-    """Another contact law than ADAMS's."""
+    """Return another contact law than ADAMS's."""
     return Feature(
         f"contact law {law}",
         "contact.law",
@@ -132,7 +132,7 @@ def bearing_length(case: Case) -> float:
 
 
 def friction_feature(law: str) -> Feature:
-    """Another friction law than ADAMS's."""
+    """Return another friction law than ADAMS's."""
     return Feature(
         f"friction law {law}",
         "friction.law",
@@ -184,13 +184,13 @@ def with_play(case: Case) -> Case:
 
 
 def named(key: str, value: Any) -> Any:
-    """The group that a case file's value stands for."""
+    """Return the group that a case file's value stands for."""
     worn = {"joint": "both", "clearance_mm": 0.1}  # for a group that needs it
     return getattr(Case.from_values({**worn, key: value}), key)
 
 
 def with_group(case: Case, key: str, group: Any) -> Case:
-    """A case with another group, or without it."""
+    """Return a case with another group, or without it."""
     groups: dict[str, Any] = {key: group}
     return replace(case, **groups)
 
@@ -198,7 +198,7 @@ def with_group(case: Case, key: str, group: Any) -> Case:
 def group_feature(
     name: str, key: str, off: str, add: Callable[[Case], Case | None], is_choice: bool = False
 ) -> Feature:
-    """A group of the mechanism that a case may name."""
+    """Return a group of the mechanism that a case may name."""
     return Feature(
         name,
         key,
@@ -218,7 +218,7 @@ def with_defaults(key: str, case: Case) -> Case:
 
 
 def rubbing(case: Case) -> Case | None:
-    """A case whose ideal joints rub as its worn ones do; None where none is ideal."""
+    """Return a case whose ideal joints rub as its worn ones do; None where none is ideal."""
     if not case.friction or case.friction.law == "lugre" or len(faulty(case)) == len(JOINTS):
         return None
     return changed(case, "friction", ideal_joints=True)

@@ -41,12 +41,12 @@ class Effect:
 
 
 def comparable(case: Case) -> Case:
-    """A case solved so exactly that only its model tells in its answer."""
+    """Return a case solved so exactly that only its model tells in its answer."""
     return solved(case, "auto", min(case.rtol, ACCURACY[EXACT].rtol))
 
 
 def compare(base: Case, other: Case, repeats: int, known: xr.Dataset | None = None) -> Effect:
-    """What another model changes in the joints that the base has clearance in.
+    """Return what another model changes in the joints that the base has clearance in.
 
     Answers are compared at `EXACT`; the ratio of times is the median over `repeats` pairs of runs
     in turn, each case by its own method and tolerance. known: the base's run to compare with, where
@@ -72,7 +72,9 @@ def compare(base: Case, other: Case, repeats: int, known: xr.Dataset | None = No
 def changes(
     values: Mapping[str, np.ndarray], others: Mapping[str, np.ndarray]
 ) -> tuple[float, float, float]:
-    """Relative changes of peak acceleration and contact force, signed, and L2 of acceleration."""
+    """Return the relative changes of peak acceleration and contact force, signed, and L2 of
+    acceleration.
+    """
     peak = others["peak_acceleration"] / values["peak_acceleration"] - 1
     forces = others["peak_contact_force"] / values["peak_contact_force"] - 1
     force = forces[np.abs(forces).argmax()]

@@ -46,7 +46,7 @@ UNKNOWN: dict[str, Any] = {"facecolor": "#f0f0f0", "edgecolor": "#c9c9c9", "hatc
 
 @styled
 def draw_work_precision(study: xr.Dataset) -> Figure:
-    """A panel a scene of a study of work and precision; the paper's own point is a star.
+    """Return a panel a scene of a study of work and precision; the paper's own point is a star.
 
     Rings mark the tolerances behind the words of `accuracy`; in the hatched band the references
     themselves disagree.
@@ -108,12 +108,12 @@ def mark_tiers(panel: Axes, row: xr.Dataset) -> None:
 
 
 def uncertainty(one: xr.Dataset) -> float:
-    """How far a scene's references lie apart in acceleration."""
+    """Return how far a scene's references lie apart in acceleration."""
     return float(one["reference_uncertainty"].sel(quantity="acceleration"))
 
 
 def limits(study: xr.Dataset) -> tuple[float, float]:
-    """Errors to be shown, with room for the band below which none is known."""
+    """Return the errors to be shown, with room for the band below which none is known."""
     names = ("error_acceleration", "paper_error_acceleration")
     found = np.concatenate([study[name].values.ravel() for name in names])
     found = found[np.isfinite(found) & (found > 0)]
@@ -123,7 +123,7 @@ def limits(study: xr.Dataset) -> tuple[float, float]:
 
 
 def handles(methods: list[str]) -> list[Any]:
-    """What lines and marks mean."""
+    """Return what lines and marks mean."""
     lines = []
     for method in methods:
         line, marker, name = LOOKS.get(method, OTHER)

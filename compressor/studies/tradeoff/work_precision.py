@@ -51,13 +51,13 @@ class ReferenceFailed(CompsimError):
 
 
 def default_cases() -> dict[str, Case]:
-    """The paper's three faults at 0.2 mm, by label."""
+    """Return the paper's three faults at 0.2 mm, by label."""
     cases = paper_cases()
     return {label(fault, 0.2): cases[label(fault, 0.2)] for fault in FAULTS}
 
 
 def solved(case: Case, method: str, rtol: float, timeout: float | None = None) -> Case:
-    """A case by another method and tolerance: series kept, no error bars, no horizon."""
+    """Return a case by another method and tolerance: series kept, no error bars, no horizon."""
     solve = replace(
         case.solve, method=method, rtol=rtol, accuracy="standard", error_bars=False, horizon=False
     )
@@ -67,24 +67,27 @@ def solved(case: Case, method: str, rtol: float, timeout: float | None = None) -
 
 
 def complete(run: xr.Dataset) -> bool:
-    """Whether a run reached its end."""
+    """Return whether a run reached its end."""
     return bool(run.attrs["complete"])
 
 
 def faulty(case: Case) -> list[str]:
-    """The joints of a case that have clearance."""
+    """Return the joints of a case that have clearance."""
     return [joint for joint in JOINTS if getattr(case.clearance_mm, joint) > 0]
 
 
 def stored_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]:
-    """What errors are taken of: the acceleration, (m,), and metrics of the dense solution."""
+    """Return what errors are taken of: the acceleration, (m,), and metrics of the dense
+    solution.
+    """
     forces = run["peak_contact_force"].sel(joint=list(joints)).values
     scalars = {name: run[name].values for name in ("peak_acceleration", "rms_acceleration")}
     return {"acceleration": run["acceleration"].values, **scalars, "peak_contact_force": forces}
 
 
 def grid_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]:
-    """`stored_values` as a reader of the output grid finds them, between whose samples peaks hide.
+    """Return `stored_values` as a reader of the output grid finds them, between whose samples peaks
+    hide.
 
     Includes the acceleration over the whole run; peaks and rms are those after `settle_rev`.
     """
@@ -100,7 +103,7 @@ def grid_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]
 
 
 def errors(found: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """Relative errors by the names of `ERRORS`."""
+    """Return the relative errors by the names of `ERRORS`."""
     a, true_a = found["acceleration"], truth["acceleration"]
     relative = {"acceleration": float(np.linalg.norm(a - true_a) / np.linalg.norm(true_a))}
     for name in list(ERRORS)[1:]:
@@ -109,7 +112,7 @@ def errors(found: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -> 
 
 
 def reference(name: str, case: Case, method: str) -> dict[str, np.ndarray]:
-    """The values of a reference run. Raises ReferenceFailed."""
+    """Return the values of a reference run. Raises ReferenceFailed."""
     run = simulate(solved(case, method, REFERENCE_RTOL))
     if not complete(run):
         reason = f"{run['reason'].item()}: {run.attrs['detail']}"
@@ -174,7 +177,9 @@ COMPILE = "what the first call of the compiled solver takes beyond a second: com
 
 
 def seconds_compile(case: Case) -> float:
-    """What the first call of the compiled solver in this process takes beyond the second (s)."""
+    """Return what the first call of the compiled solver in this process takes beyond the second
+    (s).
+    """
     began = time.perf_counter()
     simulate(case)
     middle = time.perf_counter()
@@ -183,7 +188,7 @@ def seconds_compile(case: Case) -> float:
 
 
 def empty(scenes: list[str], methods: Sequence[str], tolerances: Sequence[float]) -> xr.Dataset:
-    """A study without its values: nothing run yet."""
+    """Return a study without its values: nothing run yet."""
     dims = ("scene", "method", "tolerance")
     shape = (len(scenes), len(methods), len(tolerances))
     text = {"status": "ok, failed, or missing: not run since a looser tolerance took too long",

@@ -116,7 +116,7 @@ def check(studies: "list[Study]") -> None:
 
 
 def table(machines: "tuple[Machine, ...]") -> Iterator[str]:
-    """A line for each machine, below a head."""
+    """Yield a line for each machine, below a head."""
     names = [" ".join([one.study, *(f"{k}={v}" for k, v in one.point.items())]) for one in machines]
     width = max(map(len, names))
     yield f"{'machine':<{width}}  {HEAD}"
@@ -125,7 +125,7 @@ def table(machines: "tuple[Machine, ...]") -> Iterator[str]:
 
 
 def ending(one: "Machine") -> str:
-    """How a machine ended, in a line."""
+    """Return how a machine ended, in a line."""
     found, how = one.life, one.case.wear
     if not found or not how:
         return f"failed: {one.reason}"
@@ -141,12 +141,12 @@ def ending(one: "Machine") -> str:
 
 
 def hours(value: float, sign: str = "") -> str:
-    """Hours in four digits."""
+    """Return the hours in four digits."""
     return f"{sign}{value:.0f}" if value >= 1000 else f"{sign}{value:.4g}"
 
 
 def plain(one: "Machine", folder: str) -> dict[str, Any]:
-    """A machine as JSON says it."""
+    """Return a machine as JSON says it."""
     from compressor.studies.wear.stages import wear_file
 
     found: dict[str, Any] = {"study": one.study, **one.point, "reason": one.reason}

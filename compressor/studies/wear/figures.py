@@ -14,7 +14,8 @@ MOST_PROFILES = 5
 
 @styled
 def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Figure:
-    """Clearance at the deepest place, greatest force, and what is worn off by place on the bore.
+    """Return the clearance at the deepest place, greatest force, and what is worn off by place on
+    the bore.
 
     stages: of `stages.open_wear`; limit_mm: of the clearance; factor: by which the coefficient may
     be smaller or greater, whose hours are shaded. Profiles are of the joint that is worn the most.

@@ -25,7 +25,7 @@ class Life(NamedTuple):
 
 
 def life(of: Worn, stages: xr.Dataset) -> Life:
-    """How long a machine lasts, by straight lines between its stages."""
+    """Return how long a machine lasts, by straight lines between its stages."""
     opened = stages["clearance"].transpose("stage", "joint").values
     hours = stages["hours"].values
     reached = [when(hours, opened[:, joint], of.limit) for joint in range(opened.shape[1])]
@@ -43,7 +43,7 @@ def life(of: Worn, stages: xr.Dataset) -> Life:
 
 
 def when(hours: np.ndarray, opened: np.ndarray, limit: float) -> float:
-    """When a clearance that never shrinks reaches a limit; nan where it does not."""
+    """Return when a clearance that never shrinks reaches a limit; nan where it does not."""
     beyond = np.flatnonzero(opened >= limit)
     if not beyond.size:
         return math.nan

@@ -102,14 +102,14 @@ def run_wear(
 
 
 def stored(task: Task) -> list[Stage]:
-    """The stages of a machine that are kept of an earlier run. Raises StoreError."""
+    """Return the stages of a machine that are kept of an earlier run. Raises StoreError."""
     stages = kept(task.worn, task.worn.path(task.folder))
     good = [stage for stage in stages if not stage["reason"]]
     return good if task.rerun else stages
 
 
 def complete(task: Task) -> bool:
-    """Whether all stages of a machine are stored. Raises StoreError."""
+    """Return whether all stages of a machine are stored. Raises StoreError."""
     stages = stored(task)
     return bool(stages) and task.worn.over(stages[-1])
 
@@ -134,13 +134,13 @@ def follow_wear(task: Task) -> Ended | StoreError:
 
 
 def ended(worn: Worn, stages: list[Stage]) -> Ended:
-    """How a machine's wear has ended."""
+    """Return how a machine's wear has ended."""
     last = stages[-1]
     return Ended(len(stages), life(worn, dataset(worn, stages)), last["reason"], last["detail"])
 
 
 def machine(study: str, point: dict[str, Any], case: Case, end: Ended | Lost) -> Machine:
-    """A machine of a study, and how it ended."""
+    """Return a machine of a study, and how it ended."""
     if isinstance(end, Lost):
         return Machine(study, point, case, 0, None, str(end.reason), end.detail)
     return Machine(study, point, case, *end)

@@ -98,24 +98,24 @@ class Worn:
         return to_si(self.how.coefficient_mm3_per_N_m, "mm3/(N m)") / self.sector_area
 
     def path(self, folder: Folder) -> Path:
-        """Where it is stored."""
+        """Return where it is stored."""
         return Path(folder) / FOLDER / f"{self.key}.nc"
 
     def over(self, stage: Stage) -> bool:
-        """Whether a stage is the last one: worn out, at the end of its hours, or failed."""
+        """Return whether a stage is the last one: worn out, at the end of its hours, or failed."""
         opened = self.clearances + stage["worn_depth"].max(axis=1)  # m
         late = bool(stage["hours"] >= self.most_hours)
         return bool(stage["reason"]) or late or bool((opened >= self.limit).any())
 
 
 def first(of: Worn) -> Stage:
-    """The stage of unworn bores."""
+    """Return the stage of unworn bores."""
     unworn = np.zeros((len(JOINTS), of.how.sectors))
     return staged(0.0, unworn, rub(of.case, unworn, None))
 
 
 def staged(hours: float, worn: np.ndarray, motion: Rubbed) -> Stage:
-    """What is kept of a motion on bores that were worn in some hours."""
+    """Return what is kept of a motion on bores that were worn in some hours."""
     found = {name: motion.metrics.get(name, math.nan) for name in SHOWN}
     shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
     return {
@@ -127,7 +127,7 @@ def staged(hours: float, worn: np.ndarray, motion: Rubbed) -> Stage:
 
 
 def following(of: Worn, stage: Stage) -> Stage:
-    """The stage after one that is not the last; by the midpoint rule."""
+    """Return the stage after one that is not the last; by the midpoint rule."""
     rate = of.depth_per_work[:, np.newaxis] * stage["rubbing_work"]  # m a revolution
     left = (of.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
     fastest = float(rate.max())
@@ -143,7 +143,7 @@ def following(of: Worn, stage: Stage) -> Stage:
 
 
 def dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
-    """The stages of a machine, with the dimension `stage`."""
+    """Return the stages of a machine, with the dimension `stage`."""
     found: dict[str, tuple] = {}
     for name, phrase in (("reason", "why it ended early"), ("detail", "what is known of that")):
         texts = np.array([stage[name] for stage in stages], object)
@@ -170,7 +170,7 @@ def dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
 
 
 def kept(of: Worn, path: Path) -> list[Stage]:
-    """The stages of an earlier run, none where there is no file. Raises StoreError."""
+    """Return the stages of an earlier run, none where there is no file. Raises StoreError."""
     if not path.exists():
         return []
     found = read_dataset(path, REMEDY)
@@ -192,12 +192,12 @@ def write(of: Worn, folder: Folder, stages: list[Stage]) -> None:
 
 
 def wear_file(folder: Folder, case: Case) -> Path:
-    """Where the stages of a case with wear are stored."""
+    """Return where the stages of a case with wear are stored."""
     return Worn(case).path(folder)
 
 
 def open_wear(folder: Folder, case: Case) -> xr.Dataset:
-    """How the bores of a case have worn, from a folder of results, as far as that was run.
+    """Return how the bores of a case have worn, from a folder of results, as far as that was run.
 
     Dims: `stage`, `joint`, `angle` of a place on the bore; `hours` and `worn_depth` (m) by stage,
     with the metrics of the motion on such bores. Raises StoreError where there is nothing of it.
