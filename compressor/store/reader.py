@@ -193,9 +193,7 @@ class Stored:
         return Outcome(words["status"], words["reason"], self.rows.numbers[position], attributes)
 
     def job(self, key: str) -> "xr.Dataset":
-        """Return a stored job's Dataset. Raises StoreError where there is none, or a damaged
-        one.
-        """
+        """Return a stored job's Dataset. Raises StoreError where it is missing or damaged."""
         if not KEY.fullmatch(key):
             raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
         position = self.position(key)
@@ -293,8 +291,7 @@ def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
 
 
 def read_job(folder: Folder, key: str) -> "xr.Dataset":
-    """Return a stored job's Dataset: what `simulate` gives of its case, time series where they were
-    kept.
+    """Return a stored job's Dataset: what `simulate` gives of its case, with series if stored.
 
     folder: of results; key: 20 hexadecimal digits, as `Case.key` and the coordinate `key` of a
     study have them. Raises StoreError where there is no such job, or a damaged one.
