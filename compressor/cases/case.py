@@ -274,8 +274,7 @@ class Case(Settings):
         return digest(canonical(identity(self, with_solver=True)))
 
     def attributes(self) -> dict[str, Any]:
-        """Return what a stored outcome says of its case: `name`, `case` (JSON), `key`,
-        `physics_key`.
+        """Return what an outcome stores of its case: `name`, `case` (JSON), `key`, `physics_key`.
 
         The keys of a case with values that none can be made of, such as a speed of 0, are "".
         """
