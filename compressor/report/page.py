@@ -84,13 +84,21 @@ class Running(NamedTuple):
 def templates() -> Environment:
     """Return the page's templates: they escape what they print, and what they lack is an error."""
     return Environment(
-        loader=ChoiceLoader([PackageLoader(__package__), FunctionLoader(template_elsewhere)]),
+        loader=ChoiceLoader([PackageLoader(__package__), Elsewhere(template_elsewhere)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+
+
+class Elsewhere(FunctionLoader):
+    """Loads templates by a function, and lists none of them."""
+
+    def list_templates(self) -> list[str]:
+        """Return no name."""
+        return []
 
 
 def template_elsewhere(name: str) -> str | None:

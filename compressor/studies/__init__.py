@@ -5,9 +5,10 @@ of it is imported before it is used, but for its commands, which the command lin
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import click
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     from compressor.store import Folder
 
 
-class StudyKind(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class StudyKind:
     """A kind of study: where its parts are in its folder.
 
     `verbs`: modules by the verb that each gives the command line.
@@ -29,7 +31,7 @@ class StudyKind(NamedTuple):
     """
 
     name: str
-    verbs: Mapping[str, str] = {}
+    verbs: Mapping[str, str] = field(default_factory=dict)
     group: str = ""
     figures: tuple[str, ...] = ()
     has_page: bool = False

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from compressor.analysis.claims import Claim
 from compressor.report import page
+from compressor.report.additions import Note
 from compressor.report.answer import Answer, Finding, Line
 from compressor.report.assumptions import Assumptions
 from compressor.report.diagnosis_section import DiagnosisContent
@@ -33,6 +34,8 @@ ROOT = Path(__file__).parents[2]
 HOME = Path(page.__file__).parent
 SOURCES = [*HOME.rglob("*.py")]
 KINDS = ("word", "number", "code")
+
+STUDIES = "compressor.studies"  # whose templates are named package:file
 
 
 def strings(source):
@@ -94,16 +97,16 @@ def contents(evil):
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
         "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
-        "machines.html": [Part(evil(), [evil()], plate(evil))],
+        f"{STUDIES}.claims:machines.html": [Part(evil(), [evil()], plate(evil))],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
-        "models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
+        f"{STUDIES}.tradeoff:models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
         "second_set.html": SecondSetContent(
             evil(), evil(), [evil()], [evil()], [Pair(first, plate(evil))], claims
         ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
-                                   evil(), evil(), evil(), evil()),
+                                   evil(), evil(), [Note(evil(), evil(), evil())]),
     }  # fmt: skip
 
 

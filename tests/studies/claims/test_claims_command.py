@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from compsim import cli
 
-from compressor import machines
+from compressor.studies.claims import search as searching
+from compressor.studies.claims import study as judging
 from compressor.studies.claims.judged import Judged
 from compressor.studies.claims.study import dataset
 from compressor.studies.claims.study import machines as machines_of
@@ -44,8 +45,8 @@ def here(tmp_path, monkeypatch):
         found.encoding["source"] = f"{folder}/{study.name}-search.nc"
         return found
 
-    monkeypatch.setattr(machines, "judge_machines", made)
-    monkeypatch.setattr(machines, "least_change", search)
+    monkeypatch.setattr(judging, "judge_machines", made)
+    monkeypatch.setattr(searching, "least_change", search)
     return asked
 
 

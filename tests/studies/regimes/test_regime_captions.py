@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from regimes_made import failed, made, plane
 
-from compressor.analysis.plot_captions import PLOT_CAPTIONS
-from compressor.studies.regimes.captions import bifurcation, periods, regime_of, sections, way
+from compressor.studies import STUDIES
+from compressor.studies.regimes.captions import (
+    CAPTIONS,
+    bifurcation,
+    periods,
+    regime_of,
+    sections,
+    way,
+)
 
 VALUES = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
 ALL_AGREE = [False] * len(VALUES)
@@ -27,7 +34,8 @@ def study(up, down=None, exponents=None):
 
 
 def test_the_captions_of_regimes_are_those_of_compsim_plot():
-    assert [*PLOT_CAPTIONS["regimes"]] == ["bifurcation", "sections", "periods"]
+    (kind,) = [kind for kind in STUDIES if kind.name == "regimes"]
+    assert (*CAPTIONS,) == kind.figures
 
 
 def test_a_chain_is_read_the_way_it_went():
