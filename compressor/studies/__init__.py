@@ -27,8 +27,8 @@ class StudyKind:
     then has `check_options`, `run_studies`, `ahead` and `ahead_lines`.
     `figures`: what `compsim plot` draws of it; its module `plots` has `is_stored` and `write`.
     `has_page`: whether its module `page` has `add`, what it adds to the page of a report.
-    `page_folder`: the name of the option of `compsim report`, and of the default folder, of what the
-    page is made from beside the results.
+    `page_folder`: the option of `compsim report`, and the default folder, of what the page is made
+    from beside the results.
     """
 
     name: str
