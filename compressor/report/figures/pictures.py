@@ -99,6 +99,7 @@ def inherited(name: str, heading: str) -> tuple[bytes, ...]:
 
 
 def tell(heading: str) -> None:
-    """Say what is being drawn."""
+    """Say what is being drawn, in one write: two processes share the stream."""
     with contextlib.suppress(OSError):
-        print(f"drawing {heading}", file=sys.stderr, flush=True)
+        sys.stderr.write(f"drawing {heading}\n")
+        sys.stderr.flush()
