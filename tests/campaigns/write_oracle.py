@@ -27,6 +27,7 @@ from compressor.studies.stress.extremes import FEATURES, LAWS, Budget, values
 
 ROOT = Path(__file__).parents[2]
 SEED = 33
+OF_CLAIMS = {"agreeing.yaml", "assumptions.yaml", "consistent.yaml"}  # bases of `compsim claims`
 SCIPY_METHODS = ("DOP853", "RK45", "Radau", "LSODA")
 TIMINGS = ("seconds", "written", "versions", "host")  # parts of names of what differs by the run
 JOBS_OF_A_STUDY = 12  # the first ones of an example
@@ -37,7 +38,7 @@ def cases_by_name():
     found = {}
     paths = [*ROOT.glob("configs/*.yaml"), *ROOT.glob("compressor/cases/examples/*.yaml")]
     for path in sorted(paths):
-        for study in load_studies(path):
+        for study in [] if path.name in OF_CLAIMS else load_studies(path):
             for number in range(min(study.jobs, JOBS_OF_A_STUDY)):
                 found[f"{path.name} {number}"] = study.cases[number]
     for number, drawn in enumerate(strangers(SEED, 300)):
