@@ -2,7 +2,7 @@
 
 The one table of results, as `compressor.cases` has one of parameters; needs no library, so that
 case files that name a metric are read at once. A new metric is a row of `METRICS` and its value in
-`compressor.solve.tallied.metrics`.
+`compressor.solve.run_metrics.metrics`.
 """
 
 from typing import Literal, NamedTuple
@@ -125,7 +125,7 @@ METRICS = {
         ),
     )
 }  # fmt: skip
-# of a run with `output: {signals: true}`; nan of any other (`compressor.solve.rod_load`)
+# of a run with `output: {signals: true}`; nan of any other (`compressor.solve.run_metrics`)
 ROD_LOAD = {
     row.name: row
     for row in (

@@ -16,7 +16,7 @@ import hypothesis
 import numpy as np
 import pytest
 
-from compressor.analysis.paper_cases import paper_cases
+from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.metrics import NUMBERS

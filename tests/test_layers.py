@@ -43,18 +43,16 @@ LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
     # designs, sparse systems, integrators, Student's t, splines, root finder and minimiser, spectra
     "scipy": {
-        "compressor.analysis.course",
+        "compressor.analysis.orbit",
         "compressor.analysis.effects",
-        "compressor.analysis.impacts",
-        "compressor.analysis.sobol",
+        "compressor.analysis.contacts",
         "compressor.cases.swept",
-        "compressor.studies.diagnosis.regression",
-        "compressor.studies.diagnosis.strangeness",
+        "compressor.studies.diagnosis.approximate",
         "compressor.studies.claims.search",
         "compressor.studies.search.find",
         "compressor.solve.bearing",
         "compressor.solve.scipy_driver",
-        "compressor.solve.statistics",
+        "compressor.solve.run_metrics",
         "compressor.vibration",
     },
     "yaml": {"compressor.cases.load", "compressor.cases.yaml_reader"},
@@ -63,9 +61,9 @@ LIBRARIES = {  # library -> the modules that may import it
     "h5py": {"compressor.store.hdf5"},
     "jinja2": {"compressor.report.page"},
     "matplotlib": {"compressor.report.figures", "compressor.studies.*.figures",
-                   "compressor.studies.regimes.period_map"},
+                   "compressor.studies.regimes.figures"},
     "click": {"compsim", "compressor.studies", "compressor.studies.*command"},
-    "rich": {"compsim.live"},
+    "rich": {"compsim.screen"},
     "pyarrow": {"compressor.studies.diagnosis"},
     "sklearn": set(),  # of campaigns alone
 }  # fmt: skip
@@ -283,10 +281,10 @@ def test_the_house_keeps_its_rules(rule):
         (faults_of_doors, "compressor.store", "from compressor.store.hdf5 import digest"),
         (libraries_without_door, "compressor.solve.simulate", "import h5py"),
         (libraries_without_door, "compressor.report.page", "def late():\n    import matplotlib"),
-        (libraries_without_door, "compressor.studies.wear.life", "import click"),
+        (libraries_without_door, "compressor.studies.wear.stages", "import click"),
         (
             studies_that_know_others,
-            "compressor.studies.wear.life",
+            "compressor.studies.wear.stages",
             "from compressor.studies.claims.study import read_machines",
         ),
         (
@@ -296,7 +294,7 @@ def test_the_house_keeps_its_rules(rule):
         ),
         (
             commands_outside_of_commands,
-            "compressor.studies.wear.life",
+            "compressor.studies.wear.stages",
             "from compsim.screen import say",
         ),
     ],

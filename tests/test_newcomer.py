@@ -9,7 +9,7 @@ import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-LAWS, WORDS = "compressor/physics/contact_laws.py", "compressor/cases/laws.py"
+LAWS, WORDS = "compressor/physics/contact_laws.py", "compressor/cases/groups.py"
 PUBLISHED = "tests/published.py"
 BEGIN, END = "## How to add a contact law", "## How to add a feature"
 TESTS = ("tests/physics/test_contact_laws.py", "tests/physics/test_restitution.py")

@@ -1,17 +1,33 @@
-"""Where the contacts of a joint begin and end, in a run with time series.
+"""Contacts of a joint in a run: where they begin and end, impacts, and contact modes.
 
 In contact means F_N > 0, as everywhere in the program (physics/README.md, Contact). The force on
 the rod is F_N n - F_t t with n along the eccentricity, so that F_N is its part along n. Contact is
 dry contact: the force of a film across a gap is none.
+
+The contact modes of the joints over the crank angle: flight, impact, following. The three modes are
+those of Miedema and Mansour, Mechanical joints with clearance: a three-mode model, Journal of
+Engineering for Industry 98 (1976) 1319-1323; Flores and Lankarani, Contact force models for
+multibody dynamics (2016), use them as well. Two joints have nine combinations. Ours is how the
+modes are told apart in samples:
+
+- flight: no contact (F_N = 0) from one contact to the next, with the journal off its bore in
+  between;
+- impact: the first contact after flight, for one compression and one restitution: until the force
+  vanishes, or the penetration has passed a maximum and then a minimum, and no longer than an
+  undamped impact of rod and reciprocating mass together would last at the same approach speed;
+- following: the rest. The force may vanish within it, as long as the journal stays pressed in.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
+from numpy.polynomial import Polynomial
 
-from compressor.analysis.runs import record_of
+from compressor.analysis.runs import record_of, settled
 from compressor.metrics import JOINTS
+from compressor.physics import elastic_form
 
 
 @dataclass(frozen=True)
@@ -111,3 +127,312 @@ def flights(series: ContactSeries) -> np.ndarray:
     for begin, beyond in edges.tolist():
         flying[begin:beyond] = (series.depth[begin:beyond] < 0).any()
     return flying
+
+
+STENCIL = 4  # samples that the journal's path before first touch is a polynomial through
+FINER = 16  # points a sample step in which force times rate is summed
+COLUMNS = {  # over impact: unit, long name
+    "joint": ("", "joint of the impact"),
+    "time": ("s", "time of first touch"),
+    "crank_angle": ("deg", "crank angle of first touch, from top dead centre, 0 to 360"),
+    "revolution": ("1", "revolution of first touch, the run's first being 1"),
+    "approach_speed": ("m/s", "relative normal speed at first touch"),
+    "duration": ("s", "from first touch until the normal force vanishes"),
+    "impact_duration": ("s", "part of it that is impact and not following"),
+    "impulse": ("N s", "integral of the normal force over the contact"),
+    "lost_energy": ("J", "integral of normal force times penetration rate, less what is stored"),
+    "released": ("1", "whether the contact ended before the run did"),
+}
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One impact by the names of `COLUMNS`, with its contact.
+
+    `follows`: the first sample that is following contact; after `span.last` where there is none.
+    """
+
+    joint: str
+    time: float
+    crank_angle: float
+    revolution: int
+    approach_speed: float
+    duration: float
+    impact_duration: float
+    impulse: float
+    lost_energy: float
+    released: bool
+    span: Span
+    follows: int
+
+
+def impacts(run: xr.Dataset) -> xr.Dataset:
+    """Return the table of impacts after settling, in order of time: `COLUMNS` over the dim
+    `impact`.
+
+    An impact is a contact (F_N > 0) that begins after the journal was off its bore, as in
+    `impact_count`; one that lies between two samples is not seen. `lost_energy` is what the contact
+    damping took, the clamp of the force at zero included, since the elastic energy is zero at both
+    ends (physics/README.md, Energy); what a contact still stores where the run's end cuts it off is
+    taken from it. Integrals run over the whole contact, which may go on as following contact.
+    Raises ValueError for a run without time series or clearance.
+    """
+    found = [one for joint in joints_with_clearance(run) for one in impacts_of(run, joint)]
+    found = [one for one in found if one.time >= run.attrs["settle"] * (1 - 1e-12)]
+    found.sort(key=lambda one: one.time)
+    kinds: dict[str, type | str] = {
+        "joint": f"U{max(map(len, JOINTS))}",
+        "revolution": int,
+        "released": bool,
+    }
+    variables = {}
+    for name, (unit, phrase) in COLUMNS.items():
+        values = np.array([getattr(one, name) for one in found], dtype=kinds.get(name, float))
+        attrs = {"units": unit, "long_name": phrase} if unit else {"long_name": phrase}
+        variables[name] = ("impact", values, attrs)
+    return xr.Dataset(variables)
+
+
+def impacts_of(run: xr.Dataset, joint: str) -> list[Impact]:
+    """Return the impacts at one joint over the whole run, start-up included."""
+    series = contact_series(run, joint)
+    p = record_of(run)
+    number = JOINTS.index(joint)
+    contact = elastic_form(float(p["stiffness"][number]), float(p["clearance"][number]), p)
+    mass = float(p["rod_mass"] + p["reciprocating_mass"])
+    found = []
+    for span in contact_spans(series):
+        if not span.after_flight:
+            continue
+        begin, speed = touch(series, span)
+        longest = contact.impact_time(contact.impact_depth(mass, speed), speed)
+        one = impact(series, span, (begin, speed), longest)
+        if not one.released:  # what is stored elastically is not lost
+            stored = contact.energy(float(series.depth[-1]))
+            one = replace(one, lost_energy=one.lost_energy - stored)
+        found.append(one)
+    return found
+
+
+def touch(series: ContactSeries, span: Span) -> tuple[float, float]:
+    """Return the time (s) and approach speed (m/s) of a contact's first touch.
+
+    Without contact the eccentricity is smooth, so that it is taken as the polynomial through the
+    last `STENCIL` samples without contact; of shorter flights through those and the first one in
+    contact. First touch is where its length reaches the clearance. The error of the speed falls
+    with the cube of the sample step.
+    """
+    from scipy.optimize import brentq  # takes 0.2 s, of commands that need no impacts too
+
+    first = span.first
+    chosen = np.arange(first - min(STENCIL, span.gap), first + (span.gap < STENCIL))
+    step = series.time[first] - series.time[first - 1]
+    s = (series.time[chosen] - series.time[first]) / step
+    x, y = (Polynomial.fit(s, values, s.size - 1) for values in series.place[chosen].T)
+
+    def gap(at: float) -> float:
+        return math.hypot(x(at), y(at)) - series.clearance
+
+    at = -1.0 if gap(-1.0) >= 0 else 0.0
+    if gap(-1.0) < 0 < gap(0.0):
+        at = float(brentq(gap, -1.0, 0.0))
+    rate = x(at) * x.deriv()(at) + y(at) * y.deriv()(at)
+    speed = float(rate / math.hypot(x(at), y(at)) / step)
+    return float(series.time[first] + at * step), max(0.0, speed)
+
+
+def release(series: ContactSeries, span: Span) -> float:
+    """Return the time (s) at which the normal force of a contact vanishes: by its last slope.
+
+    Known to a part of a sample step. Of a contact of one sample it is half a step later; of one
+    that the run's end cuts off, the run's end.
+    """
+    last, time, normal = span.last, series.time, series.normal
+    if last + 1 == time.size:
+        return float(time[last])
+    step = time[last + 1] - time[last]
+    fall = normal[last - 1] - normal[last]
+    if last == span.first:
+        return float(time[last] + 0.5 * step)
+    share = normal[last] / fall if fall > 0 else 1.0
+    return float(time[last] + step * min(1.0, share))
+
+
+def impact(
+    series: ContactSeries, span: Span, touched: tuple[float, float], longest: float
+) -> Impact:
+    """Return the impact of a contact, from its first touch (s, m/s); `longest`: it may last, s."""
+    begin, speed = touched
+    end = release(series, span)
+    follows = following_from(series, span, begin + longest)
+    time = series.time
+    impulse, lost = impulse_and_loss(series, span, begin, end)
+    turns = np.interp(begin, time, series.angle) / (2 * np.pi)
+    return Impact(
+        series.joint,
+        begin,
+        float(360.0 * (turns % 1.0)),
+        int(turns) + 1,
+        speed,
+        end - begin,
+        (end if follows > span.last else min(end, float(time[follows]))) - begin,
+        impulse,
+        lost,
+        span.last + 1 < time.size,
+        span,
+        follows,
+    )  # fmt: skip
+
+
+def following_from(series: ContactSeries, span: Span, until: float) -> int:
+    """Return the first sample of a contact that is no longer impact.
+
+    An impact is one compression and one restitution. It ends where the penetration has passed a
+    maximum and then a minimum, and at the latest at `until`, s.
+    """
+    depth = series.depth[span.first : span.last + 1]
+    falling = np.flatnonzero(np.diff(depth) < 0)
+    beyond = span.last + 1
+    late = int(np.searchsorted(series.time[:beyond], until, side="right"))
+    if falling.size:
+        rising = np.flatnonzero(np.diff(depth[falling[0] :]) > 0)
+        if rising.size:
+            beyond = span.first + int(falling[0] + rising[0])
+    return max(span.first + 1, min(beyond, late))
+
+
+def impulse_and_loss(
+    series: ContactSeries, span: Span, begin: float, end: float
+) -> tuple[float, float]:
+    """Return the impulse (N s) and lost energy (J) of a contact from `begin` to `end`, s.
+
+    The force is a monotone cubic (Fritsch and Carlson) through the samples in contact and zero at
+    both ends; the journal's path is a cubic spline through them and two samples on either side.
+    """
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    inside = slice(span.first, span.last + 1)
+    time, normal = series.time[inside], series.normal[inside]
+    # an end nearer to a sample would have a slope of rounding alone
+    least = 1e-3 * (series.time[1] - series.time[0])
+    if time[0] - begin > least:
+        time, normal = np.append(begin, time), np.append(0.0, normal)
+    if end - time[-1] > least:
+        time, normal = np.append(time, end), np.append(normal, 0.0)
+    if time.size < 2:
+        return 0.0, 0.0
+    force = PchipInterpolator(time, normal)
+    around = slice(max(0, span.first - 2), span.last + 3)
+    path = CubicSpline(series.time[around], series.place[around])
+    fine = np.linspace(time[0], time[-1], FINER * (time.size - 1) + 1)
+    place = path(fine)
+    rate = (place * path(fine, 1)).sum(axis=1) / np.linalg.norm(place, axis=1)
+    return float(force.integrate(time[0], time[-1])), float(np.trapezoid(force(fine) * rate, fine))
+
+
+MODES = ("flight", "impact", "following")
+FLIGHT, IMPACT, FOLLOWING = range(len(MODES))
+UNKNOWN = -1  # of a bin without samples
+
+
+def contact_modes(run: xr.Dataset) -> xr.Dataset:
+    """Return the mode of each joint with clearance after settling: `mode` over (time, joint).
+
+    Integers with their meanings in `flag_values` and `flag_meanings`; `time` has the crank angle
+    (rad) as a coordinate. Raises ValueError for a run without time series or clearance.
+    """
+    joints = [*joints_with_clearance(run)]
+    columns = [modes_of(run, joint) for joint in joints]
+    one = contact_series(run, joints[0])
+    attrs = {
+        "units": "1",
+        "long_name": "contact mode",
+        "flag_values": np.arange(len(MODES), dtype=np.int8),
+        "flag_meanings": " ".join(MODES),
+    }
+    angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
+    whole = xr.Dataset(
+        {"mode": (("time", "joint"), np.stack(columns, axis=1), attrs)},
+        {
+            "time": ("time", one.time, {"units": "s", "long_name": "time"}),
+            "crank_angle": ("time", one.angle, angle),
+            "joint": ("joint", list(joints)),
+        },
+        {"settle": run.attrs["settle"]},
+    )
+    return settled(whole)
+
+
+def modes_of(run: xr.Dataset, joint: str) -> np.ndarray:
+    """Return the mode of a joint at each sample of the whole run, (m,) integers."""
+    series = contact_series(run, joint)
+    modes = np.where(flights(series), FLIGHT, FOLLOWING).astype(np.int8)
+    for one in impacts_of(run, joint):
+        modes[one.span.first : one.follows] = IMPACT
+    return modes
+
+
+def mode_shares(modes: xr.Dataset) -> xr.Dataset:
+    """Return the shares of time of what `contact_modes` gives.
+
+    `share` over (joint, mode), and with two joints `combination_share` over (big_end_mode,
+    small_end_mode), nine numbers. Samples stand for the step that they begin.
+    """
+    mode = modes["mode"].isel(time=slice(None, -1)).values
+    each = mode[:, :, None] == np.arange(len(MODES))
+    attrs = {"units": "1", "long_name": "share of time in a contact mode"}
+    found = xr.Dataset(
+        {"share": (("joint", "mode"), each.mean(axis=0), attrs)},
+        {"joint": modes["joint"].values, "mode": list(MODES)},
+    )
+    if mode.shape[1] == 2:
+        both = (each[:, 0, :, None] & each[:, 1, None, :]).mean(axis=0)
+        attrs = {"units": "1", "long_name": "share of time in a combination of contact modes"}
+        dims = [f"{joint}_mode" for joint in modes["joint"].values]
+        found = found.assign_coords({dim: list(MODES) for dim in dims})
+        found["combination_share"] = (dims, both, attrs)
+    return found
+
+
+def angle_modes(run: xr.Dataset) -> xr.Dataset:
+    """Return `mode_map` of a run's `contact_modes`, in bins of 1 degree; raises ValueError as
+    they do.
+    """
+    return mode_map(contact_modes(run))
+
+
+def mode_map(modes: xr.Dataset, width_deg: float = 1.0) -> xr.Dataset:
+    """Return what `contact_modes` gives over the crank angle, all revolutions together.
+
+    Over bins of `width_deg`, with `angle` (deg, 0 to 360) the middle of each: `share` over (angle,
+    joint, mode), and `majority` over (angle, joint), the mode with the greatest share, the first
+    of equals. A bin without samples has shares of nan and the majority -1. Raises ValueError where
+    the width is no whole part of a revolution.
+    """
+    count = round(360.0 / width_deg) if width_deg > 0 else 0
+    if count < 1 or abs(count * width_deg - 360.0) > 1e-6:
+        raise ValueError(f"width_deg = {width_deg:g} is no whole part of 360")
+    kept = modes.isel(time=slice(None, -1))
+    # a sample on an edge belongs to the bin that begins there, whatever its rounding
+    place = np.floor(np.degrees(kept["crank_angle"].values) / width_deg + 1e-6).astype(int) % count
+    samples = np.bincount(place, minlength=count)
+    mode = kept["mode"].values
+    shares = np.full((count, mode.shape[1], len(MODES)), np.nan)
+    for joint, number in np.ndindex(shares.shape[1:]):
+        found = np.bincount(place, mode[:, joint] == number, minlength=count)
+        np.divide(found, samples, out=shares[:, joint, number], where=samples > 0)
+    majority = np.where(np.isnan(shares[:, :, 0]), UNKNOWN, np.argmax(shares, axis=2))
+    flags = modes["mode"].attrs | {"long_name": "contact mode that is most frequent"}
+    share = {"units": "1", "long_name": "share of time in a contact mode"}
+    angle = {"units": "deg", "long_name": "crank angle from top dead centre, middle of the bin"}
+    return xr.Dataset(
+        {
+            "share": (("angle", "joint", "mode"), shares, share),
+            "majority": (("angle", "joint"), majority.astype(np.int8), flags),
+        },
+        {
+            "angle": ("angle", (np.arange(count) + 0.5) * width_deg, angle),
+            "joint": modes["joint"].values,
+            "mode": list(MODES),
+        },
+    )

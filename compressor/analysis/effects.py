@@ -1,12 +1,94 @@
-"""Which swept key matters for a quantity, and how the quantity follows it."""
+"""Which swept key matters for a quantity, how the quantity follows it, and Sobol's indices."""
 
+import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from compressor.analysis.sobol import LEVEL, saltelli_design
+from compressor.program import ignore_warnings
+
+RESAMPLES = 1000
+LEVEL = 0.95
+SEED = 1  # of the resampling
+ORDERS = ("first_order", "total_order")
+
+
+@dataclass(frozen=True)
+class SaltelliDesign:
+    """Where the parts of a design stand among its points.
+
+    a, b: the parts A and B, shape (n,) each; mixed: A with each column of B, shape (k, n).
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    mixed: np.ndarray
+
+    def first(self, count: int) -> "SaltelliDesign":
+        """Return the design of the first points of the sequence; a power of two keeps its
+        balance.
+        """
+        return SaltelliDesign(self.a[:count], self.b[:count], self.mixed[:, :count])
+
+    def indices(self, values: np.ndarray, resamples: int = RESAMPLES) -> dict[str, np.ndarray]:
+        """Return both indices of a quantity over k keys with their 95 % bootstrap intervals, (k,)
+        each.
+
+        values: of all points, finite and not all the same, shape (n (k + 2),). `first_order` and
+        `total_order`, with `_low` and `_high`, by SciPy's sobol_indices (Saltelli et al., Computer
+        Physics Communications 181, 2010). A key that changes nothing has none of the variance,
+        surely.
+        """
+        from scipy.stats import sobol_indices  # takes half a second
+
+        a, b, mixed = values[self.a], values[self.b], values[self.mixed]
+        table = {"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}
+        with ignore_warnings(), seeded():  # warnings: the bootstrap of what changes nothing
+            found = sobol_indices(func=table, n=a.size, rng=np.random.default_rng(SEED))
+            spread = found.bootstrap(confidence_level=LEVEL, n_resamples=resamples)
+        idle = (mixed == a).all(axis=1)
+        rows = {}
+        for order in ORDERS:
+            interval = getattr(spread, order).confidence_interval
+            parts = ("", getattr(found, order)), ("_low", interval.low), ("_high", interval.high)
+            for end, row in parts:
+                rows[f"{order}{end}"] = np.where(idle, 0.0, np.ravel(row))
+        return rows
+
+
+@contextlib.contextmanager
+def seeded() -> Iterator[None]:
+    """Have NumPy's global draws be the same each time: this bootstrap takes no generator."""
+    state = np.random.get_state()  # noqa: NPY002
+    np.random.seed(SEED)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        np.random.set_state(state)  # noqa: NPY002
+
+
+def saltelli_design(columns: np.ndarray) -> SaltelliDesign | None:
+    """Return the parts of a `saltelli` design; None where the columns, (points, k), are no such
+    design.
+    """
+    count, keys = columns.shape
+    n, rest = divmod(count, keys + 2)
+    if rest or n < 2 or n & (n - 1) or columns.dtype == object:
+        return None
+    a, b = columns[:n], columns[n : 2 * n]
+    blocks = np.arange(2 * n, count).reshape(keys, n)
+    mixed = np.empty_like(blocks)
+    for key in range(keys):  # the order of a file's columns is not that of its design
+        expected = a.copy()
+        expected[:, key] = b[:, key]
+        same = [np.array_equal(columns[places], expected) for places in blocks]
+        if sum(same) != 1:
+            return None
+        mixed[key] = blocks[same.index(True)]
+    return SaltelliDesign(np.arange(n), np.arange(n, 2 * n), mixed)
+
 
 MOST_GAPS = 0.2  # of a grid's points
 FILLS = 500  # rounds of filling
@@ -14,8 +96,8 @@ FILLED = 1e-9  # of the values' span: no round changes more
 FEWEST = 8  # points of a ranking or a trend
 MOST_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
 MOST_POINTS = 4000  # of the resampling
-RESAMPLES = 400
-SEED = 1
+RANKING_RESAMPLES = 400
+RANKING_SEED = 1
 ORDER = 2  # of a trend
 
 
@@ -111,7 +193,7 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
     design = saltelli_design(np.stack(columns, axis=1).astype(float)) if numeric else None
     if design is not None and good.mean() >= 1.0 - MOST_GAPS:
         whole = np.where(good, values, np.median(values[good]))
-        found = design.first(MOST_BASE).indices(whole, RESAMPLES)
+        found = design.first(MOST_BASE).indices(whole, RANKING_RESAMPLES)
         if not all(np.isfinite(row).all() for row in found.values()):
             return None  # so few points differ that some resamples are all the same
         ends = {
@@ -160,10 +242,10 @@ def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, flo
         return math.nan, math.nan, math.nan
     groups = [values[codes == code] for code in np.unique(codes)]
     found = math.sqrt(max(0.0, float(kruskal(*groups).statistic)) / (values.size - 1))
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(RANKING_SEED)
     ranks, size = rankdata(values), min(values.size, MOST_POINTS)
     draws = []
-    for _ in range(RESAMPLES):
+    for _ in range(RANKING_RESAMPLES):
         picked = rng.integers(values.size, size=size)
         counts = np.bincount(codes[picked])
         sums = np.bincount(codes[picked], ranks[picked])

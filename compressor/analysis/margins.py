@@ -1,4 +1,4 @@
-"""How far a claim's measure lies from its threshold, with what its error bars allow.
+"""How far a claim's measure lies from its threshold, and how continuously a joint hits.
 
 A margin is relative to the threshold: 0 at it, positive where the claim holds, 0.1 where the
 measure could change by a tenth of the threshold. That of a difference of shares is in the shares'
@@ -7,12 +7,15 @@ own unit.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from compressor.analysis.contacts import FOLLOWING, contact_modes, impacts
 from compressor.analysis.runs import settled
+from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
 from compressor.solve import mean_bar, sure
 
 
@@ -142,3 +145,153 @@ def series_error(run: xr.Dataset, name: str, values: np.ndarray, **where: str) -
     share = float(run[f"{name}_error"].sel(where))
     size = values**2 if values.ndim == 1 else (values**2).sum(axis=-1)
     return share * math.sqrt(float(np.mean(size)))
+
+
+WINDOW = 10.0  # degrees of crank angle that count as hit by one impact or more
+SLOWEST = 0.01  # m/s: approach speed from which on a contact after flight counts as an impact
+ENERGY = 0.9  # share of the energy whose angle is told
+
+
+@dataclass(frozen=True)
+class Continuity:
+    """How a joint's contact is spread over whole revolutions; all are shares, 0 to 1.
+
+    `apart`: of crank angle in flight or impact (`contact_modes`). `hit`: of windows of `WINDOW`
+    degrees that an impact faster than `SLOWEST` falls into. `energy_angle`: of crank angle that
+    holds `ENERGY` of the energy of the horizontal joint force above `ORDER`, large where it rings
+    all around. `gini`: index of that force's magnitudes, large where it is concentrated (Hurley and
+    Rickard 2009).
+    """
+
+    apart: float
+    hit: float
+    energy_angle: float
+    gini: float
+
+
+class Shares(NamedTuple):
+    """The shares of crank angle of a `Continuity`, each with its error."""
+
+    apart: Measure
+    hit: Measure
+    energy_angle: Measure
+
+
+class Evidence(NamedTuple):
+    """What is looked at: whole revolutions of a run, a joint's impacts, its force above `ORDER`."""
+
+    kept: xr.Dataset
+    revolutions: int
+    table: xr.Dataset
+    high: np.ndarray  # (m,), N, along the cylinder
+
+
+def evidence(run: xr.Dataset, joint: str) -> Evidence:
+    """Return the `Evidence` of a joint. Raises as `continuity`."""
+    from compressor.vibration import high_pass_orders
+
+    kept, count = whole_revolutions(run)
+    force = kept["contact_force"].sel(joint=joint, axis="x").values
+    return Evidence(
+        kept, count, impacts(kept), high_pass_orders(*evenly(kept, count, force), ORDER)
+    )
+
+
+def continuity(run: xr.Dataset, joint: str, start_up: bool = False) -> Continuity:
+    """Return the `Continuity` of a joint with clearance, over settled whole revolutions of a run.
+
+    `start_up`: over whole revolutions from the run's begin. Raises NoSeriesError where there is
+    none, ValueError where the joint has no clearance.
+    """
+    return told_by(evidence(run.assign_attrs(settle=0.0) if start_up else run, joint), joint)
+
+
+def told_by(found: Evidence, joint: str) -> Continuity:
+    """Return the `Continuity` of a joint by its evidence."""
+    from compressor.vibration import energy_angle, shape
+
+    modes = contact_modes(found.kept)["mode"].sel(joint=joint).values[:-1]
+    return Continuity(
+        float((modes != FOLLOWING).mean()),
+        hit_share(found.table, joint, found.revolutions),
+        energy_angle(found.high, ENERGY),
+        shape(found.high).gini,
+    )
+
+
+def measured_shares(run: xr.Dataset, joint: str) -> Shares:
+    """Return the settled shares of a joint with clearance; errors as far as the run's error bars
+    tell.
+
+    Of `apart`, the error bar of the share of time without contact, and two samples for each impact;
+    of `hit`, a window for each impact that is within the velocity's error of `SLOWEST`, or within a
+    sample of a window's edge; of `energy_angle`, what it changes where the energy changes as much
+    as the force's error allows. Of a chaotic run the scatter of its revolutions. Raises as
+    `continuity`.
+    """
+    by = evidence(run, joint)
+    found = told_by(by, joint)
+    if is_chaotic(run):
+
+        def share(name: str) -> Callable[[xr.Dataset], float]:
+            return lambda turn: getattr(continuity(turn, joint), name)
+
+        errors = [by_revolution(by.kept, share(name)) for name in Shares._fields]
+    else:
+        errors = [apart_error(by, joint), hit_error(by, joint), angle_error(by, joint)]
+    values = (getattr(found, name) for name in Shares._fields)
+    return Shares(*(Measure(*pair) for pair in zip(values, errors, strict=True)))
+
+
+def apart_error(by: Evidence, joint: str) -> float:
+    """Return the error of the share of crank angle in flight or impact."""
+    count = int((by.table["joint"].values == joint).sum())
+    told = float(by.kept["contact_loss_fraction_error"].sel(joint=joint))
+    return told + 2.0 * count / (by.kept.sizes["time"] - 1)
+
+
+def hit_error(by: Evidence, joint: str) -> float:
+    """Return the error of the share of windows that are hit."""
+    mine = by.table["joint"].values == joint
+    speed, angle = (by.table[name].values[mine] for name in ("approach_speed", "crank_angle"))
+    doubt = series_error(by.kept, "velocity", by.kept["velocity"].values)
+    if math.isnan(doubt):
+        return math.nan
+    sample = math.degrees(float(by.kept["crank_angle"][1] - by.kept["crank_angle"][0]))
+    unsure = np.abs(angle - WINDOW * np.round(angle / WINDOW)) < sample
+    unsure = (unsure & (speed > SLOWEST - doubt)) | (np.abs(speed - SLOWEST) < doubt)
+    return float(unsure.sum()) * WINDOW / (360.0 * by.revolutions)
+
+
+def angle_error(by: Evidence, joint: str) -> float:
+    """Return the error of the share of crank angle that holds `ENERGY` of the energy."""
+    from compressor.vibration import energy_angle
+
+    force = by.kept["contact_force"].sel(joint=joint).values
+    error = series_error(by.kept, "contact_force", force, joint=joint)
+    size = math.sqrt(float(np.mean(by.high**2)))
+    if math.isnan(error) or not size:
+        return error
+    away = min(2.0 * error / size, 0.5 * ENERGY)
+    shares = (ENERGY - away, ENERGY, min(ENERGY + away, 1.0))
+    low, found, high = (energy_angle(by.high, share) for share in shares)
+    return max(high - found, found - low)
+
+
+def compared(big: Continuity, small: Continuity) -> str:
+    """Return the measures of a big end beside those of a small end, in words."""
+    return (
+        f"flight and impact {big.apart:.1%} and {small.apart:.1%} of the angle; "
+        f"{WINDOW:g}° windows hit {big.hit:.1%} and {small.hit:.1%}; {ENERGY:.0%} of the energy of "
+        f"F_x above order {ORDER} in {big.energy_angle:.0%} and {small.energy_angle:.0%} of the "
+        f"angle; Gini index {big.gini:.2f} and {small.gini:.2f}"
+    )
+
+
+def hit_share(table: xr.Dataset, joint: str, revolutions: int) -> float:
+    """Return the share of windows of `WINDOW` degrees, over the revolutions, that a joint hits
+    in.
+    """
+    counts = (table["joint"].values == joint) & (table["approach_speed"].values > SLOWEST)
+    angle = 360.0 * table["revolution"].values[counts] + table["crank_angle"].values[counts]
+    return np.unique(angle // WINDOW).size * WINDOW / (360.0 * revolutions)

@@ -1,20 +1,72 @@
 """Captions of `compsim plot`: sentences that say the numbers of what is drawn."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from compressor.analysis.contact_modes import MODES, contact_modes, mode_shares
-from compressor.analysis.contacts import joints_with_clearance
-from compressor.analysis.frame_forces import frame_forces, last_revolution, whole_revolutions
-from compressor.analysis.impacts import impacts
+from compressor.analysis.contacts import (
+    MODES,
+    UNKNOWN,
+    contact_modes,
+    impacts,
+    joints_with_clearance,
+    mode_shares,
+)
 from compressor.analysis.orbit import orbit
-from compressor.analysis.paper_cases import SPOKEN
-from compressor.analysis.runs import case_of, settled_revolutions
-from compressor.analysis.shaking import ORDER, deviation_spectrum, sensor_envelope, shaking
-from compressor.analysis.swept_rows import SweptRow, rows_modes
-from compressor.analysis.words import plural
+from compressor.analysis.runs import SPOKEN, case_of, settled_revolutions
+from compressor.analysis.shaking import (
+    ORDER,
+    Shaking,
+    deviation_spectrum,
+    frame_forces,
+    last_revolution,
+    sensor_envelope,
+    shaking,
+    whole_revolutions,
+)
+from compressor.metrics import JOINTS
+
+
+def plural(count: int, thing: str) -> str:
+    """Return a number of things in words."""
+    return f"{count} {thing}" + ("s" if count != 1 else "")
+
+
+@dataclass(frozen=True)
+class SweptRow:
+    """One job: its value on the axis in words, and what its series tell.
+
+    `shaking` is None, and `problem` says why, where the job has none. `modes`: as `angle_modes`
+    gives them, None of ideal joints. `chaotic`: single lines hold for this course of the motion
+    only. `lubricated`: its joints have oil.
+    """
+
+    value: str
+    shaking: Shaking | None = None
+    modes: xr.Dataset | None = None
+    problem: str = ""
+    chaotic: bool = False
+    lubricated: bool = False
+
+
+def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
+    """Return the most frequent modes by joint that has clearance anywhere, (rows, bins of the
+    angle).
+
+    Integers, -1 where nothing is known; {} where no joint has clearance.
+    """
+    known = [row.modes for row in rows if row.modes is not None]
+    found = {}
+    for joint in (one for one in JOINTS if any(one in modes["joint"] for modes in known)):
+        table = np.full((len(rows), known[0].sizes["angle"]), UNKNOWN)
+        for number, row in enumerate(rows):
+            if row.modes is not None and joint in row.modes["joint"]:
+                table[number] = row.modes["majority"].sel(joint=joint).values
+        found[joint] = table
+    return found
+
 
 Twin = xr.Dataset | None  # the same machine without clearance
 

@@ -10,22 +10,22 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from compressor.cases.checked import checked
-from compressor.cases.combinations import Block, Row
-from compressor.cases.conditions import NoComparison, Test, comparison
+from compressor.cases.checks import SWEEP, checked, row_of, suggestion
 from compressor.cases.keys import Leaves
 from compressor.cases.parameter import Problem, shown
-from compressor.cases.shorthands import row_of
+from compressor.cases.sheet import Block, Row
 from compressor.cases.swept import (
     SAMPLED,
+    NoComparison,
     Sweep,
+    Test,
+    comparison,
     design,
     design_size,
     is_swept,
     sweep_of,
 )
 from compressor.cases.table import WORDS, outside_identity, table
-from compressor.cases.unknown import SWEEP, suggestion
 from compressor.cases.yaml_reader import FileProblem, Node
 
 MAX_EXCLUSIONS = 20

@@ -1,29 +1,104 @@
-"""The case: one fully resolved simulation, its identity, and the numbers that follow from it."""
+"""The case: one fully resolved simulation, its identity, and the numbers that follow from it.
+
+Numbers that have changed within one version of the model, for the cases that they changed for. A
+job's key holds the version of the model, which stays while most results do. Where the equations of
+a feature are mended, its line in `CHANGES` tells stored results of before from those of now.
+"""
 
 import contextlib
 import hashlib
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
-from compressor.cases.accuracy import ACCURACY, Targets, first_rung
-from compressor.cases.checked import checked_part, values_given
-from compressor.cases.conflicts import conflicts
+from compressor.cases.checks import (
+    SHORTHANDS,
+    SWEEP,
+    checked_part,
+    expanded,
+    meant,
+    stands_for,
+    values_given,
+    written_out,
+)
+from compressor.cases.conflicts import conflicts, values_read
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, with_law
-from compressor.cases.mechanism import filled_guide
-from compressor.cases.parameter import CaseError, Problem, shown
-from compressor.cases.revisions import MODEL_VERSION
-from compressor.cases.shorthands import SHORTHANDS, expanded, stands_for
+from compressor.cases.optional_groups import filled_body, filled_guide, filled_wear
+from compressor.cases.parameter import ACCURACY, CaseError, Problem, Targets, first_rung, shown
 from compressor.cases.swept import FORMS
-from compressor.cases.synonyms import written_out
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
-from compressor.cases.unknown import SWEEP, meant
-from compressor.cases.vibration import filled_body
-from compressor.cases.wear import filled_wear
+from compressor.cases.yaml_reader import resolved
 from compressor.metrics import JOINTS
+
+MODEL_VERSION = "2"  # part of a job's key: see `compressor.cases.case`
+REVISION = 1
+MODEL = f"{MODEL_VERSION}.{REVISION}"  # which results are stored with
+# what the text of a case holds if it may be one of `CHANGES`: quick to search a store for
+SUSPECT = re.compile(rb'"(drive|lubricant|rod|guide|body)\\?": |lugre|"signals\\?": true')
+
+
+class Change(NamedTuple):
+    """What a revision has changed, and for which cases, by their nested values."""
+
+    revision: int
+    what: str
+    affects: Callable[[Mapping[str, Any]], bool]
+
+
+def _rubs_on_the_pin(values: Mapping[str, Any]) -> bool:
+    """Return whether friction puts a couple on the crosshead pin that an ideal guide bears."""
+    friction = values.get("friction")
+    if not friction or (values.get("guide") or {}).get("clearance_mm"):
+        return False
+    return values["joint"] in ("small_end", "both") or bool(friction.get("ideal_joints"))
+
+
+def _restitutes(values: Mapping[str, Any]) -> bool:
+    play = (values.get("guide") or {}).get("clearance_mm")
+    return bool(play and values["contact"].get("restitution"))
+
+
+def _has_no_lugre_friction(values: Mapping[str, Any]) -> bool:
+    friction = values.get("friction") or {}
+    return friction.get("law") == "lugre" and not (friction["static"] and friction["dynamic"])
+
+
+CHANGES = (
+    Change(1, "times, torques and forces of a drive", lambda values: "drive" in values),
+    Change(1, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
+    Change(1, "losses of an elastic rod", lambda values: "rod" in values),
+    Change(1, "damping of the crosshead in its guide", _restitutes),
+    Change(1, "LuGre friction without a coefficient", _has_no_lugre_friction),
+    Change(
+        1, "moment on the guide",
+        lambda values: ("body" in values or bool(values["output"].get("signals")))
+        and _rubs_on_the_pin(values),
+    ),
+)  # fmt: skip
+
+
+def changes_since(model: str, values: Mapping[str, Any]) -> list[str]:
+    """Return what has changed for a case since a model that computed it.
+
+    model: the attribute `model_version` of a result, such as "2" or "2.1"; values: of the case,
+    nested as by `Case.values`.
+    """
+    revision = int(model.partition(".")[2] or 0)
+    return [one.what for one in CHANGES if revision < one.revision and one.affects(values)]
+
+
+def model_of(values: Mapping[str, Any]) -> str:
+    """Return the version and the last revision of the model that changed the numbers of a case.
+
+    The version alone where none did.
+    """
+    last = max((one.revision for one in CHANGES if one.affects(values)), default=0)
+    return f"{MODEL_VERSION}.{last}" if last else MODEL_VERSION
+
 
 # MODEL_VERSION is that of equations and of the meaning of what is stored; part of a job's identity.
 # Results of one key agree within the sum of their error bars, whichever version of the program made
@@ -406,3 +481,60 @@ def _groups_outside_identity() -> tuple[str, ...]:
     """Return the keys at the top of a case file of which nothing is part of a job's identity."""
     inside = {key.partition(".")[0] for key in table().keys() - outside_identity()}
     return tuple(sorted({key.partition(".")[0] for key in outside_identity()} - inside))
+
+
+def with_ideal_joints(case: Case) -> Case:
+    """Return the case without clearance, and without oil and wear, which only a clearance can
+    have.
+    """
+    return replace(case, joint="none", lubricant=None, wear=None)
+
+
+WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
+
+
+def to_yaml(case: Case, brief: bool = False) -> str:
+    """Return a resolved case as the text of a case file, which reads back to an equal case.
+
+    Values that the case does not read are left out. A job of a sweep over loads or laws may have
+    some that are not the defaults: its text reads back to a case of the same physics and another
+    key. brief: without the name and all that is so by default; it then reads back to an equal job.
+    """
+    values = _needed(values_read(case)) if brief else values_read(case)
+    lines = []
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            lines.append(f"{key}:")
+            lines += [f"  {name}: {_scalar(item)}" for name, item in value.items()]
+        else:
+            lines.append(f"{key}: {_scalar(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _needed(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of a case without those that follow from the others."""
+    case, kept = Case.resolve(values), dict(values)
+    for key, value in values.items():
+        for name in value if isinstance(value, Mapping) else ():
+            rest = {inner: item for inner, item in kept[key].items() if inner != name}
+            if _is_same(kept | {key: rest or WORDS.get(key, {})}, case):
+                kept[key] = rest or WORDS.get(key, {})
+        rest = {outer: item for outer, item in kept.items() if outer != key}
+        if key == "name" or _is_same(rest, case):
+            kept = rest
+    return kept or {"load": case.load}  # a file needs a key
+
+
+def _is_same(values: Mapping[str, Any], case: Case) -> bool:
+    """Return whether values make a case."""
+    try:
+        return Case.resolve({"name": case.name, **values}) == case
+    except CaseError:
+        return False
+
+
+def _scalar(value: Any) -> str:
+    """Return a value in YAML: as JSON, but plain where a word reads back as text."""
+    if isinstance(value, str) and WORD.fullmatch(value) and resolved(value) == value:
+        return value
+    return json.dumps(value)

@@ -1,26 +1,278 @@
-"""What does not fit together in a case whose values are each in range."""
+"""What does not fit together in a case whose values are each in range, and keys nobody reads.
+
+Keys that a case does not read: the one rule, of which `keys_read` has the jobs of files. Who reads
+a key stands in the table of parameters (`read`). Where a file gives a key and none of the jobs it
+is given for reads it, the file's author believes in what does not count.
+
+Where a case leaves the range that the program was judged on. Extreme scenes are drawn from it
+(`compressor.studies.stress.extremes`); it stands in the table of parameters as `judged`.
+"""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from types import FunctionType
 from typing import Any, cast
 
-from compressor.cases.law_conflicts import (
-    contact_conflicts,
-    friction_conflicts,
-    law_conflicts,
-)
-from compressor.cases.mechanism_conflicts import (
-    lubricant_conflicts,
-    mechanism_conflicts,
-    wear_conflicts,
-)
-from compressor.cases.one_way import back_action, moving_mass
-from compressor.cases.parameter import IMPLAUSIBLE, Problem
-from compressor.cases.table import GROUPS, Settings, table
-from compressor.cases.unread import unread_values
+from compressor.cases.checks import SHORTHANDS, row_of, value_in
+from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
+from compressor.cases.optional_groups import GREATEST_RATIO, LEAST_RATIO
+from compressor.cases.parameter import IMPLAUSIBLE, Problem, Reader
+from compressor.cases.table import GROUPS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
+
+
+def back_action(case: Settings, axis: str, frequency: Any) -> Any:
+    """Return the relative change of the shaking force by the motion of the body it drives, complex.
+
+    A body that accelerates by a takes the moving parts m along, so that the force X on it becomes
+    X - m a. With a = -X G / M, G = f^2 / (f_n^2 - f^2 + 2 i zeta f f_n), the change is m G / M of
+    the force, and the response of a body coupled both ways is that of one driven one way over
+    1 - m G / M. Exact for ideal joints.
+
+    frequency: Hz, a number or an array; axis: x or y.
+    """
+    body = case.body
+    assert body is not None
+    natural = getattr(body, f"frequency_{axis}_Hz")
+    stiffness = natural**2 - frequency**2 + 2j * body.damping_ratio * frequency * natural
+    return moving_mass(case) / body.mass_kg * frequency**2 / stiffness
+
+
+def moving_mass(case: Settings) -> float:
+    """Return the rod and reciprocating parts (kg), which a body takes along in both directions."""
+    return case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg
+
+
+def conditions(key: str) -> list[tuple[str, Reader]]:
+    """Return what holds where a case reads a key, each with what is unread where it does not."""
+    group = key.partition(".")[0]
+    whole = group_readers(group) if group in GROUPS else ()
+    row = table().get(key)  # a group's name has none
+    own = row.read[len(whole) :] if row else ()
+    return [*((group, one) for one in whole), *((key, one) for one in own)]
+
+
+def reads(case: Settings, key: str) -> bool:
+    """Return whether a case reads a key."""
+    return all(reader.reads(case) for _, reader in conditions(key))
+
+
+def is_off(key: str, value: Any) -> bool:
+    """Return whether a value says that there is none of something, as is so by default."""
+    row = row_of(key)
+    return not value and not (row and row.default)
+
+
+def problem_of(key: str, reader: Reader) -> Problem:
+    """Return the problem of a key or group that nothing reads."""
+    what = "group" if key in GROUPS and key not in SHORTHANDS else "key"
+    remedy = f"set that, or leave the {what} out"
+    return Problem(key, f"nothing reads this {what}: it needs {reader.words}; {remedy}")
+
+
+def unread_values(case: Settings, values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Find the keys of one case that it does not read; values: those given, by dotted key.
+
+    A value that the case would have without it passes, so that `Case.values` reads back; a group
+    that a case has only if it is named does not.
+    """
+    for key, value in values.items():
+        for unread, reader in conditions(key):
+            if reader.reads(case):
+                continue
+            named = unread in WORDS and WORDS[unread]
+            if not is_off(key, value) and (named or value != default_in(case, key)):
+                yield problem_of(unread, reader)
+            break
+
+
+def values_read(case: Any) -> dict[str, Any]:
+    """Return the values of a case, nested, without those that it does not read."""
+    found: dict[str, Any] = {}
+    for key, value in case.values().items():
+        if not isinstance(value, Mapping):
+            found[key] = value
+        elif inner := {name: v for name, v in value.items() if reads(case, f"{key}.{name}")}:
+            found[key] = inner
+    return found
+
+
+def default_in(case: Settings, key: str) -> Any:
+    """Return the value that a case would have of a key if it were not given."""
+    row = row_of(key)
+    group, _, name = key.rpartition(".")
+    within = getattr(case, group, None) if row else None
+    if row is None or row.default is not None or within is None or not isinstance(case, Settings):
+        return row.default if row else None
+    without: Any = {group: replace(within, **{name: None})}
+    return getattr(getattr(replace(case, **without), group), name)
+
+
+OF_CONTACT = ("contact.", "friction.")  # keys that ideal joints do not read
+# keys that leave a thing out at 0, as a case without the group does
+ABSENT_AT_ZERO = (
+    "clearance_mm.big_end", "clearance_mm.small_end", "guide.clearance_mm", "guide.friction",
+)  # fmt: skip
+
+
+def judged_range(key: str) -> tuple[float, float]:
+    """Return the range of a key, in its unit, that the program was judged on.
+
+    Raises KeyError for a key without one.
+    """
+    found = table()[key].judged
+    if found is None:
+        raise KeyError(key)
+    return found
+
+
+def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
+    """Return the keys of a case whose values are outside the judged range, each with a sentence.
+
+    values: nested, of one case (`Case.values`). A sentence continues the key: "62 kg is outside
+    the range that the program was judged on, 0.1 to 50 kg". Clearances of both joints are one key.
+    """
+    found = {}
+    for key, value, (low, high) in _judged_values(values):
+        if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+            unit = f" {table()[key].unit}".replace("^p", "^1.5").rstrip()
+            shared = "clearance_mm" if key.startswith("clearance_mm.") else key
+            found[shared] = (
+                f"{value:g}{unit} is outside the range that the program was judged on, "
+                f"{low:g} to {high:g}{unit}"
+            )
+    return found
+
+
+def _judged_values(values: Mapping[str, Any]) -> Iterator[tuple[str, float, tuple[float, float]]]:
+    """Yield the keys with a judged range that a case reads, their values, and the ranges."""
+    ideal = values.get("joint") == "none"
+    other_exponent = value_in(values, "contact.exponent") != 1.5  # the stiffness has another unit
+    for key, row in table().items():
+        value = value_in(values, key) if row.judged else None
+        if row.judged is None or not isinstance(value, int | float) or isinstance(value, bool):
+            continue
+        if value == 0.0 and key in ABSENT_AT_ZERO:
+            continue
+        if ideal and key.startswith(OF_CONTACT):
+            continue
+        if key == "contact.stiffness_N_per_mm15" and other_exponent:
+            continue
+        yield key, float(value), row.judged
+
+
+def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Find what a law of contact cannot do without."""
+    law, restitution = case.contact.law, case.contact.restitution
+    if law in CYLINDRICAL:
+        yield from cylinder_conflicts(case)
+    if law in RESTITUTING and restitution is None:
+        needed = f"is needed with contact.law: {law}; give it, such as 0.9"
+        yield Problem("contact.restitution", needed)
+
+
+def contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    contact = case.contact
+    if contact.materials is not None and contact.exponent != 1.5:
+        yield Problem(
+            "contact.exponent",
+            f"is {contact.exponent:g}, but Eq. 15's stiffness from materials needs exponent 1.5: "
+            "leave it out, or give stiffness_N_per_mm15 in place of materials",
+        )
+
+
+def friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    friction = case.friction
+    if friction and friction.law == "lugre" and bool(friction.static) != bool(friction.dynamic):
+        zero = "dynamic" if friction.static else "static"
+        yield Problem(
+            f"friction.{zero}",
+            "is 0 and the other coefficient is not: LuGre's bristles divide by it; give more than "
+            "0, or 0 for both",
+        )
+    if not friction or law_of(friction) not in READ_BY["friction"]["friction_velocity_mm_per_s"]:
+        return
+    if friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
+        yield Problem(
+            "friction.friction_velocity_mm_per_s",
+            f"{friction.friction_velocity_mm_per_s:g} mm/s must exceed the "
+            f"stiction_velocity_mm_per_s, {friction.stiction_velocity_mm_per_s:g} mm/s",
+        )
+
+
+def cylinder_conflicts(case: Settings) -> Iterator[Problem]:
+    """Yield a pin in a bore is known by its length and by what both are made of."""
+    contact = case.contact
+    needed = f"is needed with contact.law: {contact.law}; give it, such as"
+    if contact.length_mm is None:
+        yield Problem("contact.length_mm", f"{needed} 20")
+    if contact.materials is None and contact.modulus_GPa is None:
+        yield Problem("contact.materials", f"{needed} [steel, copper], or give modulus_GPa")
+
+
+SLIM = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
+
+
+def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Find a bearing for which the film's numbers do not hold."""
+    if not case.lubricant:
+        return
+    for joint in JOINTS:
+        width = 2.0 * case.machine.pin_radius(joint)
+        ratio = case.lubricant.bearing_length_mm / width
+        if case.joint in (joint, "both") and not LEAST_RATIO <= ratio <= GREATEST_RATIO:
+            yield Problem(
+                "lubricant.bearing_length_mm",
+                f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
+                f"hold from {LEAST_RATIO:g} to {GREATEST_RATIO:g} times",
+            )
+
+
+def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Find what a bore that wears cannot have: oil, and a limit that is reached already."""
+    if not case.wear:
+        return
+    if case.lubricant:
+        yield Problem(
+            "wear", "of a bore that runs dry is known, and the film's numbers are those of a round "
+            "one: leave out lubricant or wear",
+        )  # fmt: skip
+    most = max(case.clearance_mm.big_end, case.clearance_mm.small_end)
+    if case.wear.limit_mm is not None and case.wear.limit_mm <= most:
+        yield Problem(
+            "wear.limit_mm", f"{case.wear.limit_mm:g} mm must be more than the clearance, {most:g} "
+            "mm: it is what the clearance grows to",
+        )  # fmt: skip
+
+
+def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+    """Yield what does not fit together in guide, drive, rod and the friction of ideal joints."""
+    machine, friction = case.machine, case.friction
+    if case.drive and case.body:
+        yield Problem(
+            "body", "moves in equal steps of time, which a drive whose speed gives way has not: "
+            "leave out body or drive",
+        )  # fmt: skip
+    if case.rod:
+        if machine.rod_centre_mm != machine.rod_length_mm / 2:
+            yield Problem(
+                "machine.rod_centre_mm", "an elastic rod is a uniform bar: leave the key out"
+            )
+        least = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2 / 12
+        if (machine.rod_inertia_kg_m2 or 0.0) < SLIM * least:
+            yield Problem(
+                "machine.rod_inertia_kg_m2",
+                f"an elastic rod is a uniform bar, which has {least:.4g} kg m2 at least: leave "
+                "the key out",
+            )
+    if friction and friction.ideal_joints and friction.law == "lugre":
+        yield Problem(
+            "friction.ideal_joints", "have no bristles, as friction.law: lugre needs: choose "
+            "another law, or leave the key out",
+        )  # fmt: skip
+
 
 # One key, and the other whose place it takes; a case gives one of the two.
 IN_PLACE_OF = (

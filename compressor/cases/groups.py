@@ -6,10 +6,9 @@ units, which stand in the field's name; `compressor.solve.si_record` turns them 
 
 from dataclasses import dataclass
 
-from compressor.cases.accuracy import ACCURACY
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
-from compressor.cases.parameter import choice, documented, parameter
-from compressor.cases.readers import (
+from compressor.cases.parameter import (
+    ACCURACY,
     BIG_CLEARANCE,
     BIG_END,
     CLEARANCE,
@@ -23,6 +22,9 @@ from compressor.cases.readers import (
     SMALL_RUBBING,
     STIFFNESS,
     by_law,
+    choice,
+    documented,
+    parameter,
 )
 
 COMPILED = ("auto", "DOPRI5", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's

@@ -8,14 +8,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from compressor.cases.accuracy import TARGET
 from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
+from compressor.cases.checks import DOUBLES, SHORTHANDS, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.parameter import NAME, Parameter
+from compressor.cases.parameter import NAME, TARGET, Parameter
 from compressor.cases.regimes import ROWS, followable
-from compressor.cases.shorthands import SHORTHANDS, row_of
 from compressor.cases.swept import FORMS, SAMPLED, is_number
-from compressor.cases.synonyms import DOUBLES
 from compressor.cases.table import GROUPS, WORDS, outside_identity, table
 from compressor.metrics import METRICS
 

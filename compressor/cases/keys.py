@@ -8,12 +8,22 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
 
+from compressor.cases.checks import (
+    DOUBLES,
+    MAPPINGS,
+    SHORTHANDS,
+    TWICE,
+    accepted,
+    by_joint,
+    halved,
+    lacking_joint,
+    no_mapping,
+    stands_for,
+    unknown,
+)
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.shorthands import SHORTHANDS, stands_for
 from compressor.cases.swept import FORMS
-from compressor.cases.synonyms import DOUBLES, TWICE, by_joint, halved, lacking_joint
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
-from compressor.cases.unknown import MAPPINGS, accepted, no_mapping, unknown
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shortened
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long

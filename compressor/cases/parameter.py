@@ -1,22 +1,159 @@
-"""One row of the table of parameters, and what a value of it must satisfy.
+"""One row of the table of parameters: its readers, and what a value of it must satisfy.
+
+Who reads a key: conditions on a case, with the words that a case file has for them. The fields of
+the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`. A key without a
+reader is read by every job. `compressor.cases.unread` refuses what no job reads.
 
 `compressor.cases.table` builds the whole table from these; units are those of the case file, and
 `to_si` turns a value into SI.
+
+Accuracy as it may be asked for: in words that promise, or in numbers by metric. Tolerances come
+from the measured trade of tests/results/accuracy.json (make accuracy), for `method: auto`.
 """
 
 import math
 import re
 import reprlib
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache
 from inspect import cleandoc
 from typing import Any, TypeVar
 
-from compressor.cases.readers import Reader
+from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY, law_of
+from compressor.metrics import METRICS
 from compressor.program import CompsimError
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A condition under which a case reads a key; `words`: what a case file sets for it.
+
+    `reads` takes the case. Where numbers of the case are columns (`compressor.cases.sheet`), its
+    comparisons raise `Mixed` as theirs do.
+    """
+
+    words: str
+    reads: Callable[[Any], Any]
+
+
+def has_clearance(case: Any) -> bool:
+    """Return whether a joint has clearance."""
+    sizes = case.clearance_mm
+    return bool(sizes.big_end > 0) or bool(sizes.small_end > 0)
+
+
+def has_play(case: Any) -> bool:
+    """Return whether the guide has clearance."""
+    return bool(case.guide and case.guide.clearance_mm > 0)
+
+
+def has_ideal_friction(case: Any) -> bool:
+    """Return whether joints without clearance rub."""
+    return bool(case.friction and case.friction.ideal_joints)
+
+
+def hears_casing(case: Any) -> bool:
+    """Return whether a sensor stands where a casing mode is heard."""
+    return bool(case.body and case.sensor and case.sensor.place != "body")
+
+
+GAS = Reader("load: gas", lambda case: case.load == "gas")
+SPRING = Reader("load: spring", lambda case: case.load == "spring")
+A_JOINT = Reader("joint: big_end, small_end or both", lambda case: case.joint != "none")
+BIG_END = Reader("joint: big_end or both", lambda case: case.joint in ("big_end", "both"))
+SMALL_END = Reader("joint: small_end or both", lambda case: case.joint in ("small_end", "both"))
+CLEARANCE = Reader("clearance_mm above 0 at a joint", has_clearance)
+BIG_CLEARANCE = Reader(
+    "clearance_mm above 0 at the big end", lambda case: case.clearance_mm.big_end > 0
+)
+SMALL_CLEARANCE = Reader(
+    "clearance_mm above 0 at the small end", lambda case: case.clearance_mm.small_end > 0
+)
+IDEAL_JOINT = Reader(
+    "a joint without clearance",
+    lambda case: not case.clearance_mm.big_end > 0 or not case.clearance_mm.small_end > 0,
+)
+PLAY = Reader("guide.clearance_mm above 0", has_play)
+CONTACT = Reader(
+    f"{CLEARANCE.words} or in the guide", lambda case: has_clearance(case) or has_play(case)
+)
+RUBBING = Reader(
+    f"{CLEARANCE.words} or friction.ideal_joints: true",
+    lambda case: has_clearance(case) or has_ideal_friction(case),
+)
+SMALL_RUBBING = Reader(
+    f"{SMALL_CLEARANCE.words}, or friction.ideal_joints: true",
+    lambda case: case.clearance_mm.small_end > 0 or has_ideal_friction(case),
+)
+CORNER_DAMPED = Reader(
+    "a contact.law without a restitution",
+    lambda case: case.contact.restitution is None,
+)
+CORNER_RESTITUTION = Reader(
+    "a contact.law with a restitution", lambda case: case.contact.restitution is not None
+)
+GUIDE = Reader(
+    "guide.friction above 0 or guide.clearance_mm above 0",
+    lambda case: case.guide and (case.guide.friction > 0 or case.guide.clearance_mm > 0),
+)
+GUIDE_FRICTION = Reader(
+    "guide.friction above 0", lambda case: case.guide and case.guide.friction > 0
+)
+MATERIALS = Reader(
+    "contact.materials, such as [steel, steel]", lambda case: case.contact.materials is not None
+)
+DAMPED = Reader(
+    "contact.restitution", lambda case: case.contact.restitution is not None
+)  # which johnson and liu need not have
+STIFFNESS = (
+    CLEARANCE,
+    Reader(
+        f"another contact.law than {' or '.join(CYLINDRICAL)}",
+        lambda case: case.contact.law not in CYLINDRICAL,
+    ),
+)
+BODY = Reader("body: true", lambda case: case.body is not None)
+STEADY = Reader("body.start: steady", lambda case: case.body and case.body.start == "steady")
+ALONG_X = Reader(
+    "body.freedoms: x, xy or xy_rocking", lambda case: case.body and case.body.freedoms != "y"
+)
+ALONG_Y = Reader(
+    "body.freedoms: y, xy or xy_rocking", lambda case: case.body and case.body.freedoms != "x"
+)
+ROCKING = Reader(
+    "body.freedoms: xy_rocking", lambda case: case.body and case.body.freedoms == "xy_rocking"
+)
+CASING_HEARD = Reader("sensor.place: guide or bearing", hears_casing)
+CASING = (
+    CASING_HEARD,
+    Reader("body.casing: true", lambda case: case.body and case.body.casing),
+)
+RANDOM = Reader(
+    "sensor.noise_m_per_s2 or sensor.speed_jitter above 0",
+    lambda case: case.sensor and (case.sensor.noise_m_per_s2 > 0 or case.sensor.speed_jitter > 0),
+)
+SERIES = Reader("output.keep: series", lambda case: case.output.keep == "series")
+
+
+def by_law(group: str, key: str) -> Reader:
+    """Return the reader of a key that some laws of contact or friction alone read."""
+    readers = READ_BY[group][key]
+    every = CONTACT_LAWS if group == "contact" else FRICTION_LAWS
+    others = [law for law in every if law not in readers]
+    if len(others) < len(readers):
+        words = f"another {group}.law than {' or '.join(others)}"
+    else:
+        words = f"{group}.law: {' or '.join(readers)}"
+
+    def reads(case: Any) -> bool:
+        chosen = getattr(case, group)
+        return bool(chosen) and law_of(chosen) in readers
+
+    return Reader(words, reads)
+
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -316,3 +453,51 @@ def parameter_table(rows: Iterable[Parameter]) -> str:
         )  # fmt: skip
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+@dataclass(frozen=True)
+class Tier:
+    """What a word stands for: the error that it promises, and the tolerance of the first run.
+
+    `promise`: relative L2 error of acceleration after settling. `rtol` decides what a run costs,
+    not what it keeps.
+    """
+
+    rtol: float
+    promise: float
+
+
+ACCURACY = {
+    "draft": Tier(1e-5, 2e-2),
+    "standard": Tier(1e-6, 5e-3),
+    "fine": Tier(1e-8, 1e-4),
+    "reference": Tier(5e-11, 1e-6),
+}
+LOOSEST, TIGHTEST = 2e-4, 1e-12  # of first runs for accuracy by number, and of any run for it
+FIRST = 0.01  # of the error asked for: the first tolerance. Bars are some 26 rtol in the median
+
+TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")
+
+Targets = tuple[tuple[str, float], ...]  # (metric, greatest relative error), by name
+
+
+def first_rung(targets: Targets) -> float:
+    """Return the tolerance of the first run where accuracy is asked for by number."""
+    return min(LOOSEST, *(FIRST * target for _, target in targets))
+
+
+def checked_targets(key: str, value: Mapping[Any, Any], problems: list[Problem]) -> Targets:
+    """Return the accuracy by number as a case holds it; what is wrong with it joins `problems`."""
+    if not value:
+        problems.append(Problem(key, "needs a metric, such as {peak_acceleration: 0.01}"))
+    good = []
+    for name, target in value.items():
+        if name not in METRICS:
+            near = get_close_matches(str(name), METRICS, n=1)
+            hint = f"did you mean {near[0]}?" if near else "metrics are " + ", ".join(METRICS)
+            problems.append(Problem(f"{key}.{name}", f"unknown metric; {hint}"))
+        elif message := TARGET.check(target):
+            problems.append(Problem(f"{key}.{name}", message))
+        else:
+            good.append((name, float(target)))
+    return tuple(sorted(good))

@@ -10,12 +10,11 @@ from fractions import Fraction
 from typing import Any
 
 from compressor.cases.case import Case
+from compressor.cases.checks import SHORTHANDS, row_of, suggestion
 from compressor.cases.keys import Leaves, covers
 from compressor.cases.parameter import Parameter, shown
-from compressor.cases.shorthands import SHORTHANDS, row_of
 from compressor.cases.swept import between
 from compressor.cases.table import OF_JOINTS, table
-from compressor.cases.unknown import suggestion
 from compressor.cases.yaml_reader import FileProblem, Node, Place
 from compressor.metrics import JOINTS
 

@@ -22,10 +22,8 @@ from compressor.cases.groups import (
     Solve,
     Spring,
 )
-from compressor.cases.lubricant import Lubricant
-from compressor.cases.mechanism import Drive, Guide, Rod
-from compressor.cases.parameter import Parameter, choice
-from compressor.cases.readers import (
+from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
+from compressor.cases.parameter import (
     A_JOINT,
     BODY,
     CLEARANCE,
@@ -34,10 +32,10 @@ from compressor.cases.readers import (
     GUIDE,
     RUBBING,
     SPRING,
+    Parameter,
     Reader,
+    choice,
 )
-from compressor.cases.vibration import Body, Sensor
-from compressor.cases.wear import Wear
 
 MOST_REV = 50.0  # with `duration_rev: auto`
 

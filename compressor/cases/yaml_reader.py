@@ -8,15 +8,64 @@ only broken syntax and oversized files end it.
 
 import math
 import re
-from collections.abc import Iterator
+import shlex
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import yaml
 
-from compressor.cases.near_files import START, no_text, unreadable
 from compressor.cases.parameter import NO_VALUE
-from compressor.program import printable
+from compressor.program import CompsimError, did_you_mean, printable
+
+SUFFIXES = (".yaml", ".yml")
+RESULTS = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")  # how HDF5 and netCDF files begin
+START = "compsim init writes a case file to start from"
+MOST_LOOKED_AT = 1000  # entries of a folder
+MOST_NAMES = 5
+
+
+def unreadable(path: str, error: OSError | ValueError) -> str:
+    """Return why a file cannot be read, and what to do about it."""
+    message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+    if isinstance(error, FileNotFoundError):
+        return f"{message}; {_instead(Path(path))}"
+    if isinstance(error, IsADirectoryError):
+        inside = case_files(Path(path))
+        line = f"compsim run {shlex.quote(path.rstrip('/'))}/*.yaml"
+        return f"{message}; {f'it holds case files: {line}' if inside else 'give a case file'}"
+    return message
+
+
+def no_text(data: bytes) -> str:
+    """Return what is said of a file that is no text in UTF-8."""
+    if data.startswith(RESULTS):
+        return "is a file of results (netCDF or HDF5); a case file is YAML text"
+    return "is not UTF-8 text"
+
+
+def case_files(folder: Path) -> list[Path]:
+    """Return the case files in a folder, by their names."""
+    try:
+        entries = sorted(islice(folder.iterdir(), MOST_LOOKED_AT))
+    except OSError:
+        return []
+    return [path for path in entries if path.suffix in SUFFIXES and path.is_file()]
+
+
+def _instead(path: Path) -> str:
+    """Return what to give in place of a file that is not there."""
+    if "*" in path.name:
+        return f"no file has such a name; {START}"
+    found = {path.stem: path for path in [*case_files(Path("configs")), *case_files(path.parent)]}
+    near = did_you_mean(path.stem, found, found)
+    if near or not found:
+        return near or START
+    names = [*map(str, found.values())]
+    return f"there are {', '.join(names[:MOST_NAMES])}{', …' * (len(names) > MOST_NAMES)}"
+
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 20
@@ -271,3 +320,31 @@ class _Builder:
             self.note(event, owner, "a key is missing before the colon")
             return None
         return event.value
+
+
+class CaseFileError(CompsimError, ValueError):
+    """Case files that cannot be read; raised by `load_cases`. Also a ValueError.
+
+    `problems` lists everything wrong in all files, each with its `place` (file, line, column), its
+    dotted `key` and a `message`. The error's text has a line for each:
+
+    >>> import compressor
+    >>> with open("typo.yaml", "w") as file:
+    ...     print("joint: top\\nclearance: 0.2", file=file)
+    >>> try:
+    ...     compressor.load_cases("typo.yaml")
+    ... except compressor.CaseFileError as error:
+    ...     print(error)
+    typo.yaml:1:8: joint: needs none, big_end, small_end or both, not 'top'
+    typo.yaml:2:1: clearance: unknown key; did you mean clearance_mm?
+    """
+
+    exit_code = 2
+    prefix = ""  # each line begins with the file that it is about
+
+    def __init__(self, problems: Sequence[FileProblem]):
+        self.problems = sorted(set(problems))
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.problems))

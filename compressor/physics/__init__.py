@@ -1,11 +1,10 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
-from compressor.physics.contact import choose_laws, hysteresis
+from compressor.physics.contact import choose_laws, hysteresis, steepest
 from compressor.physics.contact_laws import elastic_form
 from compressor.physics.film import film_constants
-from compressor.physics.friction_laws import steepest
 from compressor.physics.kinematics import exact_motion, series_motion
-from compressor.physics.lane_runs import Run, march_side_by_side
+from compressor.physics.lane_march import Run, march_side_by_side
 from compressor.physics.loads import (
     complete,
     gas_corners,
@@ -14,7 +13,7 @@ from compressor.physics.loads import (
     segments,
     static_load,
 )
-from compressor.physics.march import march
+from compressor.physics.march import Status, Work, march, march_twins, new_walker, new_work
 from compressor.physics.mechanism_rows import STALLED, wear_all
 from compressor.physics.observe import (
     COLUMNS,
@@ -48,6 +47,4 @@ from compressor.physics.tally import (
     tally_energy,
     tally_step,
 )
-from compressor.physics.twin import march_twins
-from compressor.physics.walker import Status, Work, new_walker, new_work
 from compressor.physics.worn_bore import bore_fields

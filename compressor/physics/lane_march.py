@@ -6,22 +6,24 @@ or end, where the stiff partner is at work. A lane whose run has ended takes the
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from compressor.physics._jit import fused, inlined, jit
 from compressor.physics.kinematics import SMALL, crank_direction
-from compressor.physics.lane_control import control, move_on
-from compressor.physics.lane_rows import (
+from compressor.physics.lane_steps import (
     ALIVE,
     ATOL,
+    BETWEEN,
     BUDGET,
     CALL,
     COS,
     DEEPEST,
     END,
     ENERGY,
+    FIELDS,
     FIRST_FIELD,
     FLOWN,
     HELD,
@@ -32,11 +34,13 @@ from compressor.physics.lane_rows import (
     MAX_PENETRATION,
     MOMENT_SUM,
     NEXT_SAMPLE,
+    PAIR,
     PEAK,
     PEAK_KINETIC,
     PEAKED,
     PHASE,
     PLAIN,
+    R0,
     REFUSED,
     RELEASES,
     REMEMBERED,
@@ -58,14 +62,17 @@ from compressor.physics.lane_rows import (
     K,
     T,
     Z,
+    attempt_lanes,
+    look,
+    new_lanes,
 )  # fmt: skip
-from compressor.physics.lane_steps import BETWEEN, PAIR, R0, attempt_lanes, look
-from compressor.physics.lane_tally import judge, judge_closer, tally_lanes
-from compressor.physics.march import march
+from compressor.physics.lane_tally import control, judge, judge_closer, move_on, tally_lanes
+from compressor.physics.march import DONE, RUNNING, WALKER, Work, march, new_work
 from compressor.physics.observe import ACCELERATION, CRANK_POWER
+from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import FLOWS, STAGES, weights_at
 from compressor.physics.step_control import AUTO, STIFF_STEPS
-from compressor.physics.walker import RUNNING, Work
+from compressor.physics.tally import TALLY
 
 NO_TEST = 1e300  # steps without a test for stiffness, where another method is not wanted
 
@@ -303,3 +310,73 @@ def march_lanes(scene, W, k, runs, lane_jobs, most):
                 sample_lane(W, j, runs, lane_jobs[j], work_of(runs, lane_jobs[j]))
         control(scene, W, k)
         move_on(scene, W, k)
+
+
+OF_THE_LOAD = ("preload", "spring_stiffness", "spring_damping")
+
+
+class Run(NamedTuple):
+    """A run from its begin to its end, as `march` takes it; the names are those of `march`."""
+
+    walker: np.record
+    p: np.record
+    z: np.ndarray
+    size: np.ndarray
+    edges: np.ndarray
+    phases: np.ndarray
+    times: np.ndarray
+    states: np.ndarray
+    tally: np.record
+
+
+def fits(p: np.record) -> bool:
+    """Return whether runs of a record can march in lanes: default laws and powers of 1.5."""
+    default = p["laws"].size == 1
+    return bool(default and p["load"] != Load.GAS and p["exponent"] == 1.5)
+
+
+def march_side_by_side(runs: Sequence[Run], most: int) -> list[Run | None]:
+    """Return the runs of one scene with clearance at their ends, to the bit as by `march`.
+
+    None for one that does not fit into a lane, that failed, or that took more than `most` attempts
+    of a step. What the runs hold is left as it is.
+    """
+    fitting = [i for i, run in enumerate(runs) if fits(run.p)]
+    ended: list[Run | None] = [None] * len(runs)
+    if not fitting:
+        return ended
+    whole = gathered([runs[i] for i in fitting])
+    scene = (0,) * int(runs[0].p["scene"])
+    march_lanes(scene, new_lanes(), LANES, whole, np.full(LANES, -1), most)
+    for k, i in enumerate(fitting):
+        begin, samples = whole.places[k, 2:].tolist()
+        if whole.walkers["status"][k] == DONE:
+            ended[i] = runs[i]._replace(
+                walker=whole.walkers[k], z=whole.z[k], tally=whole.tallies[k],
+                states=whole.states[begin : begin + samples],
+            )  # fmt: skip
+    return ended
+
+
+def gathered(runs: Sequence[Run]) -> Runs:
+    """Return the runs in arrays."""
+    m, n = len(runs), runs[0].size.size
+    records = np.array([run.p for run in runs], RECORD).view(np.recarray)
+    walkers = np.array([run.walker for run in runs], WALKER).view(np.recarray)
+    size = np.array([run.size for run in runs])
+    counts = np.array([(run.phases.size, run.times.size) for run in runs])
+    places = np.stack([counts.cumsum(axis=0) - counts, counts], axis=2).reshape(m, 4)
+    fields = np.empty((m, len(FIELDS)))
+    for row, (name, joint) in enumerate(FIELDS):
+        column = records[name]
+        fields[:, row] = column[:, joint] if column.ndim > 1 else column
+    for name in OF_THE_LOAD:  # no load is a spring without force
+        fields[records["load"] == Load.NONE, FIELDS.index((name, 0))] = 0.0
+    return Runs(
+        walkers, records, np.array([run.tally for run in runs], TALLY).view(np.recarray),
+        np.array([run.z for run in runs]), walkers["rtol"][:, None] * size, size, fields, places,
+        np.concatenate([run.edges for run in runs]), np.concatenate([run.phases for run in runs]),
+        np.concatenate([run.times for run in runs]),
+        np.full((counts[:, 1].sum(), n), math.nan),
+        Work(*(np.zeros((m, *array.shape)) for array in new_work(n))),
+    )  # fmt: skip

@@ -3,24 +3,40 @@
 `march` advances a `Walker` by at most a number of steps and returns, so that Python can look at
 the clock; called again it goes on, to the bit. Steps land on load corners and on onsets of
 contact; the dense solution feeds the output grid and the tally.
+
+A second motion in step with the first: how fast neighbours part, without noise of step control. Two
+runs that choose their steps for themselves differ by their errors. Here the twin takes every step
+that the first motion took, by the same method and of the same length to the bit: twins that start
+alike stay alike to the bit, and what parts others are the steps' own laws. These are those of the
+motion only at a tight tolerance: at a loose one the explicit pair's steps cross the edge of
+stability now and then, where a difference grows by as much as rtol exceeds rounding.
 """
 
 import math
+from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import borrowed, jit, merged
+from compressor.physics._jit import borrowed, by_kind, jit, merged, square_root
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
+from compressor.physics.mechanism_rows import wear_at
 from compressor.physics.observe import (
     ACCELERATION,
     COLUMNS,
+    ECCENTRICITY,
     NEARNESS,
 )
-from compressor.physics.onset import LANDED, change, first_onset, remember
+from compressor.physics.onset import LANDED, change, first_onset, meeting, remember
+from compressor.physics.record import MECHANISM, zero
 from compressor.physics.runge_kutta import (
+    FLOWS,
     STAGES,
+    A,
+    P,
+    Pair,
     combine,
     error_norm,
     extend,
@@ -29,33 +45,148 @@ from compressor.physics.runge_kutta import (
     weights_at,
 )
 from compressor.physics.step_control import (
+    LEAST_ERROR,
     LEAST_STEP,
+    REST,
+    Mode,
     choose_method,
     controlled,
     first_step,
     refuse,
 )
-from compressor.physics.systems import beyond_model, derivative_with_flows, gauge, glance
+from compressor.physics.systems import (
+    beyond_model,
+    derivative_with_flows,
+    gauge,
+    glance,
+    write_eccentricities,
+)
 from compressor.physics.tally import (
+    lobatto,
     near_record,
     share_apart,
     tally_energy,
     tally_step,
 )
-from compressor.physics.walker import (
-    BEYOND_MODEL,
-    COARSE_WEIGHTS,
-    DONE,
-    NODE_WEIGHTS,
-    NODES,
-    NON_FINITE,
-    PENETRATION_IMPLAUSIBLE,
-    RUNNING,
-    STEP_UNDERFLOW,
-    WEIGHTS,
-    Work,
+
+NODES, WEIGHTS = lobatto(5)  # at which a step is observed
+COARSE_WEIGHTS = np.zeros(NODES.size)  # at its ends and in its middle alone
+COARSE_WEIGHTS[::2] = lobatto(3)[1]
+# of the stages of each explicit pair, at these nodes: (pair, node, stage)
+NODE_WEIGHTS = np.array([[P[pair] @ s ** np.arange(1, 5) for s in NODES] for pair in Pair])
+NODE_WEIGHTS[:, -1] = A[:, -1]
+
+
+class Status(IntEnum):
+    """How a walker stands."""
+
+    RUNNING = 0
+    DONE = 1
+    NON_FINITE = 2
+    STEP_UNDERFLOW = 3
+    PENETRATION_IMPLAUSIBLE = 4
+    BEYOND_MODEL = 5  # as of `mechanism_rows.beyond_model`
+
+
+# numba wants plain integers
+RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE, BEYOND_MODEL = map(int, Status)
+
+WALKER = np.dtype(
+    [
+        ("pair", "i8"),
+        ("status", "i8"),
+        ("t", "f8"),
+        ("h", "f8"),  # the next step's length; 0: to be chosen
+        ("error", "f8"),  # of the last accepted step: logarithm of its norm
+        ("fresh", "i8"),  # whether dz/dt at t is still to be evaluated
+        ("observed", "i8"),  # whether work.row holds what is observed at t, in this phase
+        ("laid", "i8"),  # whether work.dense holds the step's interpolant
+        ("landing", "f8"),  # length of the step that ends on the onset ahead, or 0
+        ("landed", "i8"),  # whether the last step ended on an onset
+        ("segment", "i8"),
+        ("sample", "i8"),  # next output sample
+        ("steps", "i8"),
+        ("taken", "f8"),  # length of the last accepted step
+        ("evaluations", "i8"),
+        ("rejected", "i8"),
+        ("onsets", "i8"),
+        ("watch", "i8"),  # whether onsets of contact are watched
+        ("mode", "i8"),  # Mode
+        ("stiff", "i8"),  # whether the present step is the stiff partner's
+        ("held", "i8"),  # explicit steps in a row that stability has held
+        ("calm", "i8"),  # stiff steps in a row that an explicit method could have h
+        ("rest", "i8"),  # steps until stiffness is tested again
+        ("pause", "i8"),  # the rest after the last change back
+        ("gain", "f8"),  # stable explicit steps' worth that stiff ones have saved since the change
+        ("rtol", "f8"),
+        ("settle", "f8"),
+        ("contact_step", "f8"),  # s: a step that resolves the contact's own frequency
+        ("deepest", "f8"),  # m: penetration beyond which the run stops
+    ],
+    align=True,
 )
-from compressor.physics.wear_step import wear_step
+
+
+class Work(NamedTuple):
+    """Arrays that a march works in; between calls the first row of `k` and `row` carry over."""
+
+    k: np.ndarray  # (7, n + 4): stages of the explicit pair, or increments of the stiff partner
+    new: np.ndarray  # (n + 4,)
+    column: np.ndarray  # (n + 4,)
+    jacobian: np.ndarray  # (n + 4, n)
+    dense: np.ndarray  # (5, n): the step's interpolant
+    weights: np.ndarray  # (7,): of the stages, at a fraction of the step
+    y: np.ndarray  # (n,)
+    rows: np.ndarray  # gauged at a step's nodes
+    apart: np.ndarray  # (2,): share of the step without contact, by joint
+    row: np.ndarray
+
+
+def new_walker(mode):
+    """Return a walker at the start of its first segment."""
+    walker = zero(WALKER)
+    walker["fresh"] = 1
+    walker["error"] = LEAST_ERROR
+    walker["mode"] = mode
+    walker["pause"] = REST // 2
+    walker["stiff"] = mode == Mode.STIFF
+    return walker
+
+
+def new_work(n):
+    """Return the arrays for a motion of n numbers (positions and rates)."""
+    size = n + FLOWS
+    return Work(
+        np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
+        np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
+        np.zeros(2), np.zeros(COLUMNS),
+    )  # fmt: skip
+
+
+@jit
+def nothing_worn(w, base, h, z, work, phase, p, tally):
+    """What sliding wears off where no bore can."""
+
+
+@jit
+def wear_by_step(w, base, h, z, work, phase, p, tally):
+    """Add to the tally what sliding wears off in the step just taken, by its nodes."""
+    if not p.sectors or w.t < w.settle:
+        return
+    n = work.y.size
+    for i in range(NODES.size):
+        for j in range(n):
+            work.y[j] = z[j] if i == 0 else work.new[j]
+        if 0 < i < NODES.size - 1:
+            if w.stiff:
+                interpolate(NODES[i], work.dense, work.y)
+            else:
+                combine(NODE_WEIGHTS[w.pair, i], h, z, work.k, work.y)
+        wear_at(ideal_after(base, NODES[i] * h, p), work.y, phase, WEIGHTS[i] * h, p, tally)
+
+
+wear_step = by_kind(MECHANISM, wear_by_step, nothing_worn)
+
 
 MIDDLE = NODES.size // 2
 INWARD = np.array([2, 1, 3])  # nodes between a step's ends, the middle first
@@ -338,3 +469,72 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         if met:  # what is seen at t is not what the step saw at its end
             w.observed = 0
         stop_beyond(w, z, tally, p)
+
+
+@jit
+def separation(t, y, other, p, rows):
+    """Return the greatest distance of two states' eccentricities, over the joint's clearance."""
+    write_eccentricities(t, y, p, rows[0])
+    write_eccentricities(t, other, p, rows[1])
+    worst = 0.0
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            i = ECCENTRICITY + 2 * joint
+            x, y_apart = rows[1, i] - rows[0, i], rows[1, i + 1] - rows[0, i + 1]
+            apart = square_root(x * x + y_apart * y_apart) / p.clearance[joint]
+            if not apart <= worst:  # keeps a nan
+                worst = apart
+    return worst
+
+
+@merged
+def follow(w, fellow, twin, work, atol, size, phase, p):
+    """Take the step that a walker took, from fellow.t on, in the twin's motion."""
+    if fellow.fresh:
+        derivative_with_flows(fellow.t, twin, phase, p, work.k[0])
+    base = crank_direction(fellow.t, p)
+    attempt(fellow, base, w.taken, twin, work, atol, size, phase, p)
+    for i in range(twin.size):
+        twin[i] = work.new[i]
+        work.k[0, i] = work.k[STAGES - 1, i]
+    fellow.fresh = w.fresh
+
+
+@merged
+def meet(w, z, twin, work, phase, p):
+    """Have the twin's contacts carry the speeds at which they meet where the first motion's do."""
+    n = work.y.size
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            place = 2 * p.freedoms + joint
+            _, speed = meeting(joint, w.t, z[:n], phase, p, work.y, work.column[:n])
+            if z[place] == max(speed, p.least_approach):  # it has met just now
+                _, speed = meeting(joint, w.t, twin[:n], phase, p, work.y, work.column[:n])
+                twin[place] = max(speed, p.least_approach)
+
+
+@jit
+def march_twins(
+    w, fellow, p, z, twin, work, twin_work, atol, size, edges, phases, times, states, tally,
+    rows, far, limit,
+):  # fmt: skip
+    """`march` with a twin in step, until they are `far` apart; fellow.status is then DONE.
+
+    fellow: the twin's walker, of the same pair; twin: its motion and flows, (n + 4,); far: as
+    share of the clearance; rows: scratch, (2, COLUMNS). The rest as for `march`.
+    """
+    n = size.size
+    for _ in range(limit):
+        if w.status != RUNNING:
+            return
+        steps, phase = w.steps, phases[w.segment]
+        fellow.t, fellow.stiff = w.t, w.stiff
+        # a plain 1 would be a type of its own, for which numba compiles all of march again
+        march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))
+        if w.steps > steps:
+            follow(w, fellow, twin, twin_work, atol, size, phase, p)
+            if has_chosen_laws(p) and w.landed:
+                meet(w, z, twin, twin_work, phase, p)
+            if not separation(w.t, z[:n], twin[:n], p, rows) <= far:
+                fellow.status = DONE
+                return

@@ -1,5 +1,4 @@
-"""The general slider-crank: any joint and the guide with or without clearance, the rod elastic or
-rigid, the crank's speed steady or not. physics/README.md, The general mechanism.
+"""The general slider-crank: joints and guide with or without clearance, the rod elastic or rigid.
 
 One system for all combinations. The bodies' velocities (`Row`) are linear in the rates of the
 coordinates (`record.Coordinate`), with a matrix of eleven columns; what a case does not name is a
@@ -10,20 +9,266 @@ The position x of the crosshead is no coordinate: it follows from the rod's leng
 crank, not times, are what integrators step through: with a speed that gives way, `t` is the crank's
 angle over the steady speed, and what passes in time passes the slower the faster the crank turns.
 So corners of the load and revolutions stay where they are.
+
+The rod as a body in the plane: rigid, or an elastic bar in a frame that floats with its ends. The
+frame's origin is the big end's bore, its first axis runs to the small end's. A point at the
+fraction s of the rod is displaced along it by two quadratic shapes, of its middle and of its small
+end, and across it by half a sine wave and a whole one: the modes of a bar with pinned ends. This is
+the model of Simeon's slider-crank (IVP test set, "crank"; linear stiffness). The mass of the
+displaced rod is spread evenly.
+
+Axes: u along the rod, (cos phi, -sin phi), and v across it, (sin phi, cos phi); the rod's spin is
+counter-clockwise, -phi'. Rows and columns of a mechanism's bodies: `mechanism.Row`.
+
+The crosshead's guide: friction of an ideal one, contact of the four corners in one with play. The
+crosshead is a block about its pin, `guide_length` to either side along x and `guide_height` along
+y. Each corner meets the plane of its side by ADAMS's IMPACT or, where the joints' law damps by a
+coefficient of restitution, by chi times the elastic force over the speed at which they met. A
+corner carries no such speed in the state: it follows from depth and rate (`approach_speed`).
 """
 
 import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from compressor.physics._jit import jit, square_root
+import numpy as np
+
+from compressor.physics._jit import fused, jit, square_root
 from compressor.physics.contact import NO_CONTACT, Contact, carried_by, joint_contact
-from compressor.physics.elastic_rod import BIG_SLOPE, MODES, SMALL_SLOPE, summed
+from compressor.physics.contact_laws import power, rise
 from compressor.physics.film import film
-from compressor.physics.guide import UNGUIDED, Guided, corners
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END, SMALL_END, Coordinate
 from compressor.physics.worn_bore import worn_contact
+
+MODES = 4  # two across, two along
+ACROSS = 2  # so many of them, the first, are across
+BIG_SLOPE = math.pi * np.array([1.0, 2.0, 0.0, 0.0])  # at the ends, times the length
+SMALL_SLOPE = math.pi * np.array([-1.0, 2.0, 0.0, 0.0])
+BENDING = math.pi**4 / 2.0 * np.array([1.0, 16.0])  # stiffness over E I / L^3
+AXIAL = np.array([[16.0, -8.0], [-8.0, 7.0]]) / 3.0  # over E A / L
+
+
+def shapes(s):
+    """Return the four shapes at fractions s of the rod, (4, s.size)."""
+    return np.array(
+        [np.sin(math.pi * s), np.sin(2.0 * math.pi * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)]
+    )
+
+
+def integrals():
+    """Return means over the rod: of the shapes, (4,), of those times s, and of products, (4, 4)."""
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    s, weights = (nodes + 1.0) / 2.0, weights / 2.0
+    each = shapes(s)
+    return each @ weights, each @ (weights * s), (each * weights) @ each.T
+
+
+FIRST, MOMENT, PRODUCT = integrals()
+
+
+@jit
+def summed(row, begin, end, q):
+    """Return the sum of a row of numbers times those of q, from begin to end."""
+    total = 0.0
+    for i in range(begin, end):
+        total += row[i] * q[i]
+    return total
+
+
+@jit
+def add_rod(axes, spin, q, rates, p, mass, force):
+    """Write the rod's mass matrix and the forces of its motion and weight; SI.
+
+    axes: u_x, u_y, v_x, v_y; spin: counter-clockwise; q, rates: of the modes, (4,), zeros of a
+    rigid rod; mass, force: of the bodies, (rows, rows) and (rows,), zeros before.
+    """
+    ux, uy, vx, vy = axes
+    m, length = p.rod_mass, p.rod_length
+    along = m * (p.rod_centre + summed(FIRST, ACROSS, MODES, q))
+    across = m * summed(FIRST, 0, ACROSS, q)
+    along_rate = m * summed(FIRST, ACROSS, MODES, rates)
+    across_rate = m * summed(FIRST, 0, ACROSS, rates)
+    polar = p.rod_inertia + m * p.rod_centre * p.rod_centre
+    polar += 2.0 * m * length * summed(MOMENT, ACROSS, MODES, q)
+    swelling = m * length * summed(MOMENT, ACROSS, MODES, rates)  # half the polar inertia's rate
+    for i in range(MODES):
+        begin, end = (0, ACROSS) if i < ACROSS else (ACROSS, MODES)
+        polar += m * q[i] * summed(PRODUCT[i], begin, end, q)
+        swelling += m * q[i] * summed(PRODUCT[i], begin, end, rates)
+    mass[1, 1], mass[2, 2], mass[3, 3] = m, m, polar
+    mass[1, 3] = mass[3, 1] = along * vx - across * ux
+    mass[2, 3] = mass[3, 2] = along * vy - across * uy
+    back = 2.0 * spin * across_rate + spin * spin * along
+    side = spin * spin * across - 2.0 * spin * along_rate
+    force[1] += back * ux + side * vx
+    force[2] += back * uy + side * vy - m * p.gravity
+    force[3] += -2.0 * spin * swelling - p.gravity * (along * vy - across * uy)
+    if p.elastic:
+        add_modes(axes, spin, q, rates, p, mass, force)
+
+
+@jit
+def add_modes(axes, spin, q, rates, p, mass, force):
+    """`add_rod` of the modes: their inertia, their coupling and the material's forces."""
+    ux, uy, vx, vy = axes
+    m = p.rod_mass
+    for i in range(MODES):
+        if i < ACROSS:
+            x, y, begin, end, others, last = vx, vy, 0, ACROSS, ACROSS, MODES
+            arm = p.rod_length * MOMENT[i] + summed(PRODUCT[i], others, last, q)
+            turning = spin * summed(PRODUCT[i], begin, end, q)
+            turning -= 2.0 * summed(PRODUCT[i], others, last, rates)
+        else:
+            x, y, begin, end, others, last = ux, uy, ACROSS, MODES, 0, ACROSS
+            arm = -summed(PRODUCT[i], others, last, q)
+            turning = spin * (p.rod_length * MOMENT[i] + summed(PRODUCT[i], begin, end, q))
+            turning += 2.0 * summed(PRODUCT[i], others, last, rates)
+        row = 4 + i
+        mass[1, row] = mass[row, 1] = m * FIRST[i] * x
+        mass[2, row] = mass[row, 2] = m * FIRST[i] * y
+        mass[3, row] = mass[row, 3] = m * arm
+        for j in range(begin, end):
+            mass[row, 4 + j] = m * PRODUCT[i, j]
+        force[row] += m * (spin * turning - p.gravity * FIRST[i] * y)
+        force[row] -= material(i, q, p) + p.rod_damping * material(i, rates, p)
+
+
+@jit
+def material(i, q, p):
+    """Return the elastic force (N) against mode i of the deflections q, (4,) m."""
+    if i < ACROSS:
+        return p.bending_stiffness * BENDING[i] * q[i]
+    return p.axial_stiffness * (AXIAL[i - 2, 0] * q[2] + AXIAL[i - 2, 1] * q[3])
+
+
+@jit
+def material_work(q, other, p):
+    """Return the sum of the elastic forces of deflections q times others, both (4,): twice the
+    energy (J).
+    """
+    total = 0.0
+    if p.elastic:
+        for i in range(MODES):
+            total += material(i, q, p) * other[i]
+    return total
+
+
+ROUNDS, AGREED = 30, 1e-14  # of Newton's method for the approach speed
+ELASTIC = 1e-3  # chi below which damping is too weak to change the approach speed
+
+
+class Guided(NamedTuple):
+    """What the guide does to the crosshead: forces (N), moment about the pin (N m), and energy."""
+
+    fx: float
+    fy: float
+    moment: float
+    stored: float  # J
+    damped: float  # W, lost in the normal direction
+    rubbed: float  # W, lost to friction
+    deepest: float  # greatest penetration of a corner (m), negative: the least gap
+
+
+UNGUIDED = Guided(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@jit
+def guide_coefficient(slip, p):
+    """Return the friction coefficient of the guide at a slip (m/s): mu tanh(v / v_s)."""
+    return p.guide_friction * math.tanh(slip / p.guide_stiction) if p.guide_friction else 0.0
+
+
+@jit
+def spent(u, chi):
+    """Return the integral of u / (1 + chi u) from 0 to u: what damping has taken of a strike's
+    motion.
+    """
+    return (u - math.log(1.0 + chi * u) / chi) / chi
+
+
+@jit
+def approach_speed(rate, stored, mass, chi):
+    """Return the speed (m/s) at which a mass (kg) that strikes freely has met, by depth's rate and
+    energy (J).
+
+    From m delta'' = -F_e (1 + chi delta' / v) with the elastic energy E: u du / (1 + chi u) from
+    delta' / v to 1 is E / (m v^2). So a free strike has the restitution of the joints' law, and no
+    state holds its beginning.
+    """
+    speed = math.sqrt(rate * rate + 2.0 * stored / mass)
+    if chi < ELASTIC:
+        return speed
+    whole, least = spent(1.0, chi), max(rate, -chi * rate)  # where the strike has its end
+    speed = max(speed, 2.0 * least)
+    for _ in range(ROUNDS):
+        u = rate / speed
+        left = whole - spent(u, chi)
+        change = speed * speed * left - stored / mass
+        change /= speed * (2.0 * left + u * u / (1.0 + chi * u))
+        if abs(change) <= AGREED * speed:
+            break
+        lower = speed - change
+        speed = lower if lower > least else 0.5 * (speed + least)
+    return speed
+
+
+@jit
+def corner_force(penetration, rate, lever, p):
+    """Return the normal force (N) of a corner and its elastic part, at a penetration (m) and its
+    rate (m/s).
+
+    lever: of the force about the pin (m), by which the crosshead weighs less there than as a whole.
+    """
+    if penetration <= 0.0:
+        return 0.0, 0.0
+    elastic = p.guide_stiffness * power(penetration, p.guide_exponent)
+    if p.guide_restituting:
+        mass = 1.0 / (1.0 / p.reciprocating_mass + lever * lever / p.crosshead_inertia)
+        stored = elastic * penetration / (p.guide_exponent + 1.0)
+        speed = max(approach_speed(rate, stored, mass, p.guide_hysteresis), p.least_approach)
+        damping = elastic * p.guide_hysteresis / speed
+    else:
+        damping = p.guide_damping * rise(penetration * p.per_guide_full_damping)
+    return max(0.0, fused(damping, rate, elastic)), elastic
+
+
+@jit
+def corner_depth(height, tilt, end, side, p):
+    """Return the penetration (m) of a corner: end and side, -1 or 1, along and across the guide."""
+    half = math.sin(0.5 * tilt)
+    depth = side * (height + end * p.guide_length * math.sin(tilt))
+    return depth - (p.guide_clearance + p.guide_height * 2.0 * half * half)
+
+
+@jit
+def corners(height, tilt, rates, p):
+    """Return `Guided` of a crosshead with play: height of its pin (m), tilt (rad), rates of x,
+    y, tilt.
+    """
+    v, rise, spin = rates
+    fx, fy, moment, stored, damped, rubbed = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    deepest = -math.inf
+    sine, half = math.sin(tilt), math.sin(0.5 * tilt)
+    drop = 2.0 * half * half  # 1 - cos(tilt)
+    for end in (-1.0, 1.0):
+        for side in (-1.0, 1.0):
+            x = end * p.guide_length * (1.0 - drop) - side * p.guide_height * sine
+            y = end * p.guide_length * sine + side * p.guide_height * (1.0 - drop)
+            penetration = corner_depth(height, tilt, end, side, p)
+            deepest = max(deepest, penetration)
+            rate = side * (rise + spin * x)
+            normal, elastic = corner_force(penetration, rate, x, p)
+            if normal > 0.0:
+                slip = v - spin * y
+                friction = -guide_coefficient(slip, p) * normal
+                fx += friction
+                fy -= side * normal
+                moment -= x * side * normal + y * friction
+                rubbed -= friction * slip
+            stored += elastic * penetration / (p.guide_exponent + 1.0)
+            damped += (normal - elastic) * rate
+    return Guided(fx, fy, moment, stored, damped, rubbed, deepest)
 
 
 class Row(IntEnum):

@@ -9,9 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import jit, square_root
-from compressor.physics.elastic_rod import add_rod
-from compressor.physics.friction_laws import friction_coefficient
-from compressor.physics.guide import guide_coefficient
+from compressor.physics.contact import friction_coefficient
 from compressor.physics.kinematics import Motion
 from compressor.physics.linear import factorize_positive, substitute_positive
 from compressor.physics.mechanism import (
@@ -21,8 +19,10 @@ from compressor.physics.mechanism import (
     add_bodies,
     add_forces,
     add_on_rod,
+    add_rod,
     carry,
     fill_bias,
+    guide_coefficient,
     joints_of,
     pose_of,
     project,

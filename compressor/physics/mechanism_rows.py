@@ -6,21 +6,23 @@ The same calls as `motion` and `observe` have for the scenes; `systems` chooses 
 import math
 
 from compressor.physics._jit import jit, square_root
-from compressor.physics.contact import nearness
+from compressor.physics.contact import LUGRE, bristle_rate, nearness
 from compressor.physics.contact_laws import elastic_energy
-from compressor.physics.elastic_rod import (
+from compressor.physics.kinematics import ideal
+from compressor.physics.mechanism import (
     ACROSS,
     BIG_SLOPE,
+    COORDINATES,
     FIRST,
     MODES,
+    ROWS,
     SMALL_SLOPE,
+    bore_axes,
+    corner_depth,
     material_work,
+    motor_torque,
     summed,
 )
-from compressor.physics.friction_laws import LUGRE, bristle_rate
-from compressor.physics.guide import corner_depth
-from compressor.physics.kinematics import ideal
-from compressor.physics.mechanism import COORDINATES, ROWS, bore_axes, motor_torque
 from compressor.physics.mechanism_motion import solve
 from compressor.physics.observe import (
     ACCELERATION,

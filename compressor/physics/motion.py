@@ -14,9 +14,15 @@ import math
 from typing import NamedTuple
 
 from compressor.physics._jit import fused, inlined, jit, merged
-from compressor.physics.contact import NO_CONTACT, Contact, carried_by, joint_contact
+from compressor.physics.contact import (
+    LUGRE,
+    NO_CONTACT,
+    Contact,
+    bristle_rate,
+    carried_by,
+    joint_contact,
+)
 from compressor.physics.contact_laws import has_chosen_laws
-from compressor.physics.friction_laws import LUGRE, bristle_rate
 from compressor.physics.kinematics import Motion, ideal, small_angle
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END as AT_BIG_END

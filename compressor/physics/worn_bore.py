@@ -16,9 +16,8 @@ import math
 import numpy as np
 
 from compressor.physics._jit import jit, square_root
-from compressor.physics.contact import Contact
+from compressor.physics.contact import Contact, friction_coefficient
 from compressor.physics.contact_laws import in_contact, normal_force
-from compressor.physics.friction_laws import friction_coefficient
 from compressor.physics.record import MOST_SECTORS
 
 FULL = 16.0 * math.sqrt(2.0) / 15.0  # S = FULL c^2 x^(5/2) (1 + ...) at a small depth x = delta / c

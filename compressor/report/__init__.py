@@ -1,8 +1,7 @@
 """A store -> figures and a page; the tools by which studies draw and add to the page."""
 
-from compressor.report.additions import Add, Additions, Chapter, Draw, Note
 from compressor.report.figures import Drawing
-from compressor.report.figures.contact import MODE_COLORS, UNSEEN, mode_handles
+from compressor.report.figures.job import MODE_COLORS, UNSEEN, mode_handles
 from compressor.report.figures.style import (
     BLACK,
     BLUE,
@@ -16,7 +15,7 @@ from compressor.report.figures.style import (
     sheet,
     styled,
 )
-from compressor.report.figures.sweep_metric import (
+from compressor.report.figures.sweep_data import (
     FOOT,
     MARKS,
     Measure,
@@ -24,9 +23,20 @@ from compressor.report.figures.sweep_metric import (
     positions,
     shown_value,
 )
-from compressor.report.page import Plate, Running, Section
-from compressor.report.plot_choice import PlotChoice, PlotError, Plotted, chosen, published
-from compressor.report.plots import write_plots
+from compressor.report.page import (
+    Add,
+    Additions,
+    Cell,
+    Chapter,
+    Draw,
+    Note,
+    Plate,
+    Row,
+    Running,
+    Section,
+    Table,
+    column_title,
+)
+from compressor.report.plots import PlotChoice, PlotError, Plotted, chosen, published, write_plots
 from compressor.report.report import restate, write_report
 from compressor.report.study_section import file_name
-from compressor.report.tables import Cell, Row, Table, column_title

@@ -1,23 +1,200 @@
-"""The first screen of a report: what was run, what failed, and what changes most.
+"""The first screen of a report: what was run, what failed, what changes most, and where from.
 
 A finding is a metric whose least and greatest value over the jobs differ by more than both error
 bars. Metrics are ranked by how many times the greatest is the least; each is told once.
 """
 
+import datetime
 import math
+import platform
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from markupsafe import Markup
 
 from compressor.analysis import SPOKEN, Claim
+from compressor.cases import MODEL, Case, CaseError
 from compressor.digits import is_known
-from compressor.metrics import METRICS
-from compressor.report.figures.sweep_metric import Measure, measures
-from compressor.report.page import Section
-from compressor.report.tables import measured
+from compressor.metrics import JOINTS, METRICS
+from compressor.program import PROGRAM, library_versions
+from compressor.report.figures.sweep_data import Measure, measures
+from compressor.report.page import Section, measured, templates
+from compressor.store import Folder, Stored, StoredStudy
+
+MASSES = {
+    "rod_mass_kg": "rod {:g} kg (a steel bar of 600 × 40 × 25 mm)",
+    "reciprocating_mass_kg": "crosshead with piston rod and piston {:g} kg",
+}
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Which of the assumptions enter what the page shows."""
+
+    masses: Sequence[str]  # that a study leaves to the defaults, in words
+    worn: bool
+    spring: bool
+    claims: bool
+
+
+def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: bool) -> Section:
+    """Return what to keep in mind of the studies of a store, and of the claims if they are told."""
+    default = Case.from_values({}).machine
+    cases = [(study, case) for study in studies if (case := last_case(stored, study))]
+    ours = [
+        words.format(getattr(default, mass))
+        for mass, words in MASSES.items()
+        if any(
+            getattr(case.machine, mass) == getattr(default, mass)
+            and f"machine.{mass}" not in {axis.key for axis in study.axes}
+            for study, case in cases
+        )
+    ]
+    content = Assumptions(
+        ours,
+        any(case.joint != "none" for _, case in cases),
+        any(case.load == "spring" for _, case in cases),
+        claims,
+    )
+    return Section("assumptions", "What to keep in mind", "assumptions.html", content)
+
+
+def last_case(stored: Stored, study: StoredStudy) -> Case | None:
+    """Return the case of a study's last stored job; None where there is none that this version
+    knows.
+    """
+    for position in stored.rows.find([*study.keys])[::-1]:
+        if position >= 0:
+            try:
+                return Case.from_attribute(stored.rows.attributes(int(position))["case"])
+            except CaseError:
+                return None
+    return None
+
+
+WIDTH = 1000.0  # units of the drawing
+ANGLE = 60.0  # degrees after top dead centre
+INSET = 74.0  # radius of a worn joint's enlarged bearing
+GAP = 14.0  # radial gap that the greatest clearance has in its inset
+
+
+@dataclass(frozen=True)
+class Inset:
+    """A worn joint enlarged: where its bearing stands, the journal's radius, and its clearance."""
+
+    name: str
+    x: float
+    y: float
+    journal: float
+    gap: float
+    clearance: str
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """What the template draws; lengths in units of the drawing, y downwards.
+
+    `crank`, `rod` and so on are lengths; `big` and `small` are where the joints are.
+    """
+
+    title: str
+    said: str
+    height: float
+    origin: tuple[float, float]
+    big: tuple[float, float]
+    small: tuple[float, float]
+    crank: float
+    thick: float
+    worn: tuple[str, ...]
+    insets: tuple[Inset, ...]
+
+
+def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
+    """Return the mechanism of a case at a crank angle (degrees after top dead centre).
+
+    The slider-crank's closed form: the crosshead is at r cos θ + sqrt(l² - (r sin θ)²) from the
+    crank's centre.
+    """
+    crank, rod = case.machine.crank_radius_mm, case.machine.rod_length_mm
+    turn = math.radians(angle)
+    pin = crank * math.cos(turn), crank * math.sin(turn)
+    crosshead = pin[0] + math.sqrt(rod**2 - pin[1] ** 2)
+    scale = (WIDTH - 260.0) / (2.0 * crank + rod)
+    height = max(260.0, 2.0 * crank * scale + 110.0)
+    worn = {joint: getattr(case.clearance_mm, joint) for joint in JOINTS}
+    worn = {joint: size for joint, size in worn.items() if size > 0.0}
+    rows = 2.0 * INSET + 66.0 if worn else 0.0
+    x, y = 60.0 + crank * scale, height / 2.0
+    most = max(worn.values(), default=1.0)
+    insets = tuple(
+        Inset(
+            SPOKEN[joint], 140.0 + 430.0 * number, height + INSET + 16.0,
+            INSET - GAP * size / most, GAP * size / most, f"{size:.3g}",
+        )
+        for number, (joint, size) in enumerate(worn.items())
+    )  # fmt: skip
+    where = " and ".join(f"{SPOKEN[joint]} ({size:g} mm)" for joint, size in worn.items())
+    title = f"Slider-crank mechanism, {angle:g}° after top dead centre"
+    said = f"{title}: crank {crank:g} mm, rod {rod:g} mm, drawn to scale. " + (
+        f"Clearance at the {where}, enlarged below." if worn else "No joint has clearance."
+    )
+    return Mechanism(
+        title, said, height + rows, (x, y), (x + pin[0] * scale, y - pin[1] * scale),
+        (x + crosshead * scale, y), crank * scale, max(5.0, min(18.0, 0.12 * crank * scale)),
+        tuple(worn), insets,
+    )  # fmt: skip
+
+
+def mechanism_svg(case: Case, angle: float = ANGLE) -> Markup:
+    """Return the picture as SVG that stands in a page; its colours are those of the page."""
+    text = templates().get_template("mechanism.svg").render(it=mechanism(case, angle))
+    return Markup(text)
+
+
+def mechanism_words(case: Case) -> str:
+    """Return what the picture does not show: speed, masses and the pin."""
+    machine = case.machine
+    pins = " and ".join(dict.fromkeys(f"{machine.pin_radius(joint):g}" for joint in JOINTS))
+    return (
+        f"{machine.speed_rpm:g} rpm; rod {machine.rod_mass_kg:g} kg, crosshead with piston "
+        f"{machine.reciprocating_mass_kg:g} kg; pins of {pins} mm radius."
+    )
+
+
+LIBRARIES = ("numpy", "scipy", "numba", "xarray", "h5py", "matplotlib")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What made a page, and the studies it is about; `written` is in UTC."""
+
+    program: str
+    libraries: str
+    platform: str
+    results: Path
+    command: str
+    written: str
+    studies: Sequence[StoredStudy]
+
+
+def provenance_section(studies: Sequence[StoredStudy], results: Folder, command: str) -> Section:
+    """Return what made this page now, and the studies it is about."""
+    versions = library_versions(*LIBRARIES)
+    content = Provenance(
+        program=f"{PROGRAM}, model {MODEL}",
+        libraries=", ".join(f"{name} {version}" for name, version in versions.items()),
+        platform=f"Python {platform.python_version()}, {platform.platform()}",
+        results=Path(results).absolute(),
+        command=command,
+        written=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        studies=studies,
+    )
+    return Section("provenance", "Where this comes from", "provenance.html", content)
+
 
 MOST_FINDINGS = 3
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning

@@ -1,4 +1,4 @@
-"""The numbers of a figure as a script beside the page, from which the page draws it interactively.
+"""The numbers of figures and of single jobs as scripts, from which the page draws.
 
 The script calls `compsimFigure(name, {...})`, since a page from disk may load scripts, but no data.
 Numbers are 32-bit floats in base64, or `[first, step, count]` where they are evenly spaced; curves
@@ -8,15 +8,18 @@ have as many points as a screen can show.
 import base64
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from compressor.report.figures.shown import Note, Panel, Scale, Sheet, Trace
-from compressor.store import publish
+from compressor.analysis import SPOKEN, NoSeriesError, last_revolution
+from compressor.metrics import JOINTS
+from compressor.report.figures.extract import Note, Panel, Scale, Sheet, Trace
+from compressor.store import DamagedJob, Stored, publish
 
 LIBRARY = "plotly.min.js"
 MOST_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
@@ -197,3 +200,56 @@ def described(sheet: Sheet) -> str:
         told.append(": ".join(part for part in (panel.title or axes, curves) if part))
     several = f"{len(told)} panels. " if len(told) > 1 else ""
     return several + "; ".join(dict.fromkeys(told))
+
+
+MOST_SERIES = 60  # jobs of a study whose time series lie beside the page
+COLORS = {"big_end": "#1f4488", "small_end": "#d0583b"}
+ANGLE = "crank angle (°), 0 = top dead centre"
+ACCELERATION, FORCE = "acceleration (m/s²)", "contact force (kN)"
+
+
+def job_scripts(stored: Stored, keys: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield the key and script of the first jobs whose time series are kept."""
+    found = 0
+    for key in dict.fromkeys(keys):
+        status = stored.status(key)
+        if found == MOST_SERIES:
+            return
+        if status is None or status.status != "ok" or not status.samples:
+            continue
+        try:
+            sheet = job_sheet(stored.job(key))
+        except (NoSeriesError, DamagedJob):
+            continue  # shorter than a revolution, or its file is damaged, of which others tell
+        found += 1
+        yield key, script(series_name(key), sheet)
+
+
+def series_name(key: str) -> str:
+    """Return the name of a job's script."""
+    return f"job-{key}"
+
+
+def job_sheet(run: xr.Dataset) -> Sheet:
+    """Return a job's acceleration and the size of its contact forces, over the last revolution."""
+    angle, turn = last_revolution(run)
+    moved = Trace("line", "acceleration", angle, turn["acceleration"].values, color="#000000")
+    sizes = 1e-3 * np.linalg.norm(turn["contact_force"].transpose("joint", "time", "axis"), axis=2)
+    forces = tuple(
+        Trace("line", SPOKEN[joint], angle, size, color=COLORS[joint])
+        for joint, size in zip(JOINTS, sizes, strict=True)
+    )
+    panels = tuple(
+        Panel(title, Scale(ANGLE, float(angle[0]), float(angle[-1]), step=90.0),
+              Scale(title, *limits(traces)), (row, row + 1), (0, 1), traces, ())
+        for row, (title, traces) in enumerate(((ACCELERATION, (moved,)), (FORCE, forces)))
+    )  # fmt: skip
+    return Sheet(panels, (1.0, 1.0), (1.0,), (8.0, 5.0))
+
+
+def limits(traces: Iterable[Trace]) -> tuple[float, float]:
+    """Return the least and the greatest value of curves, with some room."""
+    values = np.concatenate([trace.y for trace in traces])
+    low, high = float(values.min()), float(values.max())
+    room = 0.05 * (high - low) or 1.0
+    return low - room, high + room

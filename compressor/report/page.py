@@ -1,20 +1,114 @@
-"""The report as an HTML page with its figures beside it.
+"""The report as an HTML page with its figures, tables and what studies add to it.
 
 Python gives sections of plain data; the files in `templates` make markup of them, and escape every
 text that they print.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+import numpy as np
 from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from compressor.digits import by_bar
+from compressor.metrics import METRICS
+from compressor.outcome import Regime
+from compressor.report.figures import Drawing
+from compressor.report.figures.sweep_data import Measure
+from compressor.store import Folder, StoredStudy
+
 if TYPE_CHECKING:
     from compressor.report.figures import Drawing
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell: numbers stand to the right, words to the left, code in its own letters.
+
+    `value`: by what a column is sorted, where that is not the text.
+    """
+
+    text: str
+    kind: Literal["word", "number", "code"] = "word"
+    value: float | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row's cells; `mark`: the job failed, is missing, or is chaotic; `key`: of the job."""
+
+    cells: Sequence[Cell]
+    mark: Literal["", "failed", "missing", "chaotic"] = ""
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; `head` has a title for each column."""
+
+    head: Sequence[str]
+    rows: Sequence[Row]
+
+
+def number(value: float) -> str:
+    """Return a measured number to four significant digits; a dash for nan."""
+    size = abs(value)
+    if math.isnan(value):
+        return "–"
+    if size < 1e7 and size == int(size):
+        return f"{value:.0f}"
+    if not 1e-3 <= size < 1e7:
+        return f"{value:.2e}"
+    return f"{value:.{max(0, 3 - math.floor(math.log10(size)))}f}"
+
+
+def number_cell(value: float) -> Cell:
+    """Return one measured number."""
+    return Cell(number(value), "number", None if math.isnan(value) else value)
+
+
+def measured(measure: Measure, value: float, bar: float) -> str:
+    """Return a metric and its error bar, both in its unit, to the digits that the bar allows."""
+    if math.isnan(bar):
+        return number(value)
+    return by_bar(value, bar, METRICS[measure.variable].bar.relative)
+
+
+def measured_cell(measure: Measure, value: float, bar: float) -> Cell:
+    """Return a metric and its error bar."""
+    return Cell(measured(measure, value, bar), "number", None if math.isnan(value) else value)
+
+
+def value_cell(value: Any) -> Cell:
+    """Return a setting of a job: a number as the case file may give it, or a word."""
+    if isinstance(value, int | float | np.number):
+        return Cell(f"{value:.10g}", "number")
+    return Cell(str(value))
+
+
+def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> Row:
+    """Return a job's row, marked where the job failed, is missing, or is chaotic."""
+    if status == "failed":
+        return Row(cells, "failed", key)
+    if status == "missing":
+        return Row(cells, "missing", key)
+    return Row(cells, "chaotic" if regime == Regime.CHAOTIC else "", key)
+
+
+def ending(status: object, reason: object, regime: object = "") -> str:
+    """Return how a job ended, in words, and how its motion goes, if it is known."""
+    said = reason or regime
+    return f"{status}: {said}" if said else str(status)
+
+
+def column_title(measure: Measure) -> str:
+    """Return what stands above a measure's column."""
+    return measure.title + (f" ({measure.unit})" if measure.unit else "")
 
 
 @dataclass(frozen=True)
@@ -124,3 +218,31 @@ def restated(page: str, before: Running, now: Running) -> str:
     """Return a page that was written beside a run, with how the run stands now."""
     status = templates().get_template("status.html")
     return page.replace(status.render(running=before), status.render(running=now))
+
+
+Draw = Callable[[str, str, str, Drawing], Plate]  # of name, heading, caption and drawing
+
+
+class Note(NamedTuple):
+    """A line in the section of a study, and a link below it: the id of a section, and its words."""
+
+    text: str
+    anchor: str
+    link: str
+
+
+class Chapter(NamedTuple):
+    """A section with the figures that it shows."""
+
+    section: Section
+    plates: Sequence[Plate] = ()
+
+
+class Additions(NamedTuple):
+    """Notes by the name of the study that they are on, and chapters."""
+
+    notes: Mapping[str, Note]
+    chapters: Sequence[Chapter]
+
+
+Add = Callable[[Folder, Sequence[StoredStudy], Draw], Additions]  # of the folder of results

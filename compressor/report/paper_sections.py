@@ -1,20 +1,49 @@
-"""The sections of a report about the paper: figures, cases, claims, and what is missing."""
+"""The sections of a report about the paper: figures, cases, claims, other machines, diagnosis."""
 
+import itertools
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import shlex
+import warnings
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
 import xarray as xr
 
-from compressor.analysis import SPOKEN, claims, comparisons, paper_cases
-from compressor.report.figures import FIGURES
-from compressor.report.figures.sweep_metric import MEASURES, Measure, measures
-from compressor.report.page import Plate, Section
-from compressor.report.paper_runs import PaperRuns, case_files, run_command
-from compressor.report.study_section import SHORT
-from compressor.report.tables import (
+from compressor.analysis import (
+    CLEARANCES,
+    FAULTS,
+    LOADS,
+    ORDER,
+    SPOKEN,
+    Shaking,
+    caption,
+    case_of,
+    cases_of,
+    claims,
+    comparisons,
+    diagnosis_caption,
+    label,
+    paper_cases,
+    settled,
+    shaking,
+)
+from compressor.cases import Case, CaseError, points, table, value_in
+from compressor.report.figures import FIGURES, Drawing
+from compressor.report.figures import Figure as PaperFigure
+from compressor.report.figures.diagnosis import (
+    Shakings,
+    draw_diagnosis_angles,
+    draw_diagnosis_orbits,
+    draw_diagnosis_spectra,
+)
+from compressor.report.figures.sweep_data import MEASURES, Measure, measures
+from compressor.report.page import (
     Cell,
+    Plate,
     Row,
+    Section,
     Table,
     column_title,
     ending,
@@ -23,7 +52,362 @@ from compressor.report.tables import (
     number_cell,
     value_cell,
 )
-from compressor.store import Folder
+from compressor.report.study_section import SHORT, file_name
+from compressor.store import DamagedJob, Folder, Stored, StoredStudy, StoreWarning
+
+
+@dataclass(frozen=True)
+class PaperRuns:
+    """The stored runs of the paper's cases by label; `usable` ones are whole and have series."""
+
+    stored: dict[str, xr.Dataset]
+    usable: dict[str, xr.Dataset]
+    absent: dict[str, str]  # label -> why it is not usable
+
+
+def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns:
+    """Return the runs with the physics of the paper's cases."""
+    return find_runs(stored, studies, paper_cases())
+
+
+def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
+    """Return whether all stored jobs of a study, and at least one, are cases of the paper."""
+    there = sum(at >= 0 for at in stored.rows.find([*study.keys]))
+    labels = {case.physics_key for case in paper_cases().values()}
+    return 0 < there == len(paper_candidates(stored, [study], labels))
+
+
+def find_runs(
+    stored: Stored, studies: Sequence[StoredStudy], cases: Mapping[str, Case]
+) -> PaperRuns:
+    """Return the studies' runs with the physics of some cases by label; of several, the most
+    exact.
+    """
+    labels = {case.physics_key: name for name, case in cases.items()}
+    found: dict[str, xr.Dataset] = {}
+    damaged = set()
+    for key in paper_candidates(stored, studies, labels):
+        name = labels[stored.physics_key(key)]
+        try:
+            run = stored.job(key)
+        except DamagedJob as error:
+            warnings.warn(str(error), StoreWarning, stacklevel=2)
+            damaged.add(name)
+            continue
+        if name not in found or rank(run) > rank(found[name]):
+            found[name] = run
+    usable = {name: run for name, run in found.items() if rank(run)[:2] == (True, True)}
+    absent = {n: why_absent(found.get(n), n in damaged) for n in labels.values() if n not in usable}
+    return PaperRuns({n: found[n] for n in labels.values() if n in found}, usable, absent)
+
+
+def paper_candidates(
+    stored: Stored, studies: Sequence[StoredStudy], physics: Collection[str]
+) -> list[str]:
+    """Return the keys of the studies' stored jobs that simulate some physics, in the studies'
+    order.
+    """
+    keys = list(dict.fromkeys(key for study in studies for key in study.keys))
+    positions = stored.rows.find(keys)
+    wanted = np.array([*physics], "S")
+    same = np.isin(stored.rows.columns["physics_key"], wanted)
+    return [key for key, at in zip(keys, positions, strict=True) if at >= 0 and same[at]]
+
+
+def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
+    """Return what makes a run better than another of the same physics."""
+    return str(run["status"].item()) == "ok", "time" in run.dims, -run.attrs.get("rtol", math.inf)
+
+
+def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
+    """Return why a case of the paper cannot be drawn."""
+    if run is None:
+        return "its file is damaged" if damaged else "not stored"
+    if str(run["status"].item()) != "ok":
+        return f"failed: {run['reason'].item()}"
+    return "stored without its time series"
+
+
+def case_files(labels: Collection[str]) -> dict[str, str]:
+    """Return the case files that give some of the paper's cases: the text of each by its name."""
+    files = {f"{name}.yaml": f"load: {load}" for name, load in LOADS.items() if name in labels}
+    for fault in FAULTS:
+        sizes = [f"{c:g}" for c in CLEARANCES if label(fault, c) in labels]
+        if sizes:
+            text = f"joint: {fault}\nclearance_mm: [{', '.join(sizes)}]"
+            files[f"{fault.replace('_', '-')}.yaml"] = text
+    return files
+
+
+def run_command(files: Iterable[str], results: Folder) -> str:
+    """Return the command that runs case files into a store, for a shell."""
+    return f"compsim run {' '.join(files)} -o {shlex.quote(str(results))}"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A key of a case file whose value is not the default; both values with their unit."""
+
+    key: str
+    phrase: str  # what the key is; empty for a whole group
+    value: str
+    default: str
+
+    @property
+    def said(self) -> str:
+        """The difference in words."""
+        phrase = f", {self.phrase}" if self.phrase else ""
+        return f"{self.key}{phrase}: {self.value} (default: {self.default})"
+
+
+def differences(case: Case, besides: tuple[str, ...] = ()) -> list[Difference]:
+    """Return the keys in which a case's physics or span differs from the default case, in a file's
+    order.
+
+    A value that follows from others, such as the inertia of a uniform rod, is none of its own, nor
+    is one that means the same as the default. besides: groups or keys at the top to leave out.
+    """
+    values, defaults = case.values(), Case().values()
+    found = []
+    for key, value in leaves(values, defaults):
+        default = value_in(defaults, key) if "." in key else defaults.get(key)
+        if key.partition(".")[0] in besides or value == default or follows(case, values, key):
+            continue
+        row = table().get(key)
+        unit, phrase = (row.unit, row.phrase) if row else ("", "")
+        found.append(Difference(key, phrase, spelt(value, unit), spelt(default, unit)))
+    return found
+
+
+def leaves(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the dotted keys and values; a group that the default case lacks, or has alone, is
+    one value.
+    """
+    for name in dict.fromkeys([*defaults, *values]):
+        value, default = values.get(name), defaults.get(name)
+        if isinstance(value, Mapping) and isinstance(default, Mapping):
+            yield from ((f"{name}.{inner}", item) for inner, item in value.items())
+        else:
+            yield name, value
+
+
+def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
+    """Return whether a case is the same without a key: it follows from the others, or is not
+    read.
+    """
+    group, _, name = key.rpartition(".")
+    rest: dict[str, Any] = {n: item for n, item in values.items() if n != key}
+    if group:
+        rest[group] = {n: item for n, item in values[group].items() if n != name}
+    try:
+        return Case.resolve(rest).physics_key == case.physics_key
+    except CaseError:
+        return False  # what is left fits no more
+
+
+def spelt(value: Any, unit: str) -> str:
+    """Return a value as a case file has it, with its unit."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {spelt(item, '')}" for name, item in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, value))
+    if isinstance(value, int | float):
+        return f"{value:.10g}" + (f" {unit}" if unit else "")
+    return str(value)
+
+
+WORN = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
+IDEAL = ("design", "typical")
+# what the motion of a worn machine depends on; the gas does not push with the spring load
+MACHINE = ("machine", "spring", "contact", "friction")
+WHOLE = 1e-6  # revolutions: rounding of a whole one
+SET = tuple(figure for figure in FIGURES if {*WORN} & {*figure.needs})
+NO_IDEAL = (
+    "{} are not drawn: no run without clearance of a machine with this motion is stored on the "
+    "same output grid. A block with joint: none in the case file gives it."
+)
+
+
+@dataclass(frozen=True)
+class SecondSet:
+    """The paper's faults in another machine, all of one study.
+
+    `case` is one of its worn cases; `drawn` are the runs for figures and `judged` those for claims,
+    by label: the study's own, and where it has none without clearance the default machine's, if
+    those are the same.
+    """
+
+    study: str
+    case: Case
+    keys: frozenset[str]  # of the study's jobs that it shows
+    drawn: Mapping[str, xr.Dataset]
+    judged: Mapping[str, xr.Dataset]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A figure of a second set, and its counterpart in the first where that is drawn."""
+
+    first: Plate | None
+    second: Plate
+
+
+@dataclass(frozen=True)
+class SecondSetContent:
+    """What a page says of a second set; `table`: the id of its study's section."""
+
+    study: str
+    table: str
+    differences: Sequence[str]
+    notes: Sequence[str]
+    pairs: Sequence[Pair]
+    claims: Sequence[object]
+
+    @property
+    def beside(self) -> bool:
+        """Whether any figure has a counterpart."""
+        return any(pair.first for pair in self.pairs)
+
+
+def second_sets(
+    stored: Stored, studies: Sequence[StoredStudy], paper: PaperRuns
+) -> dict[str, SecondSet]:
+    """Return the second set of each study that has one, by the study's name."""
+    found = {study.name: second_set(stored, study, paper) for study in studies}
+    return {name: one for name, one in found.items() if one}
+
+
+def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSet | None:
+    """Return a study's second set: None unless it holds all nine worn cases of just one other
+    machine.
+
+    They must be alike in all but the fault, have ended well, and have time series that are
+    `comparable`.
+    """
+    machines = [*itertools.islice(other_machines(stored, study), 2)]
+    if len(machines) != 1:
+        return None  # a sweep over machines is drawn as one
+    (cases,) = machines
+    runs = find_runs(stored, [study], cases)
+    if not runs.usable.keys() >= {*WORN} or not comparable(runs.usable.values()):
+        return None
+    case = case_of(runs.usable[WORN[-1]])
+    drawn, judged = (borrowed(case, paper, loads) | runs.usable for loads in (False, True))
+    keys = frozenset(run.attrs["key"] for run in runs.stored.values())
+    return SecondSet(study.name, case, keys, drawn, judged)
+
+
+def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Case]]:
+    """Yield `cases_of` each machine but the default one whose nine worn cases a study holds."""
+    swept = {value for axis in study.axes for value in axis.values}
+    if not swept >= {*FAULTS, *CLEARANCES}:
+        return
+    positions = stored.rows.find(study.keys)
+    held = {*stored.rows.columns["physics_key"][positions[positions >= 0]].tolist()}
+    seen = set()
+    for position, point in zip(positions, points(study), strict=True):
+        # the first of the nine stands for all
+        if position < 0 or not {FAULTS[0], CLEARANCES[0]} <= {*point.values()}:
+            continue
+        try:
+            case = Case.from_attribute(stored.rows.attributes(position)["case"])
+        except CaseError:
+            continue  # of another version of compsim
+        cases = cases_of(case)
+        ideal = cases["design"].physics_key
+        if ideal in seen or not is_other(case):
+            continue
+        seen.add(ideal)
+        if all(cases[name].physics_key.encode() in held for name in WORN):
+            yield cases
+
+
+def is_other(case: Case) -> bool:
+    """Return whether a case is of another machine than the default one, whatever its span."""
+    return any(getattr(case, group) != getattr(Case(), group) for group in MACHINE)
+
+
+def comparable(runs: Collection[xr.Dataset]) -> bool:
+    """Return whether runs can be drawn and judged together.
+
+    They settle at one crank angle and have samples at the same ones, for a revolution or more, and
+    so close that the lines above `ORDER`, which claim 7 reads, can be told.
+    """
+    grids = [settled(run)["crank_angle"].values for run in runs]
+    turns = (grids[0][-1] - grids[0][0]) / (2.0 * np.pi)
+    fine = grids[0].size - 1 > 2 * (ORDER + 1) * turns
+    return turns > 1.0 - WHOLE and fine and all(np.array_equal(g, grids[0]) for g in grids)
+
+
+def borrowed(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]:
+    """Return the default machine's runs without clearance, where those of a case's machine are the
+    same.
+
+    Without clearance masses, contact and friction are not read: the motion is that of equal crank,
+    rod, speed and span. loads: whether the loads on the piston are to be the same, too.
+    """
+    default = Case()
+    lengths = ("crank_radius_mm", "rod_length_mm", "speed_rpm")
+    machine = replace(
+        default.machine, **{name: getattr(case.machine, name) for name in lengths}
+    )  # fmt: skip
+    unread = ["contact", "friction", "initial_offset_mm", "body", "sensor"]
+    unread += [] if loads else ["gas", "spring"]
+    same = replace(case, machine=machine, **{name: getattr(default, name) for name in unread})
+    twins, defaults = cases_of(same), paper_cases()
+    return {
+        load: paper.usable[load]
+        for load in IDEAL
+        if load in paper.usable and twins[load].physics_key == defaults[load].physics_key
+    }
+
+
+def second_drawings(found: SecondSet) -> Iterator[tuple[str, str, str, Drawing]]:
+    """Yield the names, headings, captions and drawings of the figures whose runs there are."""
+    for item in SET:
+        if found.drawn.keys() >= {*item.needs}:
+            heading = f"Figure {item.number} of {found.study}: {item.title}"
+            text = caption(item.number, found.drawn)
+            yield second_name(found.study, item), heading, text, item.draw(found.drawn)
+
+
+def second_name(study: str, figure: PaperFigure) -> str:
+    """Return the name of a figure's files in a study's second set."""
+    return file_name(study, f"figure-{figure.number:02d}")
+
+
+def second_anchor(study: str) -> str:
+    """Return the id of the section of a second set."""
+    return file_name("figures", study)
+
+
+def second_section(
+    found: SecondSet, plates: Sequence[Plate], first: Sequence[Plate], table: str
+) -> Section:
+    """Return a second set on the page: how its machine differs, figures, and claims.
+
+    plates: of `second_drawings`; first: of the first set; table: the id of the study's section.
+    """
+    counterparts = {plate.name: plate for plate in first}
+    names = {second_name(found.study, item): item for item in SET}
+    pairs = [
+        Pair(counterparts.get(f"figure-{names[plate.name].number:02d}"), plate) for plate in plates
+    ]
+    lacking = [item for name, item in names.items() if name not in {p.name for p in plates}]
+    notes = [NO_IDEAL.format(numbered(lacking))] if lacking else []
+    said = [one.said for one in differences(found.case, ("name", "load", "joint", "clearance_mm"))]
+    content = SecondSetContent(found.study, table, said, notes, pairs, claims(found.judged))
+    title = f"{found.study}: Figures 8 to 16 of another machine"
+    return Section(second_anchor(found.study), title, "second_set.html", content)
+
+
+def numbered(figures: Sequence[PaperFigure]) -> str:
+    """Return the figures by their numbers, such as `Figures 8, 11, 14`."""
+    return f"Figures {', '.join(str(figure.number) for figure in figures)}"
 
 
 @dataclass(frozen=True)
@@ -117,3 +501,68 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     texts = [f"# {name}\n{text}" for name, text in files.items()]
     content = MissingFigures(figures, texts, run_command(files, results))
     yield Section("missing", "Figures that could not be drawn", "missing.html", content)
+
+
+NEEDS = ("design", *(label(fault, c) for fault in FAULTS for c in CLEARANCES))
+TITLES = {
+    "spectra": "Diagnosis 1: orders of the force on the frame",
+    "orbits": "Diagnosis 2: orbits of the journals",
+    "angles": "Diagnosis 3: when the frame shakes, and the contact modes",
+}
+
+
+@dataclass(frozen=True)
+class DiagnosisContent:
+    """What a page says of the faults side by side."""
+
+    order: int
+    table: Table
+    plates: list[Plate]
+
+
+def shakings(paper: PaperRuns) -> Shakings:
+    """Return `shaking` of the healthy machine and all faults; empty unless all are stored."""
+    if not paper.usable.keys() >= {*NEEDS}:
+        return {}
+    return {name: shaking(paper.usable[name]) for name in NEEDS}
+
+
+def diagnosis_drawings(
+    found: Shakings, paper: PaperRuns
+) -> Iterator[tuple[str, str, str, Drawing]]:
+    """Yield the names, headings, captions and drawings, where there are `shakings`."""
+    if not found:
+        return
+    drawings = {
+        "spectra": draw_diagnosis_spectra(found),
+        "orbits": draw_diagnosis_orbits(paper.usable),
+        "angles": draw_diagnosis_angles(found, paper.usable),
+    }
+    for name, drawing in drawings.items():
+        caption = diagnosis_caption(name, found, paper.usable)
+        yield f"diagnosis-{name}", TITLES[name], caption, drawing
+
+
+def diagnosis_sections(found: Shakings, plates: list[Plate]) -> Iterator[Section]:
+    """Yield the section of the figures that were drawn, and a table of the force above `ORDER`."""
+    if plates:
+        content = DiagnosisContent(ORDER, force_table(found), plates)
+        yield Section("diagnosis", "Diagnosis", "diagnosis.html", content)
+
+
+def force_table(found: Shakings) -> Table:
+    """Return the rms of X above `ORDER` and its two shares, N, by fault and clearance."""
+    head = ["clearance at", "mm", "rms (N)", "near changes of direction (N)", "elsewhere (N)"]
+    healthy = found["design"]
+    rows = [Row([Cell("none"), Cell("0", "number"), *forces(healthy)])]
+    for fault in FAULTS:
+        for clearance in CLEARANCES:
+            one = found[label(fault, clearance)]
+            rows.append(Row([Cell(SPOKEN[fault]), Cell(f"{clearance:g}", "number"), *forces(one)]))
+    return Table(head, rows)
+
+
+def forces(one: Shaking) -> list[Cell]:
+    """Return the whole and its shares, to 0.1 N."""
+    values = one.spectrum.above, one.near_turns, one.elsewhere
+    return [Cell(f"{value:.1f}", "number") for value in values]

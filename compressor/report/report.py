@@ -11,43 +11,50 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compressor.analysis import caption, case_of, claims
-from compressor.report.additions import Add, Additions, Note
 from compressor.report.answer import (
     Answer,
     Finding,
     Line,
     answer_section,
+    assumptions_section,
     findings,
+    last_case,
+    mechanism_svg,
+    mechanism_words,
+    provenance_section,
     round_robin,
     study_findings,
 )
-from compressor.report.assumptions import assumptions_section, last_case
-from compressor.report.diagnosis_section import (
+from compressor.report.figures import FIGURES, Drawing
+from compressor.report.figures.extract import as_csv, extract
+from compressor.report.figures.pictures import pictures
+from compressor.report.figures.sweep import draw_sweep
+from compressor.report.interactive import (
+    described,
+    job_scripts,
+    publish_library,
+    script,
+    series_name,
+)
+from compressor.report.page import Add, Additions, Note, Plate, Running, Section, document, restated
+from compressor.report.paper_sections import (
+    SET,
     TITLES,
+    PaperRuns,
+    SecondSet,
     diagnosis_drawings,
     diagnosis_sections,
-    shakings,
-)
-from compressor.report.figures import FIGURES, Drawing
-from compressor.report.figures.extract import extract
-from compressor.report.figures.pictures import pictures
-from compressor.report.figures.shown import as_csv
-from compressor.report.figures.sweep import draw_sweep
-from compressor.report.interactive import described, publish_library, script
-from compressor.report.job_series import job_scripts, series_name
-from compressor.report.mechanism import mechanism_svg, mechanism_words
-from compressor.report.page import Plate, Running, Section, document, restated
-from compressor.report.paper_runs import PaperRuns, find_paper_runs, is_of_paper
-from compressor.report.paper_sections import missing_sections, paper_sections, spoken
-from compressor.report.provenance import provenance_section
-from compressor.report.second_sets import (
-    SET,
-    SecondSet,
+    find_paper_runs,
+    is_of_paper,
+    missing_sections,
+    paper_sections,
     second_anchor,
     second_drawings,
     second_name,
     second_section,
     second_sets,
+    shakings,
+    spoken,
 )
 from compressor.report.study_section import (
     MOST_ROWS,

@@ -11,11 +11,12 @@ import xarray as xr
 
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
-from compressor.report.additions import Note
-from compressor.report.figures.sweep_metric import measures
-from compressor.report.page import Plate, Section
-from compressor.report.tables import (
+from compressor.report.figures.sweep_data import measures
+from compressor.report.page import (
     Cell,
+    Note,
+    Plate,
+    Section,
     Table,
     column_title,
     ending,

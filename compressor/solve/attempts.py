@@ -1,6 +1,13 @@
-"""One run of a case at one tolerance, and another one to estimate its errors by."""
+"""Run a case at one tolerance, and once more to estimate its errors.
 
+Integrate one record over time: by the compiled march, or by one of SciPy's methods. Both call the
+same right-hand side, restart at every load corner, observe each accepted step's dense solution at
+Gauss-Lobatto nodes for the metrics, and sample it on the output grid.
+"""
+
+import itertools
 import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -8,21 +15,33 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import TIGHTEST, Case
-from compressor.physics import COLUMNS, state_names
-from compressor.solve.energy_audit import energy_residual
+from compressor.physics import (
+    COLUMNS,
+    FLOWS,
+    add_flows,
+    lobatto,
+    new_tally,
+    observe_all,
+    sample_segments,
+    segments,
+    state_names,
+    tally_energy,
+    tally_step,
+)
+from compressor.reasons import Reason
 from compressor.solve.error_bars import (
     Companion,
     Metrics,
     bars,
+    energy_residual,
     enlarged,
     longest,
     series_errors,
 )
-from compressor.solve.ideal_scene import closed_form
-from compressor.solve.initial import initial_state
-from compressor.solve.integrate import integrate
-from compressor.solve.request import Request, Trajectory
-from compressor.solve.rod_load import reversal, reversal_bars, reversal_times
+from compressor.solve.march_driver import COMPILED, march_through
+from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merged, overdue
+from compressor.solve.run_metrics import metrics, reversal, reversal_bars, reversal_times
+from compressor.solve.scipy_driver import step_through
 from compressor.solve.series import (
     compared_times,
     distances,
@@ -30,10 +49,92 @@ from compressor.solve.series import (
     journal_distance,
     take_samples,
 )
-from compressor.solve.si_record import is_ideal, record
-from compressor.solve.sizes import length_and_speed
-from compressor.solve.tallied import metrics
-from compressor.solve.turns import Cuts, Turns, merged
+from compressor.solve.si_record import initial_state, is_ideal, length_and_speed, record
+
+NODES, WEIGHTS = lobatto(9)
+PIECES_A_LOOK = 256  # of the quadrature between two looks at the clock
+
+
+def closed_form(
+    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf
+) -> Trajectory:
+    """Return the trajectory of ideal joints over an output grid, without integration.
+
+    `pieces`: into which each stretch between load corners, or each revolution in it, is cut;
+    `timeout`: wall time (s) that it may take.
+    """
+    deadline = time.monotonic() + timeout
+    edges, phases = segments(p, float(times[-1]))
+    result = Trajectory(
+        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally(p)
+    )
+    began = time.perf_counter()
+    grid = fine_grid(edges, pieces, 2.0 * math.pi / p.omega)
+    cuts = np.unique(np.concatenate((edges, [settle], grid)))
+    owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
+    states = np.zeros((NODES.size, 4))
+    rows = np.empty((NODES.size, COLUMNS))
+    flows, apart = np.zeros(FLOWS), np.zeros(2)
+    for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
+        phase = phases[owner[number]]
+        if number % PIECES_A_LOOK == 0 and time.monotonic() > deadline:
+            result.reason = Reason.BUDGET_SECONDS
+            result.detail, result.stop_time = overdue(timeout), float(begin)
+            result.states[times >= begin] = math.nan
+            break
+        nodes = begin + (end - begin) * NODES
+        observe_all(nodes, states, np.full(NODES.size, phase), p, rows)
+        tally_energy(rows[0], flows, result.tally)
+        add_flows(rows, WEIGHTS, end - begin, flows)
+        tally_energy(rows[-1], flows, result.tally)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, begin >= settle, result.tally, p)
+    result.seconds = time.perf_counter() - began
+    return result
+
+
+def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
+    """Return the points that cut every segment of the ideal motion into pieces a quadrature
+    resolves.
+    """
+    grids = []
+    for begin, end in itertools.pairwise(edges):
+        count = pieces * math.ceil((end - begin) / turn - 1e-9)
+        grids.append(np.linspace(begin, end, count + 1))
+    return np.concatenate(grids)
+
+
+def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndarray]:
+    """Return what a request begins with: an empty trajectory, the load's edges and phases, the
+    motion.
+    """
+    edges, phases = segments(request.p, float(request.times[-1]))
+    owner = sample_segments(request.times, edges)
+    states = np.full((request.times.size, request.start.size), math.nan)
+    result = Trajectory(request.times, states, phases[owner], new_tally(request.p))
+    z = np.zeros(request.start.size + FLOWS)
+    z[:-FLOWS] = request.start
+    rows = np.empty((1, COLUMNS))
+    observe_all(np.zeros(1), request.start[np.newaxis], phases[:1], request.p, rows)
+    tally_energy(rows[0], z[-FLOWS:], result.tally)
+    return result, edges, phases, z
+
+
+def integrate(request: Request) -> Trajectory:
+    """Integrate a scene with clearance over its output grid; a run that fails is returned too."""
+    result, edges, phases, z = ready(request)
+    began = time.perf_counter()
+    try:
+        # a trial step may leave the finite numbers; the steps taken are checked
+        with np.errstate(all="ignore"):
+            if request.method in COMPILED:
+                march_through(request, result, edges, phases, z)
+            else:
+                step_through(request, result, edges, phases, z)
+    except Stop as stop:
+        result.reason, result.detail = stop.reason, stop.detail
+    result.seconds = time.perf_counter() - began
+    return result
+
 
 PIECES = 32  # of the ideal scene's quadrature
 FINER = 0.3  # power of the tolerance by which they become more

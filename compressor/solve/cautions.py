@@ -1,4 +1,14 @@
-"""Where a case leaves the domain of its laws or the judged range, or looks like a slip of units.
+"""What is said of a case before it runs: natural scales, slips of units, laws left behind.
+
+Natural scales of a case before it runs: depths, times and steps, from its parameters alone. Closed
+formulas, tens of microseconds a case. Forces are the sum of the greatest load and inertia, hence
+bounds; the deepest contact of the random cases (tests/random_cases.py) is 0.6 to 1.6 times as deep
+as they say in nine of ten (tests/test_scales.py).
+
+Numbers that look as if they were given in another unit than their key's. The rule: a key is told of
+where every value that it has in a study lies outside its usual range, and another unit of the same
+quantity would bring all of them inside. A sweep that reaches into the usual range is meant as it
+stands, however odd its ends are.
 
 Nothing here is refused: a case is spoken of once, before it runs, and grouped over a sweep. What
 cannot be simulated at all is refused by `compressor.cases.conflicts`.
@@ -6,7 +16,7 @@ cannot be simulated at all is refused by `compressor.cases.conflicts`.
 
 import math
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,18 +30,250 @@ from compressor.cases import (
     Study,
     joint_stiffness,
     outside_judged,
+    reads,
+    row_of,
     with_ideal_joints,
 )
-from compressor.solve.ideal_scene import closed_form
+from compressor.metrics import JOINTS
+from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load, steepest
+from compressor.solve.attempts import closed_form
+from compressor.solve.march_driver import COMPILED
 from compressor.solve.request import greatest_depth
-from compressor.solve.scales import (
-    JointScales,
-    contact_scales,
-    expected_cost,
-    greatest_force,
-)
-from compressor.solve.si_record import record
-from compressor.solve.unit_slips import slips
+from compressor.solve.si_record import record, scene
+
+# Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.
+PER_RADIAN = {"big_end": 0.3, "small_end": 0.5, "both": 0.7}
+HELD = 0.5  # of the steps that stability asks for: joints are not in contact, or deep, always
+ORDER = 5
+STEP_SECONDS = {"big_end": 3.5e-6, "small_end": 3.5e-6, "both": 4.5e-6}  # of compiled methods
+SCIPY_SECONDS = 2.5e-4  # of a step of SciPy's methods, with its tally
+
+
+@dataclass(frozen=True)
+class JointScales:
+    """Natural scales of a joint's contact under a force (SI)."""
+
+    joint: str
+    clearance: float  # m
+    force: float  # N
+    penetration: float  # m, at rest under the force
+    damping_ratio: float  # of the lighter body on the contact at rest; above 1 it does not ring
+    swing_frequency: float  # Hz, of the journal swinging about the line of the force in its bore
+    friction_rate: float  # 1/s: dmu/dv F / m where it is greatest; 1.5 mu_s F / (m v_s) of ADAMS's
+    explicit_step: float  # s, the stability limit by the fastest of stiffness, damping, friction
+    limited_by: str
+    implicit_step: float  # s: the contact's own time scale, which no method can do without
+
+
+def greatest_force(p: np.record, joint: str) -> float:
+    """Return a bound of the force at a joint of the ideal machine (N): inertia and load.
+
+    m R omega^2 (1 + R / L) of what reciprocates, at the big end m R omega^2 (1 + a R / L^2) of the
+    rod as well, and the load's greatest value; in the machine they partly cancel.
+    """
+    ratio, centripetal = p["crank_ratio"], p["crank_radius"] * p["omega"] ** 2
+    inertia = p["reciprocating_mass"] * centripetal * (1 + ratio)
+    if joint == "big_end":
+        share = p["rod_centre"] / p["rod_length"]
+        inertia += p["rod_mass"] * centripetal * (1 + share * ratio)
+    return float(inertia + p["rod_mass"] * p["gravity"] + greatest_load(p))
+
+
+def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
+    """Return the scales of a joint with clearance under a force (N).
+
+    A journal that the force holds against its bore can roll to and fro on the wall, on a circle of
+    radius e, clearance and penetration. It swings like a pendulum, at sqrt(F / (m e)); m is what
+    the rod's end weighs across the force, the other end being held: (J + m_r l^2) / L^2, l from
+    the mass centre to the other end.
+    """
+    number = JOINTS.index(joint)
+    clearance, stiffness = p["clearance"][number].item(), p["stiffness"][number].item()
+    contact = elastic_form(stiffness, clearance, p)
+    mass = min(p["rod_mass"], p["reciprocating_mass"]).item()
+    depth = float(contact.static_depth(force))
+    natural = math.sqrt(contact.tangent(depth) / mass)
+    friction = 0.0
+    if p["friction"]:
+        friction = steepest(p) * force / mass
+    rates = {
+        "contact stiffness": natural,
+        "contact damping": contact.damping(depth) / mass,
+        "friction": friction,
+    }
+    fastest = max(rates, key=rates.__getitem__)
+    swing = math.sqrt(force / (across(p, joint) * (clearance + depth)))
+    return JointScales(
+        joint, clearance, force, depth, contact.damping(depth) / (2.0 * mass * natural),
+        swing / (2.0 * math.pi), friction, STABILITY_LIMIT / rates[fastest], fastest,
+        1.0 / natural,
+    )  # fmt: skip
+
+
+def across(p: np.record, joint: str) -> float:
+    """Return the mass (kg) that moves with an end of the rod across the rod, the other end being
+    held.
+    """
+    centre, length = p["rod_centre"].item(), p["rod_length"].item()
+    lever = length - centre if joint == "big_end" else centre
+    return (p["rod_inertia"].item() + p["rod_mass"].item() * lever**2) / length**2
+
+
+def contact_scales(case: Case) -> Iterator[JointScales]:
+    """Yield the scales of each joint with clearance under its greatest force."""
+    if scene(case) == Scene.IDEAL:
+        return
+    p = record(case)
+    for joint, clearance in zip(JOINTS, p["clearance"], strict=True):
+        if clearance > 0:
+            yield joint_scales(p, joint, greatest_force(p, joint))
+
+
+def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, float]:
+    """About how many steps a run of a case attempts, and how long they take (s)."""
+    steps = expected_steps(case, joints)
+    return steps, expected_seconds(case, steps)
+
+
+def expected_steps(case: Case, joints: Sequence[JointScales]) -> float:
+    """About how many steps a run of a case attempts; good to a factor of four in random cases.
+
+    As many as accuracy asks for while the contact rings, or as stability does where that is not
+    more than the stiff partner's: a few a radian. 0 where nothing is integrated. Far from the
+    defaults only its order of magnitude holds.
+    """
+    if not joints:
+        return 0.0
+    joint = joints[0].joint if len(joints) == 1 else "both"
+    radians = case.duration / min(one.implicit_step for one in joints)
+    accurate = PER_RADIAN[joint] * case.rtol ** (-1.0 / ORDER)
+    stable = HELD * case.duration / min(one.explicit_step for one in joints)
+    return max(radians * accurate, min(stable, radians * max(accurate, 2.0)))
+
+
+def expected_seconds(case: Case, steps: float) -> float:
+    """About how long so many steps take (s), without error bars, on a machine of 2024."""
+    if steps == 0:
+        return 0.0
+    joint = case.joint if case.joint in STEP_SECONDS else "both"
+    return steps * (STEP_SECONDS[joint] if case.solve.method in COMPILED else SCIPY_SECONDS)
+
+
+METRES, MICROMETRES = {"m": 1e3}, {"µm": 1e-3}
+GRAMS, MILLI = {"g": 1e-3}, 1e-3
+
+
+class Usual(NamedTuple):
+    """What is usual for a key, in its unit, and the units it may be mistaken for, as factors."""
+
+    low: float
+    high: float
+    units: dict[str, float]
+
+    def holds(self, value: float) -> bool:
+        """Return whether a value is usual; limits may come from a conversion, and count."""
+        return self.low * (1 - 1e-9) <= value <= self.high * (1 + 1e-9)
+
+
+# Ours: reciprocating compressors from model engines to large process machines, with a margin. A
+# contact is from plastic bushings to steel in a conforming bore (Hertz, K = 4/3 sqrt(R) E').
+USUAL = {
+    "clearance_mm": Usual(1e-3, 2.0, METRES | MICROMETRES),
+    "machine.crank_radius_mm": Usual(5.0, 1e3, METRES),
+    "machine.rod_length_mm": Usual(20.0, 1e4, METRES),
+    "machine.speed_rpm": Usual(120.0, 6e3, {"rad/s": 30 / math.pi, "Hz": 60.0}),
+    "machine.rod_mass_kg": Usual(0.02, 500.0, GRAMS),
+    "machine.reciprocating_mass_kg": Usual(0.05, 5e3, GRAMS),
+    "machine.pin_radius_mm": Usual(1.0, 500.0, METRES),
+    "gas.piston_radius_mm": Usual(5.0, 1e3, METRES),
+    "gas.head_clearance_mm": Usual(0.1, 200.0, METRES),
+    "gas.suction_MPa": Usual(1e-3, 50.0, {"bar": 0.1, "kPa": 1e-3, "Pa": 1e-6}),
+    "gas.discharge_MPa": Usual(0.05, 200.0, {"bar": 0.1, "kPa": 1e-3, "Pa": 1e-6}),
+    "spring.stiffness_N_per_mm": Usual(0.1, 5e3, {"N/m": MILLI, "kN/mm": 1e3}),
+    "spring.damping_N_s_per_mm": Usual(1e-4, 10.0, {"N s/m": MILLI}),
+    "spring.preload_N": Usual(5.0, 1e6, {"kN": 1e3}),
+    "spring.stroke_mm": Usual(2.0, 2e3, METRES),
+    "contact.stiffness_N_per_mm15": Usual(
+        1e4, 1e7, {"kN/mm^1.5": 1e3, "mN/mm^1.5": MILLI, "N/m^1.5": 1000.0**-1.5}
+    ),
+    "contact.damping_N_s_per_mm": Usual(0.1, 1e5, {"N s/m": MILLI}),
+    "contact.full_damping_mm": Usual(1e-3, 5.0, METRES),
+    "friction.stiction_velocity_mm_per_s": Usual(0.1, 1e4, {"m/s": 1e3}),
+    "friction.friction_velocity_mm_per_s": Usual(1.0, 1e5, {"m/s": 1e3}),
+}
+
+
+class Slip(NamedTuple):
+    """A key whose values look like another unit's, and what is said of it."""
+
+    key: str
+    message: str
+    jobs: int  # that read the key
+
+
+def slips(cases: Sequence[Case]) -> list[Slip]:
+    """Return the keys of a study's cases of which all values look like another unit's."""
+    found = []
+    for key, usual in USUAL.items():
+        read = [values for case in cases if (values := values_of(case, key))]
+        values = sorted({value for several in read for value in several})
+        unit = other_unit(key, usual, values)
+        if unit:
+            found.append(Slip(key, said(key, usual, values, unit), len(read)))
+    return found
+
+
+def values_of(case: Case, key: str) -> list[float]:
+    """Return the values of a key that a case's simulation reads; of clearances, those of worn
+    joints.
+    """
+    group, _, name = key.partition(".")
+    if not reads(case, key):
+        return []
+    if not name:  # what both joints share
+        worn = (getattr(getattr(case, group), joint) for joint in JOINTS)
+        return [value for value in worn if value]
+    if name == "stiffness_N_per_mm15" and case.contact.exponent != 1.5:
+        return []  # its unit depends on the exponent
+    owner = getattr(case, group)
+    value = getattr(owner, name) if owner is not None else None
+    return [] if value is None else [float(value)]
+
+
+def other_unit(key: str, usual: Usual, values: Iterable[float]) -> str:
+    """Return the unit in which unusual values would all be usual, "" where there is none.
+
+    Of several, the one that brings them nearest to the key's default.
+    """
+    values = [*values]
+    if not values or any(usual.holds(value) or value <= 0 for value in values):
+        return ""
+    fitting = [
+        name for name, factor in usual.units.items() if all(usual.holds(v * factor) for v in values)
+    ]
+    row = row_of(key)
+    default = float(row.default) if row and row.default else math.sqrt(usual.low * usual.high)
+    middle = sum(map(math.log, values)) / len(values)
+    return min(
+        fitting,
+        key=lambda name: abs(middle + math.log(usual.units[name] / default)),
+        default="",
+    )
+
+
+def said(key: str, usual: Usual, values: Sequence[float], other: str) -> str:
+    """Return what is said of values that look like another unit's."""
+    row, factor = row_of(key), usual.units[other]
+    unit = (row.unit if row else "").replace("^p", "^1.5")
+    low, high = values[0], values[-1]
+    if low == high:
+        given, verb, them = f"{low:g} {unit}", "is", f"it is {low * factor:.4g} {unit}"
+    else:
+        given, verb = f"{low:g} to {high:g} {unit}", "are"
+        them = f"they are {low * factor:.4g} to {high * factor:.4g} {unit}"
+    range_ = f"{usual.low:g} to {usual.high:g}"
+    return f"{given} {verb} unusual ({range_} is usual); read as {other}, {them}"
+
 
 SHALLOW = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
 LONGEST_CRANK = 0.35  # of the rod's length; 0.15 to 0.3 is usual

@@ -2,7 +2,7 @@
 
 Beyond it two correct solutions differ by more than any error bar tells, so that a number that
 depends on the course of the motion has none; statistics still have a meaning. Twins go in step
-(`compressor.physics.twin`), at a tolerance of their own: each step adds an error of about rtol,
+(`compressor.physics.march`), at a tolerance of their own: each step adds an error of about rtol,
 which must be small beside the shift that is followed. Looser ones were measured to mislead: at
 4e-6, explicit steps at the edge of stability part twins of a regular motion within a third of a
 revolution; at 1e-11 one horizon of five was off by a third. At 1e-12 horizons agree with those at
@@ -27,12 +27,9 @@ from compressor.physics import (
     new_work,
     segments,
 )
-from compressor.solve.initial import initial_state
-from compressor.solve.march_driver import CHUNK, check_march
-from compressor.solve.marching import ready_walker
-from compressor.solve.request import Request, Stop
-from compressor.solve.si_record import is_ideal, record
-from compressor.solve.sizes import natural_sizes
+from compressor.solve.march_driver import CHUNK, check_march, ready_walker
+from compressor.solve.request import Request, Stop, with_cuts
+from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record
 
 CLOSE = 1e-9  # of the clearance: how far from the motion its twin starts
 FAR = 1e-2  # of the clearance: how far apart they are no longer one motion
@@ -84,32 +81,61 @@ def part(case: Case, span: float, rtol: float, close: float, timeout: float) -> 
         shifted[p["at"][Coordinate.GUIDE]] += close * p["guide_clearance"]
     ends = np.array([0.0, span])
     request = Request(p, moved, ends, 0.0, rtol, "auto", case.solve.max_steps, timeout)
-    return followed(request, shifted)
+    return follow_twins(request, shifted)
 
 
-def followed(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting:
+class Twins:
+    """A motion and its twin, which takes the same steps, on their way through segments of time.
+
+    request: of a compiled method; shifted: the twin's initial state. `ends`: the number of
+    segments up to each of the request's cuts.
+    """
+
+    def __init__(self, request: Request, shifted: np.ndarray):
+        self.request, self.deadline = request, time.monotonic() + request.timeout
+        edges, phases = segments(request.p, float(request.times[-1]))
+        self.edges, self.phases, self.ends = with_cuts(edges, phases, request.cuts)
+        self.size = natural_sizes(request.p)
+        n = self.size.size
+        self.walker, self.fellow = (ready_walker(request, self.size) for _ in range(2))
+        self.z, self.twin = (np.append(y, np.zeros(FLOWS)) for y in (request.start, shifted))
+        self.work, self.twin_work = new_work(n), new_work(n)
+        self.rows, self.tally = np.zeros((2, COLUMNS)), new_tally(request.p)
+        self.states = np.empty((request.times.size, n))
+
+    def advance(self, count: int, far: float) -> bool:
+        """Go on through the first `count` segments, or until the twins are `far` apart: True.
+
+        far: as a share of the clearance. Raises Stop.
+        """
+        request, walker, fellow = self.request, self.walker, self.fellow
+        walker.status = Status.RUNNING
+        while walker.status == Status.RUNNING and fellow.status == Status.RUNNING:
+            left = request.max_steps - walker.steps - walker.rejected
+            march_twins(
+                walker, fellow, request.p, self.z, self.twin, self.work, self.twin_work,
+                request.rtol * self.size, self.size, self.edges[: count + 1], self.phases[:count],
+                request.times, self.states, self.tally, self.rows, far, min(CHUNK, left),
+            )  # fmt: skip
+            if Status.DONE not in (walker.status, fellow.status):
+                self.check()
+        return bool(fellow.status == Status.DONE)
+
+    def check(self) -> None:
+        """Raise Stop where the motion may go no further, or the time is up."""
+        check_march(self.request, self.walker, self.z, float(self.tally.deepest), self.deadline)
+
+
+def follow_twins(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting:
     """Follow a motion and its twin until they are `far` apart, as a share of the clearance.
 
     request: of a compiled method; shifted: the twin's initial state.
     """
-    deadline = time.monotonic() + request.timeout
-    p, tally = request.p, new_tally(request.p)
-    edges, phases = segments(p, float(request.times[-1]))
-    size = natural_sizes(p)
-    walker, fellow = ready_walker(request, size), ready_walker(request, size)
-    z, twin = (np.append(y, np.zeros(FLOWS)) for y in (request.start, shifted))
-    work, twin_work, rows = new_work(size.size), new_work(size.size), np.zeros((2, COLUMNS))
-    states = np.empty((request.times.size, size.size))
+    twins = Twins(request, shifted)
+    walker, parted, whole = twins.walker, False, False
     try:
-        while walker.status == Status.RUNNING and fellow.status == Status.RUNNING:
-            left = request.max_steps - walker.steps - walker.rejected
-            march_twins(
-                walker, fellow, p, z, twin, work, twin_work, request.rtol * size, size, edges,
-                phases, request.times, states, tally, rows, far, min(CHUNK, left),
-            )  # fmt: skip
-            if Status.DONE not in (walker.status, fellow.status):
-                check_march(request, walker, z, float(tally.deepest), deadline)
+        parted = twins.advance(twins.phases.size, far)
+        whole = not parted
     except Stop:
-        return Parting(float(walker.t), False, False, int(walker.steps + walker.rejected))
-    parted = bool(fellow.status == Status.DONE)
-    return Parting(float(walker.t), parted, not parted, int(walker.steps + walker.rejected))
+        pass
+    return Parting(float(walker.t), parted, whole, int(walker.steps + walker.rejected))

@@ -1,4 +1,4 @@
-"""Legs of a motion that goes on: whole revolutions from a state, with their Poincaré points.
+"""Legs of a motion that goes on: whole revolutions from a state, Poincaré points, and wear.
 
 A state is the motion as the solver holds it (`physics.state_names`) at top dead centre, where the
 load's segments begin; the crank angle of the Poincaré section lies inside the revolutions. Steps
@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,15 +19,14 @@ from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Table
 from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe_all
 from compressor.reasons import Reason
-from compressor.solve.attempts import Solution, attempt
-from compressor.solve.energy_audit import RUNGS, allowed, energy_residual
-from compressor.solve.error_bars import Metrics
-from compressor.solve.settling import least_promise, spanned, steady
+from compressor.solve.attempts import Solution, attempt, integrate, request, times_of
+from compressor.solve.error_bars import RUNGS, Metrics, allowed, energy_residual
+from compressor.solve.regime import least_promise, spanned, steady
+from compressor.solve.request import Cuts, Turns, merged, revolutions
+from compressor.solve.run_metrics import metrics, statistics
+from compressor.solve.series import passed
 from compressor.solve.si_record import record
 from compressor.solve.simulate import with_series
-from compressor.solve.statistics import statistics
-from compressor.solve.tallied import metrics
-from compressor.solve.turns import Cuts, Turns, merged, revolutions
 
 SHIFT = 1e-6  # rev: half the span that the rate of an eccentricity is a difference over
 
@@ -56,7 +56,7 @@ class Leg:
     def rms_error(self, last: int) -> float:
         """Return the standard error of rms_acceleration over the last so many revolutions (m/s2).
 
-        By batch means (`compressor.solve.statistics`); inf where there are too few.
+        By batch means (`compressor.solve.run_metrics`); inf where there are too few.
         """
         found = statistics(self.p, self.turns[-last:])
         return float(found["rms_acceleration_standard_error"])
@@ -80,7 +80,7 @@ def follow(
     """Follow a case from a state on, or from its own start, until enough is known.
 
     A leg whose energy does not balance is run again at a tenth of the tolerance, and at a
-    hundredth, as any run (`compressor.solve.ladder`).
+    hundredth, as any run (`compressor.solve.solution`).
     """
     deadline = time.monotonic() + span.timeout
     of, rtol = leg_case(case, span.revolutions), case.rtol
@@ -191,3 +191,56 @@ def eccentricities(p: np.record, at: float, state: np.ndarray) -> np.ndarray:
     places = rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(3, 2, 2)
     here, before, after = places
     return np.concatenate((here, (after - before) / (2.0 * span)), axis=1)
+
+
+class Rubbed(NamedTuple):
+    """A motion on bores that are given.
+
+    `work`: pressing times sliding, J a revolution, by joint and node of the bore; `spread`: its
+    standard deviation over the revolutions, by joint; `turn`: time of a revolution, s; `state`: the
+    motion at the end; `reason`, `detail`: why it stopped early, empty if it did not.
+    """
+
+    work: np.ndarray
+    spread: np.ndarray
+    turn: float
+    metrics: Metrics
+    state: np.ndarray
+    reason: str = ""
+    detail: str = ""
+
+
+def rub(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed:
+    """Follow a case over its span on worn bores, and measure what rubs after it has settled.
+
+    worn: (joint, sector), m; state: the motion to begin with, at top dead centre, or None for the
+    case's own. The span is in whole revolutions. A run whose energy does not balance is run again
+    at a tenth of the tolerance, as any other.
+    """
+    deadline, rtol = time.monotonic() + case.solve.timeout_s, case.rtol
+    ends = revolutions(case.settle, case.duration, case.turn)
+    for rung in range(RUNGS + 1):
+        p = record(case, worn)
+        asked = request(case, rtol, p, times_of(case, False), state)
+        cuts = Cuts(ends)
+        asked.timeout, asked.cuts = max(deadline - time.monotonic(), 0.0), cuts
+        run = integrate(asked)
+        residual = energy_residual(run.tally)
+        most = allowed(case.rtol, case.duration / case.turn)
+        if run.reason or residual <= most:
+            break
+        if rung == RUNGS or rtol < 9.9 * TIGHTEST:
+            run.reason = Reason.ENERGY_AUDIT_FAILED
+            run.detail = f"energy residual {residual:.2g}, more than {most:.2g}, at rtol {rtol:.2g}"
+            break
+        rtol /= 10.0
+    turns = cuts.turns
+    if run.reason or not turns:
+        nothing = np.full((len(JOINTS), worn.shape[1]), np.nan)
+        return Rubbed(nothing, nothing[:, 0], np.nan, {}, asked.start, run.reason, run.detail)
+    slid = np.array([turn["slid"] for turn in turns])
+    whole = merged(turns)
+    work = whole["worn"][:, : worn.shape[1]] / len(turns)
+    began, ended = passed(p, run.times, run.states)[[0, -1]]
+    turn = case.turn * float(ended - began) / case.duration
+    return Rubbed(work, slid.std(axis=0), turn, metrics(p, whole), run.states[-1])

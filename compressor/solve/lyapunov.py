@@ -3,7 +3,7 @@
 Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980): a twin starts a small distance away;
 after each short interval the growth ln(d / d0) is taken, and the difference is pulled back to d0
 along itself. It turns into the direction that grows fastest. Twins go in step
-(`compressor.physics.twin`), by the stiff method alone: explicit steps that stability holds part
+(`compressor.physics.march`), by the stiff method alone: explicit steps that stability holds part
 twins of motions that draw them together. A small end with a hundred times the paper's damping was
 measured at -1.0 by stiff steps and at +17 by explicit ones of the same tolerance. On periodic
 motions the exponent is the logarithm of the largest Floquet multiplier
@@ -13,28 +13,17 @@ motions the exponent is the logarithm of the largest Floquet multiplier
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from compressor.cases import Case
-from compressor.physics import (
-    COLUMNS,
-    FLOWS,
-    Status,
-    march_twins,
-    new_tally,
-    new_work,
-    segments,
-)
 from compressor.reasons import Reason
-from compressor.solve.march_driver import CHUNK, check_march
-from compressor.solve.marching import ready_walker
-from compressor.solve.request import Request, Stop
+from compressor.solve.horizon import Twins
+from compressor.solve.request import Cuts, Request, Stop
+from compressor.solve.run_metrics import parts, standard_error, sure
 from compressor.solve.si_record import is_ideal, record
-from compressor.solve.sizes import natural_sizes
-from compressor.solve.statistics import parts, standard_error, sure
-from compressor.solve.turns import Cuts, with_cuts
 
 METHOD = "RODAS"  # of the twins, whatever the case asks for
 RTOLS = (1e-8, 1e-7, 1e-6)  # the next one where steps shrink to nothing, on a contact's edge
@@ -83,10 +72,13 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
     push = np.zeros(state.size)
     push[:moving] = CLOSE / math.sqrt(moving)
     deadline = time.monotonic() + timeout
+    p, ends = record(case), np.array([0.0, times[-1]])
     for rtol, of_steps in zip(RTOLS, OF_STEPS, strict=True):
-        twins = _Twins(case, state, times, rtol, deadline)
+        left = deadline - time.monotonic()
+        request = Request(p, state, ends, 0.0, rtol, METHOD, NO_LIMIT, left, Cuts(times))
+        twins = Twins(request, state)
         try:
-            found, lost = growths(twins.follow, push, times.size, LEAST)
+            found, lost = growths(partial(follow, twins), push, times.size, LEAST)
         except Stop as stop:
             if stop.reason == Reason.BUDGET_SECONDS:
                 break
@@ -95,6 +87,17 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
         value, error = mean_with_error(each.sum(axis=1))
         return Exponent(value, error + of_steps, bool(lost.any()))
     return Exponent(math.nan, math.nan)
+
+
+def follow(twins: Twins, difference: np.ndarray) -> np.ndarray:
+    """Return a difference at the end of the next interval, in natural sizes. Raises Stop."""
+    n = twins.size.size
+    twins.twin[:n] = twins.z[:n] + difference * twins.size
+    parted = twins.advance(twins.ends.pop(0), math.inf)
+    twins.check()
+    if parted or not np.isfinite(twins.twin).all():
+        raise Stop(Reason.NON_FINITE, "the twin is no longer finite")
+    return (twins.twin[:n] - twins.z[:n]) / twins.size
 
 
 def growths(
@@ -127,39 +130,3 @@ def mean_with_error(values: np.ndarray) -> tuple[float, float]:
     """
     means = np.array([part.mean() for part in parts(values, MOST_BATCHES, LEAST_BATCH)])
     return float(means.mean()), float(sure(standard_error(means), len(means)))
-
-
-class _Twins:
-    """A motion and its twin on their way through intervals that end at `times` (s)."""
-
-    def __init__(
-        self, case: Case, state: np.ndarray, times: np.ndarray, rtol: float, deadline: float
-    ):
-        p, ends = record(case), np.array([0.0, times[-1]])
-        self.deadline = deadline
-        self.request = Request(p, state, ends, 0.0, rtol, METHOD, NO_LIMIT)
-        edges, phases = segments(p, float(times[-1]))
-        self.edges, self.phases, self.ends = with_cuts(edges, phases, Cuts(times))
-        self.size = natural_sizes(p)
-        self.walker, self.fellow = (ready_walker(self.request, self.size) for _ in range(2))
-        self.z, self.twin = (np.append(state, np.zeros(FLOWS)) for _ in range(2))
-        self.work, self.twin_work = (new_work(self.size.size) for _ in range(2))
-        self.rows, self.tally = np.zeros((2, COLUMNS)), new_tally(p)
-        self.states = np.empty((ends.size, self.size.size))
-
-    def follow(self, difference: np.ndarray) -> np.ndarray:
-        """Return the difference, in natural sizes, at the end of the next interval. Raises Stop."""
-        request, walker, size, n = self.request, self.walker, self.size, self.size.size
-        last = self.ends.pop(0)
-        self.twin[:n] = self.z[:n] + difference * size
-        walker.status = Status.RUNNING
-        while walker.status == Status.RUNNING:
-            march_twins(
-                walker, self.fellow, request.p, self.z, self.twin, self.work, self.twin_work,
-                request.rtol * size, size, self.edges[: last + 1], self.phases[:last],
-                request.times, self.states, self.tally, self.rows, math.inf, CHUNK,
-            )  # fmt: skip
-            check_march(request, walker, self.z, float(self.tally.deepest), self.deadline)
-            if self.fellow.status != Status.RUNNING or not np.isfinite(self.twin).all():
-                raise Stop(Reason.NON_FINITE, "the twin is no longer finite")
-        return (self.twin[:n] - self.z[:n]) / size

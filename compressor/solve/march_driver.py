@@ -1,16 +1,208 @@
-"""Integrate by the compiled march, in chunks between which budgets are checked."""
+"""Integrate by the compiled march, in chunks between which budgets are checked.
 
+The last steps of a march that has stopped, taken once more and looked at one by one. A march is
+resumable to the bit, so that nothing needs to be kept of a run that ends well but how it stood
+before its last chunk.
+"""
+
+import math
 import time
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics import FLOWS, Status, new_work
+from compressor.physics import (
+    FLOWS,
+    Mode,
+    Pair,
+    Status,
+    Work,
+    derivative_with_flows,
+    march,
+    new_walker,
+    new_work,
+    step_error,
+)
 from compressor.reasons import Reason
-from compressor.solve.last_steps import retrace
-from compressor.solve.marching import March, Snapshot, Standing, ready_walker
-from compressor.solve.request import LAST, Request, Stop, Trajectory, check_state, overdue, too_deep
-from compressor.solve.sizes import natural_sizes
-from compressor.solve.turns import with_cuts, with_edge
+from compressor.solve.request import (
+    LAST,
+    History,
+    Request,
+    Stop,
+    Trajectory,
+    check_state,
+    greatest_depth,
+    overdue,
+    too_deep,
+    with_cuts,
+    with_edge,
+)
+from compressor.solve.si_record import contact_sizes, natural_sizes
+
+COMPILED = {
+    "auto": (Mode.AUTO, Pair.TSIT5),
+    "DOPRI5": (Mode.EXPLICIT, Pair.DOPRI5),
+    "TSIT5": (Mode.EXPLICIT, Pair.TSIT5),
+    "RODAS": (Mode.STIFF, Pair.DOPRI5),
+}
+LANE_METHODS = ("auto", "TSIT5")
+CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
+
+
+class Standing(NamedTuple):
+    """How a march stands: all that `march` writes but the output samples."""
+
+    walker: np.record
+    z: np.ndarray  # motion and flows, (n + 4,)
+    work: Work
+    tally: np.record
+
+    def copy(self) -> "Standing":
+        """Return a copy that a march may go on from."""
+        work = Work(*(array.copy() for array in self.work))
+        return Standing(self.walker.copy(), self.z.copy(), work, self.tally.copy())
+
+    @property
+    def attempts(self) -> int:
+        """Steps attempted so far: taken, refused, and those that an onset cut short."""
+        w = self.walker
+        return int(w.steps + w.rejected + w.onsets + (w.landing > 0.0))
+
+
+class Snapshot(NamedTuple):
+    """What is kept of a standing to go on from it: of its work, what a call of `march` reads.
+
+    Records are kept as bytes: numpy takes five microseconds to copy one, a fiftieth for these.
+    """
+
+    walker: bytes
+    z: np.ndarray
+    rates: np.ndarray  # work.k[0]
+    row: np.ndarray
+    tally: bytes
+    kind: np.dtype  # of the tally
+
+    @classmethod
+    def of(cls, now: Standing) -> "Snapshot":
+        """Return a snapshot, in about a microsecond."""
+        work = now.work
+        return cls(
+            now.walker.tobytes(), now.z.copy(), work.k[0].copy(), work.row.copy(),
+            now.tally.tobytes(), now.tally.dtype,
+        )  # fmt: skip
+
+    def standing(self) -> Standing:
+        """Return a march as it stood then."""
+        work = new_work(self.z.size - FLOWS)
+        work.k[0], work.row[:] = self.rates, self.row
+        return Standing(
+            unpacked(self.walker, new_walker(0).dtype),
+            self.z.copy(),
+            work,
+            unpacked(self.tally, self.kind),
+        )
+
+
+def unpacked(data: bytes, kind: np.dtype) -> np.record:
+    """Return a record of a kind, that compiled code may write, from its bytes."""
+    return np.frombuffer(bytearray(data), kind).view(np.recarray)[0]
+
+
+@dataclass(frozen=True)
+class March:
+    """A request as the compiled loop takes it.
+
+    `size`: of each number of the motion, (n,); `edges`, `phases`: the load's segments; `states`:
+    the output samples, which are written.
+    """
+
+    request: Request
+    size: np.ndarray
+    edges: np.ndarray
+    phases: np.ndarray
+    states: np.ndarray
+
+    def advance(self, now: Standing, attempts: int, segments: int | None = None) -> None:
+        """Go on by at most so many attempts of a step, through the first so many segments."""
+        request, size = self.request, self.size
+        edges, phases = self.edges, self.phases
+        if segments is not None:
+            edges, phases = edges[: segments + 1], phases[:segments]
+        march(
+            now.walker, request.p, now.z, now.work, request.rtol * size, size, edges, phases,
+            request.times, self.states, now.tally, attempts,
+        )  # fmt: skip
+
+
+def ready_walker(request: Request, size: np.ndarray) -> np.record:
+    """Return a walker at the start of a run by a compiled method; `size` as of `natural_sizes`."""
+    mode, pair = COMPILED[request.method]
+    walker = new_walker(mode)
+    walker["pair"], walker["rtol"] = pair, request.rtol
+    length, speed = contact_sizes(request.p, size)
+    walker["watch"], walker["contact_step"] = 1, CONTACT_STEP * length / speed
+    walker["deepest"] = greatest_depth(request.p)[0]
+    return walker
+
+
+def retrace(before: Standing, after: Standing, march: March) -> History:
+    """Return the history of a march that stood like `before` and stopped like `after`.
+
+    `before` is written.
+    """
+    made = after.attempts - before.attempts
+    if made > LAST:
+        march.advance(before, made - LAST)
+    found = History()
+    for _ in range(min(made, LAST)):
+        now = before.copy()
+        w = now.walker
+        if w.fresh:
+            phase = int(march.phases[w.segment])
+            derivative_with_flows(w.t, now.z, phase, march.request.p, now.work.k[0])
+        march.advance(before, 1)
+        step = attempted(now.walker, before.walker, float(march.edges[w.segment + 1]))
+        scaled = scaled_error(now, before, step, march.request.rtol, march.size)
+        error = math.sqrt(float(np.mean(scaled**2)))
+        found.add(float(w.t), step, error, described(now.walker, before.walker))
+        found.dominant = dominant(scaled, before.work.new[: march.size.size])
+    return found
+
+
+def attempted(now: np.record, then: np.record, end: float) -> float:
+    """Return the length (s) of the step that was attempted, by the rules of `march`."""
+    if then.steps > now.steps:
+        return float(then.t - now.t)
+    if now.landing > 0.0 or now.h == 0.0:
+        return float(now.landing) or math.nan
+    h = min(now.h, end - now.t)
+    return float(end - now.t if now.t + 1.01 * h >= end else h)
+
+
+def scaled_error(
+    now: Standing, then: Standing, step: float, rtol: float, size: np.ndarray
+) -> np.ndarray:
+    """Return the estimated error of each number of the motion over its tolerance, (n,)."""
+    n = now.z.size - FLOWS
+    error = step_error(now.walker, now.work.k, then.work.k, step)[:n]
+    largest = np.maximum(np.abs(now.z[:n]), np.abs(then.work.new[:n]))
+    return error / (rtol * (size + largest))
+
+
+def dominant(scaled: np.ndarray, new: np.ndarray) -> int:
+    """Return the number of the state that went bad first, or has the largest error."""
+    bad = np.flatnonzero(~np.isfinite(new) | ~np.isfinite(scaled))
+    return int(bad[0]) if bad.size else int(np.abs(scaled).argmax())
+
+
+def described(now: np.record, then: np.record) -> str:
+    """Return the method of an attempt, and what became of it."""
+    method = "RODAS" if now.stiff else Pair(int(now.pair)).name
+    if then.steps > now.steps:
+        return f"{method} to an onset" if now.landing > 0.0 else f"{method} taken"
+    return f"{method} refused" if then.rejected > now.rejected else f"{method} cut at an onset"
+
 
 CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
 

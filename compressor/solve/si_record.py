@@ -1,7 +1,11 @@
-"""Case -> the SI record of parameters that compiled functions read.
+"""The SI record of a case, the sizes that tolerances are relative to, and its initial state.
 
 Gathered in a dict, for which the record is filled once: to read a field back would take ten times
 as long, for every job.
+
+The motion at the start of a case: top dead centre, ideal rates, and an elastic rod bent as it is
+then, at rest in itself. Without this deflection under what moves it, it would ring from the first
+moment on.
 """
 
 import math
@@ -12,14 +16,22 @@ import numpy as np
 from compressor.cases import Case, Guide, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
+    FLOWS,
     MOST_SECTORS,
+    Coordinate,
     Load,
     Scene,
     bore_fields,
     choose_laws,
     complete,
+    derivative_with_flows,
+    elastic_form,
     hysteresis,
+    is_featured,
     new_record,
+    start,
+    state_names,
+    static_load,
 )
 
 NO_APPROACH = 1000.0  # mm/s: of laws that damp by none, and divide nothing by it
@@ -188,3 +200,176 @@ def _features(case: Case, p: dict[str, Any]) -> None:
         p["bending_stiffness"] = modulus * width * depth**3 / 12 / length**3
         slowest = math.pi**2 * math.sqrt(p["bending_stiffness"] / p["rod_mass"])  # rad/s
         p["rod_damping"] = 2.0 * rod.damping_ratio / slowest
+
+
+MODES = {  # of the rod: stiffness over E I / L^3 or E A / L, share of its mass that moves
+    Coordinate.BEND_1: (math.pi**4 / 2, 0.5),
+    Coordinate.BEND_2: (8 * math.pi**4, 0.5),
+    Coordinate.STRETCH_MIDDLE: (16 / 3, 8 / 15),
+    Coordinate.STRETCH: (7 / 3, 2 / 15),
+}
+
+# J: of an energy that is integrated beside the motion and moves nothing, so that it neither holds
+# steps back nor tells two motions apart
+UNCONTROLLED = 1e12
+
+
+def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -> np.ndarray:
+    """Return the size of each number of a mechanism's state, (n,): deflections under the forces at
+    hand.
+
+    joints: length (m) and speed (m/s) of the journals in their bores; bristle: of bristles (m).
+    """
+    sizes = np.ones(len(state_names(p)))
+    n = int(p["freedoms"])
+    force = p["reciprocating_mass"] * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
+    each = {Coordinate(one): joints for one in range(Coordinate.BIG_X, Coordinate.GUIDE)}
+    if p["tilting"]:
+        height = _guide_sizes(p, force)
+        each[Coordinate.GUIDE] = height
+        each[Coordinate.TILT] = height[0] / p["guide_length"], height[1] / p["guide_length"]
+    for mode, (stiffness, share) in MODES.items() if p["elastic"] else ():
+        bending = mode < Coordinate.STRETCH_MIDDLE
+        stiffness *= p["bending_stiffness" if bending else "axial_stiffness"]
+        pressed = force
+        if bending:  # by the rod's own inertia
+            pressed = p["rod_mass"] * p["crank_radius"] * p["omega"] ** 2
+        size = pressed / stiffness
+        each[mode] = size, size * math.sqrt(stiffness / (share * p["rod_mass"]))
+    for coordinate, (size, rate) in each.items():
+        place = p["at"][coordinate]
+        if place >= 0:
+            sizes[place], sizes[n + place] = size, rate
+    sizes[2 * n : 2 * n + 4] = joints[1], joints[1], bristle, bristle
+    if p["driven"]:
+        place = p["at"][Coordinate.CRANK]
+        moving = p["reciprocating_mass"] + p["rod_mass"]
+        inertia = p["crank_inertia"] + moving * p["crank_radius"] ** 2
+        # a steep line holds the speed nearer than inertia does
+        held = inertia * p["omega"] ** 2 + p["torque_slope"] * p["omega"]
+        sizes[place] = min(1.0, force * p["crank_radius"] / held)
+        sizes[place - 1] = sizes[place] / p["omega"]
+    if p["elastic"]:
+        sizes[p["rod_loss"]] = UNCONTROLLED
+    return sizes
+
+
+def _guide_sizes(p: np.record, force: float) -> tuple[float, float]:
+    """Return the length (m) and speed (m/s) of the crosshead in its guide, as of a journal."""
+    across = force * p["crank_ratio"] + p["reciprocating_mass"] * p["gravity"]
+    stiffness, exponent = p["guide_stiffness"], p["guide_exponent"]
+    depth = (across / stiffness) ** (1.0 / exponent)
+    length = max(min(p["guide_clearance"], depth), 1e-3 * depth)
+    tangent = exponent * stiffness * depth ** (exponent - 1.0)
+    return length, length * math.sqrt(tangent / p["reciprocating_mass"])
+
+
+def length_and_speed(p: np.record) -> tuple[float, float]:
+    """Return the length (m) and speed (m/s) that absolute tolerances are relative to.
+
+    The length is the smaller of the clearance and the penetration under the forces at hand, but
+    not below a thousandth of the latter; the speed is that length at the contact's frequency, or
+    that at which a film against the wall gives way to the forces, if that is less.
+    """
+    moving = p["reciprocating_mass"]
+    force = moving * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
+    joints = [j for j in zip(p["clearance"].tolist(), p["stiffness"], strict=True) if j[0] > 0.0]
+    clearance = min(clearance for clearance, _ in joints)
+    contact = elastic_form(max(stiffness for _, stiffness in joints), clearance, p)
+    depth = contact.static_depth(force)
+    length = max(min(clearance, depth), 1e-3 * depth)
+    mass = min(p["rod_mass"], moving)
+    speed = length * math.sqrt(contact.tangent(depth) / mass)
+    if (damping := film_damping(p)) > 0.0:
+        speed = min(speed, force / damping)
+    return length, speed
+
+
+def film_damping(p: np.record) -> float:
+    """Return the damping (N s/m) of a film that is pressed against the wall; 0 of dry joints.
+
+    Of the joint with the smaller clearance, whose film is the stiffer one.
+    """
+    if not is_featured(p) or p["viscosity"] == 0.0:
+        return 0.0
+    clearance, joint = min((one, j) for j, one in enumerate(p["clearance"].tolist()) if one > 0.0)
+    size = 2.0 * p["film_length"] * p["viscosity"] * p["pin_radius"][joint] ** 3 / clearance**2
+    return float(size * p["film_constants"][joint, -1] / clearance)
+
+
+def natural_sizes(p: np.record) -> np.ndarray:
+    """Return the size of each number of the state: deviations (m, rad), their rates (per s), shape
+    (2 n,).
+
+    With chosen laws also of what contacts carry (`state_names`): speeds, bristles as they slide.
+    """
+    if is_featured(p):
+        joints = length_and_speed(p) if p["clearance"].any() else (1.0, 1.0)
+        return mechanism_sizes(p, joints, bristle_size(p, joints[0]))
+    length, speed = length_and_speed(p)
+    n = int(p["freedoms"])
+    sizes = np.full(2 * n, length)
+    sizes[n:] = speed
+    sizes[n - 1 :: n] *= 1.0 / p["rod_length"]  # the last freedom is an angle
+    more = len(state_names(p)) - sizes.size
+    if not more:
+        return sizes
+    bent = bristle_size(p, length)
+    return np.concatenate((sizes, np.full(2, speed), np.full(2, bent)))
+
+
+def bristle_size(p: np.record, length: float) -> float:
+    """Return the deflection (m) of bristles that slide; a length where there are none."""
+    stiffness = float(p["bristle_stiffness"])
+    return float(p["dynamic"]) / stiffness if stiffness and p["dynamic"] else length
+
+
+def contact_sizes(p: np.record, sizes: np.ndarray) -> tuple[float, float]:
+    """Return the length (m) and speed (m/s) of the journals in their bores, of sizes by
+    `natural_sizes`.
+
+    Of a mechanism with ideal joints no step need be as short as theirs.
+    """
+    if not is_featured(p):
+        return sizes[0], sizes[sizes.size // 2]
+    return length_and_speed(p) if p["clearance"].any() else (math.inf, 1.0)
+
+
+def absolute_tolerances(p: np.record, rtol: float) -> np.ndarray:
+    """Return SciPy's atol, for the numbers of the state, and energy flows."""
+    energy = (p.reciprocating_mass + p.rod_mass) * (p.crank_radius * p.omega) ** 2 / 2
+    return rtol * np.concatenate((natural_sizes(p), np.full(FLOWS, energy)))
+
+
+ROUNDS = 4  # in which the rod's deflection is found: nearly linear
+SHIFT = 1e-7  # m, by which its modes are moved to learn how they answer
+
+
+def initial_state(case: Case, p: np.record, shift: np.ndarray | float = 0.0) -> np.ndarray:
+    """Return the state at time 0, journals as offset by the case and by a shift (m), (joint,
+    axis).
+    """
+    y = np.zeros(len(state_names(p)))
+    start(offsets(case) + shift, y, p)
+    if is_featured(p) and p["elastic"]:
+        deflect(p, y)
+    return y
+
+
+def deflect(p: np.record, y: np.ndarray) -> None:
+    """Deflect the rod, in y, so that its modes are not accelerated: Newton's method."""
+    n, first = int(p["freedoms"]), int(p["at"][Coordinate.BEND_1])
+    modes = slice(first, first + 4)
+    z = np.append(y, np.zeros(FLOWS))
+    rates = np.empty_like(z)
+    answer = np.empty((4, 4))
+    for _ in range(ROUNDS):
+        derivative_with_flows(0.0, z, 0, p, rates)
+        here = rates[n:][modes].copy()
+        for mode in range(4):
+            moved = z.copy()
+            moved[first + mode] += SHIFT
+            derivative_with_flows(0.0, moved, 0, p, rates)
+            answer[:, mode] = (rates[n:][modes] - here) / SHIFT
+        z[modes] -= np.linalg.solve(answer, here)
+    y[modes] = z[modes]

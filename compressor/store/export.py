@@ -22,10 +22,9 @@ import numpy as np
 from compressor.program import PROGRAM, CompsimError
 from compressor.store.files import Folder, WrongName, publish, publishing
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.names import find_study, whole_key
 from compressor.store.reader import Stored, read_store
 from compressor.store.series_file import image_of, read_bytes, read_series
-from compressor.store.studies import StoredStudy, read_studies
+from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 
 if TYPE_CHECKING:
     import xarray as xr

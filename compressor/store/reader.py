@@ -9,8 +9,14 @@
 A job is stored when it has a row and, if the row tells of time series, their file. Every file
 appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
 no index: what is stored is read from the rows. `compressor.store.writer` writes them.
+
+Stored jobs of which this version of the program would tell more, or other numbers. A key holds the
+version of the model, and results of one version agree within their error bars but for what a
+revision has mended (`compressor.cases.revisions`): a job that another version of the program has
+made is not stale for that alone.
 """
 
+import json
 import os
 import re
 import warnings
@@ -22,7 +28,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import Case
+from compressor.cases import SUSPECT, Case, changes_since
+from compressor.metrics import METRICS, ROD_LOAD
 from compressor.outcome import Outcome
 from compressor.reasons import Reason
 from compressor.store.files import (
@@ -35,15 +42,60 @@ from compressor.store.files import (
     system_error,
 )
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.names import find_study
-from compressor.store.rows import Rows
-from compressor.store.segment import NAME, Cut, Segment, read_segment
+from compressor.store.rows import GIVEN, NAME, Cut, Rows, Segment, read_segment
 from compressor.store.series_file import read_series, read_values
-from compressor.store.stale import stale
-from compressor.store.studies import read_studies
+from compressor.store.studies import find_study, read_studies
 
 if TYPE_CHECKING:
     import xarray as xr
+
+WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
+
+
+def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
+    """Return the stored jobs, of those with some keys, by what a run of this version would give.
+
+    A job may stand under several metrics. Jobs that this version has made are none of them,
+    whatever metric has no value there.
+    """
+    found: dict[str, set[str]] = {}
+    positions = rows.find(list(keys))
+    positions = positions[positions >= 0]
+    old = positions[rows.columns["given"][positions] != GIVEN.encode()]
+    for name, lack in _lacking(rows, old).items() if len(old) else ():
+        if lack.any():
+            found[name] = {key.decode() for key in rows.columns["key"][old[lack]]}
+    for position in old.tolist():
+        for what in _changed(rows, position):
+            found.setdefault(f"this version's {what}", set()).add(
+                rows.columns["key"][position].decode()
+            )
+    return found
+
+
+def _changed(rows: Rows, position: int) -> list[str]:
+    """Return what a revision of the model has changed since a job was stored."""
+    if not SUSPECT.search(rows.text(position)):
+        return []
+    attributes = rows.attributes(position)
+    try:
+        values = json.loads(str(attributes.get("case", "")))
+        return changes_since(str(attributes.get("model_version", "")), values)
+    except (ValueError, KeyError, TypeError, AttributeError):  # of a case that no version has
+        return []
+
+
+def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
+    """Return which rows lack what any run of this version gives that ends well, by name."""
+    good = rows.words["status"][positions] == "ok"
+    signals = rows.words["signals"][positions] == "yes"
+    found = {}
+    for name in (*METRICS, *ROD_LOAD):
+        absent = np.isnan(rows.numbers[name][positions])
+        asked = good & signals if name in ROD_LOAD else good
+        found[name] = asked & absent.all(axis=tuple(range(1, absent.ndim)))
+    return found | {name: good & (rows.words[name][positions] == "") for name in WORDS}
+
 
 # reasons that leave no time series
 BROKEN = {Reason.INTERNAL_ERROR, Reason.WORKER_DIED, Reason.OUT_OF_MEMORY, Reason.INVALID_INPUT}

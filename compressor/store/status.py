@@ -1,30 +1,310 @@
-"""What a store can be asked: how its studies stand, and what is known of one job.
+"""Status and verification of a store, and how far its numbers can be trusted.
+
+What stored numbers cannot say of themselves: how far to trust them, in sentences. Of motions that
+were not seen to repeat, or settled after metrics began to count; of clipped sensor records; of
+cases outside the range that the program was judged on. From stored values alone, so that older
+stores answer as far as they have them.
 
 Reads studies and rows only, so that 100,000 jobs answer at once; of one job that an older version
 has stored perhaps its file.
 Jobs whose row is damaged count as missing, with a StoreWarning.
+
+Compare every file of a store with its digest, and name the jobs that damage costs. There is no
+index, so that a file that is gone is known by those that speak of it: rows of their files of time
+series and of their study, studies and files of time series of their rows.
 """
 
 import contextlib
+import copy
 import math
 import os
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compressor.cases import (
+    Case,
+    CaseError,
+    Sensor,
+    outside_judged,
+    points,
+    stands_for,
+    value_in,
+)
 from compressor.metrics import NUMBERS
-from compressor.store.caveats import job_caveats, study_caveats
-from compressor.store.files import Folder, final_path
+from compressor.outcome import Regime
+from compressor.store.files import Folder, StoreError, final_path, is_locked, no_results
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.names import find_job
-from compressor.store.reader import read_store
-from compressor.store.studies import Again, Change, change_of, owners, read_studies
+from compressor.store.reader import places, read_store, unowned_series
+from compressor.store.rows import Cut, Rows
+from compressor.store.series_file import read_dataset
+from compressor.store.studies import (
+    Again,
+    Change,
+    StoredStudy,
+    change_of,
+    find_job,
+    owners,
+    read_studies,
+    read_study,
+    study_paths,
+)
 
 if TYPE_CHECKING:
     from compressor.cases import Study
+
+AUTO = "solve: {settle_rev: auto, duration_rev: auto} waits for that"
+LONGER = "a longer run may give other numbers, or be chaotic"
+
+
+def study_caveats(rows: Rows, study: StoredStudy) -> list[str]:
+    """Return what to know of a study's finished jobs beside their numbers, a sentence each."""
+    return [
+        *run_caveats(rows, study),
+        *(f"{key}: {text}" for key, text in _outside_of_study(study).items()),
+    ]
+
+
+def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:
+    """Return what only a run can tell of a study: motions not seen to repeat, clipped records."""
+    positions = rows.find(study.keys)
+    there = positions >= 0
+    there[there] = rows.words["status"][positions[there]] == "ok"
+    positions = positions[there]
+    if not positions.size:
+        return []
+    numbers, regimes = rows.course[positions], rows.words["regime"][positions]
+    settle = np.array(_settle_revs(study), float)[there]
+    unrepeated = is_unrepeated(regimes, numbers["settled_rev"])
+    late = is_late(regimes, numbers["settled_rev"], settle)
+    return [
+        *_of_repetition(int(unrepeated.sum()), int(late.sum()), positions.size),
+        *_of_clipping(numbers["clipped_fraction"]),
+    ]
+
+
+def is_unrepeated(regime: Any, settled: Any) -> Any:
+    """Return whether motions were not seen to repeat; settled (rev): also where `auto` found it."""
+    return (np.asarray(regime) == Regime.PREDICTABLE) & np.isnan(settled)
+
+
+def is_late(regime: Any, settled: Any, settle: Any) -> Any:
+    """Return whether periodic motions settled after metrics began to count, at `settle` (rev)."""
+    return (np.asarray(regime) == Regime.PERIODIC) & (np.asarray(settled) > settle)
+
+
+def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> list[str]:
+    """Return what to know of a job that is ok beside its numbers, a sentence each.
+
+    numbers, attributes: as a row of a store has them.
+    """
+    regime = attributes.get("regime", "")
+    settled, clipped = (
+        float(numbers.get(name, math.nan)) for name in ("settled_rev", "clipped_fraction")
+    )
+    try:
+        case = Case.from_attribute(attributes["case"])
+    except (KeyError, CaseError):
+        return []  # of another version of the program
+    found = []
+    begin = math.nan if case.solve.settle_rev == "auto" else float(case.solve.settle_rev)
+    if is_unrepeated(regime, settled):
+        within = "its settled revolutions"
+        if case.solve.duration_rev != "auto":
+            count = (case.duration - case.settle) / case.turn
+            within = f"{count:.3g} settled revolution{'s' * (round(count, 9) != 1)}"
+        found.append(f"the motion was not seen to repeat within {within}; {LONGER}; {AUTO}")
+    if is_late(regime, settled, begin):
+        found.append(
+            f"the motion repeats from revolution {settled:g} on, and metrics count from "
+            f"{begin:g} on: start-up is in them; solve.settle_rev: auto leaves it out"
+        )
+    if case.sensor and (text := case.sensor.report_clipping(clipped)):
+        found.append(text)
+    return [*found, *(f"{key}: {text}" for key, text in outside_judged(case.values()).items())]
+
+
+def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
+    """Yield what is said of motions that did not repeat, and of those that did too late."""
+    parts = [f"{unrepeated} of {jobs} jobs were not seen to repeat"] if unrepeated else []
+    if late:
+        start = "" if unrepeated else f" of {jobs} jobs"
+        parts.append(
+            f"{late}{start} settled after solve.settle_rev, with start-up in their numbers"
+        )
+    if parts:
+        yield f"{'; '.join(parts)}; {LONGER}; {AUTO}"
+
+
+def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
+    """Yield what is said of sensor records of which a thousandth or more is clipped."""
+    known = fractions[~np.isnan(fractions)]
+    clipped = known[known >= Sensor.REPORTED]
+    if clipped.size:
+        yield (
+            f"{clipped.size} of {known.size} sensor records are clipped, at worst "
+            f"{100 * clipped.max():.3g} % of their samples: raise sensor.range_m_per_s2"
+        )
+
+
+def _settle_revs(study: StoredStudy) -> list[float]:
+    """Return the revolution at which metrics of each job begin to count; nan where that is
+    `auto`.
+    """
+    fixed = value_in(study.fixed, "solve.settle_rev")
+    given = (point.get("solve.settle_rev", fixed) for point in points(study))
+    return [float(v) if isinstance(v, int | float) else math.nan for v in given]
+
+
+def _outside_of_study(study: StoredStudy) -> dict[str, str]:
+    """Return the judged keys that a study leaves, each with a sentence: of fixed values and
+    axes' ends.
+    """
+    base = copy.deepcopy(study.fixed)
+    ends: list[tuple[str, Any]] = []
+    for axis in study.axes:
+        values = [v for v in axis.values if isinstance(v, int | float)]
+        ends += [(axis.key, end) for end in ({min(values), max(values)} if values else ())]
+        if axis.key == "joint":
+            base["joint"] = next((v for v in axis.values if v != "none"), "none")
+    found = outside_judged(base)
+    for key, value in sorted(ends):
+        for part in stands_for(key) or (key,):
+            group, _, name = part.rpartition(".")
+            if group:
+                changed = {group: (base.get(group) or {}) | {name: value}}
+                found |= outside_judged(base | changed)
+    return found
+
+
+FORMER_REMEDY = "delete it: its jobs stay stored"
+# machines over values and over hours, and by choices of the model
+FOLLOWED = ("regimes/*/*.nc", "wear/*.nc", "models/*.nc")
+ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
+STUDY_REMEDY = "run its case file again, which computes nothing anew"
+FOLLOWED_REMEDY = "delete it: the command that made it makes it again"
+
+
+@dataclass(frozen=True)
+class LostJob:
+    """A job whose result is damaged, and the studies that it belongs to, with its swept values."""
+
+    key: str
+    studies: dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A file of a store that is gone or not what was written, and the jobs that are lost with it.
+
+    A run of `again` computes the jobs anew; `remedy` is what else is to be done, or "".
+    """
+
+    path: Path
+    problem: str
+    keys: tuple[str, ...]
+    remedy: str = ""
+    jobs: tuple[LostJob, ...] = ()
+    again: tuple[Again, ...] = ()
+
+
+def verify(
+    folder: Folder, progress: Callable[[int, int], None] = lambda done, total: None
+) -> list[Damage]:
+    """Return all damage to a store: to segments, files of time series, studies, chains, wear and
+    choices of the model.
+
+    Jobs that a study has and no row knows are damage, too, unless a run is at work there: they have
+    not run, or their row is gone. `progress` is told how many files of time series were read, of
+    how many. Raises StoreError for a folder that cannot be read.
+    """
+    busy = {place for place in places(folder) if is_locked(place)}
+    stored = read_store(folder, DamagedJob)
+    followed = [path for pattern in FOLLOWED for path in sorted(Path(folder).glob(pattern))]
+    if not (stored.segments or stored.damaged or study_paths(folder) or followed):
+        raise no_results(folder)
+    found: list[Damage] = []
+    for path in followed:
+        try:
+            read_dataset(path, FOLLOWED_REMEDY)
+        except StoreError as error:
+            found.append(Damage(path, error.problem, (), error.remedy))
+    studies: list[StoredStudy] = []
+    for where, remedy in (("studies", "run its case file again"), ("former", FORMER_REMEDY)):
+        for path in study_paths(folder, where):
+            try:
+                studies.append(read_study(path))
+            except StoreError as error:
+                found.append(Damage(path, error.problem, (), remedy))
+    rows = Rows.of(stored.segments)
+    keys = [key.decode() for key in rows.columns["key"]]
+    absent = {key for study in studies for key in study.keys}.difference(keys)
+    for damage in stored.damaged:
+        inside = damage.possible_keys() if isinstance(damage, Cut) else set()
+        lost = absent & {key.decode() for key in inside} or absent
+        remedy = "" if isinstance(damage, Cut) else damage.remedy
+        found.append(Damage(Path(damage.path), damage.problem, tuple(sorted(lost)), remedy))
+    for position, key in enumerate(keys):
+        if not rows.intact(position):
+            place = rows.path(position)
+            assert place is not None
+            problem = "is damaged" if place.exists() else "is missing"
+            found.append(Damage(place, problem, (key,)))
+        progress(position + 1, len(rows))
+    busy |= {place for place in places(folder) if is_locked(place)}
+    found += _gone(folder, rows, studies, {key for damage in found for key in damage.keys}, busy)
+    return _owned(found, studies)
+
+
+def _gone(
+    folder: Folder, rows: Rows, studies: list[StoredStudy], lost: set[str], busy: set[Path]
+) -> Iterator[Damage]:
+    """Yield what the files of a store show to be gone, but for jobs known to be lost.
+
+    busy: the places that a run was at work in, whose rows may have come since they were read.
+    """
+    stored = {key.decode() for key in rows.columns["key"]}
+    for place in (place for place in places(folder) if place not in busy):
+        series = unowned_series(place, rows)
+        if keys := {name[:20] for name in series} - lost:
+            problem = f"no row knows the jobs of {len(series)} of its files"
+            yield Damage(place / "jobs", problem, tuple(sorted(keys)), ROWS_REMEDY)
+            lost = lost | keys
+    for study in () if busy else studies:
+        absent = {*study.keys} - stored - lost
+        if absent and not study.former_of:
+            problem = f"no row knows {len(absent)} of its {study.jobs} jobs: not run yet, or gone"
+            path = Path(folder) / "studies" / f"{study.name}.json"
+            yield Damage(path, problem, tuple(sorted(absent)))
+    known = {key for study in studies for key in study.keys}
+    strays = [
+        at for at, key in enumerate(rows.columns["key"].tolist()) if key.decode() not in known
+    ]
+    strays.sort(key=rows.source.__getitem__)  # attributes are read by segment
+    names = Counter(str(rows.attributes(at).get("name", "")) for at in strays)
+    for name, count in sorted(names.items()):
+        path = Path(folder) / "studies" / f"{name}.json"
+        if name and not path.exists():
+            yield Damage(
+                path, f"is gone, and {count} stored jobs were run for it", (), STUDY_REMEDY
+            )
+
+
+def _owned(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:
+    """Return the damage with the studies of its jobs."""
+    belong = owners(studies, (key for damage in found for key in damage.keys))
+    owned = []
+    for damage in found:
+        jobs = tuple(LostJob(key, belong[key]) for key in damage.keys)
+        names = {name for job in jobs for name in job.studies}
+        present = (study for study in studies if not study.former_of)
+        again = tuple(study.again for study in present if study.name in names)
+        owned.append(replace(damage, jobs=jobs, again=again))
+    return owned
 
 
 FORMER = "clipped_share"  # name of `clipped_fraction` in files of series

@@ -32,8 +32,15 @@ from compressor.store.files import (
     system_error,
 )
 from compressor.store.reader import places, read_store, segment_paths, unowned_series
-from compressor.store.rows import Rows, merge
-from compressor.store.segment import Segment, encode, of_outcomes, read_segment, segment_name
+from compressor.store.rows import (
+    Rows,
+    Segment,
+    encode,
+    merge,
+    of_outcomes,
+    read_segment,
+    segment_name,
+)
 from compressor.store.series_file import series_path
 
 MOST_ROWS = 4096  # in a segment that is written at once; one with fewer is small

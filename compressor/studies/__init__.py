@@ -5,7 +5,7 @@ of it is imported before it is used, but for its commands, which the command lin
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class StudyKind:
     """A kind of study: where its parts are in its folder.
 
-    `verbs`: modules by the verb that each gives the command line.
+    `verbs`: of the command line, which its module `command` has.
     `group`: the group of keys by which a case file asks `compsim run` for it; its module `command`
     then has `check_options`, `run_studies`, `ahead` and `ahead_lines`.
     `figures`: what `compsim plot` draws of it; its module `plots` has `is_stored` and `write`.
@@ -32,7 +32,7 @@ class StudyKind:
     """
 
     name: str
-    verbs: Mapping[str, str] = field(default_factory=dict)
+    verbs: tuple[str, ...] = ()
     group: str = ""
     figures: tuple[str, ...] = ()
     has_page: bool = False
@@ -44,23 +44,19 @@ class StudyKind:
 
 
 STUDIES = (
-    StudyKind("claims", {"claims": "command"}, has_page=True, page_folder="claims"),
+    StudyKind("claims", ("claims",), has_page=True, page_folder="claims"),
     StudyKind("regimes", group="regimes", figures=("bifurcation", "sections", "periods")),
-    StudyKind("wear", {"wear": "command"}),
-    StudyKind("diagnosis", {"dataset": "dataset_command", "identify": "identify_command"}),
-    StudyKind("tradeoff", {"tradeoff": "command", "explain": "explain_command"}, has_page=True),
-    StudyKind("stress", {"stress": "command"}),
-    StudyKind("search", {"find": "command"}),
+    StudyKind("wear", ("wear",)),
+    StudyKind("diagnosis", ("dataset", "identify")),
+    StudyKind("tradeoff", ("tradeoff", "explain"), has_page=True),
+    StudyKind("stress", ("stress",)),
+    StudyKind("search", ("find",)),
 )
 
 
 def verbs() -> "list[click.Command]":
     """Return the commands of all studies."""
-    return [
-        getattr(kind.module(module), verb)
-        for kind in STUDIES
-        for verb, module in kind.verbs.items()
-    ]
+    return [getattr(kind.module("command"), verb) for kind in STUDIES for verb in kind.verbs]
 
 
 def kind_of(study: "Study") -> StudyKind | None:

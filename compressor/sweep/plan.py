@@ -17,9 +17,8 @@ import numpy as np
 
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, read_store, series_file
-from compressor.sweep.wanted import Wanted, stored
+from compressor.sweep.wanted import Wanted, revolutions, stored
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
-from compressor.sweep.work import revolutions
 
 ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
 MOST_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn

@@ -16,12 +16,10 @@ from typing import Any, Protocol
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.store import Folder, StoreError, Writer, write_study
-from compressor.sweep.batches import Input
-from compressor.sweep.execution import require_posix, rest, run_batches
+from compressor.sweep.execution import Input, require_posix, rest, run_batches
 from compressor.sweep.run_job import run_ahead, run_job
-from compressor.sweep.wanted import End, Missing, Wanted, stored
+from compressor.sweep.wanted import End, Missing, Now, Wanted, Work, stored
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.work import Now, Work
 from compressor.sweep.worker import Done, Lost, Workers
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""

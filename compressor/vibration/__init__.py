@@ -2,12 +2,11 @@
 
 from compressor.vibration.accelerometer import Record, analogue_rate, listen
 from compressor.vibration.body import Forces, body_motion
-from compressor.vibration.envelope import envelope_spectrum, kurtogram
-from compressor.vibration.indicators import (
+from compressor.vibration.envelope import (
     energy_angle,
+    envelope_spectrum,
     high_pass_orders,
+    kurtogram,
     shape,
 )
-from compressor.vibration.orders import resampled, rms_above
-from compressor.vibration.spectra import line_amplitudes
-from compressor.vibration.tacho import smooth_pulses
+from compressor.vibration.spectra import line_amplitudes, resampled, rms_above, smooth_pulses

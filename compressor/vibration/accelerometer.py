@@ -7,8 +7,14 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt
 
 from compressor.cases import Body, Sensor
-from compressor.vibration.body import BodyMotion, Forces, body_motion, casing_acceleration, centre
-from compressor.vibration.linear import oscillate
+from compressor.vibration.body import (
+    BodyMotion,
+    Forces,
+    body_motion,
+    casing_acceleration,
+    centre,
+    oscillate,
+)
 
 AXES = ("x", "y")
 POLES = 8  # of the anti-aliasing filter, Butterworth

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from compressor.analysis import captions
-from compressor.analysis.course import Course
-from compressor.analysis.paper_cases import CLEARANCES, FAULTS, label
+from compressor.analysis.orbit import Course
+from compressor.analysis.runs import CLEARANCES, FAULTS, label
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
 from compressor.solve.simulate import simulate

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from compressor.analysis.claim_rules import RULES, more_continuous
-from compressor.analysis.claims import claim_margins, claims
-from compressor.analysis.continuity import Shares
-from compressor.analysis.margins import Measure
-from compressor.analysis.paper_cases import CLEARANCES, FAULT_LABELS, paper_cases
+from compressor.analysis.claims import RULES, claim_margins, claims, more_continuous
+from compressor.analysis.margins import Measure, Shares
 from compressor.analysis.runs import (
+    CLEARANCES,
+    FAULT_LABELS,
     active_share,
     case_of,
     force_relation,
     ideal_motion,
     load_corners,
     load_phases,
+    paper_cases,
     record_of,
     settled,
 )

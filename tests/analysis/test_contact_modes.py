@@ -5,14 +5,14 @@ import pytest
 import xarray as xr
 from bouncing import CONTACT, FLIGHT, bounce, pressed, run_of, times
 
-from compressor.analysis.contact_modes import (
+from compressor.analysis.contacts import (
     FOLLOWING,
     MODES,
     contact_modes,
+    impacts,
     mode_map,
     mode_shares,
 )
-from compressor.analysis.impacts import impacts
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.analysis.continuity import (
+from compressor.analysis.margins import (
     SLOWEST,
     Continuity,
     compared,
@@ -14,7 +14,7 @@ from compressor.analysis.continuity import (
     hit_share,
     measured_shares,
 )
-from compressor.analysis.frame_forces import whole_revolutions
+from compressor.analysis.shaking import whole_revolutions
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 

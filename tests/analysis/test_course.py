@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.analysis.course import course, ringing, turning_points
-from compressor.analysis.paper_cases import CLEARANCES, label
-from compressor.analysis.runs import ideal_motion, settled
+from compressor.analysis.orbit import course, ringing, turning_points
+from compressor.analysis.runs import CLEARANCES, ideal_motion, label, settled
 from compressor.cases.case import Case
-from compressor.solve.scales import contact_scales
+from compressor.solve.cautions import contact_scales
 from compressor.solve.simulate import simulate
 
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.analysis.frame_forces import (
+from compressor.analysis.shaking import (
     NoSeriesError,
     frame_forces,
     healthy_twin,
     whole_revolutions,
 )
 from compressor.cases.case import Case
-from compressor.solve.signals import SIGNALS
+from compressor.solve.series import SIGNALS
 from compressor.solve.simulate import simulate
 
 DRAFT = {"accuracy": "draft", "duration_rev": 2.5, "error_bars": False}

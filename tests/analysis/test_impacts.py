@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bouncing import CONTACT, FLIGHT, IMPULSE, LOST, SPEED, bounce, pressed, run_of, times
 
-from compressor.analysis.impacts import COLUMNS, impacts, impacts_of
+from compressor.analysis.contacts import COLUMNS, impacts, impacts_of
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 

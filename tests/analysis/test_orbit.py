@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from bouncing import CLEARANCE, FLIGHT, SPEED, TURN, bounce, pressed, run_of, times
 
-from compressor.analysis.course import course
-from compressor.analysis.orbit import NUMBERS, SERIES, orbit
+from compressor.analysis.orbit import NUMBERS, SERIES, course, orbit
 
 
 def test_the_orbit_of_a_known_motion():

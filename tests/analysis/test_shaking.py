@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from compressor.analysis.frame_forces import frame_forces
-from compressor.analysis.paper_cases import paper_cases
+from compressor.analysis.runs import paper_cases
 from compressor.analysis.shaking import (
     deviation_spectrum,
+    frame_forces,
     near_a_turn,
     sensor_envelope,
     shaking,

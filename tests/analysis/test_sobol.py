@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.analysis.sobol import saltelli_design
+from compressor.analysis.effects import saltelli_design
 from compressor.cases.swept import design
 
 

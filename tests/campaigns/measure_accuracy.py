@@ -23,8 +23,8 @@ import xarray as xr
 from joblib import Parallel, delayed
 from random_cases import load_equations, strangers
 
-from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
+from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
 from compressor.report.figures.kept_error import draw_kept_error

@@ -26,9 +26,9 @@ from compressor.metrics import JOINTS
 from compressor.outcome import Regime
 from compressor.solve.attempts import attempt
 from compressor.solve.horizon import predictability_horizon
+from compressor.solve.request import Cuts, revolutions
+from compressor.solve.run_metrics import metrics
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.tallied import metrics
-from compressor.solve.turns import Cuts, revolutions
 
 REVOLUTIONS, SETTLE = 200, 8
 BATCHES = 16

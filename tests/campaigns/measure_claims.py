@@ -17,7 +17,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from measure_accuracy import provenance
 
-from compressor.analysis.claim_rules import RULES
+from compressor.analysis.claims import RULES
 from compressor.cases.case import Case
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
@@ -31,13 +31,19 @@ from compressor.studies.claims.findings import (
     deciding,
     flips,
     most_consistent,
+    sensitivity,
     spoken,
     summary,
 )
-from compressor.studies.claims.judged import CLAIMS, SHARES, cases_judged, judge
 from compressor.studies.claims.search import least_change
-from compressor.studies.claims.sensitivity import sensitivity
-from compressor.studies.claims.study import judge_machines, machines
+from compressor.studies.claims.study import (
+    CLAIMS,
+    SHARES,
+    cases_judged,
+    judge,
+    judge_machines,
+    machines,
+)
 
 FOLDER = "claims"
 GENERATIONS = 12

@@ -15,13 +15,13 @@ import numpy as np
 import xarray as xr
 from measure_accuracy import provenance
 
-from compressor.analysis.paper_cases import FAULTS
+from compressor.analysis.runs import FAULTS
 from compressor.cases.case import Case
 from compressor.cases.groups import Contact
 from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
 from compressor.report.figures.style import render
 from compressor.solve.attempts import attempt
-from compressor.solve.energy_audit import allowed
+from compressor.solve.error_bars import allowed
 from compressor.solve.simulate import simulate, with_series
 from compressor.studies.tradeoff.work_precision import (
     REFERENCES,

@@ -26,8 +26,8 @@ from compressor.cases.groups import Output
 from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import open_study, read_store
 from compressor.store.series_file import read_series, series_path, write_series
+from compressor.store.status import verify
 from compressor.store.studies import StoredAxis, StoredStudy, encode
-from compressor.store.verify import verify
 from compressor.store.writer import Writer
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}

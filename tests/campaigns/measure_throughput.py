@@ -27,8 +27,8 @@ from random_cases import strangers
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.solve.side_by_side import side_by_side
 from compressor.solve.simulate import measure
+from compressor.solve.solution import side_by_side
 from compressor.store.reader import read_store
 from compressor.sweep.warm_up import LANES
 

@@ -15,7 +15,7 @@ import xarray as xr
 from compsim import cli
 from measure_accuracy import provenance
 
-from compressor.cases.accuracy import ACCURACY
+from compressor.cases.parameter import ACCURACY
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.page import model_table
 from compressor.studies.tradeoff.work_precision import (

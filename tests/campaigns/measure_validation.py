@@ -40,9 +40,8 @@ from published import (
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.solve import predictability_horizon, simulate
-from compressor.solve.attempts import request, times_of
+from compressor.solve.attempts import integrate, request, times_of
 from compressor.solve.bearing import reynolds
-from compressor.solve.integrate import integrate
 
 SICONOS = "Siconos, SliderCrankMoreauJeanDirectProjectionOSI.ref, steps of 0.1 ms"
 TIMES = (1e-3, 2e-3)  # s

@@ -15,8 +15,7 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
-from compressor.studies.wear.life import life
-from compressor.studies.wear.stages import Worn, dataset, first, following
+from compressor.studies.wear.stages import Worn, dataset, first, following, life
 
 ONE = {"joint": "big_end", "clearance_mm": 0.2}
 LIMIT = 1.5  # clearances, at which it ends

@@ -8,8 +8,8 @@ from measure_accuracy import SEEDS, TRUTH, apart, drawing, run, settled
 from page_tables import kept
 from random_cases import strangers
 
-from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
+from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
 

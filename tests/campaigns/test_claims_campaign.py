@@ -7,7 +7,7 @@ from page_tables import claims_table, claims_words, kept
 from compressor.cases.case import Case
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.studies.claims.judged import judge
+from compressor.studies.claims.study import judge
 
 
 def machine(rod, reciprocating, **solve):

@@ -17,10 +17,9 @@ from measure_identify import (
 from page_tables import kept
 
 from compressor.cases.load import load_studies
-from compressor.studies.diagnosis.approximate import Interval
+from compressor.studies.diagnosis.approximate import Distance, Interval
 from compressor.studies.diagnosis.features import FEATURES
 from compressor.studies.diagnosis.identify import Answer, Candidate
-from compressor.studies.diagnosis.strangeness import Distance
 
 
 def test_machines_are_spread_and_come_again():

@@ -8,12 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.groups import Machine
 from compressor.cases.laws import USUAL
 from compressor.cases.load import load_cases
-from compressor.cases.parameter import CaseError, Problem, shown, to_si
+from compressor.cases.parameter import ACCURACY, CaseError, Problem, shown, to_si
 from compressor.cases.table import table
 from compressor.metrics import JOINTS
 from compressor.program import CompsimError

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import NO_SWEEP, Case
+from compressor.cases.checks import known
 from compressor.cases.load import CaseFileError, load_cases
 from compressor.cases.parameter import CaseError
-from compressor.cases.unknown import known
 from compressor.program import CompsimError
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}

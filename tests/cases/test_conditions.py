@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compressor.cases.conditions import MAX_DEPTH, MAX_LENGTH, NoComparison, comparison
+from compressor.cases.swept import MAX_DEPTH, MAX_LENGTH, NoComparison, comparison
 from compressor.cases.table import table
 
 JOB = {

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from compressor.analysis.paper_cases import FAULT_LABELS, cases_of
+from compressor.analysis.runs import FAULT_LABELS, cases_of
 from compressor.cases.case import Case
 from compressor.cases.examples import FOLDER, STARTS, example, templates
-from compressor.cases.keys_read import itself
-from compressor.cases.load import load_studies
+from compressor.cases.load import itself, load_studies
 from compressor.solve.cautions import cautions
 from compressor.solve.simulate import simulate
 from compressor.studies.claims.command import EXAMPLES
-from compressor.studies.claims.judged import cases_judged
+from compressor.studies.claims.study import cases_judged
 
 ROOT = Path(__file__).parent.parent.parent
 NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))

@@ -3,11 +3,10 @@
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.judged import judged_range, outside_judged
+from compressor.cases.conflicts import judged_range, outside_judged
 from compressor.cases.parameter import parameter_table
 from compressor.cases.table import table
-from compressor.studies.stress.extreme_features import RANGES
-from compressor.studies.stress.extremes import OF_LAWS, PAPER_DAMPING, SPANS
+from compressor.studies.stress.extremes import OF_LAWS, PAPER_DAMPING, RANGES, SPANS
 
 LOOSE = {"joint": "both", "clearance_mm": 0.2}
 

@@ -11,15 +11,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compressor.cases.case import Case
+from compressor.cases.case import Case, to_yaml
+from compressor.cases.checks import known
+from compressor.cases.conflicts import values_read
 from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import parameter_table
 from compressor.cases.study import Axis
 from compressor.cases.table import table
-from compressor.cases.unknown import known
-from compressor.cases.unread import values_read
-from compressor.cases.written import to_yaml
 from compressor.cases.yaml_reader import MAX_BYTES, resolved
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"

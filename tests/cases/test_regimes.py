@@ -5,9 +5,9 @@ import math
 
 import pytest
 
+from compressor.cases.checks import MAPPINGS
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.regimes import ROWS, followable
-from compressor.cases.unknown import MAPPINGS
 
 REGIMES = "regimes: {over: clearance_mm, from: 0.01, to: 1, n: 3, log: true, direction: both}\n"
 WORN = "joint: big_end\n"

@@ -2,8 +2,7 @@
 
 import pytest
 
-from compressor.cases.case import Case
-from compressor.cases.revisions import MODEL, MODEL_VERSION, SUSPECT, changes_since, model_of
+from compressor.cases.case import MODEL, MODEL_VERSION, SUSPECT, Case, changes_since, model_of
 
 RUBS = {"joint": "small_end", "clearance_mm": 0.2}
 BODY = {"body": True, "solve": {"duration_rev": 3, "settle_rev": 1}}

@@ -13,16 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case, parts_of
-from compressor.cases.checked import values_given
-from compressor.cases.columns import Column, Mixed, alike, places_where
-from compressor.cases.keys_read import itself
-from compressor.cases.load import MAX_CONFLICTS, CaseFileError, load_studies
+from compressor.cases.checks import value_of, values_given
+from compressor.cases.conflicts import reads
+from compressor.cases.load import MAX_CONFLICTS, CaseFileError, itself, load_studies
 from compressor.cases.parameter import CaseError
-from compressor.cases.shorthands import value_of
+from compressor.cases.sheet import Column, Mixed, alike, places_where
 from compressor.cases.table import GROUPS, outside_identity, table
-from compressor.cases.unread import reads
 from compressor.studies.claims.command import EXAMPLES
-from compressor.studies.claims.judged import cases_judged
+from compressor.studies.claims.study import cases_judged
 
 ROOT = Path(__file__).parents[2]
 FILES = [*(ROOT / "configs").glob("*.yaml"), *(ROOT / "compressor/cases/examples").glob("*.yaml")]

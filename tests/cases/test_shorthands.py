@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.shorthands import (
+from compressor.cases.checks import (
     SHORTHANDS,
     expanded,
     row_of,

@@ -5,12 +5,11 @@ from dataclasses import replace
 import pytest
 
 from compressor.cases.case import Case
+from compressor.cases.checks import DOUBLES, meant
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.parameter import CaseError
 from compressor.cases.study import Axis
-from compressor.cases.synonyms import DOUBLES
 from compressor.cases.table import GROUPS, table
-from compressor.cases.unknown import meant
 
 
 @pytest.fixture

@@ -13,8 +13,7 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.table import table
 from compressor.solve import simulate
 from compressor.store.series_file import series_image
-from compressor.studies.wear.life import life
-from compressor.studies.wear.stages import Worn, dataset, first, following
+from compressor.studies.wear.stages import Worn, dataset, first, following, life
 
 SHORT = {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 5,
          "error_bars": False, "horizon": False}  # fmt: skip

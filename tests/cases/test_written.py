@@ -2,9 +2,8 @@
 
 import pytest
 
-from compressor.cases.case import Case
+from compressor.cases.case import Case, to_yaml
 from compressor.cases.load import load_cases
-from compressor.cases.written import to_yaml
 
 
 def test_what_is_written_stays_readable():

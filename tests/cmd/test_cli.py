@@ -16,7 +16,7 @@ import pytest
 from compsim import cli, plan, run
 from compsim.screen import duration
 
-from compressor.analysis.paper_cases import paper_cases
+from compressor.analysis.runs import paper_cases
 from compressor.cases import load
 from compressor.cases.load import MAX_JOBS, load_cases
 from compressor.store import reader as store
@@ -428,7 +428,7 @@ def test_explain_of_a_failed_job_says_so(case_file, capsys):
 
 
 def test_explain_of_an_effect_that_failed():
-    from compressor.studies.tradeoff.explain_command import advised, without_nan
+    from compressor.studies.tradeoff.command import advised, without_nan
 
     effect = types.SimpleNamespace(reason="non_finite")
     told = types.SimpleNamespace(advice=[types.SimpleNamespace(name="load", effect=effect)])

@@ -10,10 +10,9 @@ import pytest
 from compsim import cli
 from conftest import store
 
-from compressor.analysis.contact_modes import angle_modes
-from compressor.analysis.frame_forces import frame_forces
-from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS
-from compressor.analysis.swept_rows import SweptRow
+from compressor.analysis.contacts import angle_modes
+from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS, SweptRow
+from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
 from compressor.report.figures.job import draw_spectra
 from compressor.solve.simulate import simulate

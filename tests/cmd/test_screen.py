@@ -9,7 +9,7 @@ import pytest
 from compsim import screen as module
 from compsim.screen import Screen
 
-from compressor.sweep.work import Now
+from compressor.sweep.wanted import Now
 
 
 @pytest.fixture

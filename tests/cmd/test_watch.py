@@ -15,7 +15,7 @@ from compsim import cli, watch
 from compsim.watch import Watch, Writer
 
 from compressor.report.page import document
-from compressor.sweep.work import Now
+from compressor.sweep.wanted import Now
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 NOW = Now(12, 3, 400, 125.0)

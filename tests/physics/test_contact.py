@@ -10,9 +10,8 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
-from compressor.physics.contact import joint_contact
+from compressor.physics.contact import friction_coefficient, joint_contact
 from compressor.physics.contact_laws import normal_force, rise
-from compressor.physics.friction_laws import friction_coefficient
 from compressor.solve.si_record import record
 
 K = 3.36e5 * 1000**1.5

@@ -11,7 +11,7 @@ from scipy.special import lambertw
 
 from compressor.cases.case import Case
 from compressor.cases.materials import composite_modulus
-from compressor.physics.cylinder_laws import (
+from compressor.physics.contact_laws import (
     FLATTEST,
     JOHNSON_DEEPEST,
     johnson,

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.cases.table import table
-from compressor.physics.friction_laws import (
+from compressor.physics.contact import (
     FrictionLaw,
     bristle_rate,
     friction_coefficient,

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case, CaseError
 from compressor.physics.contact_laws import power, rise
-from compressor.physics.guide import approach_speed, corner_force
+from compressor.physics.mechanism import approach_speed, corner_force
 from compressor.solve.si_record import record
 
 LEVER = 0.05  # m

@@ -19,7 +19,7 @@ from compressor.metrics import METRICS
 from compressor.physics.motion import derivative, start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS, derive
-from compressor.solve.integrate import integrate
+from compressor.solve.attempts import integrate
 from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure

@@ -8,19 +8,17 @@ import reference
 
 from compressor.cases.case import Case
 from compressor.physics.loads import segments
-from compressor.physics.march import march
+from compressor.physics.march import Status, march, new_walker, new_work
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
 from compressor.physics.runge_kutta import FLOWS, Pair
 from compressor.physics.step_control import Mode
 from compressor.physics.tally import new_tally
-from compressor.physics.walker import Status, new_walker, new_work
 from compressor.solve import march_driver
-from compressor.solve.integrate import integrate
+from compressor.solve.attempts import integrate
 from compressor.solve.request import Request
-from compressor.solve.si_record import offsets, record, scene
-from compressor.solve.sizes import natural_sizes
+from compressor.solve.si_record import natural_sizes, offsets, record, scene
 
 PULSES = {"load": "gas", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
 

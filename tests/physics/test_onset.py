@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from compressor.analysis.paper_cases import paper_cases
+from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED
 from compressor.physics.contact import Contact, nearness
 from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
-from compressor.physics.march import march, measure_apart
+from compressor.physics.march import NODES, Status, march, measure_apart, new_walker, new_work
 from compressor.physics.motion import evaluate, start
 from compressor.physics.observe import (
     COLUMNS,
@@ -40,11 +40,9 @@ from compressor.physics.onset import (
 from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, interpolate, take_step
 from compressor.physics.tally import new_tally
-from compressor.physics.walker import NODES, Status, new_walker, new_work
-from compressor.solve.marching import COMPILED as METHODS
-from compressor.solve.marching import CONTACT_STEP
-from compressor.solve.si_record import offsets, record, scene
-from compressor.solve.sizes import length_and_speed, natural_sizes
+from compressor.solve.march_driver import COMPILED as METHODS
+from compressor.solve.march_driver import CONTACT_STEP
+from compressor.solve.si_record import length_and_speed, natural_sizes, offsets, record, scene
 
 H = 1e-3  # s, of the hand-made steps
 CLEARANCE = 2e-4  # m

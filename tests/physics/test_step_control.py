@@ -7,6 +7,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics import rosenbrock
+from compressor.physics.march import new_walker, new_work
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, Pair
 from compressor.physics.step_control import (
@@ -25,7 +26,6 @@ from compressor.physics.step_control import (
     refuse,
     stiff_rate,
 )
-from compressor.physics.walker import new_walker, new_work
 from compressor.solve.si_record import record
 
 H = 1e-3

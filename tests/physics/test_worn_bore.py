@@ -10,17 +10,15 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
 from compressor.cases.case import Case
-from compressor.cases.mechanism import Drive
+from compressor.cases.optional_groups import Drive
 from compressor.physics import FLOWS, derivative_with_flows, state_names
 from compressor.physics.mechanism_rows import contact_at
 from compressor.physics.record import BIG_END
 from compressor.physics.worn_bore import depth_of, overlaps, penetration_of, unworn, worn_contact
-from compressor.solve.attempts import request, times_of
-from compressor.solve.energy_audit import energy_residual
-from compressor.solve.initial import initial_state
-from compressor.solve.integrate import integrate
-from compressor.solve.si_record import record
-from compressor.solve.tallied import metrics
+from compressor.solve.attempts import integrate, request, times_of
+from compressor.solve.error_bars import energy_residual
+from compressor.solve.run_metrics import metrics
+from compressor.solve.si_record import initial_state, record
 
 C = 2e-4  # m
 WEAR = {"joint": "both", "clearance_mm": 0.2, "wear": True}

@@ -13,8 +13,8 @@ from compressor.report.answer import (
     study_findings,
     worded,
 )
-from compressor.report.figures.sweep_metric import MEASURES
-from compressor.report.tables import measured
+from compressor.report.figures.sweep_data import MEASURES
+from compressor.report.page import measured
 
 PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
 FORCE = next(m for m in MEASURES if m.variable == "peak_contact_force")

@@ -5,20 +5,20 @@ import re
 import numpy as np
 import pytest
 
-from compressor.analysis import diagnosis_captions
-from compressor.analysis.diagnosis_captions import course_of, diagnosis_caption
-from compressor.analysis.frame_forces import frame_forces
-from compressor.analysis.paper_cases import CLEARANCES, FAULTS, label
-from compressor.report.diagnosis_section import (
+from compressor.analysis import captions
+from compressor.analysis.captions import course_of, diagnosis_caption
+from compressor.analysis.runs import CLEARANCES, FAULTS, label
+from compressor.analysis.shaking import frame_forces
+from compressor.report.figures.diagnosis import BIN
+from compressor.report.paper_sections import (
     NEEDS,
     TITLES,
+    PaperRuns,
     diagnosis_drawings,
     diagnosis_sections,
     force_table,
     shakings,
 )
-from compressor.report.figures.diagnosis import BIN
-from compressor.report.paper_runs import PaperRuns
 
 KEPT = slice(1200, 4800)  # three settled revolutions
 
@@ -138,7 +138,7 @@ def test_courses_in_words():
     assert course_of([1.0, 2.0, 30.0]) == "rises from 1.0 N to 30 N"
     assert course_of([3.0, 2.0, 0.01]) == "falls from 3.0 N to less than 0.1 N"
     assert course_of([30.0, 20.0, 40.0]) == "goes from 30 N over 20 N to 40 N"
-    assert diagnosis_captions.CAPTIONS.keys() == TITLES.keys()
+    assert captions.DIAGNOSIS_CAPTIONS.keys() == TITLES.keys()
 
 
 def test_the_table_has_every_case(found, paper_runs):

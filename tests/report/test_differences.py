@@ -3,7 +3,7 @@
 import pytest
 
 from compressor.cases.case import Case
-from compressor.report.differences import differences
+from compressor.report.paper_sections import differences
 
 
 def told(values):

@@ -10,9 +10,7 @@ import pytest
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from compressor.report.figures.artists import with_jobs
-from compressor.report.figures.extract import extract
-from compressor.report.figures.shown import Sheet, as_csv
+from compressor.report.figures.extract import Sheet, as_csv, extract, with_jobs
 from compressor.report.interactive import (
     MOST_POINTS,
     content,

@@ -12,9 +12,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 
 from compressor.analysis import cam
-from compressor.analysis.paper_cases import paper_cases
+from compressor.analysis.runs import paper_cases
 from compressor.report.figures import FIGURES, curves, style
-from compressor.report.figures.response import MOTION
+from compressor.report.figures.paper import MOTION
 from compressor.solve.si_record import record
 
 FIGURE = {figure.number: figure for figure in FIGURES}

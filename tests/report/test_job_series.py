@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_report import forget, part_of
 
-from compressor.report import job_series
+from compressor.report import interactive
 from compressor.report.figures import pictures
-from compressor.report.job_series import job_scripts, job_sheet
+from compressor.report.interactive import job_scripts, job_sheet
 from compressor.report.report import write_report
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -32,7 +32,7 @@ def test_only_jobs_that_kept_their_series_have_scripts(paper_store, monkeypatch)
     found = dict(job_scripts(stored, ["0" * 20, *keys]))
     assert {*found} == {*keys}
     assert all(text.startswith(f'compsimFigure("job-{key}"') for key, text in found.items())
-    monkeypatch.setattr(job_series, "MOST_SERIES", 2)
+    monkeypatch.setattr(interactive, "MOST_SERIES", 2)
     assert [key for key, _ in job_scripts(stored, keys)] == keys[:2]
 
 

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from compressor.cases.case import Case
-from compressor.report.mechanism import mechanism, mechanism_svg, mechanism_words
+from compressor.report.answer import mechanism, mechanism_svg, mechanism_words
 
 
 def case(joint="both", crank=120.0, rod=600.0, **more):

@@ -16,16 +16,25 @@ from matplotlib.figure import Figure
 
 from compressor.analysis.claims import Claim
 from compressor.report import page
-from compressor.report.additions import Note
-from compressor.report.answer import Answer, Finding, Line
-from compressor.report.assumptions import Assumptions
-from compressor.report.diagnosis_section import DiagnosisContent
-from compressor.report.page import Plate, Running, Section, document, templates
-from compressor.report.paper_sections import MissingFigures
-from compressor.report.provenance import Provenance
-from compressor.report.second_sets import Pair, SecondSetContent
+from compressor.report.answer import Answer, Assumptions, Finding, Line, Provenance
+from compressor.report.page import (
+    Cell,
+    Note,
+    Plate,
+    Row,
+    Running,
+    Section,
+    Table,
+    document,
+    templates,
+)
+from compressor.report.paper_sections import (
+    DiagnosisContent,
+    MissingFigures,
+    Pair,
+    SecondSetContent,
+)
 from compressor.report.study_section import JobsContent, StudyContent
-from compressor.report.tables import Cell, Row, Table
 from compressor.store.studies import StoredStudy
 from compressor.studies.claims.page import Part
 from compressor.studies.tradeoff.page import ModelsContent

@@ -12,14 +12,13 @@ import pytest
 import xarray as xr
 from conftest import CONFIGS, keep, store
 
-from compressor.analysis.paper_cases import paper_cases
+from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases
 from compressor.reasons import Reason
-from compressor.report import tables
-from compressor.report.diagnosis_section import TITLES
+from compressor.report import page
 from compressor.report.figures import FIGURES, pictures
-from compressor.report.paper_runs import find_paper_runs, paper_candidates
+from compressor.report.paper_sections import TITLES, find_paper_runs, paper_candidates
 from compressor.report.report import KINDS, write_report
 from compressor.store.files import StoreError, StoreWarning
 from compressor.store.reader import finished_keys, read_job, read_store
@@ -474,7 +473,7 @@ def test_a_report_that_cannot_be_written_is_an_error(own, tmp_path):
      (-394.784, "-394.8"), (2.5e9, "2.50e+09"), (float("inf"), "inf")],
 )  # fmt: skip
 def test_numbers(value, shown):
-    assert tables.number(value) == shown
+    assert page.number(value) == shown
 
 
 def test_configs_are_the_papers_cases():

@@ -11,7 +11,7 @@ from conftest import keep, store
 from test_report import forget, read
 
 from compressor.analysis.captions import caption
-from compressor.analysis.paper_cases import (
+from compressor.analysis.runs import (
     CLEARANCES,
     FAULT_LABELS,
     FAULTS,
@@ -20,16 +20,17 @@ from compressor.analysis.paper_cases import (
     paper_cases,
 )
 from compressor.cases.case import Case
-from compressor.report import report, second_sets
+from compressor.report import paper_sections, report
 from compressor.report.figures import Drawing, pictures
-from compressor.report.paper_runs import PaperRuns, find_paper_runs
-from compressor.report.report import write_report
-from compressor.report.second_sets import (
+from compressor.report.paper_sections import (
+    PaperRuns,
     borrowed,
     comparable,
+    find_paper_runs,
     is_other,
     second_drawings,
 )
+from compressor.report.report import write_report
 from compressor.store.reader import finished_keys, read_store
 from compressor.store.studies import read_studies
 
@@ -51,7 +52,7 @@ def add(folder, name, solve=SHORT, **values):
 
 def sets(folder):
     stored, studies = read_store(folder), read_studies(folder)
-    return second_sets.second_sets(stored, studies, find_paper_runs(stored, studies))
+    return paper_sections.second_sets(stored, studies, find_paper_runs(stored, studies))
 
 
 @pytest.fixture(scope="module")
@@ -74,10 +75,10 @@ def undrawn(monkeypatch):
     """Nothing is drawn of the paper's figures, and no pixels are made, which takes long."""
     figures = {
         module: tuple(replace(item, draw=lambda runs: Drawing()) for item in getattr(module, name))
-        for module, name in ((report, "FIGURES"), (second_sets, "SET"))
+        for module, name in ((report, "FIGURES"), (paper_sections, "SET"))
     }
     monkeypatch.setattr(report, "FIGURES", figures[report])
-    monkeypatch.setattr(second_sets, "SET", figures[second_sets])
+    monkeypatch.setattr(paper_sections, "SET", figures[paper_sections])
     monkeypatch.setattr(pictures, "render", lambda figure, kind: bytes(24))
 
 

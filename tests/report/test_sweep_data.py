@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from swept_made import grid, listed
 
-from compressor.report.figures.sweep_data import OUTSIDE, sweep_of
-from compressor.report.figures.sweep_metric import MEASURES
+from compressor.report.figures.sweep_data import MEASURES, OUTSIDE, sweep_of
 
 PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
 RMS = next(m for m in MEASURES if m.variable == "rms_acceleration")

@@ -7,9 +7,8 @@ from swept_made import grid, listed
 from compressor.cases.swept import design
 from compressor.report.figures.extract import extract
 from compressor.report.figures.sweep import draw_sweep
-from compressor.report.figures.sweep_data import sweep_of
-from compressor.report.figures.sweep_metric import measures
-from compressor.report.figures.sweep_ranking import leading, ranking
+from compressor.report.figures.sweep_data import measures, sweep_of
+from compressor.report.figures.sweep_maps import leading, ranking
 
 AXES = {"clearance_mm": [1.0, 2.0, 3.0], "speed_rpm": [1.0, 2.0, 3.0, 4.0],
         "load": ["spring", "gas"]}  # fmt: skip

@@ -16,14 +16,13 @@ from compressor.cases.materials import contact_stiffness
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import CARRIED
+from compressor.solve.attempts import integrate
 from compressor.solve.cautions import remarks
-from compressor.solve.horizon import CLOSE, FAR, followed, predictability_horizon
-from compressor.solve.integrate import integrate
+from compressor.solve.horizon import CLOSE, FAR, follow_twins, predictability_horizon
 from compressor.solve.request import Request
-from compressor.solve.scipy_landing import needs_landings
-from compressor.solve.si_record import offsets, record
+from compressor.solve.scipy_driver import needs_landings
+from compressor.solve.si_record import natural_sizes, offsets, record
 from compressor.solve.simulate import simulate
-from compressor.solve.sizes import natural_sizes
 from compressor.studies.tradeoff.explain import terms, unknowns
 
 pytestmark = pytest.mark.compiled
@@ -83,7 +82,7 @@ def request(case, shift, rtol, samples=1):
 def test_twins_that_start_alike_stay_alike():
     """Through hundreds of impacts, each with its own speed."""
     asked = request(dry(duration_rev=3, settle_rev=0), 0.0, 1e-9)
-    assert followed(asked, asked.start.copy(), far=1e-9).horizon == math.inf
+    assert follow_twins(asked, asked.start.copy(), far=1e-9).horizon == math.inf
 
 
 def test_a_horizon_is_that_of_two_separate_runs():
@@ -103,7 +102,7 @@ def test_a_horizon_is_that_of_two_separate_runs():
     twin = request(case, CLOSE, 1e-13).start
     for far, rel in ((1e-7, 0.01), (1e-5, 0.01), (FAR, 0.06)):
         parted = case.duration * np.flatnonzero(apart > far)[0] / 20_000
-        found = followed(request(case, 0.0, 1e-13), twin, far=far).horizon
+        found = follow_twins(request(case, 0.0, 1e-13), twin, far=far).horizon
         assert found == pytest.approx(parted, rel=rel)
 
 

@@ -6,7 +6,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.solve import attempts
-from compressor.solve.energy_audit import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
+from compressor.solve.error_bars import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
 from compressor.solve.simulate import measure, simulate
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}

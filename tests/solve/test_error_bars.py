@@ -5,9 +5,9 @@ import pytest
 from conftest import keep
 from random_cases import random_cases
 
-from compressor.cases.accuracy import ACCURACY, first_rung
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
+from compressor.cases.parameter import ACCURACY, first_rung
 from compressor.metrics import ERRORS, METRICS, SERIES, SERIES_ERRORS, Bar, Metric
 from compressor.solve import attempts
 from compressor.solve.error_bars import (

@@ -12,9 +12,8 @@ from compressor.cases.case import Case, CaseError
 from compressor.cases.load import load_studies
 from compressor.physics import COLUMNS, derivative_with_flows
 from compressor.physics.observe import observe
-from compressor.solve.foundation import BODY
 from compressor.solve.si_record import record
-from compressor.solve.simulate import measure, simulate
+from compressor.solve.simulate import BODY, measure, simulate
 from compressor.store.reader import open_study, read_store
 
 TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}

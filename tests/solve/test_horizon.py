@@ -17,8 +17,8 @@ from compressor.physics.march import march
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
-from compressor.solve.horizon import CLOSE, FAR, RTOL, followed, predictability_horizon
-from compressor.solve.integrate import integrate
+from compressor.solve.attempts import integrate
+from compressor.solve.horizon import CLOSE, FAR, RTOL, follow_twins, predictability_horizon
 from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure, simulate
@@ -64,13 +64,13 @@ def damped(joint, damping, **solve):
 def alike(joint, method, damping):
     """When twins that start alike have parted at all, in s."""
     asked = request(damped(joint, damping, duration_rev=0.12), 0.0, 1e-5, method)
-    return followed(asked, asked.start.copy(), far=0.0).horizon
+    return follow_twins(asked, asked.start.copy(), far=0.0).horizon
 
 
 def shifted(joint, method, damping):
     made = damped(joint, damping, duration_rev=0.12)
     other = request(made, 1e-15, 1e-5).start
-    return followed(request(made, 0.0, 1e-5, method), other, far=0.0).horizon
+    return follow_twins(request(made, 0.0, 1e-5, method), other, far=0.0).horizon
 
 
 def test_twins_that_start_alike_stay_alike_to_the_bit():
@@ -91,7 +91,7 @@ def test_twins_that_start_alike_stay_alike_to_the_bit():
 @pytest.mark.parametrize(("joint", "method", "damping"), SCENES)
 def test_rounding_does_not_part_compiled_twins(joint, method, damping):
     asked = request(damped(joint, damping), 0.0, RTOL, method)
-    assert followed(asked, asked.start.copy(), far=1e-5).horizon == math.inf
+    assert follow_twins(asked, asked.start.copy(), far=1e-5).horizon == math.inf
 
 
 def eccentricities(asked):

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 import reference
 
-from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
+from compressor.cases.parameter import ACCURACY
 from compressor.physics.record import FREEDOMS
-from compressor.solve.march_driver import CHUNK, with_edge
-from compressor.solve.marching import COMPILED
-from compressor.solve.si_record import record, scene
+from compressor.solve.march_driver import CHUNK, COMPILED, with_edge
+from compressor.solve.si_record import absolute_tolerances, record, scene
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.sizes import absolute_tolerances
 
 SOME = [("big_end", 0.3), ("small_end", 0.2), ("both", 0.1)]  # of the paper's faults
 

@@ -7,16 +7,15 @@ import pytest
 from page_tables import kept
 from random_cases import random_cases
 
-from compressor.cases.accuracy import ACCURACY, TIGHTEST, first_rung
 from compressor.cases.case import Case
+from compressor.cases.parameter import ACCURACY, TIGHTEST, first_rung
 from compressor.metrics import ERRORS, METRICS, SERIES_ERRORS
 from compressor.physics import Column
-from compressor.solve import attempts, ladder
+from compressor.solve import attempts, solution
 from compressor.solve.error_bars import ENLARGED, ORDER, closeness, enlarged, unmet
-from compressor.solve.ladder import AIM, LEAST, MOST, further
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.solution import solve
+from compressor.solve.solution import AIM, LEAST, MOST, further, solve
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -131,14 +130,14 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
         return other
 
     alone = of(ILL, accuracy="draft", max_steps=20_000)
-    monkeypatch.setattr(ladder, "companion", lucky)
+    monkeypatch.setattr(solution, "companion", lucky)
     found = solve(alone)
     first = ACCURACY["draft"].rtol
     assert asked[:2] == pytest.approx([first, first * attempts.LOOSER])
     assert len(asked) > 2
     assert min(asked) < 0.11 * first
     assert found.promise == "kept"
-    monkeypatch.setattr(ladder, "witness", lambda *_: None)
+    monkeypatch.setattr(solution, "witness", lambda *_: None)
     assert solve(alone).rtol == first  # which is not enough
 
 
@@ -167,7 +166,7 @@ def test_later_runs_that_agree_by_chance_keep_no_promise(
 
 def test_a_third_run_that_tells_more_is_what_the_next_run_is_compared_with(monkeypatch, asked):
     """It is tighter than the one that it spoke against; a failed one is not heard."""
-    original, made, rtol = ladder.recheck, [], ACCURACY["standard"].rtol
+    original, made, rtol = solution.recheck, [], ACCURACY["standard"].rtol
 
     def wary(case, now, other, first, search):
         excess, _ = original(case, now, other, first, search)
@@ -178,7 +177,7 @@ def test_a_third_run_that_tells_more_is_what_the_next_run_is_compared_with(monke
             return 2.0, third
         return excess, None
 
-    monkeypatch.setattr(ladder, "recheck", wary)
+    monkeypatch.setattr(solution, "recheck", wary)
     found = solve(of(ILL, accuracy="standard"))
     first, again = made
     assert again * attempts.TIGHTER == pytest.approx(found.rtol)
@@ -191,10 +190,10 @@ def test_of_some_runs_the_tightest_that_balances_is_compared_with(monkeypatch):
     case = of(ILL, rtol=1e-5)
     one = attempts.attempt(case, 1e-5, 60.0, False)
     other, third, last = (replace(one, rtol=rtol) for rtol in (4e-6, 1e-6, TIGHTEST))
-    assert ladder.tightest(case, one, other, third, last) is third
-    monkeypatch.setattr(ladder, "balanced", lambda _, run: run is not third)
-    assert ladder.tightest(case, one, other, third) is other
-    assert ladder.tightest(case, one, third) is one
+    assert solution.tightest(case, one, other, third, last) is third
+    monkeypatch.setattr(solution, "balanced", lambda _, run: run is not third)
+    assert solution.tightest(case, one, other, third) is other
+    assert solution.tightest(case, one, third) is one
 
 
 def test_a_witness_that_fails_is_not_heard(monkeypatch):

@@ -9,8 +9,8 @@ from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
 from compressor.physics.record import STATE_NAMES, Scene
 from compressor.solve import march_driver
-from compressor.solve.integrate import integrate
-from compressor.solve.marching import COMPILED
+from compressor.solve.attempts import integrate
+from compressor.solve.march_driver import COMPILED
 from compressor.solve.request import LAST
 from compressor.solve.simulate import measure, simulate
 

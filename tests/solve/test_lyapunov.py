@@ -9,12 +9,11 @@ from compressor.cases.case import Case
 from compressor.physics.motion import start
 from compressor.physics.record import FREEDOMS
 from compressor.solve import lyapunov
+from compressor.solve.attempts import integrate
 from compressor.solve.horizon import CLOSE, FAR, predictability_horizon
-from compressor.solve.integrate import integrate
 from compressor.solve.lyapunov import OF_STEPS, growths, largest_exponent, mean_with_error
 from compressor.solve.request import Request
-from compressor.solve.si_record import offsets, record, scene
-from compressor.solve.sizes import natural_sizes
+from compressor.solve.si_record import natural_sizes, offsets, record, scene
 
 LIGHT = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0.336}}
 

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compressor.cases.case import MODEL_VERSION, Case
-from compressor.cases.revisions import changes_since
+from compressor.cases.case import MODEL_VERSION, Case, changes_since
 from compressor.solve.simulate import simulate
 
 PATH = Path(__file__).parent.parent / "results" / f"model-{MODEL_VERSION}.json"

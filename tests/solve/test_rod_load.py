@@ -12,7 +12,7 @@ from conftest import store
 
 from compressor.cases.case import Case
 from compressor.physics import COLUMNS
-from compressor.solve.rod_load import SMALL_END, reversal
+from compressor.solve.run_metrics import SMALL_END, reversal
 from compressor.solve.simulate import measure
 
 SIGNALLED = {"output": {"signals": True}}

@@ -13,7 +13,7 @@ from compressor.metrics import JOINTS
 from compressor.physics.contact_laws import Power
 from compressor.physics.step_control import STABILITY_LIMIT
 from compressor.solve.attempts import attempt
-from compressor.solve.scales import (
+from compressor.solve.cautions import (
     across,
     contact_scales,
     expected_seconds,

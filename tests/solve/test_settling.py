@@ -9,7 +9,7 @@ from conftest import CHAOTIC
 from compressor.cases.case import Case, CaseError
 from compressor.cases.table import MOST_REV
 from compressor.metrics import METRICS
-from compressor.solve.settling import MEASURED, agree, least_promise, steady
+from compressor.solve.regime import MEASURED, agree, least_promise, steady
 from compressor.solve.simulate import measure, simulate
 
 PAPER = {"joint": "big_end", "clearance_mm": 0.2}

@@ -10,13 +10,13 @@ import pytest
 from random_cases import strangers
 
 from compressor.cases.case import Case
-from compressor.physics import lane_rows as rows
 from compressor.physics import lane_steps
-from compressor.physics.lane_runs import fits
+from compressor.physics import lane_steps as rows
+from compressor.physics.lane_march import fits
 from compressor.physics.record import RECORD
 from compressor.solve.si_record import record
-from compressor.solve.side_by_side import MOST_ATTEMPTS, side_by_side
 from compressor.solve.simulate import measure, observe
+from compressor.solve.solution import MOST_ATTEMPTS, side_by_side
 
 pytestmark = pytest.mark.compiled
 
@@ -127,10 +127,10 @@ def test_lanes_know_every_field_of_the_record():
 
 
 LOOK = """
-from compressor.physics import lane_rows, lane_steps
+from compressor.physics import lane_steps
 weights = (0.1,) * 7
 for function in (lane_steps.stage_rates, lane_steps.look_at_node):
-    function((0, 0, 0), lane_rows.new_lanes(), lane_rows.LANES, 0.5, weights, 1)
+    function((0, 0, 0), lane_steps.new_lanes(), lane_steps.LANES, 0.5, weights, 1)
     print(*function.made.inspect_asm().values())
 """
 

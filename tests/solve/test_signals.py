@@ -10,7 +10,7 @@ from conftest import keep
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import load_studies
 from compressor.metrics import ROD_LOAD, SERIES
-from compressor.solve.signals import SIGNALS
+from compressor.solve.series import SIGNALS
 from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import open_study, read_store
 from compressor.sweep.sweep import sweep

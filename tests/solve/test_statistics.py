@@ -7,18 +7,18 @@ import pytest
 
 from compressor.metrics import METRICS, QUANTILES, STATISTICS
 from compressor.physics import new_record, new_tally
-from compressor.solve.statistics import (
+from compressor.solve.request import merged
+from compressor.solve.run_metrics import (
     LEAST_SECTION,
     MOST_BATCHES,
     chaotic_bars,
+    metrics,
     of_peaks,
     parts,
     standard_error,
     statistics,
     sure,
 )
-from compressor.solve.tallied import metrics
-from compressor.solve.turns import merged
 
 TURN = 0.1  # s
 

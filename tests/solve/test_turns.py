@@ -6,8 +6,8 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.solve.attempts import attempt
-from compressor.solve.tallied import metrics
-from compressor.solve.turns import Cuts, merged, revolutions
+from compressor.solve.request import Cuts, merged, revolutions
+from compressor.solve.run_metrics import metrics
 
 TALLIED = ("seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts")
 

@@ -7,7 +7,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.table import table
-from compressor.solve.unit_slips import USUAL, slips
+from compressor.solve.cautions import USUAL, slips
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
 SPEED, STIFFNESS = "machine.speed_rpm", "contact.stiffness_N_per_mm15"

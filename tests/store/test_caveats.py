@@ -12,10 +12,9 @@ from compressor.outcome import REGIME_WORDS, Regime
 from compressor.report.report import write_report
 from compressor.solve.simulate import simulate
 from compressor.store import hdf5
-from compressor.store.caveats import is_late, is_unrepeated, job_caveats
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.rows import Rows
-from compressor.store.status import report_job, standings
+from compressor.store.status import is_late, is_unrepeated, job_caveats, report_job, standings
 from compressor.studies.diagnosis.data_card import data_card
 from compressor.studies.diagnosis.data_set import make_data_set
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from compressor.store.files import WrongName, writable_folder
-from compressor.store.folders import holds_results, no_results
+from compressor.store.files import WrongName, holds_results, no_results, writable_folder
 
 
 @pytest.fixture

@@ -11,9 +11,8 @@ from compressor.outcome import without_run
 from compressor.store import studies as stored_studies
 from compressor.store.files import StoreWarning
 from compressor.store.reader import open_study, read_store
-from compressor.store.status import changes, report_job, standings
+from compressor.store.status import changes, report_job, standings, verify
 from compressor.store.studies import Change, read_studies, write_study
-from compressor.store.verify import verify
 from compressor.store.writer import Writer
 
 FEW = {"clearance_mm": [0.1, 0.2]}

@@ -4,8 +4,7 @@ import pytest
 
 from compressor.program import did_you_mean
 from compressor.store.files import WrongName
-from compressor.store.names import find_job, find_study
-from compressor.store.studies import StoredAxis, StoredStudy
+from compressor.store.studies import StoredAxis, StoredStudy, find_job, find_study
 
 
 def study(name, axes, keys, is_grid=True):

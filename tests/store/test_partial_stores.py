@@ -8,7 +8,7 @@ import pytest
 from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job, read_store
-from compressor.store.verify import verify
+from compressor.store.status import verify
 from compressor.store.writer import Writer
 from compressor.sweep.sweep import sweep
 

@@ -28,7 +28,6 @@ from compressor.store import hdf5
 from compressor.store import reader as store
 from compressor.store.files import StoreError, discard_leftovers
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.names import find_job
 from compressor.store.series_file import (
     read_series,
     read_values,
@@ -36,7 +35,7 @@ from compressor.store.series_file import (
     series_path,
     write_series,
 )
-from compressor.store.studies import encode, read_studies, write_study
+from compressor.store.studies import encode, find_job, read_studies, write_study
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 

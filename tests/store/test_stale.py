@@ -11,12 +11,10 @@ from compsim import cli
 
 from compressor.cases.load import load_studies
 from compressor.program import PROGRAM
-from compressor.store import segment as segments
-from compressor.store.reader import open_study, read_store
-from compressor.store.rows import merge
-from compressor.store.segment import GIVEN, encode, read_segment, segment_name
-from compressor.store.stale import stale
-from compressor.store.verify import verify
+from compressor.store import rows as segments
+from compressor.store.reader import open_study, read_store, stale
+from compressor.store.rows import GIVEN, encode, merge, read_segment, segment_name
+from compressor.store.status import verify
 from compressor.sweep.sweep import Options, sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}

@@ -17,7 +17,7 @@ from compressor.solve.simulate import measure, simulate
 from compressor.store.export import export
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import open_study, read_store
-from compressor.store.segment import LATER, decode, encode, of_outcomes
+from compressor.store.rows import LATER, decode, encode, of_outcomes
 from compressor.store.status import standings
 from compressor.store.studies import write_study
 

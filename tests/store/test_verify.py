@@ -9,7 +9,7 @@ from compsim import cli
 from compressor.store.files import StoreError
 from compressor.store.hdf5 import SEAL, DamagedJob
 from compressor.store.series_file import image_of, read_dataset, write_dataset
-from compressor.store.verify import verify
+from compressor.store.status import verify
 
 PLACES = ("wear/0123456789abcdef0123.nc", "regimes/some/0123456789abcdef0123.nc",
           "regimes/some/pair-0123456789abcdef0123.nc")  # fmt: skip

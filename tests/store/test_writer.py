@@ -24,12 +24,12 @@ from compressor.outcome import ROW, Outcome, SeriesFile
 from compressor.solve.simulate import simulate
 from compressor.store import hdf5, writer
 from compressor.store import reader as store
-from compressor.store import segment as segments
+from compressor.store import rows as segments
 from compressor.store.files import StoreError
 from compressor.store.rows import merge
 from compressor.store.series_file import intact, read_values, write_series
+from compressor.store.status import verify
 from compressor.store.studies import StoredAxis, StoredStudy, encode
-from compressor.store.verify import verify
 from compressor.store.writer import Writer
 
 

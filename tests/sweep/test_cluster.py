@@ -19,12 +19,12 @@ from bad_jobs import work as poisoned
 from compsim.cli import main
 from test_execution import is_running, lost, results, wait_for
 
+from compressor.cases.case import MODEL
 from compressor.cases.load import load_studies
-from compressor.cases.revisions import MODEL
 from compressor.store import reader as store
 from compressor.store.files import StoreError
-from compressor.store.verify import verify
-from compressor.sweep import cluster, cluster_batches, shared_folder
+from compressor.store.status import verify
+from compressor.sweep import cluster, cluster_batches
 from compressor.sweep.cluster import Cluster
 from compressor.sweep.cluster_batches import Remote
 from compressor.sweep.sweep import Options, sweep
@@ -132,9 +132,7 @@ def watched(backend, after, act):
 
 
 def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        shared_folder, "store_series", lambda *_: pytest.fail("the folder is shared")
-    )
+    monkeypatch.setattr(cluster, "store_series", lambda *_: pytest.fail("the folder is shared"))
     victim = dask.workers[0].process.pid
     with Cluster(dask.scheduler_address) as backend:
         killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
@@ -152,12 +150,12 @@ def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path
 
     stored = []
 
-    def noted(*arguments, real=shared_folder.store_series):
+    def noted(*arguments, real=cluster.store_series):
         stored.append(arguments)
         return real(*arguments)
 
     monkeypatch.setattr(cluster, "visible", elsewhere)
-    monkeypatch.setattr(shared_folder, "store_series", noted)
+    monkeypatch.setattr(cluster, "store_series", noted)
     with Cluster(dask.scheduler_address) as backend:
         sweep(studies, tmp_path / "out", options=Options(backend=backend))
     assert len(stored) == 10
@@ -165,10 +163,10 @@ def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path
 
 
 def test_a_folder_is_shared_if_our_file_is_seen(tmp_path):
-    with shared_folder.visible(tmp_path) as (token, text):
-        assert shared_folder.sees(token, text)
-        assert not shared_folder.sees(token, "of another run")
-    assert not shared_folder.sees(token, text)
+    with cluster.visible(tmp_path) as (token, text):
+        assert cluster.sees(token, text)
+        assert not cluster.sees(token, "of another run")
+    assert not cluster.sees(token, text)
 
 
 def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_path, monkeypatch):
@@ -176,7 +174,7 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         raise StoreError(place, "No space left on device", "free some")
 
     monkeypatch.setattr(cluster, "visible", lambda place: contextlib.nullcontext((place, "")))
-    monkeypatch.setattr(shared_folder, "store_series", full)
+    monkeypatch.setattr(cluster, "store_series", full)
     with (
         Cluster(dask.scheduler_address) as backend,
         pytest.raises(StoreError, match="No space left on device"),

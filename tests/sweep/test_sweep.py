@@ -16,7 +16,7 @@ import compressor.store.writer
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
-from compressor.store.verify import verify
+from compressor.store.status import verify
 from compressor.sweep import warm_up
 from compressor.sweep.sweep import Failure, Options, sweep
 from compressor.sweep.wanted import Wanted

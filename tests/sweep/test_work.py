@@ -6,7 +6,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.reasons import Reason
-from compressor.sweep.work import FEWEST, Now, Work
+from compressor.sweep.wanted import FEWEST, Now, Work
 from compressor.sweep.worker import Done, Lost
 
 START_UP = 40.0  # s: the equations are compiled, workers start

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
+from compressor.cases.optional_groups import Body, Sensor
 from compressor.cases.table import table
-from compressor.cases.vibration import Body, Sensor
 from compressor.vibration.accelerometer import analogue_rate, listen, paces
 from compressor.vibration.body import Forces
 

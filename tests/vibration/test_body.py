@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.cases.vibration import Body
+from compressor.cases.optional_groups import Body
 from compressor.vibration.body import Forces, body_motion, casing_acceleration
 
 STEP, COUNT = 1e-4, 4001

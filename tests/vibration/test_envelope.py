@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from compressor.vibration.checks import SignalError
 from compressor.vibration.envelope import band_envelope, envelope_spectrum, kurtogram
+from compressor.vibration.spectra import SignalError
 
 RATE, SIZE = 10_000.0, 30_000  # samples a second; 3 s
 TIME = np.arange(SIZE) / RATE

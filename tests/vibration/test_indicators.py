@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from compressor.vibration.checks import SignalError
-from compressor.vibration.indicators import (
+from compressor.vibration.envelope import (
     crest_factor,
     energy_angle,
     gini,
@@ -15,6 +14,7 @@ from compressor.vibration.indicators import (
     rms,
     shape,
 )
+from compressor.vibration.spectra import SignalError
 
 M = 720
 ANGLE = 2 * np.pi * np.arange(4 * M) / M  # four revolutions

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.vibration.linear import one_step, oscillate
+from compressor.vibration.body import one_step, oscillate
 
 STEP = 4e-5
 FREQUENCY, DAMPING = 20.0, 0.03

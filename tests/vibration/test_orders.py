@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from compressor.vibration.checks import SignalError
-from compressor.vibration.orders import (
+from compressor.vibration.spectra import (
+    SignalError,
     angle_window,
     order_spectrum,
     resampled,

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.vibration.checks import SignalError
-from compressor.vibration.spectra import WINDOWS, line_amplitudes, noise_bandwidth
+from compressor.vibration.spectra import WINDOWS, SignalError, line_amplitudes, noise_bandwidth
 
 BLOCK = 240
 

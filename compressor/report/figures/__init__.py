@@ -8,10 +8,15 @@ from matplotlib.figure import Figure as Drawing
 
 from compressor.analysis import CLEARANCES, label
 from compressor.report.figures.curves import Runs
-from compressor.report.figures.forces import draw_contact_force, draw_piston_force
-from compressor.report.figures.machine import draw_cam, draw_pressure_volume
-from compressor.report.figures.relation import draw_relation
-from compressor.report.figures.response import draw_fault_response, draw_load_response
+from compressor.report.figures.paper import (
+    draw_cam,
+    draw_contact_force,
+    draw_fault_response,
+    draw_load_response,
+    draw_piston_force,
+    draw_pressure_volume,
+    draw_relation,
+)
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,16 @@ from compressor.analysis import (
     label,
     rows_modes,
 )
-from compressor.report.figures.contact import CORNERS, corner, mode_handles, plot_orbit
 from compressor.report.figures.curves import ANGLE_AXIS, Runs
-from compressor.report.figures.job import ORDERS_AXIS, plot_lines
-from compressor.report.figures.study_maps import plot_modes
+from compressor.report.figures.job import (
+    CORNERS,
+    ORDERS_AXIS,
+    corner,
+    mode_handles,
+    plot_lines,
+    plot_modes,
+    plot_orbit,
+)
 from compressor.report.figures.style import (
     BLUE,
     BY_CLEARANCE,

@@ -7,24 +7,25 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from compressor.report.figures import sweep_captions as captions
-from compressor.report.figures.sweep_data import Sweep, sweep_of
-from compressor.report.figures.sweep_lines import draw_curves
-from compressor.report.figures.sweep_maps import draw_maps
-from compressor.report.figures.sweep_metric import Measure, measures
-from compressor.report.figures.sweep_multiples import (
-    draw_multiples,
-    draw_overview,
-    roles_of,
-)
-from compressor.report.figures.sweep_ranking import (
+from compressor.report.figures.sweep_data import Measure, Sweep, measures, sweep_of
+from compressor.report.figures.sweep_maps import (
     Ranking,
+    draw_maps,
     draw_ranking,
     leading,
     order_of,
     overall,
     ranking,
 )
-from compressor.report.figures.sweep_scatter import MOST_COLUMNS, draw_points, draw_scatter
+from compressor.report.figures.sweep_panels import (
+    MOST_COLUMNS,
+    draw_curves,
+    draw_multiples,
+    draw_overview,
+    draw_points,
+    draw_scatter,
+    roles_of,
+)
 
 MOST_ROWS = 3  # measures that stand in a figure with rows of them
 MOST_DETAILED = 2  # measures that have a figure of their own

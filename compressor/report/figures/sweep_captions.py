@@ -4,14 +4,18 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from compressor.report.figures.sweep_data import Axis, Sweep
-from compressor.report.figures.sweep_lines import MOST_POINTS as MOST_JOBS
-from compressor.report.figures.sweep_maps import MOST_CELLS
-from compressor.report.figures.sweep_metric import Measure, shown_value
-from compressor.report.figures.sweep_multiples import MOST_COLUMNS, MOST_PLACES, MOST_ROWS, Roles
-from compressor.report.figures.sweep_panels import MOST_LINES
-from compressor.report.figures.sweep_ranking import Ranking, told
-from compressor.report.figures.sweep_scatter import MOST_POINTS, grouping
+from compressor.report.figures.sweep_data import Axis, Measure, Sweep, shown_value
+from compressor.report.figures.sweep_maps import MOST_CELLS, Ranking, told
+from compressor.report.figures.sweep_panels import (
+    MOST_COLUMNS,
+    MOST_JOBS,
+    MOST_LINES,
+    MOST_PLACES,
+    MOST_POINTS,
+    MOST_ROWS,
+    Roles,
+    grouping,
+)
 
 MARKS = (
     "A cross: a job failed here; an empty grey circle: a job was not run; a ring: a chaotic job, "

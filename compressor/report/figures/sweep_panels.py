@@ -1,8 +1,9 @@
-"""What the figures of a sweep share: a panel a metric, marks of jobs without result, colours."""
+"""Sweeps drawn as lines, rows and columns of lines, or points: a panel a metric."""
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -10,11 +11,21 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from compressor.report.figures.artists import with_jobs
-from compressor.report.figures.style import BLUE, CYCLE, Line, sheet
-from compressor.report.figures.sweep_data import Axis, spans_decades
-from compressor.report.figures.sweep_metric import MARKS, NAMES, Measure
+from compressor.analysis import trend
+from compressor.report.figures.extract import with_jobs
+from compressor.report.figures.style import BLUE, CYCLE, Line, legend_above, sheet, styled
+from compressor.report.figures.sweep_data import (
+    MARKS,
+    NAMES,
+    Axis,
+    Measure,
+    Sweep,
+    coarse,
+    named,
+    spans_decades,
+)
 
 COLUMNS = 3
 MOST_LINES = 12  # in a panel
@@ -147,3 +158,315 @@ def thinned(size: int, most: int) -> np.ndarray:
 
 
 PLAIN_LINE = Line(BLUE, "-", 1.4).properties() | {"marker": "o", "markersize": 3.8}
+
+
+MOST_JOBS = 1000
+
+
+@styled
+def draw_curves(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
+    """Return every measure over the one axis of a grid, a point a job; over words without a line.
+
+    Of more than MOST_JOBS jobs as many are drawn.
+    """
+    sweep = coarse(sweep, 0, MOST_JOBS)
+    (axis,) = sweep.axes
+    x, status, chaotic, keys = axis.places, sweep.status, sweep.chaotic, sweep.keys
+    figure, panels = metric_panels(measures, 2.35)
+    line = PLAIN_LINE | ({"linestyle": "none"} if axis.is_words else {})
+    for panel, measure in zip(panels, measures, strict=True):
+        values, bars = sweep.values(measure), sweep.bars(measure)
+        scale_x(panel, axis)
+        span = scale_y(panel, values)
+        plot_jobs(panel, (x, values, bars), keys, measure.title, line, span)
+        mark_points(panel, x[chaotic], values[chaotic], None if keys is None else keys[chaotic],
+                    RING, CHAOTIC)  # fmt: skip
+        mark_feet(panel, x, status, keys)
+        panel.set_ylabel(measure.unit)
+    figure.supxlabel(axis.title, fontsize="medium")
+    handles = marks_shown(status, chaotic)
+    if handles:
+        legend_above(figure, handles)
+    return figure
+
+
+MOST_COLUMNS, MOST_ROWS = 4, 3
+MOST_PLACES = 200  # in x
+
+
+class Roles(NamedTuple):
+    """Which axis of a sweep does what, by number; -1: none. The others are averaged over."""
+
+    x: int
+    color: int
+    column: int = -1
+    row: int = -1
+
+
+@dataclass(frozen=True)
+class Part:
+    """A measure at points: of a sweep or, of a line, over x and what is averaged, (x, others)."""
+
+    values: np.ndarray
+    bars: np.ndarray
+    status: np.ndarray
+    chaotic: np.ndarray
+    keys: np.ndarray | None
+
+    @property
+    def is_jobs(self) -> bool:
+        """Whether each point is one job."""
+        return self.values.shape[1] == 1
+
+
+def roles_of(sweep: Sweep, order: Sequence[int], detailed: bool) -> Roles:
+    """Return which axis does what. order: the axes' numbers, the strongest first.
+
+    In x lies the one of the two strongest axes of numbers that has more values, in colours the
+    strongest of the others; with `detailed` the next two make columns and rows.
+    """
+    numbers = [n for n in order if not sweep.axes[n].is_words] or list(order)
+    x = max(numbers[:2], key=lambda n: sweep.axes[n].values.size)
+    color, *others = [n for n in order if n != x]
+    return Roles(x, color, *(others[:2] if detailed else []))
+
+
+def chosen_of(axis: Axis, most: int) -> np.ndarray:
+    """Return the numbers of an axis' values that are shown."""
+    return thinned(axis.values.size, most)
+
+
+@styled
+def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
+    """Return every measure over two axes, as lines; means over the others, if there are any.
+
+    What is not known within its error bar is no part of a mean.
+    """
+    sweep = coarse(sweep, role.x, MOST_PLACES)
+    figure, panels = metric_panels(measures, 2.35)
+    entries: dict[str, Line2D] = {}
+    for panel, measure in zip(panels, measures, strict=True):
+        colors = chosen_of(sweep.axes[role.color], MOST_LINES)
+        whole = whole_part(sweep, measure, role)
+        parts = [line_part(whole, role, {role.color: int(n)}) for n in colors]
+        entries |= plot_parts(panel, sweep, role, parts, whole)
+        panel.set_ylabel(measure.unit)
+    figure.supxlabel(sweep.axes[role.x].title, fontsize="medium")
+    legend_above(figure, [*entries.values(), *marks_of(sweep, role)])
+    return figure
+
+
+def is_averaged(sweep: Sweep, role: Roles) -> bool:
+    """Return whether lines are means over some axes."""
+    return any(n not in role for n in range(len(sweep.axes)))
+
+
+def marks_of(sweep: Sweep, role: Roles) -> list[Line2D]:
+    """Return the legend's entries of marks: means have none."""
+    return [] if is_averaged(sweep, role) else marks_shown(sweep.status, sweep.chaotic)
+
+
+@styled
+def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
+    """Return a panel for each value of one axis and, in rows, of another, or for each measure."""
+    sweep = coarse(sweep, role.x, MOST_PLACES)
+    columns = chosen_of(sweep.axes[role.column], MOST_COLUMNS)
+    has_rows = role.row >= 0
+    rows: Sequence[int] = chosen_of(sweep.axes[role.row], MOST_ROWS).tolist() if has_rows else []
+    grid_rows = [(measures[0], n) for n in rows] if has_rows else [(m, -1) for m in measures]
+    figure, grid = sheet(
+        len(grid_rows), columns.size, 2.2 * len(grid_rows) + 1.0, sharex=True,
+        sharey=True if has_rows else "row",
+    )  # fmt: skip
+    entries: dict[str, Line2D] = {}
+    for line, (measure, row) in zip(grid, grid_rows, strict=True):
+        whole = whole_part(sweep, measure, role)
+        for panel, column in zip(line, columns, strict=True):
+            at = {role.column: int(column)} | ({role.row: row} if has_rows else {})
+            colors = chosen_of(sweep.axes[role.color], MOST_LINES)
+            parts = [line_part(whole, role, at | {role.color: int(n)}) for n in colors]
+            entries |= plot_parts(panel, sweep, role, parts, whole)
+            words = [] if has_rows else [measure.title]
+            words += [sweep.axes[axis].told(n) for axis, n in at.items()]
+            panel.set_title("\n".join(words), fontsize=9)
+        line[0].set_ylabel(measure.unit)
+    figure.supxlabel(sweep.axes[role.x].title, fontsize="medium")
+    legend_above(figure, [*entries.values(), *marks_of(sweep, role)])
+    return figure
+
+
+def whole_part(sweep: Sweep, measure: Measure, role: Roles) -> Part:
+    """Return a measure over a sweep; where lines are means, what is known of it within its error
+    bar.
+    """
+    values = sweep.known(measure) if is_averaged(sweep, role) else sweep.values(measure)
+    return Part(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
+
+
+def line_part(whole: Part, role: Roles, at: dict[int, int]) -> Part:
+    """Return what a line shows: the points over x at a value of some axes, numbers by number."""
+
+    def part(values: np.ndarray) -> np.ndarray:
+        index = tuple(at.get(n, slice(None)) for n in range(values.ndim))
+        left = [n for n in range(values.ndim) if n not in at]
+        return np.moveaxis(values[index], left.index(role.x), 0).reshape(values.shape[role.x], -1)
+
+    return Part(
+        part(whole.values), part(whole.bars), part(whole.status), part(whole.chaotic),
+        None if whole.keys is None else part(whole.keys),
+    )  # fmt: skip
+
+
+def plot_parts(
+    panel: Axes, sweep: Sweep, role: Roles, parts: Sequence[Part], whole: Part
+) -> dict[str, Line2D]:
+    """Return a panel's lines and marks; gives the legend's entries by name."""
+    axis, color = sweep.axes[role.x], sweep.axes[role.color]
+    x, chosen = axis.places, chosen_of(color, MOST_LINES)
+    scale_x(panel, axis)
+    entries = {}
+    values = whole.values  # so that all panels of a measure have one scale
+    if role.column < 0 and not parts[0].is_jobs:
+        values = np.stack([mean_of(part.values) for part in parts])
+    span = scale_y(panel, values)
+    for n, part, line in zip(chosen, parts, lines_for(color, chosen), strict=True):
+        marker = MARKERS[int(n) % len(MARKERS)] if color.is_words else "o"
+        style = line.properties() | {"marker": marker, "markersize": 3.4}
+        style |= {"linestyle": "none"} if axis.is_words else {}
+        name = color.told(int(n))
+        entries[name] = Line2D([], [], label=name, **style)
+        plot_part(panel, x, part, name, style, span)
+    if not parts[0].is_jobs:
+        return entries
+    places = np.repeat(x, sum(part.values.shape[1] for part in parts))
+    status = np.concatenate([part.status for part in parts], axis=1).ravel()
+    keys = [part.keys for part in parts if part.keys is not None]
+    mark_feet(panel, places, status, np.concatenate(keys, axis=1).ravel() if keys else None)
+    return entries
+
+
+def plot_part(
+    panel: Axes, x: np.ndarray, part: Part, name: str, style: dict[str, Any], span: float
+) -> None:  # fmt: skip
+    """A line through jobs with their bars, or through means."""
+    if part.is_jobs:
+        keys = None if part.keys is None else part.keys[:, 0]
+        values, ring = part.values[:, 0], part.chaotic[:, 0]
+        plot_jobs(panel, (x, values, part.bars[:, 0]), keys, name, style, span)
+        mark_points(panel, x[ring], values[ring], None if keys is None else keys[ring], RING,
+                    CHAOTIC)  # fmt: skip
+        return
+    panel.plot(x, mean_of(part.values), label=name, **style)
+
+
+def mean_of(values: np.ndarray) -> np.ndarray:
+    """Return the means over the last axis of what is known; nan where nothing is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=-1)
+    return np.where(count, np.where(known, values, 0.0).sum(axis=-1) / np.maximum(count, 1), np.nan)
+
+
+MOST_POINTS = 2000  # in a panel
+PLACES = 60  # of a trend
+
+
+@styled
+def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
+    """Return every measure over the axis that matters most for it; axes: their numbers, one a
+    measure.
+    """
+    figure, panels = metric_panels(measures, 2.35)
+    for panel, axis, measure in zip(panels, axes, measures, strict=True):
+        plot_points(panel, sweep, axis, measure)
+        panel.set_xlabel(sweep.axes[axis].title)
+        panel.set_ylabel(measure.unit)
+    legend_above(figure, entries(sweep))
+    return figure
+
+
+@styled
+def draw_scatter(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
+    """Return the measures in rows over axes in columns."""
+    figure, grid = sheet(
+        len(measures), len(axes), 2.3 * len(measures) + 0.9, sharex="col", sharey="row"
+    )
+    for row, measure in zip(grid, measures, strict=True):
+        for panel, axis in zip(row, axes, strict=True):
+            plot_points(panel, sweep, axis, measure)
+        row[0].set_title(measure.title)
+        row[0].set_ylabel(measure.unit)
+    for panel, axis in zip(grid[-1], axes, strict=True):
+        panel.set_xlabel(sweep.axes[axis].title)
+    legend_above(figure, entries(sweep))
+    return figure
+
+
+def grouping(sweep: Sweep) -> tuple[str, list[Any], np.ndarray]:
+    """Return the words that have a colour: their axis' phrase, the words, and each job's number.
+
+    The first axis of words with no more of them than there are lines to tell apart.
+    """
+    for axis in sweep.axes:
+        if axis.is_words and len(axis.words) <= len(CYCLE):
+            return axis.phrase, axis.words, axis.places.astype(int)
+    return "", [""], np.zeros(sweep.place.shape, int)
+
+
+def plot_points(panel: Axes, sweep: Sweep, axis: int, measure: Measure) -> None:
+    """The jobs over one axis, and for each group the trend and its interval."""
+    one = sweep.axes[axis]
+    x, y, keys = one.places, sweep.values(measure), sweep.keys
+    scale_x(panel, one)
+    scale_y(panel, y)
+    phrase, words, group = grouping(sweep)
+    shown = np.zeros(y.size, bool)
+    shown[thinned(y.size, MOST_POINTS)] = True
+    for n, word in enumerate(words):
+        name = named(phrase, word) if phrase else "a job"
+        here = shown & (group == n)
+        color = CYCLE[n].color if phrase else BLUE
+        mark = {"linestyle": "none", "marker": MARKERS[n], "markersize": 3.0, "color": color,
+                "alpha": 0.55 if y.size < 500 else 0.35, "markeredgewidth": 0.0}  # fmt: skip
+        mark_points(panel, x[here], y[here], None if keys is None else keys[here], mark, name)
+        if not one.is_words:
+            known = np.where(group == n, sweep.known(measure), np.nan)
+            plot_trend(panel, x, known, color, name)
+    ring = shown & sweep.chaotic
+    mark_points(panel, x[ring], y[ring], None if keys is None else keys[ring], RING, CHAOTIC)
+    mark_feet(panel, x[shown], sweep.status[shown], None if keys is None else keys[shown])
+
+
+def plot_trend(panel: Axes, x: np.ndarray, y: np.ndarray, color: str, name: str) -> None:
+    """A parabola through points and the 95 % interval of its mean, on the panel's scales."""
+    logs = panel.get_xscale() == "log", panel.get_yscale() == "log"
+    there = x[np.isfinite(x) & np.isfinite(y)]
+    if not there.size or not np.ptp(there):
+        return
+    low, high = there.min(), there.max()
+    at = np.geomspace(low, high, PLACES) if logs[0] else np.linspace(low, high, PLACES)
+    found = trend(
+        np.log(x) if logs[0] else x, np.log(y) if logs[1] else y, np.log(at) if logs[0] else at
+    )
+    if found is None:
+        return
+    middle, below, above = (np.exp(part) if logs[1] else part for part in found)
+    name = "" if name == "a job" else f", {name}"
+    panel.fill_between(at, below, above, color=color, alpha=0.22, linewidth=0.0,
+                       label=f"95 % interval of the trend{name}")  # fmt: skip
+    panel.plot(at, middle, color=color, linewidth=1.8, label=f"trend{name}", zorder=3)
+
+
+def entries(sweep: Sweep) -> list[Any]:
+    """Return the legend of a scatter diagram."""
+    return [*_entries(sweep), *marks_shown(sweep.status, sweep.chaotic)]
+
+
+def _entries(sweep: Sweep) -> Iterator[Any]:
+    phrase, words, _ = grouping(sweep)
+    for n, word in enumerate(words):
+        color = CYCLE[n].color if phrase else BLUE
+        yield Line2D([], [], color=color, linestyle="none", marker=MARKERS[n], markersize=4.5,
+                     label=named(phrase, word) if phrase else "a job")  # fmt: skip
+    color = BLUE if not phrase else "#606060"
+    yield Line2D([], [], color=color, linewidth=1.8, label="trend")
+    yield Patch(facecolor=color, alpha=0.3, label="its 95 % interval")

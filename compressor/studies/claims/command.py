@@ -63,9 +63,8 @@ def claims(
     one_thread_each()  # before numpy loads
     from compressor.cases import load_studies, templates
     from compressor.store import writable_folder
-    from compressor.studies.claims.judged import cases_judged
     from compressor.studies.claims.search import least_change
-    from compressor.studies.claims.study import judge_machines
+    from compressor.studies.claims.study import cases_judged, judge_machines
     from compressor.sweep import cores
 
     paths = configs or tuple(str(templates()[name].path) for name in EXAMPLES)
@@ -122,9 +121,9 @@ def sentences(found: "xr.Dataset") -> Iterator[str]:
         consistency,
         deciding,
         is_mass_plane,
+        sensitivity,
         summary,
     )
-    from compressor.studies.claims.sensitivity import sensitivity
 
     if "looked" in found.attrs:
         yield from change(found)

@@ -75,7 +75,7 @@ def border(panel: Axes, found: xr.Dataset, inside: np.ndarray, color: str) -> No
 def draw_sensitivity(table: xr.Dataset, names: list[str]) -> Figure:
     """Return main and total effect of each assumption on each claim's margin, with 95 % intervals.
 
-    table: of `compressor.studies.claims.sensitivity`; names: of its assumptions, in words.
+    table: of `compressor.studies.claims.findings`; names: of its assumptions, in words.
     """
     claims = [c for c in table["claim"].values.tolist()
               if not np.isnan(table["total_order"].sel(claim=c)).all()]  # fmt: skip

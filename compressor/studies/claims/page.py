@@ -17,10 +17,10 @@ from compressor.studies.claims.findings import (
     deciding,
     flips,
     is_mass_plane,
+    sensitivity,
     spoken,
     summary,
 )
-from compressor.studies.claims.sensitivity import sensitivity
 from compressor.studies.claims.study import read_machines
 
 MAP = (

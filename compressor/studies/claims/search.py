@@ -17,11 +17,11 @@ import xarray as xr
 
 from compressor.cases import Axis, Case, Study, design, value_in
 from compressor.store import Folder, StoreError, write_dataset
-from compressor.studies.claims.judged import Judged
 from compressor.studies.claims.study import (
     ELSEWHERE,
     OTHERS,
     ClaimsError,
+    Judged,
     judge_machines,
     kept,
     machine_key,

@@ -15,7 +15,14 @@ import numpy as np
 
 from compressor.program import CompsimError
 from compressor.store import Folder
-from compressor.studies.diagnosis.approximate import Interval, Posterior
+from compressor.studies.diagnosis.approximate import (
+    Distance,
+    Interval,
+    KernelRidge,
+    Logistic,
+    Posterior,
+    Strangeness,
+)
 from compressor.studies.diagnosis.features import FEATURES, RecordError
 from compressor.studies.diagnosis.library import (
     SIDES,
@@ -25,9 +32,7 @@ from compressor.studies.diagnosis.library import (
     stored_record,
     vector,
 )
-from compressor.studies.diagnosis.record_file import SteadySpeed, read_record
-from compressor.studies.diagnosis.regression import KernelRidge, Logistic
-from compressor.studies.diagnosis.strangeness import Distance, Strangeness
+from compressor.studies.diagnosis.record_files import SteadySpeed, read_record
 from compressor.vibration import Record
 
 FEWEST_JOBS = 30  # of one joint, for it to be told

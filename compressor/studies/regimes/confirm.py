@@ -26,8 +26,16 @@ from compressor.program import PROGRAM
 from compressor.solve import follow, record
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 from compressor.studies.regimes.chains import FOLDER, REMEDY, Chain, kept
-from compressor.studies.regimes.periods import apart, places, tolerance
-from compressor.studies.regimes.values import Clock, Motion, Row, measured, stretch
+from compressor.studies.regimes.values import (
+    Clock,
+    Motion,
+    Row,
+    apart,
+    measured,
+    places,
+    stretch,
+    tolerance,
+)
 
 FURTHER = 200  # rev that a motion runs on before it is looked at again
 STARTS = 8  # from other places

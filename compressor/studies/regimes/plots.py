@@ -19,8 +19,7 @@ from compressor.report import (
 from compressor.store import Folder
 from compressor.studies.regimes.captions import CAPTIONS
 from compressor.studies.regimes.dataset import followed_studies, open_regimes
-from compressor.studies.regimes.figures import draw_bifurcation, draw_sections
-from compressor.studies.regimes.period_map import draw_periods
+from compressor.studies.regimes.figures import draw_bifurcation, draw_periods, draw_sections
 
 MOST_SECTIONS = 6
 

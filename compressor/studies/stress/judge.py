@@ -1,7 +1,7 @@
 """Judge a run that says ok: is any number of it wrong, and do its error bars say so?
 
 A run states its error by its error bars; it has passed its energy audit, or it would not
-say ok (`compressor.solve.energy_audit`). A number is wrong in silence where it lies farther from a
+say ok (`compressor.solve.error_bars`). A number is wrong in silence where it lies farther from a
 judge's than ten times its bar and than what the tolerance lets one expect: a thousand times rtol,
 but 5 % at most, and of the time without contact 1e-4 of the span at least. The judge is another
 integrator at a hundredth of the tolerance, not below 1e-12. Judges are asked until two say the

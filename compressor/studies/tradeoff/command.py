@@ -1,7 +1,10 @@
-"""`compsim tradeoff`: what accuracy costs by method and tolerance, and what the terms change."""
+"""How far choices of the model move a case's metrics, as a table of text."""
 
+import dataclasses
+import json
 import os
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,18 +12,67 @@ import click
 from compsim.results import files, folders
 from compsim.screen import (
     DONE,
+    SOME_FAILED,
     Screen,
+    caution,
+    configs_argument,
+    limit,
+    plural,
     print_text,
     say,
     setting,
+    without_nan,
 )
 
-from compressor.studies.tradeoff.model_text import model_lines
+from compressor.digits import by_bar
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from compressor.cases import Case
+    from compressor.cases import Case, Study
+    from compressor.solve import JointScales
+    from compressor.studies.tradeoff.explain import Explanation
+    from compressor.studies.tradeoff.page import ModelTable
+
+WIDEST = 12  # columns of a word of a head
+FIRST = "choice of the model"
+
+
+def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterator[str]:
+    """Yield a table of choices: a head, the case itself, each choice, the span, and a summary.
+
+    place: which job it is of; times: with a column of wall times over the case's own, and no
+    summary, since not only choices of the model are there.
+    """
+    from compressor.studies.tradeoff.page import headline
+
+    yield f"{place}:"
+    titles = [f"{m.title}" + (f" ({m.unit})" if m.unit else "") for m in table.measures]
+    heads = [textwrap.wrap(title, WIDEST) for title in titles] + [["time"]] * times
+    numbers = zip(table.measures, table.values, table.bars, strict=True)
+    values = [by_bar(value, bar, m.is_relative, bare=True) for m, value, bar in numbers]
+    rows = [["the case itself", *values, *["× 1"] * times]]
+    for row in table.rows:
+        time = [f"× {row.time_ratio:.2g}" if row.time_ratio == row.time_ratio else "–"] * times
+        rows.append([row.name, *row.cells, *time])
+    rows.append(["all of them", *table.span_texts, *[""] * times])
+    depth = max(map(len, heads), default=1)
+    stacked = [[""] * (depth - len(head)) + head for head in heads]
+    above = [[FIRST * (n == depth - 1), *(head[n] for head in stacked)] for n in range(depth)]
+    notes = [""] * (depth - 1) + ["assumed", "", *(row.note for row in table.rows), ""]
+    yield from aligned([*above, *rows], notes)
+    if table.unknown:
+        yield f"  not known of the case itself: {', '.join(table.unknown)}"
+    if not times:
+        yield headline(table)
+
+
+def aligned(rows: Sequence[Sequence[str]], notes: Sequence[str]) -> Iterator[str]:
+    """Yield rows with their first cell to the left, the others to the right, a note behind."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for (first, *cells), note in zip(rows, notes, strict=True):
+        told = (f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
+        yield "  ".join([f"  {first:<{widths[0]}}", *told, note]).rstrip()
 
 
 @click.command()
@@ -148,3 +200,184 @@ def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
             f"{one['place_error'].item():.0%} of the clearance, and change the ideal acceleration "
             f"by {one['acceleration_error'].item():.2%}"
         )
+
+
+INDENT = 12  # columns of a heading
+
+
+@click.command()
+@configs_argument
+@click.option("-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
+              help="Worker processes that the sweep's cost is told for.")  # fmt: skip
+@click.option("--models", is_flag=True,
+              help="Instead: how far choices of the model move each metric.")  # fmt: skip
+@click.option("-o", "--output", shell_complete=folders, show_default="results",
+              help="Folder of results that keeps what --models finds.")  # fmt: skip
+@setting
+@limit
+@click.option("--json", "as_json", is_flag=True, help="The same as JSON, a list of studies.")
+def explain(
+    configs: tuple[str, ...],
+    jobs: int,
+    models: bool,
+    output: str | None,
+    overrides: tuple[str, ...],
+    max_jobs: int,
+    as_json: bool,
+) -> int:
+    """Tell what case files ask for: terms, natural scales, cost, and what is paid for in vain.
+
+    Runs the first job of each case file, and again without each feature that it pays for. With
+    --models it runs that job by other contact and friction laws, twice and half the contact
+    stiffness and damping, with an oil film, an elastic rod and play in the guide, or without where
+    the case has them. The table says how far each choice moves each metric; it is stored in models/
+    of the folder -o, and the report of that folder shows it. --set chooses another job than the
+    first, as in --set clearance_mm=0.3. Exit code 3 where such a job fails.
+    """
+    if output is not None and not models:
+        raise click.UsageError("-o keeps what --models finds: add --models, or leave -o out")
+    from compressor.cases import load_studies
+
+    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, follow=False)
+    caution(studies)
+    if models:
+        return explain_models(studies, output or "results", as_json)
+    from compressor.studies.tradeoff.explain import explain as explained
+
+    found = []
+    for study in studies:
+        first = "the job" if study.jobs == 1 else f"the first of {plural(study.jobs)}"
+        say(f"running {first} of {study.name}, with and without each of its features")
+        screen = Screen(False, "features", alike=False)
+        try:
+            found.append(explained(study, jobs, progress=screen))
+        finally:
+            screen.end()
+        if not as_json:
+            print_text("\n".join(lines(found[-1])))
+    if as_json:
+        plain = [without_nan(dataclasses.asdict(one)) for one in found]
+        print_text(json.dumps(plain, indent=1, ensure_ascii=False))
+    return SOME_FAILED if any(one.reason for one in found) else DONE
+
+
+def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
+    """Print and store how far choices of the model move the metrics of each study's first job."""
+    from compressor.store import models_file, writable_folder, write_dataset
+    from compressor.studies.tradeoff.model_choices import explain_models as run_models
+    from compressor.studies.tradeoff.page import model_table, place_text
+
+    writable_folder(folder)
+    failed, found = False, []
+    for study in studies:
+        screen = Screen(False, "choices of the model", alike=False)
+        try:
+            data = run_models(study, progress=screen)
+        finally:
+            screen.end()
+        if data["status"].values[0] != "ok":
+            failed = True
+            say(f"{study.name}: the job failed, {data['reason'].values[0]}: {data.attrs['detail']}")
+            continue
+        path = models_file(folder, study.name)
+        write_dataset(path, data)
+        table = model_table(data)
+        found.append({"study": study.name, "file": str(path), **dataclasses.asdict(table)})
+        if not as_json:
+            print_text("\n".join(model_lines(place_text(study, data.attrs["key"]), table)))
+            say(str(path))
+    if as_json:
+        print_text(json.dumps(without_nan(found), indent=1, ensure_ascii=False))
+    return SOME_FAILED if failed else DONE
+
+
+def heading(word: str, text: str) -> str:
+    """Return a line under a heading."""
+    return f"  {word:<{INDENT}}{text}"
+
+
+def lines(told: "Explanation") -> Iterator[str]:
+    """Yield an explanation as it is printed."""
+    point = ", ".join(f"{key} = {value}" for key, value in told.point.items())
+    yield f"{told.study}: {plural(told.jobs)}" + (f"; explained: {point}" if point else "")
+    count = len(told.unknowns)
+    solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
+    yield heading("scene", f"{told.scene}: {solved}")
+    if count:
+        yield heading("", "; ".join(name.rpartition(",")[0] for name in told.unknowns))
+    for number, (term, words) in enumerate(told.active.items()):
+        yield heading("" if number else "active", f"{term}: {words}")
+    if told.absent:
+        yield heading("absent", f"{', '.join(told.absent)}: cost nothing")
+    for number, text in enumerate(text for joint in told.scales for text in scale_lines(joint)):
+        yield heading("" if number else "scales", text)
+    word = told.accuracy or "given"
+    yield heading("tolerance", f"{word}: rtol {told.rtol:g}, {told.method}, "
+                  f"for errors below {percent(told.promise)}")  # fmt: skip
+    if told.reason:
+        yield heading("cost", f"unknown: the job failed, {told.reason}: {told.detail}")
+        return
+    yield from cost_lines(told)
+    for number in range(len(told.advice)):
+        yield heading("" if number else "without", advised(told, number))
+
+
+def scale_lines(joint: "JointScales") -> Iterator[str]:
+    """Yield the natural scales of a joint."""
+    name = joint.joint.replace("_", " ")
+    yield (
+        f"{name}: {joint.force:.0f} N at most in the ideal machine press "
+        f"{joint.penetration * 1e6:.0f} µm deep;"
+    )
+    along = "does not ring" if joint.damping_ratio >= 1.0 else "rings"
+    yield (
+        f"held there it {along} along the force (damping ratio {joint.damping_ratio:.2g}), and "
+        f"swings across it in its bore at about {joint.swing_frequency:.0f} Hz "
+        f"({1e3 / joint.swing_frequency:.2f} ms);"
+    )
+    yield (
+        f"{joint.limited_by} holds explicit steps to about {joint.explicit_step * 1e6:.3g} µs, "
+        f"the contact's stiffness implicit ones to {joint.implicit_step * 1e6:.3g} µs"
+    )
+
+
+def cost_lines(told: "Explanation") -> Iterator[str]:
+    """Yield what a job and the sweep cost."""
+    work = f" ({told.steps} steps, {told.evaluations} evaluations)" if told.steps else ""
+    yield heading("cost", f"{1e3 * told.seconds:.3g} ms a job{work}")
+    solved = f"{1e3 * told.solution_seconds:.3g} ms of it for the solution (`seconds` in show)"
+    rest = f", the rest for {', '.join(told.other_work)}" if told.other_work else ""
+    yield heading("", solved + rest)
+    if told.expected_steps:
+        yield heading("", f"by the scales alone about {told.expected_steps:.1g} steps, "
+                      f"{1e3 * told.expected_seconds:.1g} ms")  # fmt: skip
+    if told.jobs > 1:
+        workers = plural(told.workers, "worker")
+        yield heading("", f"{told.sweep_seconds:.2g} s for {plural(told.jobs)} with {workers}, "
+                      "if all cost the same")  # fmt: skip
+
+
+def advised(told: "Explanation", number: int) -> str:
+    """Return what leaving a feature out does, and whether it is worth while: of one of the
+    advice.
+    """
+    advice = told.advice[number]
+    effect = advice.effect
+    if effect.reason:
+        return f"{advice.name}: the run failed, {effect.reason}"
+    saved = 1 - effect.time_ratio
+    told_time = (
+        f"{'saves' if saved >= 0 else 'costs'} {100 * abs(saved):.0f} % of the solution's time"
+    )
+    text = (
+        f"{advice.name}: peak acceleration {percent(effect.change_peak_acceleration, '+')}, "
+        f"contact force {percent(effect.change_peak_contact_force, '+')}, {told_time}"
+    )
+    if advice.removable:
+        return f"{text}; less than {percent(told.promise)}: leave it out ({advice.neutral})"
+    return f"{text}; needed for {' and '.join(advice.needed_for)}"
+
+
+def percent(share: float, sign: str = "") -> str:
+    """Return a share in per cent, to two digits."""
+    return f"{100 * share:{sign}z.2g} %"

@@ -31,8 +31,7 @@ from compressor.solve import (
     simulate,
     stiffness_of,
 )
-from compressor.studies.tradeoff.feature_rows import FEATURES, Feature
-from compressor.studies.tradeoff.features import Effect, comparable, compare
+from compressor.studies.tradeoff.features import FEATURES, Effect, Feature, comparable, compare
 from compressor.studies.tradeoff.work_precision import SLOW, Progress, complete, faulty
 
 SCENES = {  # by the joints with clearance

@@ -25,8 +25,14 @@ from compressor.cases import (
 from compressor.metrics import METRICS
 from compressor.program import PROGRAM
 from compressor.solve import simulate
-from compressor.studies.tradeoff.feature_rows import FEATURES, Feature, changed
-from compressor.studies.tradeoff.features import SERIES_ERRORS, read_from_grid, series_errors
+from compressor.studies.tradeoff.features import (
+    FEATURES,
+    SERIES_ERRORS,
+    Feature,
+    changed,
+    read_from_grid,
+    series_errors,
+)
 from compressor.studies.tradeoff.work_precision import SLOW, Progress, complete, faulty
 
 ITSELF = "the case itself"

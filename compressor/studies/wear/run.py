@@ -8,8 +8,17 @@ from typing import Any, NamedTuple
 
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, StoreError, writable_folder
-from compressor.studies.wear.life import Life, life
-from compressor.studies.wear.stages import Stage, Worn, dataset, first, following, kept, write
+from compressor.studies.wear.stages import (
+    Life,
+    Stage,
+    Worn,
+    dataset,
+    first,
+    following,
+    kept,
+    life,
+    write,
+)
 from compressor.sweep import Done, Lost, Needs, Progress, run_here
 
 AT_MOST = 100_000  # motions, the wall time of which a machine may take

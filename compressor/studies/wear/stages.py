@@ -1,15 +1,4 @@
-"""Stages of wear: a bore's profile, the motion on it, and the step to the next one.
-
-    RESULTS/wear/MACHINE.nc    the stages that are finished, in the order of operating hours
-
-MACHINE is a hash of all that decides the numbers. A stage's motion stands for all revolutions until
-the next one; it is taken from the profile midway, so that errors fall with the square of the step.
-The file is written anew after each stage and is whole or absent; what was interrupted goes on from
-the last stage in it, and ends in the same numbers to the bit.
-
-Wear is slow: how a motion wears depends on the profile alone, and every profile is reached after
-the fewer revolutions, the greater the coefficient is. So one machine tells of all coefficients.
-"""
+"""How long a joint lasts: the hours until its clearance has grown to a limit."""
 
 import hashlib
 import json
@@ -17,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -206,3 +195,45 @@ def open_wear(folder: Folder, case: Case) -> xr.Dataset:
     if not path.exists():
         raise StoreError(path, "is not there", "compsim wear the case file")
     return read_dataset(path, REMEDY)
+
+
+class Life(NamedTuple):
+    """Hours until the first joint is worn out, nan where that is after the last stage.
+
+    low, high: with the greatest and the least coefficient; `joint`: that is worn out, or is the
+    nearest to it; `clearance`, `angle`: there at the end (m), and of the deepest place (rad).
+    """
+
+    hours: float
+    low: float
+    high: float
+    joint: str
+    clearance: float
+    angle: float
+
+
+def life(of: Worn, stages: xr.Dataset) -> Life:
+    """Return how long a machine lasts, by straight lines between its stages."""
+    opened = stages["clearance"].transpose("stage", "joint").values
+    hours = stages["hours"].values
+    reached = [when(hours, opened[:, joint], of.limit) for joint in range(opened.shape[1])]
+    worst = int(np.nanargmin(reached)) if np.isfinite(reached).any() else int(opened[-1].argmax())
+    found, factor, most = reached[worst], of.how.coefficient_factor, of.how.hours
+    deepest = stages["worn_depth"].isel(stage=-1, joint=worst)
+    return Life(
+        found if found <= most else math.nan,
+        found / factor if found <= factor * most else math.nan,
+        found * factor if found * factor <= most else math.nan,
+        str(stages["joint"].values[worst]),
+        float(opened[-1, worst]),
+        float(stages["angle"].values[int(deepest.values.argmax())]),
+    )
+
+
+def when(hours: np.ndarray, opened: np.ndarray, limit: float) -> float:
+    """Return when a clearance that never shrinks reaches a limit; nan where it does not."""
+    beyond = np.flatnonzero(opened >= limit)
+    if not beyond.size:
+        return math.nan
+    last = int(beyond[0])
+    return float(np.interp(limit, opened[last - 1 : last + 1], hours[last - 1 : last + 1]))

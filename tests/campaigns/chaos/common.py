@@ -27,8 +27,7 @@ from compressor.report import report
 from compressor.report.figures import pictures
 from compressor.report.page import Plate
 from compressor.store.reader import open_study
-from compressor.store.status import standings
-from compressor.store.verify import verify
+from compressor.store.status import standings, verify
 from compressor.sweep import plan as forecast
 from compressor.sweep.sweep import sweep
 

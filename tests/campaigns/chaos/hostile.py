@@ -37,7 +37,7 @@ from compressor.cases.load import CaseFileError
 from compressor.cases.study import Study
 from compressor.store import hdf5
 from compressor.store.reader import read_store
-from compressor.store.segment import decode, encode, segment_name
+from compressor.store.rows import decode, encode, segment_name
 from compressor.store.studies import read_study
 from compressor.sweep.sweep import Summary
 

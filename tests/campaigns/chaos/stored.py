@@ -11,8 +11,8 @@ from compressor.store.files import StoreError
 from compressor.store.hdf5 import DamagedJob, opened
 from compressor.store.reader import places, read_store
 from compressor.store.series_file import intact
+from compressor.store.status import verify
 from compressor.store.studies import study_paths
-from compressor.store.verify import verify
 
 TIMED = "seconds"
 LEAN = {  # of a quick job

@@ -8,8 +8,7 @@ from compsim import cli
 
 from compressor.studies.claims import search as searching
 from compressor.studies.claims import study as judging
-from compressor.studies.claims.judged import Judged
-from compressor.studies.claims.study import dataset
+from compressor.studies.claims.study import Judged, dataset
 from compressor.studies.claims.study import machines as machines_of
 
 MAP = "machine: {rod_mass_kg: [3, 4.7], reciprocating_mass_kg: [10, 14]}\n"

@@ -5,10 +5,10 @@ import math
 import pytest
 
 from compressor.analysis.claims import claims
-from compressor.analysis.paper_cases import cases_of
+from compressor.analysis.runs import cases_of
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
-from compressor.studies.claims.judged import CLAIMS, ideal_text, judge
+from compressor.studies.claims.study import CLAIMS, ideal_text, judge
 
 QUICK = {"accuracy": "draft", "duration_rev": 2, "output_step_deg": 1}
 

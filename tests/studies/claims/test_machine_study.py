@@ -8,9 +8,10 @@ from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
 from compressor.store.series_file import write_dataset
 from compressor.studies.claims import study as machine_study
-from compressor.studies.claims.judged import Judged, cases_judged
 from compressor.studies.claims.study import (
     ClaimsError,
+    Judged,
+    cases_judged,
     dataset,
     judge_machines,
     judged,

@@ -9,13 +9,12 @@ from compressor.cases.load import load_studies
 from compressor.report.page import Plate, document
 from compressor.store.files import StoreError
 from compressor.store.series_file import write_dataset
-from compressor.studies.claims.judged import Judged, cases_judged
 from compressor.studies.claims.page import (
     add,
     machine_drawings,
     machine_files,
 )
-from compressor.studies.claims.study import dataset
+from compressor.studies.claims.study import Judged, cases_judged, dataset
 
 
 def verdict(case):

@@ -8,9 +8,8 @@ from compressor.store import StoreError
 from compressor.store.series_file import read_dataset, write_dataset
 from compressor.studies.claims import search as searching
 from compressor.studies.claims.findings import change
-from compressor.studies.claims.judged import Judged, cases_judged
 from compressor.studies.claims.search import POPULATION, Span, cost, least_change
-from compressor.studies.claims.study import ClaimsError, dataset, machine_key
+from compressor.studies.claims.study import ClaimsError, Judged, cases_judged, dataset, machine_key
 
 TEXT = """\
 machine: {rod_mass_kg: {saltelli: [1, 9]}, reciprocating_mass_kg: {saltelli: [2, 30]}}

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from compressor.cases.swept import design
-from compressor.studies.claims.sensitivity import sensitivity
+from compressor.studies.claims.findings import sensitivity
 from compressor.studies.claims.study import ClaimsError
 
 KEYS = ("rod_mass_kg", "static", "dynamic")

@@ -11,7 +11,6 @@ from compsim import cli
 
 from compressor.cases.case import Case
 from compressor.studies.diagnosis.data_card import ABSENT, counts, data_card, escaped
-from compressor.studies.diagnosis.data_files import write_data_set
 from compressor.studies.diagnosis.data_set import (
     LABELS,
     WORDS,
@@ -21,6 +20,7 @@ from compressor.studies.diagnosis.data_set import (
     models_of,
 )
 from compressor.studies.diagnosis.features import FEATURES
+from compressor.studies.diagnosis.record_files import write_data_set
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.studies.diagnosis.features import RecordError
-from compressor.studies.diagnosis.record_file import SteadySpeed, read_record
+from compressor.studies.diagnosis.record_files import SteadySpeed, read_record
 
 RATE, TURN = 1000.0, 0.1
 TIMES = np.arange(450) / RATE

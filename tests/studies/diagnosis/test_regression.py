@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from compressor.studies.diagnosis.regression import KernelRidge, Logistic
+from compressor.studies.diagnosis.approximate import KernelRidge, Logistic
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.studies.diagnosis.strangeness import Strangeness
+from compressor.studies.diagnosis.approximate import Strangeness
 
 FEATURES = 24
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.studies.regimes.periods import (
+from compressor.studies.regimes.values import (
     LONGEST,
     MORE,
     TOLERANCE,

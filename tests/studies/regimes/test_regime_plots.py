@@ -6,16 +6,18 @@ import xarray as xr
 from regimes_made import REVOLUTIONS, failed, made, plane
 
 from compressor.report.figures.style import render
-from compressor.report.plot_choice import PlotChoice, PlotError, published
+from compressor.report.plots import PlotChoice, PlotError, published
 from compressor.studies.regimes.figures import (
+    CLASSES,
     PERIODS,
     ROWS_OF,
     draw_bifurcation,
+    draw_periods,
     draw_sections,
     edges_of,
+    period_classes,
     period_rows,
 )
-from compressor.studies.regimes.period_map import CLASSES, draw_periods, period_classes
 from compressor.studies.regimes.plots import (
     MOST_SECTIONS,
     chosen_values,

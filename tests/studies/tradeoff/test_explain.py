@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from compressor.cases.accuracy import ACCURACY
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
+from compressor.cases.parameter import ACCURACY
 from compressor.studies.tradeoff.explain import explain, ideal_scales, promise, terms, unknowns
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0}

@@ -7,15 +7,17 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.groups import Friction
-from compressor.cases.mechanism import Rod
+from compressor.cases.optional_groups import Rod
 from compressor.solve.simulate import simulate
-from compressor.studies.tradeoff.feature_rows import (
+from compressor.studies.tradeoff.features import (
     CONTACT_LAWS,
     FEATURES,
+    compare,
+    read_from_grid,
+    series_errors,
     with_contact,
     with_elastic_rod,
 )
-from compressor.studies.tradeoff.features import compare, read_from_grid, series_errors
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 BY_NAME = {feature.name: feature for feature in FEATURES}

@@ -13,9 +13,9 @@ from compressor.cases.load import load_studies
 from compressor.metrics import JOINTS, METRICS
 from compressor.solve.si_record import stiffness_of
 from compressor.solve.simulate import simulate
-from compressor.store.folders import models_file
+from compressor.store.files import models_file
 from compressor.store.series_file import write_dataset
-from compressor.store.verify import verify
+from compressor.store.status import verify
 from compressor.studies.tradeoff import model_choices as module
 from compressor.studies.tradeoff.model_choices import (
     GRID,

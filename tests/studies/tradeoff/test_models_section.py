@@ -9,8 +9,7 @@ import xarray as xr
 
 from compressor.metrics import JOINTS, METRICS
 from compressor.report.page import document
-from compressor.store.files import StoreWarning
-from compressor.store.folders import models_file
+from compressor.store.files import StoreWarning, models_file
 from compressor.store.series_file import write_dataset
 from compressor.store.studies import StoredAxis, StoredStudy
 from compressor.studies.tradeoff.page import (

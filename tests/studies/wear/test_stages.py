@@ -8,8 +8,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.solve import rub
-from compressor.studies.wear.life import life, when
-from compressor.studies.wear.stages import Worn, dataset, first, following
+from compressor.studies.wear.stages import Worn, dataset, first, following, life, when
 
 VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
 

@@ -1,0 +1,429 @@
+"""Which keys and values a case file may have: shorthands, synonyms, what was meant instead.
+
+Shorthands: a group's name with one value for several of its keys, as in `clearance_mm: 0.2`. The
+one place that knows which there are. A shorthand is an axis of a sweep like any key, so that it
+stays one until a case is built.
+
+Words of the trade: keys that are twice one of ours, and other units that are answered. A synonym is
+written out as its key when values are read, so that nothing else knows it; so is a value that a key
+has for each joint, such as `pin_radius_mm: {big_end: 60, small_end: 35}`.
+
+Keys that are not there, and groups that are none: what they are told, in files and values alike. An
+unknown key is told what was probably meant, or else what there is.
+"""
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from compressor.cases.parameter import NO_VALUE, Parameter, Problem, checked_targets, shown
+from compressor.cases.table import GROUPS, WORDS, Settings, table
+from compressor.metrics import JOINTS
+
+
+class Shorthand(NamedTuple):
+    """The keys that a group's name stands for, what their value is, and a name for each of it."""
+
+    keys: tuple[str, ...]
+    phrase: str
+    each: str
+
+
+SHORTHANDS = {
+    "clearance_mm": Shorthand(
+        tuple(f"clearance_mm.{joint}" for joint in JOINTS),
+        "radial clearance, of both joints or each",
+        "radial clearance",
+    )
+}
+
+
+def stands_for(key: str) -> tuple[str, ...]:
+    """Return the keys that a shorthand sets; none where a key is no shorthand."""
+    return SHORTHANDS[key].keys if key in SHORTHANDS else ()
+
+
+def row_of(key: str) -> Parameter | None:
+    """Return the row of the table that a key's values must keep; None where there is none."""
+    return table().get(next(iter(stands_for(key)), key))
+
+
+def phrase_of(key: str) -> str:
+    """Return what a key's values are called: of a shorthand, what each of its keys' is."""
+    row = row_of(key)
+    return SHORTHANDS[key].each if key in SHORTHANDS else row.phrase if row else key
+
+
+def expanded(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the nested values with every shorthand written out as the group that it stands for."""
+    return {
+        key: {name.rpartition(".")[2]: value for name in stands_for(key)}
+        if key in SHORTHANDS and not isinstance(value, Mapping)
+        else value
+        for key, value in values.items()
+    }
+
+
+def single(values: Iterable[Any]) -> Any:
+    """Return the one value that all are equal to, or None."""
+    found = {*values}
+    return found.pop() if len(found) == 1 else None
+
+
+def value_of(case: Settings, key: str) -> Any:
+    """Return a case's value of a dotted key; None where it has none, or no single one."""
+    if key in WORDS:
+        return getattr(case, key) is not None
+    if key in SHORTHANDS:
+        return single(size for part in stands_for(key) if (size := value_of(case, part)) > 0)
+    value: Any = case
+    for part in key.split("."):
+        value = getattr(value, part, None)
+    return value
+
+
+def value_in(values: Mapping[str, Any], key: str) -> Any:
+    """Return the value of a dotted key in nested values; None where they have none, or no single
+    one.
+    """
+    value: Any = values
+    for part in key.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else None
+    if not isinstance(value, Mapping):
+        return value
+    return single(size for size in value.values() if size > 0) if key in SHORTHANDS else None
+
+
+# key -> the key whose double it is; a file gives one of the two
+DOUBLES = {
+    "machine.stroke_mm": "machine.crank_radius_mm",
+    "gas.bore_mm": "gas.piston_radius_mm",
+}
+# key that may have a value for each joint -> the keys that these are of
+PER_JOINT = {
+    "machine.pin_radius_mm": {
+        "big_end": "machine.pin_radius_mm", "small_end": "machine.small_end_pin_radius_mm",
+    },
+}  # fmt: skip
+# unit at the end of an unknown key -> the unit of ours, and what one of it is there
+OTHER_UNITS = {
+    "bar": ("MPa", 0.1), "kPa": ("MPa", 1e-3), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3),
+    "cm": ("mm", 10.0), "m": ("mm", 1e3), "kN": ("N", 1e3),
+}  # fmt: skip
+PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
+TWICE = "stands in place of {}: give one of the two"
+
+
+def halved(value: Any) -> Any:
+    """Return half of a number, and any other value as it is."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return value / 2 if is_number else value
+
+
+def by_joint(key: str, value: Any) -> Mapping[str, str]:
+    """Return the keys that a value for each joint is of, by joint; none of any other value."""
+    keys = PER_JOINT.get(key, {})
+    return keys if isinstance(value, Mapping) and {*value} & {*keys} else {}
+
+
+def lacking_joint(key: str, value: Mapping[str, Any]) -> str:
+    """Return what is wrong with the joints of a value for each; "" if nothing is."""
+    joints = [*PER_JOINT[key]]
+    if {*value} == {*joints}:
+        return ""
+    given = ", ".join(map(str, value))
+    return f"needs both, {' and '.join(joints)}, not {given}; or one number for both joints"
+
+
+def written_out(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
+    """Return nested values with each synonym as its key; both at once are a problem."""
+    found = dict(values)
+    for synonym, key in DOUBLES.items():
+        group, _, name = synonym.partition(".")
+        within, own = found.get(group), key.rpartition(".")[2]
+        if not isinstance(within, Mapping) or name not in within:
+            continue
+        if own in within:
+            problems.append(Problem(synonym, TWICE.format(key)))
+        rest = {inner: value for inner, value in within.items() if inner != name}
+        found[group] = {own: halved(within[name])} | rest
+    for key in PER_JOINT:
+        group, _, name = key.partition(".")
+        within = found.get(group)
+        value: Any = within.get(name) if isinstance(within, Mapping) else None
+        keys = by_joint(key, value)
+        if not keys or not isinstance(within, Mapping):
+            continue
+        if message := lacking_joint(key, value):
+            problems.append(Problem(key, message))
+        rest = {inner: one for inner, one in within.items() if inner != name}
+        each = {keys[joint].rpartition(".")[2]: value[joint] for joint in keys if joint in value}
+        found[group] = each | rest
+    return found
+
+
+def synonyms_of(group: str) -> list[str]:
+    """Return the synonyms that a group may hold, without its name."""
+    return [key.rpartition(".")[2] for key in DOUBLES if key.partition(".")[0] == group]
+
+
+def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
+    """Return the hint at a key in another unit, such as "; write suction_MPa: 0.2"; or ""."""
+    stem, _, unit = name.rpartition("_")
+    ours, factor = OTHER_UNITS.get(unit, ("", 1.0))
+    key = f"{stem}_{ours}"
+    if not stem or key not in allowed:
+        return ""
+    values = value if isinstance(value, list | tuple) else [value]
+    if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
+        return f"; write {key}: 1 {unit} is {factor:g} {ours}"
+    told = ", ".join(f"{one * factor:.12g}" for one in values)
+    return f"; write {key}: " + (f"[{told}]" if isinstance(value, list | tuple) else told)
+
+
+def of_percent(name: str, group: str, value: Any, stroke: float) -> str:
+    """Return the hint at the key that stands for a clearance in per cent; "" for another name.
+
+    stroke: of the piston (mm), of which a cylinder's clearance is a share; nan where it is swept.
+    """
+    if not PERCENT.fullmatch(name) or group not in ("", "gas", "machine"):
+        return ""
+    told = f", {name.rpartition('_')[2]} of the stroke, in mm"
+    if isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(stroke):
+        told = f": {value / 100 * stroke:.4g}, of a stroke of {stroke:g} mm"
+    if group == "gas":
+        return f"; write head_clearance_mm{told}"
+    return f"; of the cylinder, write gas.head_clearance_mm{told}; of joints, clearance_mm in mm"
+
+
+def stroke_in(values: Any) -> float:
+    """Return the stroke of a case's nested values (mm), nan where it is no number.
+
+    It is the default's where they give none.
+    """
+    machine = values.get("machine") if isinstance(values, Mapping) else None
+    given = machine if isinstance(machine, Mapping) else {}
+    radius = given.get("crank_radius_mm", table()["machine.crank_radius_mm"].default)
+    found = given.get("stroke_mm", 2 * radius if isinstance(radius, int | float) else None)
+    is_number = isinstance(found, int | float) and not isinstance(found, bool)
+    return float(found) if is_number and found is not None else math.nan
+
+
+# keys of a case file that are no part of a case: how values are swept together
+SWEEP = ("sample", "zip", "exclude", "blocks", "regimes")
+MAPPINGS = {  # of these, what stands in them
+    "sample": ("n", "seed"),
+    "regimes": (
+        "over", "from", "to", "n", "log", "direction", "section_deg", "settle_rev", "measure_rev",
+        "exponent",
+    ),
+}  # fmt: skip
+MOST_MEANT = 3  # keys that an unknown one may have meant
+
+
+def known(group: str, file: bool = True) -> list[str]:
+    """Return the keys that a group (or, for "", the top) may hold; of a `file`, those of sweeps,
+    too.
+    """
+    if group in MAPPINGS:
+        return [*MAPPINGS[group]]
+    names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
+    return [*names, *SWEEP] if file and not group else names
+
+
+def accepted(group: str, file: bool = True) -> list[str]:
+    """Return the keys that a group may hold, words of the trade among them."""
+    return [*known(group, file), *synonyms_of(group)]
+
+
+def unknown(name: str, group: str, file: bool = True, value: Any = None, values: Any = None) -> str:
+    """Return what is said of a key that a group does not have.
+
+    value: the key's. values: the whole case's, nested, as far as they are known.
+    """
+    whole = group or ("a case file" if file else "a case")
+    hint = (
+        in_our_unit(name, value, accepted(group))
+        or of_percent(name, group, value, stroke_in(values))
+        or suggestion(name, group)
+        or f"; {whole} has {', '.join(known(group, file))}"
+    )
+    return f"unknown key{hint}"
+
+
+def no_mapping(key: str, value: Any) -> str:
+    """Return what is told of a value that stands where a group's keys are due."""
+    word = f"{shown(WORDS[key])} or " if key in WORDS else ""
+    return f"needs {word}a mapping of keys{_example(key)}, not {shown(value)}"
+
+
+def _example(group: str) -> str:
+    """Return a key of a group with its default, such as crank_radius_mm: 120."""
+    for name in known(group) if group in GROUPS else ():
+        row = table()[f"{group}.{name}"]
+        if row.default is not None:
+            value = f"{row.default:g}" if isinstance(row.default, float) else shown(row.default)
+            return f", such as {{{name}: {value.strip(chr(39))}}}"
+    return ""
+
+
+def suggestion(name: str, group: str) -> str:
+    """Return the end of an error about an unknown key: what was probably meant, if anything."""
+    if name in table() and "." in name:
+        outer, _, inner = name.partition(".")
+        return f"; write {inner} inside {outer}"
+    if group and name in known(""):
+        return f"; write {name} at the top, outside {group}"
+    if name.partition(":")[0] in known(group):
+        return "; put a space after the colon"
+    if name in DOUBLES:
+        return f"; write {DOUBLES[name]}, which is half of it"
+    keys = meant(name, group)
+    return f"; did you mean {' or '.join(keys)}?" if keys else ""
+
+
+def meant(name: str, group: str) -> list[str]:
+    """Return the dotted keys that an unknown one probably stands for, in a group of that group."""
+    if name in table() and not group:
+        return [name]
+    if group and name in map(_leaf, DOUBLES):
+        return []  # a word of another group, which is like none of this one
+    if near := _nearest(name, known(group), 0.6) or _nearest(name, synonyms_of(group), 0.8):
+        return [f"{group}.{near}" if group else near]
+    if group:
+        return _holding(name, f"{group}.")
+    every = [*table(), *DOUBLES]
+    near = _nearest(name, [_leaf(key) for key in every], cutoff=0.8)
+    return [key for key in every if _leaf(key) == near] or _holding(name)
+
+
+def _holding(name: str, within: str = "") -> list[str]:
+    """Return the keys, if they are few, in whose name all words of another one stand."""
+    words = {word for word in name.lower().split("_") if word}
+    found = [
+        key
+        for key in table()
+        if key.startswith(within) and words and words <= {*_leaf(key).lower().split("_")}
+    ]
+    return found if len(found) <= MOST_MEANT else []
+
+
+def _leaf(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
+    """Return the allowed key with another unit, or else the one most alike."""
+    stems = {_stem(key): key for key in reversed(allowed)}
+    for stem in sorted(stems, key=len, reverse=True):
+        if stem != stems[stem] and f"{name}_".startswith(f"{stem}_"):
+            return stems[stem]
+    lower = {key.lower(): key for key in allowed}
+    near = get_close_matches(name.lower(), lower, n=1, cutoff=cutoff)
+    return lower[near[0]] if near else None
+
+
+def _stem(name: str) -> str:
+    """Return a key's name without its unit."""
+    if name in map(_leaf, DOUBLES):
+        return name.removesuffix("_mm")
+    if name in map(_leaf, DOUBLES):
+        return name.removesuffix("_mm")
+    for row in table().values():
+        if _leaf(row.key) == name and row.unit:
+            unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")
+            return name.removesuffix(f"_{unit}")
+    return name
+
+
+PLAIN = (int, float, str)
+
+
+def checked(key: str, value: Any, problems: list[Problem]) -> Any:
+    """Return a value as its dataclass holds it; its default if it is wrong, which joins
+    `problems`.
+    """
+    row, before = table()[key], len(problems)
+    if value is None and row.optional:
+        return row.default
+    if row.kind == "accuracy" and isinstance(value, Mapping):
+        targets = checked_targets(key, value, problems)
+        return targets if len(problems) == before else row.default
+    if not isinstance(value, PLAIN):
+        value = _scalar(value)
+    message = row.check(value)
+    if message:
+        problems.append(Problem(key, message))
+        return row.default
+    if row.kind == "number" and not isinstance(value, str):
+        return float(value) + 0.0  # no -0.0: equal cases have one key
+    if row.kind == "integer":
+        return int(value)
+    return tuple(value) if row.kind == "materials" else row.choice_of(value)
+
+
+def _scalar(value: Any) -> Any:
+    """Return a scalar of numpy or xarray as Python has it; any other value as it is."""
+    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+
+
+def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
+    """Return the dataclass, scalar or None that stands for a key at the top of a case file.
+
+    What is wrong with its value joins `problems`.
+    """
+    if key in GROUPS:
+        if key in WORDS and value is WORDS[key]:
+            return GROUPS[key]() if value else None
+        if not isinstance(value, Mapping):
+            problems.append(Problem(key, NO_VALUE if value is None else no_mapping(key, value)))
+            return None
+        try:
+            found, wrong = _shared_group(key, tuple((n, v, type(v)) for n, v in value.items()))
+        except TypeError:  # a list or a mapping is in it
+            found, wrong = _group(key, value.items())
+        problems += wrong
+        return found
+    if key not in table() or "." in key:
+        message = unknown(str(key), "", file=False, value=value)
+        problems.append(Problem(str(key), message))
+        return None
+    return checked(key, value, problems)
+
+
+@lru_cache(maxsize=256)
+def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[Any, list[Problem]]:
+    """Return a group from its values, and what is wrong; jobs of a sweep share those they have
+    alike.
+
+    Types are part of the values, since 1, 1.0 and true are equal.
+    """
+    return _group(key, [(name, value) for name, value, _ in items])
+
+
+def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Problem]]:
+    """Return a group from its values, the defaults in place of wrong ones, and what is wrong."""
+    problems: list[Problem] = []
+    fields = {item.name for item in dataclasses.fields(GROUPS[key])}
+    good = {}
+    for name, value in items:
+        if name in fields:
+            good[name] = checked(f"{key}.{name}", value, problems)
+        else:
+            problems.append(Problem(f"{key}.{name}", unknown(str(name), key, value=value)))
+    return GROUPS[key](**good), problems
+
+
+def values_given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that are set in nested values, by dotted key."""
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            found |= {f"{key}.{name}": item for name, item in value.items() if item is not None}
+        else:
+            found[key] = value
+    return found

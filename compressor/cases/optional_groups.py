@@ -1,0 +1,405 @@
+"""The optional groups of a case file: oil, guide, drive, rod, body, sensor and wear."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar
+
+from compressor.cases.groups import PerJoint
+from compressor.cases.parameter import (
+    ALONG_X,
+    ALONG_Y,
+    CASING,
+    CASING_HEARD,
+    CORNER_DAMPED,
+    CORNER_RESTITUTION,
+    GUIDE_FRICTION,
+    PLAY,
+    RANDOM,
+    ROCKING,
+    STEADY,
+    choice,
+    documented,
+    parameter,
+)
+
+LEAST_RATIO, GREATEST_RATIO = 0.125, 1.0  # of a bearing's length and diameter
+
+
+@documented
+@dataclass(frozen=True)
+class Lubricant:
+    """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
+
+    The film bears by rotation and squeeze; in its last share of the clearance the dry contact takes
+    over. `True` stands for the defaults:
+
+    >>> import compressor
+    >>> case = compressor.Case.from_values(
+    ...     {"joint": "big_end", "clearance_mm": 0.05, "lubricant": True}
+    ... )
+    >>> case.lubricant.viscosity_mPa_s
+    30.0
+    """
+
+    viscosity_mPa_s: float = parameter(
+        30.0, "mPa s", (0, 1e6), "ISO VG 100 at about 65 °C (ISO 3448)", "dynamic viscosity",
+        above=True, judged=(3.0, 300.0),
+    )  # fmt: skip
+    bearing_length_mm: float = parameter(
+        20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bearings", above=True
+    )
+    last_share: float = parameter(
+        0.02,
+        "",
+        (0.001, 0.5),
+        "ours",
+        "of the clearance, in which the film bears no more",
+        judged=(0.01, 0.1),
+    )
+
+
+OURS = "ours"
+
+
+@documented
+@dataclass(frozen=True)
+class Guide:
+    """The crosshead's guide; a case's `guide`, None unless a case asks: ideal, without friction.
+
+    With a clearance the crosshead moves across and tilts, and its four corners meet the guide as
+    journals meet their bores: by `contact.law` where that has a restitution, else by ADAMS's
+    IMPACT. `True` stands for the defaults, an ideal guide with friction:
+
+    >>> import compressor
+    >>> case = compressor.Case.from_values({"guide": {"clearance_mm": 0.1}})
+    >>> round(case.guide.crosshead_inertia_kg_m2, 4)  # 14 kg (0.12^2 + 0.08^2) / 12
+    0.0243
+    """
+
+    clearance_mm: float = parameter(
+        0.0, "mm", (0, 100), OURS, "between crosshead and guide, on each side", judged=(0.01, 0.2)
+    )
+    friction: float = parameter(
+        0.05, "", (0, 10), OURS, "coefficient of friction, oiled", judged=(0.01, 0.2)
+    )
+    stiction_velocity_mm_per_s: float = parameter(
+        10.0, "mm/s", (0, 1e6), "Table 3, of the joints", "speed at which friction is three "
+        "quarters of its greatest", above=True, read=GUIDE_FRICTION,
+    )  # fmt: skip
+    crosshead_length_mm: float = parameter(
+        120.0,
+        "mm",
+        (0.001, 1e4),
+        OURS,
+        "the crosshead's length",
+        read=PLAY,
+        judged=(60.0, 250.0),
+    )
+    crosshead_height_mm: float = parameter(
+        80.0,
+        "mm",
+        (0.001, 1e4),
+        OURS,
+        "the crosshead's height",
+        read=PLAY,
+        judged=(40.0, 150.0),
+    )
+    crosshead_inertia_kg_m2: float | None = parameter(
+        None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
+        "the crosshead's inertia about its pin", above=True, optional=True, read=PLAY,
+    )  # fmt: skip
+    stiffness_N_per_mm15: float = parameter(
+        3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
+        "contact stiffness of a corner, in N/mm^exponent", above=True, read=PLAY,
+        judged=(3e4, 3e6),
+    )  # fmt: skip
+    exponent: float | None = parameter(
+        None, "", (1, 3), "as the joints'", "force exponent of a corner", optional=True, read=PLAY
+    )
+    damping_N_s_per_mm: float | None = parameter(
+        None, "N s/mm", (0, 1e9), "as the joints'", "greatest contact damping of a corner",
+        optional=True, read=(PLAY, CORNER_DAMPED),
+    )  # fmt: skip
+    full_damping_mm: float | None = parameter(
+        None, "mm", (0, 1e3), "as the joints'", "penetration of full damping of a corner",
+        above=True, optional=True, read=(PLAY, CORNER_DAMPED),
+    )  # fmt: skip
+    restitution: float | None = parameter(
+        None, "", (0, 1), "as the joints'", "coefficient of restitution of a corner",
+        above=True, optional=True, read=(PLAY, CORNER_RESTITUTION),
+    )  # fmt: skip
+
+
+@documented
+@dataclass(frozen=True)
+class Drive:
+    """A motor whose speed gives way; a case's `drive`, None unless a case asks: steady speed.
+
+    The motor's torque is a line by the speed: `torque_N_m` at `machine.speed_rpm`, and more by
+    `slope_N_m_s` for each rad/s that the crank is slower. `True` stands for the defaults; a
+    crank that runs free has neither torque nor slope:
+
+    >>> import compressor
+    >>> free = {"slope_N_m_s": 0, "flywheel_kg_m2": 0.5}
+    >>> compressor.Case.from_values({"drive": free}).drive.torque_N_m
+    0.0
+    """
+
+    flywheel_kg_m2: float = parameter(
+        5.0,
+        "kg m2",
+        (0, 1e9),
+        OURS,
+        "inertia of crank, flywheel and motor",
+        above=True,
+        judged=(1.0, 100.0),
+    )
+    torque_N_m: float = parameter(0.0, "N m", (-1e9, 1e9), OURS, "torque at machine.speed_rpm")
+    slope_N_m_s: float = parameter(
+        100.0,
+        "N m s",
+        (0, 1e9),
+        OURS,
+        "by which the torque grows for each rad/s that speed falls",
+        judged=(10.0, 1e4),
+    )
+    unbalance_kg_mm: float = parameter(
+        0.0, "kg mm", (0, 1e9), OURS,
+        "the crank's mass times its centre's distance from the axis, on which gravity acts",
+    )  # fmt: skip
+
+
+@documented
+@dataclass(frozen=True)
+class Rod:
+    """An elastic rod; a case's `rod`, None unless a case asks: rigid.
+
+    A bar of rectangular section: two bending modes, and two shapes of stretch. `True` stands for
+    the defaults:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"rod": True}).rod.depth_mm
+    40.0
+    """
+
+    youngs_modulus_GPa: float = parameter(
+        207.0,
+        "GPa",
+        (0, 1e6),
+        "Table 2, steel",
+        "modulus of elasticity",
+        above=True,
+        judged=(70.0, 250.0),
+    )
+    depth_mm: float = parameter(
+        40.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar", "section, in the plane of motion",
+        above=True, judged=(20.0, 80.0),
+    )  # fmt: skip
+    width_mm: float = parameter(
+        25.0,
+        "mm",
+        (0, 1e4),
+        "assumed: a 600 x 40 x 25 mm bar",
+        "section, across it",
+        above=True,
+        judged=(10.0, 50.0),
+    )
+    damping_ratio: float = parameter(
+        0.005,
+        "",
+        (0, 1),
+        OURS,
+        "of the first bending mode, in proportion to stiffness",
+        judged=(2e-3, 0.1),
+    )
+
+
+def filled_guide(guide: Guide, mass: float) -> Guide:
+    """Return a guide with its crosshead's inertia, by the mass (kg) that reciprocates."""
+    if guide.crosshead_inertia_kg_m2 is not None:
+        return guide
+    square = (guide.crosshead_length_mm / 1000) ** 2 + (guide.crosshead_height_mm / 1000) ** 2
+    return replace(guide, crosshead_inertia_kg_m2=mass * square / 12)
+
+
+BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mode
+
+
+@documented
+@dataclass(frozen=True)
+class Body:
+    """The compressor's rigid body on its foundation; a case's `body`, None unless a case asks.
+
+    It is driven one way: the machine's forces move it, and it does not move the machine back. A
+    body for which that would be wrong, since its motion would change the force by more than 30 %
+    at the speed's first two orders, is refused. `True` stands for the defaults:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"body": True}).body.mass_kg
+    500.0
+    """
+
+    freedoms: str = choice(
+        "xy", ("x", "y", "xy", "xy_rocking"), OURS, "how the rigid body may move"
+    )
+    mass_kg: float = parameter(500.0, "kg", (0, 1e7), OURS, "mass of the body", above=True)
+    inertia_kg_m2: float = parameter(
+        40.0, "kg m2", (0, 1e9), OURS, "its inertia about its mass centre", above=True, read=ROCKING
+    )
+    centre_x_mm: float = parameter(
+        300.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's", read=ROCKING
+    )
+    centre_y_mm: float = parameter(
+        -200.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's", read=ROCKING
+    )
+    frequency_x_Hz: float = parameter(
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency along x", above=True, read=ALONG_X
+    )
+    frequency_y_Hz: float = parameter(
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency along y", above=True, read=ALONG_Y
+    )
+    frequency_rocking_Hz: float = parameter(
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency of rocking", above=True, read=ROCKING
+    )
+    damping_ratio: float = parameter(0.03, "", (0, 0.99), OURS, "of the foundation", above=True)
+    casing: bool = choice(
+        True, (), OURS, "a casing mode at the guide and one at the main bearing, heard by sensors",
+        kind="boolean", read=CASING_HEARD,
+    )  # fmt: skip
+    casing_mass_kg: float | None = parameter(
+        None, "kg", (0, 1e6), "ours: a 25th of the body's mass", "modal mass of a casing mode",
+        above=True, optional=True, read=CASING,
+    )  # fmt: skip
+    casing_frequency_Hz: float = parameter(
+        2000.0, "Hz", (0, 1e5), OURS, "natural frequency of a casing mode", above=True, read=CASING
+    )
+    casing_damping_ratio: float = parameter(
+        0.02, "", (0, 0.99), OURS, "damping ratio of a casing mode", above=True, read=CASING
+    )
+    start: str = choice(
+        "steady", ("steady", "rest"), OURS,
+        "steady: as if the settled revolutions had always repeated; rest: at rest at time 0",
+    )  # fmt: skip
+
+
+@documented
+@dataclass(frozen=True)
+class Sensor:
+    """An accelerometer on the body, with a tacho; a case's `sensor`, None unless a case asks.
+
+    `True` stands for the defaults:
+
+    >>> import compressor
+    >>> sensor = {"place": "bearing", "noise_m_per_s2": 0.05}
+    >>> case = compressor.Case.from_values({"body": True, "sensor": sensor})
+    >>> case.sensor.rate_Hz, case.sensor.noise_m_per_s2
+    (25600.0, 0.05)
+    """
+
+    REPORTED: ClassVar[float] = 1e-3  # of a record's samples: clipping is reported from here on
+
+    place: str = choice(
+        "guide", ("guide", "bearing", "body"), OURS,
+        "crosshead guide at mid-stroke, main bearing, or the body's mass centre",
+    )  # fmt: skip
+    direction: str = choice("y", ("x", "y"), OURS, "what it measures along")
+    rate_Hz: float = parameter(25600.0, "Hz", (0, 1e6), OURS, "sampling rate", above=True)
+    low_pass_Hz: float | None = parameter(
+        None, "Hz", (0, 1e6), "usual: rate_Hz / 2.56", "anti-aliasing filter's corner",
+        above=True, optional=True,
+    )  # fmt: skip
+    mounting_Hz: float = parameter(
+        25000.0, "Hz", (0, 1e6), "usual: on a stud", "mounting resonance", above=True
+    )
+    mounting_damping_ratio: float = parameter(
+        0.03, "", (0, 0.99), OURS, "damping ratio of the mounting", above=True
+    )
+    range_m_per_s2: float = parameter(
+        490.0, "m/s2", (0, 1e6), "usual: 50 g", "beyond it the signal is clipped", above=True
+    )
+    noise_m_per_s2: float = parameter(
+        0.0015, "m/s2", (0, 1e6), "usual: piezoelectric", "rms of white noise up to half the rate"
+    )
+    speed_jitter: float = parameter(
+        0.0, "", (0, 0.1), OURS,
+        "rms of the speed's relative deviation, drawn once a revolution and smooth between: 0.93 "
+        "of it at all times, 0.81 of it in a revolution's mean speed", read=STEADY,
+    )  # fmt: skip
+    seed: int = parameter(
+        1, "", (0, 2**31), OURS, "of noise and jitter", kind="integer", read=RANDOM
+    )
+    length_rev: int | None = parameter(
+        None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
+        kind="integer", optional=True, read=STEADY,
+    )  # fmt: skip
+
+    def report_clipping(self, fraction: float) -> str:
+        """Return a sentence about a record with a fraction clipped; "" below a thousandth."""
+        if not fraction >= self.REPORTED:
+            return ""
+        return (
+            f"{100 * fraction:.3g} % of the sensor's samples are clipped at its range, "
+            f"{self.range_m_per_s2:g} m/s²: levels and spectra are those of the clipped record; "
+            "raise sensor.range_m_per_s2"
+        )
+
+
+def filled_body(body: Body) -> Body:
+    """Return a body with the modal mass of its casing, by default a 25th of the body's mass."""
+    if body.casing_mass_kg is not None:
+        return body
+    return replace(body, casing_mass_kg=body.mass_kg / BODIES_PER_CASING)
+
+
+value = partial(parameter, identity=False)  # of no single run
+
+
+@documented
+@dataclass(frozen=True)
+class Wear:
+    """How the rod's bores wear in joints with clearance; a case's `wear`, None: they stay round.
+
+    `compsim wear` follows them over operating hours, by Archard's law on a bore divided into
+    sectors. A single run has an unworn bore. `True` stands for the defaults:
+
+    >>> import compressor
+    >>> case = compressor.Case.from_values({"joint": "both", "clearance_mm": 0.1, "wear": True})
+    >>> case.wear.limit_mm  # twice the greater clearance
+    0.2
+    """
+
+    coefficient_mm3_per_N_m: float = value(
+        1e-8, "mm3/(N m)", (0, 1.0),
+        "assumed: of oiled metals, for which tables give 1e-9 to 1e-6 (Archard, J. Appl. Phys. 24, "
+        "1953, defines it)",
+        "volume that is worn off for each N m of pressing and sliding", above=True,
+    )  # fmt: skip
+    coefficient_factor: float = value(
+        2.0, "", (1, 1e6), "assumed", "how many times smaller or greater the coefficient may be"
+    )
+    limit_mm: float | None = value(
+        None, "mm", (0, 1e4), "assumed: twice the greater clearance",
+        "clearance at the deepest place, at which a joint counts as worn out", above=True,
+        optional=True,
+    )  # fmt: skip
+    hours: float = value(
+        50000.0, "h", (0, 1e9), "ours", "operating hours after which it ends at the latest",
+        above=True,
+    )  # fmt: skip
+    step_mm: float = value(
+        0.01, "mm", (0, 1e4), "ours: tests/results/README.md, Wear",
+        "wear at the deepest place for which one motion stands", above=True,
+    )  # fmt: skip
+    bore_length_mm: float = value(
+        20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bores", above=True
+    )
+    sectors: int = value(
+        72, "", (24, 180), "ours: tests/results/README.md, Wear",
+        "that a bore is divided into by angle", kind="integer",
+    )  # fmt: skip
+
+
+def filled_wear(wear: Wear, clearance_mm: PerJoint) -> Wear:
+    """Return the wear with its limit, by the clearances of both joints."""
+    most = max(clearance_mm.big_end, clearance_mm.small_end)
+    return wear if wear.limit_mm or not most else replace(wear, limit_mm=2.0 * most)

@@ -1,0 +1,228 @@
+"""The metrics of a run: from its tally, of its rod load, and averages where it is chaotic.
+
+How the rod load at the crosshead pin changes its side, which keeps the pin's bearing oiled. API 618
+(5th edition) judges the combined rod load there: for how many degrees of a revolution it lies on
+its smaller side, and how great its peak on that side is beside the other one's.
+
+What is known of a chaotic motion: averages and peaks over revolutions, with standard errors.
+Revolutions follow on each other and are no independent draws. So standard errors come from batch
+means (Schmeiser, Operations Research 30, 1982): of up to `MOST_BATCHES` batches of as many
+revolutions each. A quantile's is that of the batches' own quantiles (sectioning: Asmussen and
+Glynn, Stochastic Simulation, 2007, III.5).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from compressor.cases import Case
+from compressor.metrics import METRICS, QUANTILES, ROD_LOAD
+from compressor.physics import Column, is_featured
+from compressor.solve.error_bars import Companion, Metrics, energy_residual
+from compressor.solve.request import Trajectory, last_state, merged
+
+ROUNDING = 1e-12
+
+
+def metrics(p: np.record, tally: np.record) -> Metrics:
+    """Return the metrics by name, from what was tallied after settling."""
+    ideal = p["clearance"] == 0
+    seconds = tally["seconds"] or math.nan
+    axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
+    # the spans of steps add up to within rounding: whole revolutions are to stay whole
+    name = "steady_seconds" if is_featured(p) else "seconds"
+    steady = tally[name] or math.nan
+    revolutions = round(float(steady * p["omega"]) / math.tau, 9)
+    return {
+        "peak_acceleration": tally["peak"][0],
+        "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
+        "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
+        "peak_contact_force": tally["peak"][sizes:],
+        "peak_contact_force_axis": tally["peak"][axes:sizes].reshape(2, 2),
+        "max_penetration": np.where(ideal, 0.0, tally["max_penetration"]),
+        "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
+        "mean_crank_torque": tally["crank_torque"] / seconds,
+        "mean_guide_moment": tally["guide_moment"] / seconds,
+        "impact_count": np.where(ideal, 0.0, tally["impacts"]),
+        "release_count": np.where(ideal, 0.0, tally["releases"]),
+        "impacts_per_rev": np.where(ideal, 0.0, tally["impacts"] / revolutions),
+        "releases_per_rev": np.where(ideal, 0.0, tally["releases"] / revolutions),
+    }
+
+
+def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
+    """Return the energy flows and counts by name."""
+    tally, state = trajectory.tally, last_state(trajectory)
+    elastic = is_featured(p) and p["elastic"]
+    lost = float(state[p["rod_loss"]]) if elastic else 0.0
+    # both are integrated by the same stages: without a contact they are equal but for rounding
+    contact = tally["damping_loss"] - lost
+    return {
+        "crank_work": tally["crank_work"],
+        "load_work": tally["load_work"],
+        "contact_damping_loss": 0.0 if abs(contact) <= ROUNDING * lost else contact,
+        "rod_damping_loss": lost,
+        "friction_loss": tally["friction_loss"],
+        "energy_residual": energy_residual(tally) if tally["started"] else math.nan,
+        "steps": trajectory.steps,
+        "rejected": trajectory.rejected,
+        "evaluations": trajectory.evaluations,
+        "seconds": trajectory.seconds,
+    }
+
+
+A_TURN = 1440  # samples of the rod load a revolution
+FEWEST, MOST = 64, 200_000  # of them over a settled part
+SMALL_END = Column.FORCE + 2  # of the pin's force along x, positive in tension
+
+
+def reversal_times(case: Case) -> np.ndarray:
+    """Return the times (s) after settling at which the rod load is sampled; none without
+    signals.
+    """
+    span = case.duration - case.settle
+    count = round(min(max(A_TURN * span / case.turn, FEWEST), MOST)) if case.output.signals else 0
+    return case.settle + span / max(count, 1) * (np.arange(count) + 0.5)
+
+
+def reversal(rows: np.ndarray) -> Metrics:
+    """Return the `ROD_LOAD` numbers of observed rows, (m, COLUMNS); none without rows.
+
+    Each row stands in the middle of one of m equal steps. Between samples the load is a straight
+    line, its peaks those of the samples.
+    """
+    load = rows[:, SMALL_END]
+    if not load.size:
+        return {}
+    before, after = load[:-1], load[1:]
+    width = np.abs(after - before)
+    above = np.maximum(before, 0.0) + np.maximum(after, 0.0)
+    # of a step whose ends have the same sign all or nothing, else the part above zero
+    crossing = before * after < 0.0
+    part = np.divide(above, width, out=np.zeros_like(width), where=crossing)
+    inside = np.where(crossing, part, before + after > 0.0).sum()
+    tension = (inside + 0.5 * (load[0] > 0.0) + 0.5 * (load[-1] > 0.0)) / load.size
+    pull, push = max(load.max(), 0.0), max(-load.min(), 0.0)
+    greater = max(pull, push)
+    return {
+        "rod_load_reversal_angle": 2.0 * math.pi * min(tension, 1.0 - tension),
+        "rod_load_reversal_share": min(pull, push) / greater if greater else 0.0,
+    }
+
+
+def reversal_bars(rows: np.ndarray, other: Companion | None, others: np.ndarray) -> Metrics:
+    """Return the error bar of each number, by another run at the same times; inf without one.
+
+    What half as many samples would change stands for what is lost between samples. The bars are as
+    careful as those of the metrics that were calibrated (`compressor.metrics.Bar`).
+    """
+    ours = reversal(rows)
+    if other is None or others.shape != rows.shape:
+        return dict.fromkeys(ours, math.inf)
+    theirs, coarse = reversal(others), reversal(rows[::2])
+    found = {}
+    for name, value in ours.items():
+        bar = ROD_LOAD[name].bar
+        path = bar.path * float(other.apart["contact_force"][1]) * abs(value)
+        by_run = other.closeness * math.hypot(bar.own * (value - theirs[name]), path)
+        found[name] = by_run + abs(value - coarse[name])
+    return found
+
+
+MOST_BATCHES = 30
+LEAST_SECTION = 5  # revolutions of which a quantile is taken
+SURE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
+AIM = 0.01  # of rms_acceleration: its standard error that revolutions are counted for
+
+
+def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
+    """Return statistics by name (`compressor.metrics.STATISTICS`) from the tallies of revolutions.
+
+    A standard error is inf where there are too few revolutions to tell.
+    """
+    found: Metrics = {"revolutions": float(len(turns))}
+    whole = metrics(p, merged(turns))
+    each = [metrics(p, turn) for turn in turns]
+    batches = [metrics(p, merged(part)) for part in parts(turns, MOST_BATCHES, 1)]
+    for name, row in METRICS.items():
+        if row.kind == "greatest":
+            found |= of_peaks(name, np.array([one[name] for one in each]))
+            continue
+        averages = np.array([one[name] for one in batches])
+        if row.kind == "root":  # the mean square is what is averaged
+            error = standard_error(averages**2) / (2.0 * whole[name] or math.nan)
+        elif row.kind == "count":  # in so many batches
+            error = len(batches) * standard_error(averages)
+        else:
+            error = standard_error(averages)
+        found[f"{name}_standard_error"] = error
+    share = found["rms_acceleration_standard_error"] / whole["rms_acceleration"]
+    found["revolutions_to_one_percent"] = max(1.0, np.ceil(len(turns) * (share / AIM) ** 2))
+    return found
+
+
+def of_peaks(name: str, values: np.ndarray) -> Metrics:
+    """Return the mean and quantiles of the revolutions' greatest values, (n, ...), with standard
+    errors.
+    """
+    means = np.array([part.mean(axis=0) for part in parts(values, MOST_BATCHES, 1)])
+    sections = parts(values, MOST_BATCHES, LEAST_SECTION)
+    own = np.array([quantiles(part) for part in sections])
+    return {
+        f"{name}_mean": values.mean(axis=0),
+        f"{name}_mean_standard_error": standard_error(means),
+        f"{name}_quantile": quantiles(values),
+        f"{name}_quantile_standard_error": standard_error(own),
+    }
+
+
+def quantiles(values: np.ndarray) -> np.ndarray:
+    """Return the `QUANTILES` over the first axis, as the last one."""
+    return np.moveaxis(np.quantile(values, QUANTILES, axis=0), 0, -1)
+
+
+def parts(items: Sequence | np.ndarray, most: int, least: int) -> list:
+    """Up to `most` batches of equally many items in a row, at least `least`; the first are left."""
+    size = max(least, math.ceil(len(items) / most))
+    count = max(1, len(items) // size)
+    skipped = max(0, len(items) - count * size)
+    return [items[skipped + i * size : skipped + (i + 1) * size] for i in range(count)]
+
+
+def standard_error(means: np.ndarray) -> np.ndarray:
+    """Return the standard error of the mean of batches, (batches, ...); inf of a single one."""
+    if len(means) < 2:
+        return np.full(means.shape[1:], math.inf)
+    return means.std(axis=0, ddof=1) / math.sqrt(len(means))
+
+
+def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
+    """Return half the length of the interval that holds in 95 % of cases, by Student's t."""
+    batches = len(parts(range(revolutions), MOST_BATCHES, 1))
+    from scipy.special import stdtrit  # takes a tenth of a second, of chaotic motions alone
+
+    return np.asarray(error) * float(stdtrit(max(batches - 1, 1), SURE))
+
+
+def mean_bar(values: np.ndarray) -> float:
+    """Return half of the 95 % interval of the mean of revolutions' values in a row, (n,), by batch
+    means.
+
+    inf of a single one.
+    """
+    means = np.array([part.mean() for part in parts(values, MOST_BATCHES, 1)])
+    return float(sure(standard_error(means), len(values)))
+
+
+def chaotic_bars(found: Metrics, numbers: Metrics) -> Metrics:
+    """Return the error bars of a chaotic run's metrics: of averages; a greatest value is not
+    known.
+    """
+    bars = {}
+    for name, row in METRICS.items():
+        if row.kind == "greatest":
+            bars[name] = np.where(np.asarray(numbers[name]) == 0.0, 0.0, math.inf)
+        else:
+            bars[name] = sure(found[f"{name}_standard_error"], int(found["revolutions"]))
+    return bars
