@@ -81,7 +81,7 @@ class Outcome:
     def __reduce__(self) -> Any:
         """As workers send it: to send the names of all numbers would take most of the time."""
         parts = self.status, self.reason, self.numbers.tobytes(), self.attributes, self.series
-        return _received, parts
+        return _rebuild_outcome, parts
 
     @property
     def key(self) -> str:
@@ -119,7 +119,7 @@ class Outcome:
         return named
 
 
-def _received(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:
+def _rebuild_outcome(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:
     return Outcome(status, reason, row(numbers), *rest)
 
 

@@ -167,10 +167,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         discard_output()  # otherwise click exits only where nobody reads on
         return UNREAD
     except Exception as error:
-        return told(error)
+        return report_error(error)
 
 
-def told(error: Exception) -> int:
+def report_error(error: Exception) -> int:
     """Say what went wrong and return the exit code; only what nobody foresaw has a traceback."""
     if isinstance(error, CompsimError):
         say(f"{error.prefix}{error}")

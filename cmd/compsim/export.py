@@ -63,14 +63,14 @@ def export(
     if as_json:
         print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
     else:
-        for line in told(found, output):
+        for line in list_exported(found, output):
             print_text(line)
     for damage in damaged:
         say(f"{damage}: left out")
     return STORE if damaged else DONE
 
 
-def told(found: "list[Exported]", output: str) -> list[str]:
+def list_exported(found: "list[Exported]", output: str) -> list[str]:
     """Return what was written, a line a file; files in a folder of the output are told together."""
     lines = []
     for (place, _), group in itertools.groupby(found, key=lambda one: _line_of(one, output)):

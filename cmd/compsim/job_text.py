@@ -30,20 +30,20 @@ def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[
     """Yield the headings and lines of a job; limits: of the rod load's reversal, degrees and
     percent.
     """
-    yield "", aligned(stop(found))
+    yield "", align_lines(stop(found))
     # a count grows with the run: the number per revolution is shown in its place
     shown = [name for name, row in metrics.METRICS.items() if row.kind != "count"]
     known = numbers(found, [*shown, *metrics.STATISTICS, *metrics.ROD_LOAD])
-    told = aligned([*known, *reversal_verdict(found, *limits)])
+    told = align_lines([*known, *reversal_verdict(found, *limits)])
     yield "metrics, with their error bars", [*told, *cautions(found), *found.caveats]
     yield (
         "relative errors of the time series",
-        aligned(series_errors(found, [*metrics.SERIES_ERRORS])),
+        align_lines(series_errors(found, [*metrics.SERIES_ERRORS])),
     )
-    yield "the run", aligned([*numbers(found, [*metrics.LEDGER]), *facts(found)])
+    yield "the run", align_lines([*numbers(found, [*metrics.LEDGER]), *facts(found)])
 
 
-def aligned(lines: list[Line]) -> list[str]:
+def align_lines(lines: list[Line]) -> list[str]:
     """Return the lines with their labels in a column."""
     width = max((len(label) for label, _ in lines), default=0)
     return [f"{label:<{max(width, WIDTH)}}  {text}" for label, text in lines]
@@ -86,11 +86,11 @@ def numbers(found: "JobReport", names: list[str]) -> list[Line]:
         values, (errors, relative, said) = found.numbers[name], bar_of(found, name)
         unit, factor = unit_of(name)
         for place, label in places(name, metrics.NUMBERS[name][0]):
-            value = picked(values, place)
+            value = pick_value(values, place)
             if math.isnan(value) or tells_nothing(found, name, place):
                 continue
-            error = math.nan if errors is None else picked(errors, place)
-            text = measured(value * factor, error * factor, relative)
+            error = math.nan if errors is None else pick_value(errors, place)
+            text = format_measured(value * factor, error * factor, relative)
             if text != UNKNOWN:
                 text = " ".join(filter(None, (text, unit, "" if math.isnan(error) else said)))
             elif said:
@@ -104,7 +104,7 @@ def series_errors(found: "JobReport", names: list[str]) -> list[Line]:
     lines = []
     for name in names:
         for place, label in places(name, metrics.NUMBERS[name][0]):
-            error = picked(found.numbers[name], place)
+            error = pick_value(found.numbers[name], place)
             if not (math.isnan(error) or tells_nothing(found, name, place)):
                 lines.append((label, UNKNOWN if math.isinf(error) else f"{error:.2g}"))
     return lines
@@ -152,7 +152,7 @@ def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], 
         yield tuple(number for number, _ in choice), ", ".join(told)
 
 
-def picked(values: Any, place: tuple[int, ...]) -> float:
+def pick_value(values: Any, place: tuple[int, ...]) -> float:
     """Return one of a number's values."""
     for number in place:
         values = values[number]
@@ -161,13 +161,13 @@ def picked(values: Any, place: tuple[int, ...]) -> float:
 
 def tells_nothing(found: "JobReport", name: str, place: tuple[int, ...]) -> bool:
     """Return whether a number is that of the contact in a joint that has no clearance."""
-    if not place or metrics.JOINTS[place[0]] in worn(found):
+    if not place or metrics.JOINTS[place[0]] in joints_with_clearance(found):
         return False
     rows = (row for row in metrics.METRICS.values() if name.startswith(row.name))
     return any(row.contact for row in rows) or name in OF_CONTACT
 
 
-def worn(found: "JobReport") -> tuple[str, ...]:
+def joints_with_clearance(found: "JobReport") -> tuple[str, ...]:
     """Return the joints of a job's case that have clearance."""
     from compressor.cases import Case
 
@@ -175,7 +175,7 @@ def worn(found: "JobReport") -> tuple[str, ...]:
     return tuple(name for name in metrics.JOINTS if joint in (name, "both"))
 
 
-def measured(value: float, error: float, relative: bool) -> str:
+def format_measured(value: float, error: float, relative: bool) -> str:
     """Return a number with its error, by the digits that it allows; six digits without one."""
     return f"{value:.6g}" if math.isnan(error) else by_bar(value, error, relative)
 
@@ -193,7 +193,7 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
         if math.isinf(bar):
             return [("rod load", "its reversal is not known well enough to be judged")]
         bar = 0.0 if math.isnan(bar) else bar
-        told.append(measured(value, bar, True) if bar else f"{value:.4g}")
+        told.append(format_measured(value, bar, True) if bar else f"{value:.4g}")
         clear = value - least
         worst = min(worst, clear / abs(clear) if abs(clear) >= bar and clear else 0.0)
     word = {1.0: "passes", 0.0: "cannot be told apart from", -1.0: "fails"}[worst]

@@ -86,13 +86,13 @@ def folders(_: click.Context, __: click.Parameter, word: str) -> Items:
 def studies(context: click.Context, _: click.Parameter, word: str) -> Items:
     """Return the names of the stored studies."""
     folder, _rest = read_so_far(context)
-    return [CompletionItem(name) for name in sorted(stored(folder)) if name.startswith(word)]
+    return [CompletionItem(name) for name in sorted(study_files(folder)) if name.startswith(word)]
 
 
 def jobs(context: click.Context, _: click.Parameter, word: str) -> Items:
     """Return the names of studies and keys of jobs; after a study's name values of its axes."""
     folder, words = read_so_far(context)
-    known = stored(folder)
+    known = study_files(folder)
     if words and words[0] in known:
         return [CompletionItem(text) for text in values(known[words[0]]) if text.startswith(word)]
     names = [*known, *(path.name for path in Path(folder).glob("regimes/*"))]
@@ -116,12 +116,12 @@ def read_so_far(context: click.Context) -> tuple[str, tuple[str, ...]]:
         return option or "results", words
 
 
-def stored(folder: str) -> dict[str, Path]:
+def study_files(folder: str) -> dict[str, Path]:
     """Return the files of a folder's studies by name."""
     return {path.stem: path for path in Path(folder).glob("studies/*.json")}
 
 
-def read(path: Path) -> dict[str, Any]:
+def read_study_file(path: Path) -> dict[str, Any]:
     """Return a study's file; nothing where it is large, or damaged."""
     try:
         if path.stat().st_size > MOST_BYTES:
@@ -138,13 +138,15 @@ def keys(folder: str, known: dict[str, Path]) -> list[str]:
     """
     found = {path.name[:20] for path in Path(folder).glob("jobs/*.h5")}
     if sum(path.stat().st_size for path in known.values()) <= MOST_BYTES:
-        found.update(key for path in known.values() for key in read(path).get("keys", ()))
+        found.update(
+            key for path in known.values() for key in read_study_file(path).get("keys", ())
+        )
     return sorted(found)
 
 
 def values(path: Path) -> Iterator[str]:
     """Yield `axis=value` of all values of a study's axes."""
-    for axis in read(path).get("axes", ()):
+    for axis in read_study_file(path).get("axes", ()):
         for value in dict.fromkeys(map(str, axis["values"])):
             yield f"{axis['key']}={value.lower() if value in ('True', 'False') else value}"
 

@@ -153,9 +153,9 @@ class Screen:
         if self.known:
             seconds, at_least, since = self.known
             rest = max(0.0, seconds - (time.monotonic() - since))
-            return f", {'over ' * at_least}{guessed(rest)} left"
+            return f", {'over ' * at_least}{format_guess(rest)} left"
         left = self.pace.left(self.total) if self.alike else None
-        return "" if left is None else f", {guessed(left)} left"
+        return "" if left is None else f", {format_guess(left)} left"
 
     def draw(self) -> None:
         """Show the line of progress on a terminal."""
@@ -354,7 +354,7 @@ def stored_before(count: int) -> str:
     return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
 
 
-def guessed(seconds: float) -> str:
+def format_guess(seconds: float) -> str:
     """Return the seconds that are a guess."""
     return duration(seconds) if seconds >= 1 else "under 1 s"
 

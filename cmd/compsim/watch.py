@@ -90,7 +90,7 @@ class Watch:
     def pipe(self) -> IO[str]:
         """Return the input of the process, which is started where there is none."""
         if self.process is None:
-            self.process = started(self.told)
+            self.process = start_process(self.told)
             threading.Thread(target=self.listen, args=[self.process], daemon=True).start()
         assert self.process.stdin
         return self.process.stdin
@@ -147,7 +147,7 @@ class Watch:
         return not answer["ended"]
 
 
-def started(told: dict[str, str]) -> "subprocess.Popen[str]":
+def start_process(told: dict[str, str]) -> "subprocess.Popen[str]":
     """Return the process, in a session of its own: Ctrl-C is for the run."""
     return subprocess.Popen(
         [sys.executable, "-m", "compsim.watch", json.dumps(told)],

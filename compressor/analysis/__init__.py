@@ -30,7 +30,7 @@ from compressor.analysis.runs import (
     label,
     load_phases,
     paper_cases,
-    settled,
+    settled_part,
     settled_revolutions,
 )
 from compressor.analysis.shaking import (

@@ -30,7 +30,7 @@ from compressor.analysis.runs import (
     ideal_motion,
     label,
     load_corners,
-    settled,
+    settled_part,
 )
 from compressor.analysis.shaking import AFTER, BEFORE, ORDER, Shaking
 
@@ -129,7 +129,7 @@ def deviations(of: Sequence[xr.Dataset]) -> str:
     """Return how far the motion leaves that of the machine without clearance."""
     greatest = np.zeros(3)
     for run in of:
-        kept = settled(run)
+        kept = settled_part(run)
         ideal = ideal_motion(kept)
         for number, name in enumerate(SERIES):
             away = np.abs(kept[name].values - ideal[number]).max() / np.ptp(ideal[number])
@@ -145,10 +145,10 @@ def motion(courses: Sequence[Course]) -> str:
     """Return how the journal moves in its bearing."""
     joint = SPOKEN[courses[0].joint]
     apart = [one.apart for one in courses]
-    spans = spanned([one.turns for one in courses])
+    spans = angle_spans([one.turns for one in courses])
     if any(one.turns for one in courses):
         near = spans and max(high - low for low, high in spans) <= APART
-        at = " and ".join(map(said, spans)) if near else apart_from_each_other(courses)
+        at = " and ".join(map(format_span, spans)) if near else apart_from_each_other(courses)
         reverses = f"The horizontal force at the {joint} changes its sign near {at}."
     else:
         reverses = f"The horizontal force at the {joint} does not change its sign."
@@ -169,10 +169,10 @@ def motion(courses: Sequence[Course]) -> str:
 def rings(courses: Sequence[Course]) -> list[str]:
     """Return the frequencies after the first change of sign, where all runs have the same one."""
     found = [one.rings for one in courses]
-    spans = spanned([one.turns[:1] for one in courses])
+    spans = angle_spans([one.turns[:1] for one in courses])
     if not np.isfinite(found).all() or not spans or max(spans[0]) - min(spans[0]) > APART:
         return []
-    return [f"After the first change acceleration rings at {listed(found, 0)} Hz."]
+    return [f"After the first change acceleration rings at {list_by_clearance(found, 0)} Hz."]
 
 
 def peaks(of: Sequence[xr.Dataset]) -> str:
@@ -180,7 +180,7 @@ def peaks(of: Sequence[xr.Dataset]) -> str:
     found = [float(run["peak_acceleration"]) for run in of]
     grows = all(b > a for a, b in itertools.pairwise(found))
     how = "grows with clearance" if grows else "does not always grow with clearance"
-    return f"The greatest acceleration {how}: {listed(found, 0)} m/s²."
+    return f"The greatest acceleration {how}: {list_by_clearance(found, 0)} m/s²."
 
 
 def contact_force(runs: Runs, fault: str, joint: str) -> str:
@@ -195,8 +195,8 @@ def contact_force(runs: Runs, fault: str, joint: str) -> str:
         "Force on the rod: (a) along the cylinder, positive away from the crank, and (b) vertical, "
         "on a scale of its own. Left, the last revolution, a row a clearance; right, the part in "
         f"the black rectangles, where the horizontal forces{at} differ most.",
-        f"Greatest: {listed(np.array(along) / 1e3, 2)} kN along the cylinder, "
-        f"{listed(np.array(across) / 1e3, 2)} kN across it.",
+        f"Greatest: {list_by_clearance(np.array(along) / 1e3, 2)} kN along the cylinder, "
+        f"{list_by_clearance(np.array(across) / 1e3, 2)} kN across it.",
     ]
     slopes = [force_relation(run, joint).slope for run in of]
     if max(slopes) < 0:
@@ -211,12 +211,12 @@ def relation(runs: Runs, joint: str) -> str:
     found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
     return (
         "A dot for each stored sample. The line is the least-squares fit of force on acceleration; "
-        f"its slope is a mass: {listed([one.slope for one in found], 2)} kg, with r² "
+        f"its slope is a mass: {list_by_clearance([one.slope for one in found], 2)} kg, with r² "
         f"{', '.join(f'{one.r2:.3f}' for one in found)}. {LOOP[joint]}"
     )
 
 
-def spanned(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
+def angle_spans(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     """Return the least and the greatest of each angle (degrees) over runs, in the order of the
     first run.
 
@@ -233,7 +233,7 @@ def spanned(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     return [*zip(first + np.min(away, axis=0), first + np.max(away, axis=0), strict=True)]
 
 
-def said(span: tuple[float, float]) -> str:
+def format_span(span: tuple[float, float]) -> str:
     """Return a span of angles in words."""
     low, high = (f"{angle % 360.0:.0f}".replace("360", "0") for angle in span)
     return f"{low}°" if low == high else f"{low}–{high}°"
@@ -261,7 +261,7 @@ def decimals(size: float, usual: int) -> int:
     return max(usual, 1 - math.floor(math.log10(size))) if size > 0 else usual
 
 
-def listed(values: Sequence[float] | np.ndarray, usual: int) -> str:
+def list_by_clearance(values: Sequence[float] | np.ndarray, usual: int) -> str:
     """Return the numbers of 0.1, 0.2 and 0.3 mm, in this order; usual: digits after the point."""
     digits = decimals(float(np.abs(values).min()), usual)
     return ", ".join(f"{value:.{digits}f}" for value in values)

@@ -20,11 +20,11 @@ from compressor.analysis.margins import (
     above,
     at_least,
     at_most,
-    compared,
+    compare_continuity,
     continuity,
     exceeds,
     least,
-    measured,
+    measure,
     measured_shares,
     metric,
     peak,
@@ -42,7 +42,7 @@ from compressor.analysis.runs import (
     ideal_motion,
     label,
     load_corners,
-    settled,
+    settled_part,
     settled_revolutions,
 )
 from compressor.metrics import JOINTS
@@ -95,7 +95,7 @@ def acceleration_alone(runs: Runs) -> Verdict:
     """Return claim 3: displacement and velocity hardly change with clearance, acceleration does."""
     rows, margins = [], []
     for name in FAULT_LABELS:
-        kept = settled(runs[name])
+        kept = settled_part(runs[name])
         changes = []
         for series, ideal in zip(MOTION, ideal_motion(kept), strict=True):
             spread = float(np.std(ideal))
@@ -105,7 +105,7 @@ def acceleration_alone(runs: Runs) -> Verdict:
                 motion = dict(zip(MOTION, ideal_motion(part), strict=True))[series]
                 return float(np.sqrt(np.mean((part[series].values - motion) ** 2))) / spread
 
-            changes.append(measured(kept, away, error))
+            changes.append(measure(kept, away, error))
         margins += [at_most(changes[0], 0.01), at_most(changes[1], 0.05)]
         margins.append(at_least(changes[2], 0.10))
         said = "x {:.2%}, v {:.2%}, a {:.1%}".format(*(change.value for change in changes))
@@ -162,7 +162,7 @@ def across_over_up(run: xr.Dataset, joint: str) -> Measure:
         across, up = means(part)
         return across / up if up else math.inf
 
-    kept = settled(run)
+    kept = settled_part(run)
     force = kept["contact_force"].sel(joint=joint).values
     error = series_error(kept, "contact_force", force, joint=joint)
     sizes = [math.sqrt(float(np.mean(part**2))) for part in force.T]
@@ -170,7 +170,7 @@ def across_over_up(run: xr.Dataset, joint: str) -> Measure:
     parts = [
         Measure(mean, error * (size + both)) for mean, size in zip(means(kept), sizes, strict=True)
     ]
-    return measured(kept, ratio, parts[0].over(parts[1]).error)
+    return measure(kept, ratio, parts[0].over(parts[1]).error)
 
 
 def proportional_force(runs: Runs) -> Verdict:
@@ -199,11 +199,11 @@ def correlation(run: xr.Dataset, joint: str) -> Measure:
 
     A correlation changes by at most the sum of the errors' shares of the standard deviations.
     """
-    kept = settled(run)
+    kept = settled_part(run)
     a, force = kept["acceleration"].values, kept["contact_force"].sel(joint=joint).values
     away = series_error(run, "acceleration", a) / float(np.std(a))
     away += series_error(run, "contact_force", force, joint=joint) / float(np.std(force[:, 0]))
-    return measured(kept, lambda part: force_relation(part, joint).r2, 2.0 * away)
+    return measure(kept, lambda part: force_relation(part, joint).r2, 2.0 * away)
 
 
 def steady_impacts(runs: Runs) -> Verdict:
@@ -231,7 +231,7 @@ def impact_rows(runs: Runs) -> Iterator[tuple[str, str]]:
     for begin, start_up in (("settled", False), ("from the start", True)):
         for c in CLEARANCES:
             pair = [continuity(runs[label(joint, c)], joint, start_up) for joint in JOINTS]
-            yield f"{c:g} mm, {begin}", compared(*pair)
+            yield f"{c:g} mm, {begin}", compare_continuity(*pair)
     for c in CLEARANCES:
         big, small = (active_share(runs[label(joint, c)]) for joint in JOINTS)
         impacts, releases = (
@@ -367,7 +367,7 @@ def claim_margins(runs: Runs) -> tuple[list[Margin], dict[str, Margin]]:
     Of claim 7 also by each of its shares alone, and by the share of time in which the machine
     vibrates (`active_share`), without an error.
     """
-    kept = {name: settled(run) for name, run in runs.items()}
+    kept = {name: settled_part(run) for name, run in runs.items()}
     each = [rule.judge(kept)[0] for rule in RULES]
     shares = Shares._fields
     alone = {name: least(each[6][n :: len(shares)]) for n, name in enumerate(shares)}

@@ -25,7 +25,7 @@ import numpy as np
 import xarray as xr
 from numpy.polynomial import Polynomial
 
-from compressor.analysis.runs import record_of, settled
+from compressor.analysis.runs import record_of, settled_part
 from compressor.metrics import JOINTS
 from compressor.physics import elastic_form
 
@@ -360,7 +360,7 @@ def contact_modes(run: xr.Dataset) -> xr.Dataset:
         },
         {"settle": run.attrs["settle"]},
     )
-    return settled(whole)
+    return settled_part(whole)
 
 
 def modes_of(run: xr.Dataset, joint: str) -> np.ndarray:

@@ -45,7 +45,10 @@ class SaltelliDesign:
 
         a, b, mixed = values[self.a], values[self.b], values[self.mixed]
         table = {"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}
-        with ignore_warnings(), seeded():  # warnings: the bootstrap of what changes nothing
+        with (
+            ignore_warnings(),
+            seed_global_draws(),
+        ):  # warnings: the bootstrap of what changes nothing
             found = sobol_indices(func=table, n=a.size, rng=np.random.default_rng(SEED))
             spread = found.bootstrap(confidence_level=LEVEL, n_resamples=resamples)
         idle = (mixed == a).all(axis=1)
@@ -59,7 +62,7 @@ class SaltelliDesign:
 
 
 @contextlib.contextmanager
-def seeded() -> Iterator[None]:
+def seed_global_draws() -> Iterator[None]:
     """Have NumPy's global draws be the same each time: this bootstrap takes no generator."""
     state = np.random.get_state()  # noqa: NPY002
     np.random.seed(SEED)  # noqa: NPY002
@@ -143,7 +146,7 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     unknown = ~np.isfinite(values)
     if not values.size or unknown.mean() > MOST_GAPS:
         return None
-    values = filled(values, unknown)
+    values = fill_unknown(values, unknown)
     axes = range(values.ndim)
     apart = [tuple(n for n in axes if n != axis) for axis in axes]
     scaled = (values - values.mean()) / (np.ptp(values) or 1.0)
@@ -156,7 +159,7 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     return Effects("grid", main, total, filled=int(unknown.sum()))
 
 
-def filled(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+def fill_unknown(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     """Return the values with unknown points as the sum of their axes' main effects, which this
     finds.
     """

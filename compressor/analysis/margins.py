@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis.contacts import FOLLOWING, contact_modes, impacts
-from compressor.analysis.runs import settled
+from compressor.analysis.runs import settled_part
 from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
 from compressor.solve import mean_bar, sure
 
@@ -95,7 +95,7 @@ def is_chaotic(run: xr.Dataset) -> bool:
 
 def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
     """Yield the whole settled revolutions of a run, both ends included."""
-    kept = settled(run)
+    kept = settled_part(run)
     turns = (kept["crank_angle"].values - kept["crank_angle"].values[0]) / (2.0 * math.pi)
     for number in range(int(turns[-1] + 1e-6)):
         inside = (turns >= number - 1e-6) & (turns <= number + 1 + 1e-6)
@@ -110,9 +110,9 @@ def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> floa
     return mean_bar(np.array([value(turn) for turn in revolutions(run)]))
 
 
-def measured(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> Measure:
+def measure(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> Measure:
     """Return a value of a run's settled part with an error; of a chaotic run by its revolutions."""
-    kept = settled(run)
+    kept = settled_part(run)
     return Measure(value(kept), by_revolution(kept, value) if is_chaotic(run) else error)
 
 
@@ -278,7 +278,7 @@ def angle_error(by: Evidence, joint: str) -> float:
     return max(high - found, found - low)
 
 
-def compared(big: Continuity, small: Continuity) -> str:
+def compare_continuity(big: Continuity, small: Continuity) -> str:
     """Return the measures of a big end beside those of a small end, in words."""
     return (
         f"flight and impact {big.apart:.1%} and {small.apart:.1%} of the angle; "

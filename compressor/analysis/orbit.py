@@ -12,7 +12,7 @@ from compressor.analysis.contacts import (
     flights,
     joints_with_clearance,
 )
-from compressor.analysis.runs import case_of, ideal_motion, settled
+from compressor.analysis.runs import case_of, ideal_motion, settled_part
 
 APART = 20.0  # degrees: changes of sign nearer to each other are one turn
 AFTER, SPAN = 5.0, 90.0  # degrees after a turn, and how long its ringing is looked at
@@ -42,7 +42,7 @@ class Course:
 
 def course(run: xr.Dataset, joint: str) -> Course:
     """Return the course of a joint with clearance, from a run with time series."""
-    kept = settled(run)
+    kept = settled_part(run)
     angle = np.degrees(kept["crank_angle"].values)
     place = kept["eccentricity"].sel(joint=joint).values
     contact = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))
@@ -126,7 +126,7 @@ def orbit(run: xr.Dataset) -> xr.Dataset:
     series or clearance.
     """
     joints = [*joints_with_clearance(run)]
-    kept = settled(run)
+    kept = settled_part(run)
     found = [orbit_of(contact_series(kept, joint)) for joint in joints]
     one = contact_series(kept, joints[0])
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}

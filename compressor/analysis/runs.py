@@ -54,7 +54,7 @@ FAULT_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
 ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibrate
 
 
-def settled(run: xr.Dataset) -> xr.Dataset:
+def settled_part(run: xr.Dataset) -> xr.Dataset:
     """Return the samples from `settle_rev` on: start-up is not the machine."""
     time, begin = run["time"].values, run.attrs["settle"] * (1 - 1e-12)
     return run if time[0] >= begin else run.isel(time=time >= begin)
@@ -62,7 +62,7 @@ def settled(run: xr.Dataset) -> xr.Dataset:
 
 def settled_revolutions(run: xr.Dataset) -> float:
     """Return the revolutions that a run's metrics are taken over."""
-    return float(np.ptp(settled(run)["crank_angle"].values)) / math.tau
+    return float(np.ptp(settled_part(run)["crank_angle"].values)) / math.tau
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Relation:
 
 def force_relation(run: xr.Dataset, joint: str) -> Relation:
     """Return `Relation` of a run's settled series at one joint (force on the rod)."""
-    kept = settled(run)
+    kept = settled_part(run)
     a = kept["acceleration"].values
     force = kept["contact_force"].sel(joint=joint, axis="x").values
     slope, intercept = np.polyfit(a, force, 1)
@@ -132,7 +132,7 @@ def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = ACTIVE
     It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation
     from the ideal motion exceeds `level` times the ideal peak acceleration.
     """
-    kept = settled(run)
+    kept = settled_part(run)
     _, _, ideal = ideal_motion(kept)
     angle = kept["crank_angle"].values
     width = max(1, round(np.radians(window_deg) / (angle[1] - angle[0])))

@@ -14,7 +14,7 @@ import xarray as xr
 
 from compressor.analysis.contacts import joints_with_clearance
 from compressor.analysis.orbit import turning_points
-from compressor.analysis.runs import case_of, ideal_motion, record_of, settled
+from compressor.analysis.runs import case_of, ideal_motion, record_of, settled_part
 from compressor.cases import Case, with_ideal_joints
 from compressor.solve import SIGNALS, signals_of_scene, simulate
 
@@ -57,7 +57,7 @@ def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:
     """
     if "time" not in run.dims or "crank_angle" not in run:
         raise NoSeriesError("the run has no time series (output.keep: series)")
-    kept = settled(run)
+    kept = settled_part(run)
     turns = (kept["crank_angle"].values - kept["crank_angle"].values[0]) / (2.0 * np.pi)
     count = int(np.floor(turns[-1] + 1e-6))
     if count < 1:
@@ -173,11 +173,11 @@ def evenly(kept: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.n
     """Return a signal of `whole_revolutions` at an even number of equal crank angles a turn, and
     this.
     """
-    from compressor.vibration import resampled
+    from compressor.vibration import resample_angle
 
     crank = kept["crank_angle"].values
     a_turn = (crank.size - 1) // revolutions // 2 * 2
-    return resampled(crank, values, a_turn)[: revolutions * a_turn], a_turn
+    return resample_angle(crank, values, a_turn)[: revolutions * a_turn], a_turn
 
 
 def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:

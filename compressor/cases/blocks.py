@@ -10,9 +10,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from compressor.cases.checks import SWEEP, checked, row_of, suggestion
+from compressor.cases.checks import SWEEP, check_value, row_of, suggestion
 from compressor.cases.keys import Leaves
-from compressor.cases.parameter import Problem, shown
+from compressor.cases.parameter import Problem, quote_value
 from compressor.cases.sheet import Block, Row
 from compressor.cases.swept import (
     SAMPLED,
@@ -100,7 +100,7 @@ class Draft:
             values = tuple(node.value for node in row)
             if values in seen:
                 where = "in the list" if self.sweeps[keys[0]].kind == "list" else "among its values"
-                told = ", ".join(map(shown, values))
+                told = ", ".join(map(quote_value, values))
                 self.refuse(row[0], " with ".join(keys), f"{told} is {where} twice")
             seen.add(values)
         return rows
@@ -130,8 +130,8 @@ def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
             found.refuse(node, key, "cannot be swept: it does not change what a job computes")
         elif sweep := sweep_of(key, node, problems):
             found.sweeps[key] = sweep
-    sampled = _sampled(found)
-    groups = [*([sampled] if sampled else []), *_zipped(found)]
+    sampled = _sampled_keys(found)
+    groups = [*([sampled] if sampled else []), *_zip_groups(found)]
     first = {key: group for group in groups for key in group}
     found.factors = list(dict.fromkeys(first.get(key, (key,)) for key in found.sweeps))
     found.exclusions = list(_exclusions(found))
@@ -149,7 +149,7 @@ def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
     found: list[Problem] = []
     row = row_of(key)
     assert row  # an unknown key was told when it was read
-    value = checked(row.key, node.plain(), found)
+    value = check_value(row.key, node.plain(), found)
     parts = node.value if isinstance(node.value, dict) else {}
     for problem in found:
         part = parts.get(problem.key.removeprefix(f"{row.key}."))
@@ -158,7 +158,7 @@ def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
     return None if found else replace(node, value=value)
 
 
-def _sampled(found: Draft) -> tuple[str, ...]:
+def _sampled_keys(found: Draft) -> tuple[str, ...]:
     """Return the keys that one sampling design draws together, in the order of the file."""
     keys = tuple(key for key, sweep in found.sweeps.items() if sweep.kind in SAMPLED)
     for name, least, most in (("n", 1, math.inf), ("seed", 0, MAX_SEED)):
@@ -185,7 +185,7 @@ def _sampled(found: Draft) -> tuple[str, ...]:
     return keys
 
 
-def _zipped(found: Draft) -> Iterable[tuple[str, ...]]:
+def _zip_groups(found: Draft) -> Iterable[tuple[str, ...]]:
     """Yield the good groups of `zip`: swept keys, each in one group, with equally many values."""
     node = found.leaves.values.get("zip")
     taken: set[str] = set()
@@ -199,7 +199,7 @@ def _zipped(found: Draft) -> Iterable[tuple[str, ...]]:
             pass  # how it is swept is wrong, and told
         elif bad:
             hint = "" if bad[0] in table() else suggestion(bad[0], "")
-            found.refuse(group, "zip", f"{shown(bad[0])} is not swept here{hint}")
+            found.refuse(group, "zip", f"{quote_value(bad[0])} is not swept here{hint}")
         elif taken & {*keys} or len({*keys}) < len(keys):
             twice = next(key for key in keys if key in taken or keys.count(key) > 1)
             found.refuse(group, "zip", f"{twice} is named twice")

@@ -19,8 +19,8 @@ from compressor.cases.checks import (
     SHORTHANDS,
     SWEEP,
     checked_part,
-    expanded,
-    meant,
+    expand_shorthands,
+    probable_keys,
     stands_for,
     values_given,
     written_out,
@@ -28,10 +28,17 @@ from compressor.cases.checks import (
 from compressor.cases.conflicts import conflicts, values_read
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, with_law
 from compressor.cases.optional_groups import filled_body, filled_guide, filled_wear
-from compressor.cases.parameter import ACCURACY, CaseError, Problem, Targets, first_rung, shown
+from compressor.cases.parameter import (
+    ACCURACY,
+    CaseError,
+    Problem,
+    Targets,
+    first_rung,
+    quote_value,
+)
 from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
-from compressor.cases.yaml_reader import resolved
+from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "2"  # part of a job's key: see `compressor.cases.case`
@@ -250,7 +257,9 @@ class Case(Settings):
         try:
             values = json.loads(text)
         except (TypeError, ValueError, RecursionError) as error:
-            message = f"needs JSON text, such as the attribute `case` of a run, not {shown(text)}"
+            message = (
+                f"needs JSON text, such as the attribute `case` of a run, not {quote_value(text)}"
+            )
             raise CaseError([Problem("", message)]) from error
         contact = values.get("contact") if isinstance(values, Mapping) else None
         cylinder = isinstance(contact, dict) and contact.get("law") in CYLINDRICAL
@@ -364,7 +373,9 @@ def require_case(value: Any) -> Case:
     """Return a value that is a Case. Raises CaseError for any other."""
     if isinstance(value, Case):
         return value
-    raise CaseError([Problem("", f"needs a Case, as of Case.from_values, not {shown(value)}")])
+    raise CaseError(
+        [Problem("", f"needs a Case, as of Case.from_values, not {quote_value(value)}")]
+    )
 
 
 def parts_of(
@@ -377,9 +388,9 @@ def parts_of(
     """
     problems: list[Problem] = []
     if not isinstance(values, Mapping):
-        message = f"needs a mapping of keys, such as {EXAMPLE}, not {shown(values)}"
+        message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
         raise CaseError([Problem("", message)])
-    whole = expanded(written_out(values, problems))
+    whole = expand_shorthands(written_out(values, problems))
     parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
     if problems:
         wrong = _everything_wrong(whole, parts, problems, {} if lenient else values_given(values))
@@ -435,12 +446,12 @@ def _everything_wrong(
         key, _, inner = problem.key.rpartition(".")
         wrong.add(problem.key)
         if problem.key not in (*table(), *GROUPS):
-            wrong |= {*meant(inner, key)} if key in ("", *GROUPS) else {key}
+            wrong |= {*probable_keys(inner, key)} if key in ("", *GROUPS) else {key}
         whole = key if inner in FORMS else problem.key
         value = _value_at(whole, values)
         if _is_swept(whole, value):
             wrong.add(whole)
-            problem = Problem(whole, f"{shown(value)} {NO_SWEEP}")
+            problem = Problem(whole, f"{quote_value(value)} {NO_SWEEP}")
         yield problem
     known = {item.name for item in fields(Case)} - wrong
     rest = Case(**{key: part for key, part in parts.items() if key in known})
@@ -500,7 +511,7 @@ def to_yaml(case: Case, brief: bool = False) -> str:
     some that are not the defaults: its text reads back to a case of the same physics and another
     key. brief: without the name and all that is so by default; it then reads back to an equal job.
     """
-    values = _needed(values_read(case)) if brief else values_read(case)
+    values = _independent_values(values_read(case)) if brief else values_read(case)
     lines = []
     for key, value in values.items():
         if isinstance(value, Mapping):
@@ -511,7 +522,7 @@ def to_yaml(case: Case, brief: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _needed(values: dict[str, Any]) -> dict[str, Any]:
+def _independent_values(values: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a case without those that follow from the others."""
     case, kept = Case.resolve(values), dict(values)
     for key, value in values.items():
@@ -535,6 +546,6 @@ def _is_same(values: Mapping[str, Any], case: Case) -> bool:
 
 def _scalar(value: Any) -> str:
     """Return a value in YAML: as JSON, but plain where a word reads back as text."""
-    if isinstance(value, str) and WORD.fullmatch(value) and resolved(value) == value:
+    if isinstance(value, str) and WORD.fullmatch(value) and resolve_scalar(value) == value:
         return value
     return json.dumps(value)

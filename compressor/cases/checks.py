@@ -20,7 +20,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from compressor.cases.parameter import NO_VALUE, Parameter, Problem, checked_targets, shown
+from compressor.cases.parameter import NO_VALUE, Parameter, Problem, checked_targets, quote_value
 from compressor.cases.table import GROUPS, WORDS, Settings, table
 from compressor.metrics import JOINTS
 
@@ -58,7 +58,7 @@ def phrase_of(key: str) -> str:
     return SHORTHANDS[key].each if key in SHORTHANDS else row.phrase if row else key
 
 
-def expanded(values: Mapping[str, Any]) -> dict[str, Any]:
+def expand_shorthands(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the nested values with every shorthand written out as the group that it stands for."""
     return {
         key: {name.rpartition(".")[2]: value for name in stands_for(key)}
@@ -118,7 +118,7 @@ PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
 
-def halved(value: Any) -> Any:
+def halve(value: Any) -> Any:
     """Return half of a number, and any other value as it is."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return value / 2 if is_number else value
@@ -150,7 +150,7 @@ def written_out(values: Mapping[str, Any], problems: list[Problem]) -> dict[str,
         if own in within:
             problems.append(Problem(synonym, TWICE.format(key)))
         rest = {inner: value for inner, value in within.items() if inner != name}
-        found[group] = {own: halved(within[name])} | rest
+        found[group] = {own: halve(within[name])} | rest
     for key in PER_JOINT:
         group, _, name = key.partition(".")
         within = found.get(group)
@@ -225,7 +225,7 @@ MAPPINGS = {  # of these, what stands in them
 MOST_MEANT = 3  # keys that an unknown one may have meant
 
 
-def known(group: str, file: bool = True) -> list[str]:
+def known_keys(group: str, file: bool = True) -> list[str]:
     """Return the keys that a group (or, for "", the top) may hold; of a `file`, those of sweeps,
     too.
     """
@@ -235,9 +235,9 @@ def known(group: str, file: bool = True) -> list[str]:
     return [*names, *SWEEP] if file and not group else names
 
 
-def accepted(group: str, file: bool = True) -> list[str]:
+def accepted_keys(group: str, file: bool = True) -> list[str]:
     """Return the keys that a group may hold, words of the trade among them."""
-    return [*known(group, file), *synonyms_of(group)]
+    return [*known_keys(group, file), *synonyms_of(group)]
 
 
 def unknown(name: str, group: str, file: bool = True, value: Any = None, values: Any = None) -> str:
@@ -247,26 +247,28 @@ def unknown(name: str, group: str, file: bool = True, value: Any = None, values:
     """
     whole = group or ("a case file" if file else "a case")
     hint = (
-        in_our_unit(name, value, accepted(group))
+        in_our_unit(name, value, accepted_keys(group))
         or of_percent(name, group, value, stroke_in(values))
         or suggestion(name, group)
-        or f"; {whole} has {', '.join(known(group, file))}"
+        or f"; {whole} has {', '.join(known_keys(group, file))}"
     )
     return f"unknown key{hint}"
 
 
 def no_mapping(key: str, value: Any) -> str:
     """Return what is told of a value that stands where a group's keys are due."""
-    word = f"{shown(WORDS[key])} or " if key in WORDS else ""
-    return f"needs {word}a mapping of keys{_example(key)}, not {shown(value)}"
+    word = f"{quote_value(WORDS[key])} or " if key in WORDS else ""
+    return f"needs {word}a mapping of keys{_example(key)}, not {quote_value(value)}"
 
 
 def _example(group: str) -> str:
     """Return a key of a group with its default, such as crank_radius_mm: 120."""
-    for name in known(group) if group in GROUPS else ():
+    for name in known_keys(group) if group in GROUPS else ():
         row = table()[f"{group}.{name}"]
         if row.default is not None:
-            value = f"{row.default:g}" if isinstance(row.default, float) else shown(row.default)
+            value = (
+                f"{row.default:g}" if isinstance(row.default, float) else quote_value(row.default)
+            )
             return f", such as {{{name}: {value.strip(chr(39))}}}"
     return ""
 
@@ -276,23 +278,23 @@ def suggestion(name: str, group: str) -> str:
     if name in table() and "." in name:
         outer, _, inner = name.partition(".")
         return f"; write {inner} inside {outer}"
-    if group and name in known(""):
+    if group and name in known_keys(""):
         return f"; write {name} at the top, outside {group}"
-    if name.partition(":")[0] in known(group):
+    if name.partition(":")[0] in known_keys(group):
         return "; put a space after the colon"
     if name in DOUBLES:
         return f"; write {DOUBLES[name]}, which is half of it"
-    keys = meant(name, group)
+    keys = probable_keys(name, group)
     return f"; did you mean {' or '.join(keys)}?" if keys else ""
 
 
-def meant(name: str, group: str) -> list[str]:
+def probable_keys(name: str, group: str) -> list[str]:
     """Return the dotted keys that an unknown one probably stands for, in a group of that group."""
     if name in table() and not group:
         return [name]
     if group and name in map(_leaf, DOUBLES):
         return []  # a word of another group, which is like none of this one
-    if near := _nearest(name, known(group), 0.6) or _nearest(name, synonyms_of(group), 0.8):
+    if near := _nearest(name, known_keys(group), 0.6) or _nearest(name, synonyms_of(group), 0.8):
         return [f"{group}.{near}" if group else near]
     if group:
         return _holding(name, f"{group}.")
@@ -343,7 +345,7 @@ def _stem(name: str) -> str:
 PLAIN = (int, float, str)
 
 
-def checked(key: str, value: Any, problems: list[Problem]) -> Any:
+def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
     """Return a value as its dataclass holds it; its default if it is wrong, which joins
     `problems`.
     """
@@ -392,7 +394,7 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
         message = unknown(str(key), "", file=False, value=value)
         problems.append(Problem(str(key), message))
         return None
-    return checked(key, value, problems)
+    return check_value(key, value, problems)
 
 
 @lru_cache(maxsize=256)
@@ -412,7 +414,7 @@ def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Proble
     good = {}
     for name, value in items:
         if name in fields:
-            good[name] = checked(f"{key}.{name}", value, problems)
+            good[name] = check_value(f"{key}.{name}", value, problems)
         else:
             problems.append(Problem(f"{key}.{name}", unknown(str(name), key, value=value)))
     return GROUPS[key](**good), problems

@@ -314,7 +314,7 @@ def conflicts(
             yield from rule(case, given)
         yield from unread_values(case, values)
         return
-    undecided = _undecided(wrong)
+    undecided = _undecided_keys(wrong)
     known = cast(Settings, _Known(case, undecided))
     for rule in RULES:
         with contextlib.suppress(_Unknown):
@@ -325,7 +325,7 @@ def conflicts(
                 yield from unread_values(known, {key: value})
 
 
-def _undecided(wrong: frozenset[str]) -> frozenset[str]:
+def _undecided_keys(wrong: frozenset[str]) -> frozenset[str]:
     """Return the keys of which nothing is known where some are wrong: these, and what they
     decide.
     """

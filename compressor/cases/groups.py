@@ -23,7 +23,7 @@ from compressor.cases.parameter import (
     STIFFNESS,
     by_law,
     choice,
-    documented,
+    document_fields,
     parameter,
 )
 
@@ -32,7 +32,7 @@ JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class PerJoint:
     """The radial clearance of each joint, mm; 0 where the joint is ideal.
@@ -65,7 +65,7 @@ class PerJoint:
     )
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Offset:
     """How far a journal starts from its bore's centre, mm; a case's `initial_offset_mm`.
@@ -92,7 +92,7 @@ class Offset:
     )
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Machine:
     """The mechanism and its masses; a case's `machine`.
@@ -156,7 +156,7 @@ class Machine:
         return self.pin_radius_mm if own is None else own
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Gas:
     """The gas load, an ideal cycle (Eq. 13); a case's `gas`, read with `load: gas`.
@@ -190,7 +190,7 @@ class Gas:
     )
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Spring:
     """The spring load, a spring between piston and cam follower (§2.2); a case's `spring`.
@@ -211,7 +211,7 @@ class Spring:
     )  # fmt: skip
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Contact:
     """The normal contact law of both joints; a case's `contact`.
@@ -291,7 +291,7 @@ class Contact:
     )  # fmt: skip
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Friction:
     """Friction at the joints; a case's `friction`, None without.
@@ -356,7 +356,7 @@ class Friction:
     )  # fmt: skip
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Solve:
     """How far, how finely and how exactly to integrate; a case's `solve`.
@@ -424,7 +424,7 @@ class Solve:
     )  # fmt: skip
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Output:
     """What is stored of a job; a case's `output`. Not part of the job's identity.

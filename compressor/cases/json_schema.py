@@ -47,7 +47,9 @@ def _mapping(properties: Schema) -> Schema:
 def _group(name: str) -> Schema:
     """Return the schema of a group of keys."""
     rows = [row for row in table().values() if row.key.startswith(f"{name}.")]
-    rows += [_doubled(word, key) for word, key in DOUBLES.items() if word.startswith(f"{name}.")]
+    rows += [
+        _synonym_row(word, key) for word, key in DOUBLES.items() if word.startswith(f"{name}.")
+    ]
     mapping = _mapping({row.key.removeprefix(f"{name}."): _value(row) for row in rows})
     pairs = (*IN_PLACE_OF, *DOUBLES.items())
     rivals = [pair for pair in pairs if pair[0].startswith(f"{name}.")]
@@ -64,7 +66,7 @@ def _group(name: str) -> Schema:
     return {"description": about, **mapping}
 
 
-def _doubled(word: str, key: str) -> Parameter:
+def _synonym_row(word: str, key: str) -> Parameter:
     """Return the row of a word of the trade, whose values are twice those of a key."""
     row = table()[key]
     span = {"default": 2 * row.default, "low": 2 * row.low, "high": 2 * row.high}

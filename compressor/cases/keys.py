@@ -13,9 +13,9 @@ from compressor.cases.checks import (
     MAPPINGS,
     SHORTHANDS,
     TWICE,
-    accepted,
+    accepted_keys,
     by_joint,
-    halved,
+    halve,
     lacking_joint,
     no_mapping,
     stands_for,
@@ -24,7 +24,7 @@ from compressor.cases.checks import (
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
-from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shortened
+from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shorten
 
 MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
 
@@ -79,24 +79,25 @@ def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) 
     doubled = next((word for word, half in DOUBLES.items() if half == own), own)
     if own in found.values and own != doubled:
         problems.append(FileProblem(node.key_place, doubled, TWICE.format(own)))
-    found.values[own] = node if own == key else _halved(node)
+    found.values[own] = node if own == key else _halve_node(node)
     found.places[own] = node.key_place
 
 
-def _halved(node: Node, first: int | None = None) -> Node:
+def _halve_node(node: Node, first: int | None = None) -> Node:
     """Return a node with its numbers halved, of a list the `first` ones; None: all.
 
     A form such as `{linspace: [160, 200, 5]}` has two ends and a count, a range a step.
     """
     if isinstance(node.value, dict):
         inner = {
-            word: _halved(item, None if word == "range" else 2) for word, item in node.value.items()
+            word: _halve_node(item, None if word == "range" else 2)
+            for word, item in node.value.items()
         }
         return replace(node, value=inner)
     if isinstance(node.value, list):
         items = node.value[:first]
-        return replace(node, value=[*map(_halved, items), *node.value[len(items) :]])
-    return replace(node, value=halved(node.value))
+        return replace(node, value=[*map(_halve_node, items), *node.value[len(items) :]])
+    return replace(node, value=halve(node.value))
 
 
 def _is_sweep(name: str, node: Node) -> bool:
@@ -112,7 +113,7 @@ def _known(
     value.
     """
     for name, item in node.value.items():
-        if name not in accepted(group):
+        if name not in accepted_keys(group):
             message = "unknown key"
             if len(problems) < MAX_SUGGESTIONS:
                 message = unknown(name, group, value=item.plain(), values=root.plain())
@@ -127,7 +128,7 @@ def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[st
     found: dict[str, Leaves] = {}
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
-        place, own = Place(f"--set {shortened(text)}"), DOUBLES.get(key, key)
+        place, own = Place(f"--set {shorten(text)}"), DOUBLES.get(key, key)
         if not key or not equals:
             message = "needs the form key=value, such as joint=both"
             problems.append(FileProblem(place, "", message))
@@ -153,20 +154,20 @@ def overridden(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
     kept = {
         key: node
         for outer, value in file.values.items()
-        for key, node in _opened(outer, value, new).items()
+        for key, node in _open_group(outer, value, new).items()
         if key in new or not any(covers(other, key) for other in gone)
     }
     return Leaves(kept | new, places | file.places)
 
 
-def merged(file: Leaves, block: Leaves) -> Leaves:
+def merge_leaves(file: Leaves, block: Leaves) -> Leaves:
     """Return a file's leaves with every leaf of one of its blocks in place of the file's."""
     changes = {key: Leaves({key: node}, {}) for key, node in block.values.items()}
     found = overridden(file, changes)
     return Leaves(found.values, file.places | block.places)
 
 
-def _opened(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
+def _open_group(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
     """Return a value that stands for a whole group, split up if an override sets a part of the
     group.
     """
@@ -180,7 +181,7 @@ def covers(outer: str, key: str) -> bool:
     return f"{key}.".startswith(f"{outer}.")
 
 
-def nested(chosen: Mapping[str, Node]) -> dict[str, Any]:
+def nest_values(chosen: Mapping[str, Node]) -> dict[str, Any]:
     """Return the values by dotted key as a case file has them, group by group."""
     values: dict[str, Any] = {}
     for key, node in chosen.items():

@@ -19,12 +19,19 @@ from compressor.cases import blocks, regimes
 from compressor.cases.case import Case
 from compressor.cases.checks import SHORTHANDS, row_of
 from compressor.cases.conflicts import conditions, is_off, problem_of
-from compressor.cases.keys import Leaves, leaves, merged, nested, overridden, read_overrides
-from compressor.cases.parameter import CaseError, Problem, Reader, shown
+from compressor.cases.keys import (
+    Leaves,
+    leaves,
+    merge_leaves,
+    nest_values,
+    overridden,
+    read_overrides,
+)
+from compressor.cases.parameter import CaseError, Problem, Reader, quote_value
 from compressor.cases.regimes import GROUP, Regimes
 from compressor.cases.sheet import Block, columns
 from compressor.cases.study import Axis, Cases, Study, Told, unheard
-from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, counted
+from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
 from compressor.cases.table import WORDS, table
 from compressor.cases.yaml_reader import (
     CaseFileError,
@@ -32,7 +39,7 @@ from compressor.cases.yaml_reader import (
     Node,
     Place,
     read_file,
-    shortened,
+    shorten,
 )
 
 if TYPE_CHECKING:
@@ -170,7 +177,7 @@ def load_studies(
     problems += _unread(drafts, keys)
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
-        problems.append(FileProblem(Place(f"--only {shortened(only)}"), "", NONE_SELECTED))
+        problems.append(FileProblem(Place(f"--only {shorten(only)}"), "", NONE_SELECTED))
     if problems:
         raise CaseFileError(problems)
     return studies
@@ -181,7 +188,7 @@ def _path_of(path: Any) -> str:
     try:
         return os.fsdecode(path)
     except TypeError as error:
-        message = f"needs the path of a case file, not {shown(path)}"
+        message = f"needs the path of a case file, not {quote_value(path)}"
         raise CaseFileError([FileProblem(Place("load_cases"), "", message)]) from error
 
 
@@ -190,7 +197,7 @@ def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
     try:
         return comparison(text)
     except NoComparison as error:
-        problems.append(FileProblem(Place(f"--only {shortened(text)}"), "", str(error)))
+        problems.append(FileProblem(Place(f"--only {shorten(text)}"), "", str(error)))
         return None
 
 
@@ -205,7 +212,7 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
         problems.append(FileProblem(root.place, "", message))
     whole = overridden(found, changes)
     name = _name(path, whole, problems) if root else ""
-    asked = regimes.read(whole, problems)
+    asked = regimes.read_regimes(whole, problems)
     if "blocks" in changes:
         found = overridden(found, {"blocks": changes["blocks"]})
     gone = ("blocks", GROUP)
@@ -309,7 +316,7 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told, read: Ke
     selected = range(len(cases)) if only is None else cases.where(only)
     return Study(
         draft.name, draft.path, tuple(axes), cases, tuple(keys), is_grid, selected,
-        draft.regimes, chains, tuple(nested(block.fixed) for block in found),
+        draft.regimes, chains, tuple(nest_values(block.fixed) for block in found),
     )  # fmt: skip
 
 
@@ -332,7 +339,7 @@ def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
         draft.problems.append(FileProblem(node.place, "blocks", message))
     else:
         for item in items:
-            yield overridden(merged(file, _block_leaves(item, draft)), draft.changes)
+            yield overridden(merge_leaves(file, _block_leaves(item, draft)), draft.changes)
 
 
 def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
@@ -363,9 +370,9 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
         return True
     largest = max(drafts, key=lambda one: math.prod(one.sizes().values()))
     keys = max(largest.factors, key=lambda keys: largest.size(keys[0]))
-    told = [" x ".join(f"{name} ({counted(n)})" for name, n in one.items()) for one in sizes]
+    told = [" x ".join(f"{name} ({format_count(n)})" for name, n in one.items()) for one in sizes]
     message = (
-        f"{counted(total)} jobs are more than {max_jobs}: {shortened(' + '.join(told), 300)}; "
+        f"{format_count(total)} jobs are more than {max_jobs}: {shorten(' + '.join(told), 300)}; "
         "ask for fewer, or raise --max-jobs"
     )
     place = largest.sweeps[keys[0]].node.place
@@ -381,7 +388,7 @@ def _refuse_conflicts(draft: _Draft, cases: Cases) -> None:
             cases.case(chosen)
         except CaseError as error:
             for problem in error.problems:
-                found.setdefault(problem, _located(problem, chosen, block, draft.path))
+                found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
@@ -397,15 +404,19 @@ def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...
     place = places.get(GROUP, Place(draft.path, 1, 1))
     total = len(cases) * asked.n * len(asked.directions)
     if total > max_jobs:
-        message = f"{counted(total)} values are more than {max_jobs}; lower n, or raise --max-jobs"
+        message = (
+            f"{format_count(total)} values are more than {max_jobs}; lower n, or raise --max-jobs"
+        )
         draft.problems.append(FileProblem(places.get(f"{GROUP}.n", place), f"{GROUP}.n", message))
         return ()
     found = []
     for block, chosen in cases.combinations():
         try:
-            chain = tuple(map(cases.case, regimes.followed(asked, chosen)))
+            chain = tuple(map(cases.case, regimes.follow_key(asked, chosen)))
         except CaseError as error:
-            wrong = (_located(problem, chosen, block, draft.path) for problem in error.problems)
+            wrong = (
+                _locate_problem(problem, chosen, block, draft.path) for problem in error.problems
+            )
             draft.problems.extend(wrong)
             return ()
         if message := regimes.objection(chain, asked):
@@ -414,7 +425,9 @@ def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...
     return tuple(found)
 
 
-def _located(problem: Problem, chosen: Mapping[str, Node], block: Block, path: str) -> FileProblem:
+def _locate_problem(
+    problem: Problem, chosen: Mapping[str, Node], block: Block, path: str
+) -> FileProblem:
     """Return a case's problem at the value it is about, or at the nearest key, group or block."""
     group = problem.key.partition(".")[0]
     for key in (problem.key, group):

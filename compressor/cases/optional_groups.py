@@ -18,14 +18,14 @@ from compressor.cases.parameter import (
     ROCKING,
     STEADY,
     choice,
-    documented,
+    document_fields,
     parameter,
 )
 
 LEAST_RATIO, GREATEST_RATIO = 0.125, 1.0  # of a bearing's length and diameter
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Lubricant:
     """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
@@ -61,7 +61,7 @@ class Lubricant:
 OURS = "ours"
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Guide:
     """The crosshead's guide; a case's `guide`, None unless a case asks: ideal, without friction.
@@ -130,7 +130,7 @@ class Guide:
     )  # fmt: skip
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Drive:
     """A motor whose speed gives way; a case's `drive`, None unless a case asks: steady speed.
@@ -169,7 +169,7 @@ class Drive:
     )  # fmt: skip
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Rod:
     """An elastic rod; a case's `rod`, None unless a case asks: rigid.
@@ -225,7 +225,7 @@ def filled_guide(guide: Guide, mass: float) -> Guide:
 BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mode
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Body:
     """The compressor's rigid body on its foundation; a case's `body`, None unless a case asks.
@@ -282,7 +282,7 @@ class Body:
     )  # fmt: skip
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Sensor:
     """An accelerometer on the body, with a tacho; a case's `sensor`, None unless a case asks.
@@ -354,7 +354,7 @@ def filled_body(body: Body) -> Body:
 value = partial(parameter, identity=False)  # of no single run
 
 
-@documented
+@document_fields
 @dataclass(frozen=True)
 class Wear:
     """How the rod's bores wear in joints with clearance; a case's `wear`, None: they stay round.

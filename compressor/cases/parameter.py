@@ -236,7 +236,7 @@ SHORT = reprlib.Repr()
 SHORT.maxstring = SHORT.maxother = SHORT.maxlong = 60
 
 
-def shown(value: Any) -> str:
+def quote_value(value: Any) -> str:
     """Return a value as an error message quotes it: control characters escaped, long values cut."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -291,11 +291,11 @@ class Parameter:
     @property
     def needed(self) -> str:
         """The allowed values in words, with their unit."""
-        words = listed(self.choices)
+        words = join_with_or(self.choices)
         if self.kind == "choice":
             return words
         if self.kind == "boolean":
-            return listed([*self.choices, "true", "false"])
+            return join_with_or([*self.choices, "true", "false"])
         if self.kind == "accuracy":
             return f"{words}, or errors by metric such as {{peak_acceleration: 0.01}}"
         if self.kind == "materials":
@@ -361,7 +361,7 @@ class Parameter:
         """Return the error of a value of another kind; `word`: what may be a choice that is
         misspelt.
         """
-        message = f"needs {self.needed}, not {shown(value)}"
+        message = f"needs {self.needed}, not {quote_value(value)}"
         if not isinstance(word, str):
             return message
         lower = dict(self.aliases)
@@ -380,10 +380,12 @@ class Parameter:
         if not isinstance(value, str):
             return self._refused(value)
         good = NAME.fullmatch(value) and not value.startswith(".")
-        return None if good else f"{shown(value)} is no name: use {self.range}, no leading dot"
+        return (
+            None if good else f"{quote_value(value)} is no name: use {self.range}, no leading dot"
+        )
 
 
-def listed(words: Sequence[str]) -> str:
+def join_with_or(words: Sequence[str]) -> str:
     """Return the words as a sentence lists them: a, b or c."""
     return " or ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
@@ -422,7 +424,7 @@ def _field(default: Any, row: dict[str, Any]) -> Any:
     )
 
 
-def documented(group: type[Group]) -> type[Group]:
+def document_fields(group: type[Group]) -> type[Group]:
     """Return a group's dataclass, its fields told in its docstring: range, unit, default,
     source.
     """
@@ -446,7 +448,7 @@ def parameter_table(rows: Iterable[Parameter]) -> str:
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)
-        default = shown(row.default) if row.kind == "boolean" else default.removesuffix(".0")
+        default = quote_value(row.default) if row.kind == "boolean" else default.removesuffix(".0")
         cells = (
             f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
             row.readers,

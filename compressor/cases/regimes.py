@@ -12,7 +12,7 @@ from typing import Any
 from compressor.cases.case import Case
 from compressor.cases.checks import SHORTHANDS, row_of, suggestion
 from compressor.cases.keys import Leaves, covers
-from compressor.cases.parameter import Parameter, shown
+from compressor.cases.parameter import Parameter, quote_value
 from compressor.cases.swept import between
 from compressor.cases.table import OF_JOINTS, table
 from compressor.cases.yaml_reader import FileProblem, Node, Place
@@ -96,7 +96,7 @@ class Regimes:
         return asdict(self)
 
 
-def read(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
+def read_regimes(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
     """Return what `regimes` asks for in a file's leaves; None without it, or with something wrong
     in it.
 
@@ -114,7 +114,7 @@ def read(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
     if missing := [name for name in ("over", "from", "to", "n") if name not in nodes]:
         words = "; write {over: clearance_mm, from: 0.01, to: 1, n: 60}"
         problems.append(FileProblem(place, GROUP, f"needs {' and '.join(missing)}{words}"))
-    given = {name: _checked(name, node, problems) for name, node in nodes.items()}
+    given = {name: _check_regimes_value(name, node, problems) for name, node in nodes.items()}
     if len(problems) == before:
         _check_range(given, nodes, problems)
     if len(problems) > before:
@@ -123,7 +123,7 @@ def read(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
     return Regimes(given["over"], given["from"], given["to"], **more)
 
 
-def _checked(name: str, node: Node, problems: list[FileProblem]) -> Any:
+def _check_regimes_value(name: str, node: Node, problems: list[FileProblem]) -> Any:
     """Return the value of a key of `regimes`; what is wrong with it joins `problems`."""
     value, key = node.plain(), f"{GROUP}.{name}"
     if name == "over":
@@ -145,7 +145,7 @@ def _not_followed(key: Any) -> str | None:
     row = row_of(key) if isinstance(key, str) else None
     if row is None:
         hint = suggestion(key, "") if isinstance(key, str) else ""
-        return f"{shown(key)} is no key of a number, such as clearance_mm{hint}"
+        return f"{quote_value(key)} is no key of a number, such as clearance_mm{hint}"
     if row.kind != "number":
         return f"{key} is no number: give a key such as clearance_mm or machine.speed_rpm"
     if key.partition(".")[0] in NOT_FOLLOWED:
@@ -198,7 +198,7 @@ def at_first(leaves: Leaves, asked: Regimes, problems: list[FileProblem]) -> Lea
     return Leaves(leaves.values | {over: Node(asked.first, place, place)}, places)
 
 
-def followed(asked: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
+def follow_key(asked: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
     """Yield a combination of a file's values at each value of the key that is followed, going
     up.
     """

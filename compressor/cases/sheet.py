@@ -22,7 +22,7 @@ import numpy as np
 from compressor.cases.case import Case, canonical, digest, identity, parts_of
 from compressor.cases.checks import SHORTHANDS, single, stands_for, value_of
 from compressor.cases.conflicts import IN_PLACE_OF, RULES
-from compressor.cases.keys import Leaves, covers, nested
+from compressor.cases.keys import Leaves, covers, nest_values
 from compressor.cases.swept import Test
 from compressor.cases.table import OF_JOINTS, outside_identity, table
 from compressor.cases.yaml_reader import Node
@@ -278,7 +278,7 @@ class Sheet:
 
         Raises CaseError where values do not fit that all jobs share.
         """
-        parts, given = parts_of(nested(jobs.chosen) | {"name": name})
+        parts, given = parts_of(nest_values(jobs.chosen) | {"name": name})
         changes: dict[str, dict[str, Column]] = {}
         for key, column in jobs.columns.items():
             for part in stands_for(key) or (key,):

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from compressor.cases.case import Case
-from compressor.cases.keys import nested
+from compressor.cases.keys import nest_values
 from compressor.cases.parameter import CaseError
 from compressor.cases.regimes import Regimes
 from compressor.cases.sheet import Block
@@ -182,7 +182,7 @@ class Cases(Sequence[Case]):
 
     def case(self, chosen: Mapping[str, Node]) -> Case:
         """Return the case of one combination. Raises CaseError where its values do not fit."""
-        return Case.resolve(nested(chosen) | {"name": self.name})
+        return Case.resolve(nest_values(chosen) | {"name": self.name})
 
     def combinations(self) -> Iterator[tuple[Block, dict[str, Node]]]:
         """Yield the values of every case by dotted key, and the block that they are of."""

@@ -25,8 +25,8 @@ from fractions import Fraction
 from typing import Any, NoReturn
 
 from compressor.cases.checks import row_of, suggestion
-from compressor.cases.parameter import Parameter, shown
-from compressor.cases.yaml_reader import FileProblem, Node, resolved, shortened
+from compressor.cases.parameter import Parameter, quote_value
+from compressor.cases.yaml_reader import FileProblem, Node, resolve_scalar, shorten
 from compressor.program import ignore_warnings
 
 # designs of samples, which draw several keys together
@@ -97,7 +97,7 @@ def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> Sweep | None:
     else:
         numbers = _numbers(words[0], node.value[words[0]], refuse)
         if numbers:
-            return _ranged(key, node, words[0], numbers, bool(log and log.value), refuse)
+            return _sweep_range(key, node, words[0], numbers, bool(log and log.value), refuse)
     return None
 
 
@@ -120,7 +120,7 @@ def _is_finite(value: object) -> bool:
     return number and math.isfinite(value)  # type: ignore[arg-type]
 
 
-def _ranged(
+def _sweep_range(
     key: str, node: Node, word: str, numbers: list[Fraction], log: bool,
     refuse: Callable[..., None],
 ) -> Sweep | None:  # fmt: skip
@@ -168,7 +168,7 @@ def between(word: str, first: Fraction, last: Fraction, count: int) -> Make:
 
     def geometric() -> list[float]:
         inner = (low * (high / low) ** (i / (count - 1)) for i in range(1, count - 1))
-        return [low, *map(rounded, inner), high]
+        return [low, *map(round_made_value, inner), high]
 
     return geometric if word == "logspace" else even
 
@@ -178,17 +178,17 @@ def _spread(low: float, high: float, log: bool) -> Spread:
 
     def spread(share: float) -> float:
         value = low * (high / low) ** share if log else low + (high - low) * share
-        return min(max(rounded(value), low), high)
+        return min(max(round_made_value(value), low), high)
 
     return spread
 
 
-def rounded(value: float) -> float:
+def round_made_value(value: float) -> float:
     """Return a made value to 12 digits, which print alike wherever its last bits come from."""
     return float(f"{value:.12g}")
 
 
-def counted(count: int) -> str:
+def format_count(count: int) -> str:
     """Return a number of jobs as it is told, however large."""
     return str(count) if count < 10**100 else f"over 10^{int(count.bit_length() * 0.30103) - 1}"
 
@@ -279,7 +279,7 @@ class _Reader:
     def refuse(self, at: int, message: str) -> NoReturn:
         """Raise NoComparison about what stands at a place of the code."""
         rest = self.text[self.indent + at :].lstrip()
-        where = f"character {len(self.text) - len(rest) + 1}, {shown(shortened(rest, 20))}"
+        where = f"character {len(self.text) - len(rest) + 1}, {quote_value(shorten(rest, 20))}"
         raise NoComparison(f"{message} (at {where if rest else 'the end'})")
 
     def tree(self) -> ast.expr:
@@ -364,7 +364,7 @@ class _Reader:
             self.refuse(node.col_offset, NEEDS_KEY)
         row = row_of(key)
         if row is None:
-            self.refuse(node.col_offset, f"unknown key {shown(key)}{suggestion(key, '')}")
+            self.refuse(node.col_offset, f"unknown key {quote_value(key)}{suggestion(key, '')}")
         if row.kind in ("materials", "text"):
             self.refuse(node.col_offset, f"{key} cannot be compared")
         return key, row
@@ -373,8 +373,8 @@ class _Reader:
         """Return what a number or a word means in a case file; None for anything else."""
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
             sign = "-" if isinstance(node.op, ast.USub) else "+"
-            return resolved(sign + self.written(node.operand))
-        return resolved(self.written(node))
+            return resolve_scalar(sign + self.written(node.operand))
+        return resolve_scalar(self.written(node))
 
 
 def _misfit(code: str, error: SyntaxError) -> tuple[int, str]:

@@ -104,7 +104,7 @@ class FileProblem:
     message: str
 
     def __str__(self) -> str:
-        parts = (str(self.place), shortened(printable(self.key)), printable(self.message))
+        parts = (str(self.place), shorten(printable(self.key)), printable(self.message))
         return ": ".join(part for part in parts if part)
 
 
@@ -129,7 +129,7 @@ class _Unreadable(Exception):
     """Ends the reading of a file; carries the last problem."""
 
 
-def shortened(text: str, most: int = 60) -> str:
+def shorten(text: str, most: int = 60) -> str:
     """Return the text of at most `most` characters."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
@@ -170,7 +170,7 @@ def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | No
         place = builder.place(error.problem_mark or error.context_mark)
         hint = "; indent with spaces, not tabs" if "'\\t'" in str(error.problem) else ""
         problems.append(
-            FileProblem(place, "", f"is no YAML: {shortened(str(error.problem), 120)}{hint}")
+            FileProblem(place, "", f"is no YAML: {shorten(str(error.problem), 120)}{hint}")
         )
     except yaml.reader.ReaderError as error:
         problems.append(_forbidden(text, error.position, start))
@@ -189,7 +189,7 @@ def _place_at(path: str, before: str) -> Place:
     return Place(path, before.count("\n") + 1, len(before) - before.rfind("\n"))
 
 
-def resolved(text: str) -> Any:
+def resolve_scalar(text: str) -> Any:
     """Return what a plain scalar means in the core schema of YAML 1.2."""
     if text in NULLS:
         return None
@@ -280,7 +280,7 @@ class _Builder:
             self.note(event, key, "tags (!) are not allowed")
 
     def scalar(self, event: Any, key: str) -> Any:
-        value = resolved(event.value) if event.style is None else event.value
+        value = resolve_scalar(event.value) if event.style is None else event.value
         if value is None:
             self.note(event, key, NO_VALUE)
         return value

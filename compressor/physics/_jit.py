@@ -89,11 +89,11 @@ def load_numba() -> None:
         return numba.types.Dispatcher(value)
 
     # to be known before anything is compiled
-    for intrinsic in (borrowed, fused, square_root):
+    for intrinsic in (without_refcount, fma, square_root):
         intrinsic.make_here()  # type: ignore[union-attr]
 
 
-def _compiled(function: Function, **options: Any) -> Function:
+def _compile(function: Function, **options: Any) -> Function:
     def make() -> Any:
         import numba
 
@@ -108,26 +108,26 @@ def jit(function: Function) -> Function:
     """Compile `function` on its first call and keep the machine code on disk.
 
     Arithmetic is IEEE's, in the order written, so that a run has the same bits by itself and in a
-    lane beside others; products and sums are fused where `fused` says so. A division by zero
+    lane beside others; products and sums are fused where `fma` says so. A division by zero
     gives inf or nan, not an exception, so that the caller can judge a state that went wrong. As it
     is with ``COMPSIM_JIT=0``.
     """
-    return _compiled(function)
+    return _compile(function)
 
 
-def merged(function: Function) -> Function:
+def inline_llvm(function: Function) -> Function:
     """Return `jit`, written by LLVM into each caller, whatever its size: at a small part of the
-    time that `inlined` takes to compile.
+    time that `inline_numba` takes to compile.
     """
-    return _compiled(function, forceinline=True)
+    return _compile(function, forceinline=True)
 
 
-def inlined(function: Function) -> Function:
+def inline_numba(function: Function) -> Function:
     """Return `jit`, written into each caller by numba, with its types: for what loops over lanes
-    call with tuples or arrays. `merged` into one another, LLVM sees too late that nothing is called
-    there, and makes no vector code of the loop.
+    call with tuples or arrays. By `inline_llvm`, LLVM sees too late that nothing is called there,
+    and makes no vector code of the loop.
     """
-    return _compiled(function, inline="always")
+    return _compile(function, inline="always")
 
 
 class ByKind:
@@ -167,7 +167,7 @@ class ByKind:
         return self.of(arguments).get_overload(arguments)
 
 
-def by_kind(least: int, special: Function, usual: Function) -> Function:
+def dispatch_on_record(least: int, special: Function, usual: Function) -> Function:
     """Return `special` for records whose `laws` are at least so many, `usual` for all others."""
     chosen: Any = ByKind(least, special, usual)
     return chosen
@@ -181,7 +181,7 @@ def plain(function: Function) -> Function:
     return getattr(function, "__wrapped__", function)
 
 
-def _borrowed() -> Any:
+def _without_refcount() -> Any:
     from numba.core import types
     from numba.extending import intrinsic
     from numba.np.arrayobj import make_array, populate_array
@@ -204,7 +204,7 @@ def _borrowed() -> Any:
     return intrinsic(borrowed)
 
 
-def _fused() -> Any:
+def _fma() -> Any:
     from numba.core import types
     from numba.extending import intrinsic
 
@@ -231,7 +231,7 @@ def _square_root() -> Any:
     return intrinsic(square_root)
 
 
-def fused(a: float, b: float, c: float) -> float:
+def fma(a: float, b: float, c: float) -> float:
     """a b + c, rounded once: one instruction instead of two. Python itself rounds twice."""
     return a * b + c
 
@@ -243,7 +243,7 @@ def square_root(a: float) -> float:
     return math.sqrt(a)
 
 
-def borrowed(array: Any) -> Any:
+def without_refcount(array: Any) -> Any:
     """Return the same array without a share in its ownership: nothing counts its references.
 
     Counting is atomic, and every call that takes an array counts twice.
@@ -252,6 +252,6 @@ def borrowed(array: Any) -> Any:
 
 
 if ENABLED:
-    fused = Intrinsic(_fused, fused)  # type: ignore[assignment]
+    fma = Intrinsic(_fma, fma)  # type: ignore[assignment]
     square_root = Intrinsic(_square_root, square_root)  # type: ignore[assignment]
-    borrowed = Intrinsic(_borrowed, borrowed)  # type: ignore[assignment]
+    without_refcount = Intrinsic(_without_refcount, without_refcount)  # type: ignore[assignment]

@@ -12,7 +12,7 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from compressor.physics._jit import fused, inlined, jit, merged, square_root
+from compressor.physics._jit import fma, inline_llvm, inline_numba, jit, square_root
 from compressor.physics.contact_laws import (
     HYSTERESIS,
     Law,
@@ -41,13 +41,13 @@ COULOMB_TANH, THRELFALL = int(FrictionLaw.COULOMB_TANH), int(FrictionLaw.THRELFA
 AMBROSIO, LUGRE = int(FrictionLaw.AMBROSIO), int(FrictionLaw.LUGRE)
 
 
-@merged
+@inline_llvm
 def adams(slip, p):
     """Return ADAMS's law: rises from 0 to `static` over the stiction velocity, falls to
     `dynamic`.
     """
     fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
-    size = fused(p.dynamic - p.static, fall, p.static)
+    size = fma(p.dynamic - p.static, fall, p.static)
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
@@ -71,7 +71,7 @@ def ambrosio(slip, p):
 def stribeck(slip, p):
     """Return LuGre's coefficient in steady sliding without its viscous part."""
     ratio = slip / p.stiction_velocity
-    return fused(p.static - p.dynamic, math.exp(-ratio * ratio), p.dynamic)
+    return fma(p.static - p.dynamic, math.exp(-ratio * ratio), p.dynamic)
 
 
 @jit
@@ -89,7 +89,7 @@ def bristle_rate(slip, bristle, p):
 def lugre(slip, bristle, p):
     """Return LuGre's law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995)."""
     bending = p.bristle_damping * bristle_rate(slip, bristle, p)
-    return fused(p.bristle_stiffness, bristle, fused(p.viscous, slip, bending))
+    return fma(p.bristle_stiffness, bristle, fma(p.viscous, slip, bending))
 
 
 @jit
@@ -106,7 +106,7 @@ def chosen_coefficient(slip, bristle, p):
     return adams(slip, p)
 
 
-@merged
+@inline_llvm
 def friction_coefficient(slip, bristle, p):
     """Return signed friction coefficient of a slip (m/s) and of the bristles' deflection (m)."""
     if has_chosen_laws(p):
@@ -149,7 +149,7 @@ def hysteresis(contact: str, restitution: float) -> float:
     return HYSTERESIS[Law[contact.upper()]](restitution)
 
 
-@merged
+@inline_llvm
 def carried_by(joint, y, p):
     """Return what a joint's contact carries in the state: the speed (m/s) at which the bodies met,
     and the mean deflection (m) of the bristles. Nothing with the default laws.
@@ -177,7 +177,7 @@ class Contact(NamedTuple):
 NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@inlined
+@inline_numba
 def joint_contact(eccentricity, spins, bearing, carried, p):
     """Return the contact between a joint's journal and the rod's bore.
 
@@ -188,31 +188,31 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
     """
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, stiffness = bearing
-    distance = square_root(fused(ex, ex, ey * ey))
+    distance = square_root(fma(ex, ex, ey * ey))
     penetration = distance - clearance
     if distance == 0.0:
         return Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0)
     per_distance = 1.0 / distance
     nx = ex * per_distance
     ny = ey * per_distance
-    rate = fused(ex_rate, nx, ey_rate * ny)
+    rate = fma(ex_rate, nx, ey_rate * ny)
     bore = pin + clearance
     arm = pin - penetration
     journal_spin, rod_spin = spins
-    turning = fused(journal_spin, arm, -(rod_spin * bore))
-    slip = fused(ey_rate, nx, fused(-ex_rate, ny, turning))
+    turning = fma(journal_spin, arm, -(rod_spin * bore))
+    slip = fma(ey_rate, nx, fma(-ex_rate, ny, turning))
     approach, bristle = carried
     normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, clearance, p)
     friction = 0.0
     if p.friction and in_contact(normal):
         friction = -friction_coefficient(slip, bristle, p) * normal
-    fx = fused(normal, nx, friction * ny)
-    fy = fused(normal, ny, -(friction * nx))
+    fx = fma(normal, nx, friction * ny)
+    fy = fma(normal, ny, -(friction * nx))
     moment = -bore * friction
     return Contact(fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped)
 
 
-@merged
+@inline_llvm
 def nearness(contact, stiffness, clearance, p):
     """Return the positive in contact; otherwise how far from it: the gap (m), or the clamped force
     as one.

@@ -27,7 +27,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import fused, inlined, jit, merged, plain, square_root
+from compressor.physics._jit import fma, inline_llvm, inline_numba, jit, plain, square_root
 
 FLATTEST = 1.25  # of ln(4 S c / F) - 1: from there on Johnson's force goes on along its tangent
 JOHNSON_DEEPEST = 0.5  # of the clearance: up to which the law is meant, before that
@@ -110,7 +110,7 @@ class Conformal:
 
     def static_depth(self, force: float) -> float:
         """Return the penetration (m) at rest under a force (N)."""
-        return solved(self.force, force)
+        return solve_rising(self.force, force)
 
     def tangent(self, depth: float) -> float:
         """Return the stiffness (N/m) of small motion about a penetration (m)."""
@@ -122,7 +122,7 @@ class Conformal:
 
     def impact_depth(self, mass: float, speed: float) -> float:
         """Return the greatest penetration (m) of an impact: m v^2 / 2 is the energy there."""
-        return solved(self.energy, 0.5 * mass * speed**2)
+        return solve_rising(self.energy, 0.5 * mass * speed**2)
 
     def impact_time(self, depth: float, speed: float) -> float:
         """Return the contact time (s) of an impact that goes to a depth (m): 2 / v times the
@@ -137,7 +137,7 @@ class Conformal:
         return float(2.0 * depth / speed * np.sum(weights * left / np.sqrt(1.0 - spent)))
 
 
-def solved(rising: Callable[[float], float], value: float) -> float:
+def solve_rising(rising: Callable[[float], float], value: float) -> float:
     """Return where a function that rises with a length (m) from 0 has a value, by bisection."""
     low, high = 1e-30, 1e3
     if not value > rising(low):
@@ -205,13 +205,13 @@ HYSTERESIS: dict[Law, Callable[[float], float]] = {
 IMPACT, JOHNSON, LIU = int(Law.IMPACT), int(Law.JOHNSON), int(Law.LIU)
 
 
-@merged
+@inline_llvm
 def has_chosen_laws(p):
     """Return whether laws other than the default ones may be a record's: a constant of its type."""
     return len(p.laws) > 1
 
 
-@merged
+@inline_llvm
 def rise(s):
     """Return ADAMS's STEP from 0 at s = 0 to 1 at s = 1: a cubic, constant outside."""
     if s <= 0.0:
@@ -221,7 +221,7 @@ def rise(s):
     return s * s * (3.0 - 2.0 * s)
 
 
-@merged
+@inline_llvm
 def power(base, exponent):
     """base ** exponent for base >= 0; a square root does for Hertz's 1.5."""
     if exponent == 1.5:
@@ -229,23 +229,23 @@ def power(base, exponent):
     return base**exponent
 
 
-@merged
+@inline_llvm
 def impact_elastic(penetration, stiffness, p):
     """Return the elastic force (N) of ADAMS's IMPACT: K delta^p."""
     return stiffness * power(penetration, p.exponent)
 
 
-@merged
+@inline_llvm
 def impact(penetration, rate, stiffness, p):
     """Return `normal_force` by ADAMS's IMPACT, damped by C_max STEP(delta / d_max) (N s/m)."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = impact_elastic(penetration, stiffness, p)
-    unclamped = fused(p.damping * rise(penetration * p.per_full_damping), rate, elastic)
+    unclamped = fma(p.damping * rise(penetration * p.per_full_damping), rate, elastic)
     return max(0.0, unclamped), elastic, unclamped
 
 
-@merged
+@inline_llvm
 def elastic_force(penetration, stiffness, clearance, p):
     """Return the elastic force (N) of the record's law at a positive penetration (m).
 
@@ -258,7 +258,7 @@ def elastic_force(penetration, stiffness, clearance, p):
     return impact_elastic(penetration, stiffness, p)
 
 
-@merged
+@inline_llvm
 def elastic_energy(elastic, penetration, stiffness, clearance, p):
     """Return the energy (J) that is stored where the elastic force (N) has reached a penetration
     (m).
@@ -276,11 +276,11 @@ def hysteretic(penetration, rate, approach, stiffness, clearance, p):
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = elastic_force(penetration, stiffness, clearance, p)
-    unclamped = fused(elastic * p.hysteresis / approach, rate, elastic)
+    unclamped = fma(elastic * p.hysteresis / approach, rate, elastic)
     return max(0.0, unclamped), elastic, unclamped
 
 
-@merged
+@inline_llvm
 def normal_force(penetration, rate, approach, stiffness, clearance, p):
     """F_N, its elastic part, and F_N before its lower bound (N), by the record's law.
 
@@ -292,7 +292,7 @@ def normal_force(penetration, rate, approach, stiffness, clearance, p):
     return impact(penetration, rate, stiffness, p)
 
 
-@inlined
+@inline_numba
 def in_contact(normal):
     """Return whether a joint is in contact: F_N > 0, everywhere in the program."""
     return normal > 0.0

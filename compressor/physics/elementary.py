@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import fused, merged
+from compressor.physics._jit import fma, inline_llvm
 
 LOG_2 = math.log(2.0)
 PER_LOG_2 = 1.0 / LOG_2
@@ -26,7 +26,7 @@ C1, C2, C3 = 4.16666666666666019037e-2, -1.38888888888741095749e-3, 2.4801587289
 C4, C5, C6 = -2.75573143513906633035e-7, 2.08757232129817482790e-9, -1.13596475577881948265e-11
 
 
-@merged
+@inline_llvm
 def logarithm(x):
     """Return natural logarithm of a normal positive number, to 1e-8: enough to choose a step by.
 
@@ -41,34 +41,34 @@ def logarithm(x):
     f = (m - 1.0) / (m + 1.0)
     s = f * f
     q = s * s
-    series = fused(q, fused(q, NINTH, fused(s, SEVENTH, FIFTH)), fused(s, THIRD, 1.0))
-    return fused(np.float64(exponent), LOG_2, 2.0 * f * series)
+    series = fma(q, fma(q, NINTH, fma(s, SEVENTH, FIFTH)), fma(s, THIRD, 1.0))
+    return fma(np.float64(exponent), LOG_2, 2.0 * f * series)
 
 
-@merged
+@inline_llvm
 def exponential(y):
     """Return the e^y for |y| < 700, to 1e-8: 2^k times a Taylor series of the rest."""
     k = math.floor(y * PER_LOG_2 + 0.5)
-    r = fused(-k, LOG_2, y)
+    r = fma(-k, LOG_2, y)
     s = r * r
-    low = fused(s, fused(r, SIXTH, 0.5), 1.0 + r)
-    high = fused(s, fused(r, PER_5040, PER_720), fused(r, PER_120, PER_24))
+    low = fma(s, fma(r, SIXTH, 0.5), 1.0 + r)
+    high = fma(s, fma(r, PER_5040, PER_720), fma(r, PER_120, PER_24))
     scale = np.int64((np.int64(k) + BIAS) << FRACTION_BITS).view(np.float64)
-    return fused(s * s, high, low) * scale
+    return fma(s * s, high, low) * scale
 
 
-@merged
+@inline_llvm
 def direction(angle):
     """Return the cosine and sine of an angle (rad), to their last digit up to some 1e5 turns."""
     quarters = math.floor(angle * PER_QUARTER + 0.5)
     r = (angle - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW
     z = r * r
     q = z * z
-    tail = fused(q, fused(z, S6, S5), fused(z, S4, S3))
-    sine = fused(z * r, fused(q, tail, fused(z, S2, S1)), r)
+    tail = fma(q, fma(z, S6, S5), fma(z, S4, S3))
+    sine = fma(z * r, fma(q, tail, fma(z, S2, S1)), r)
     half = 0.5 * z
     rest = 1.0 - half
-    tail = q * fused(q, fused(q, fused(z, C6, C5), fused(z, C4, C3)), fused(z, C2, C1))
+    tail = q * fma(q, fma(q, fma(z, C6, C5), fma(z, C4, C3)), fma(z, C2, C1))
     cosine = rest + (((1.0 - rest) - half) + tail)
     turned = np.int64(quarters) & 3
     odd = (turned & 1) == 1

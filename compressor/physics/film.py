@@ -107,7 +107,7 @@ def film_constants(ratio, share, number):
         quotient = [number(name, one, ratio) / each[name](one, ratio) for one in eps]
         fit = np.polynomial.Chebyshev.fit(eps, quotient, count - 1)
         found += fit.convert(kind=np.polynomial.Polynomial).coef.tolist()
-    wall = plain(kept)(1.0, share)
+    wall = plain(bounded_eccentricity)(1.0, share)
     return (*found, plain(squeeze_number)(wall, ratio, np.array(found)))
 
 
@@ -137,7 +137,7 @@ def squeeze_number(eps, b, constants):
 
 
 @jit
-def kept(eps, share):
+def bounded_eccentricity(eps, share):
     """eps up to the film's last share, and from there to the wall smoothly to its middle."""
     begin = 1.0 - share
     if eps <= begin:
@@ -163,7 +163,7 @@ def film(joint, eccentricity, spins, p):
         return 0.0, 0.0, 0.0, 0.0, 0.0
     nx, ny = (ex / distance, ey / distance) if distance > 0.0 else (1.0, 0.0)
     radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
-    eps = kept(distance / clearance, p.film_share)
+    eps = bounded_eccentricity(distance / clearance, p.film_share)
     ratio = 0.5 * p.film_length / pin
     relative = clearance / pin
     size = fade * 2.0 * p.film_length * pin * p.viscosity / (relative * relative)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import fused, inlined, jit, square_root
+from compressor.physics._jit import fma, inline_numba, jit, square_root
 from compressor.physics.elementary import direction
 
 SMALL = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
@@ -39,7 +39,7 @@ def ideal(t, p):
     return ideal_at(math.cos(theta), math.sin(theta), p)
 
 
-@inlined
+@inline_numba
 def ideal_at(cos_theta, sin_theta, p):
     """Return the ideal `Motion` at a crank angle given by its cosine and sine."""
     ratio = p.crank_ratio
@@ -56,7 +56,7 @@ def ideal_at(cos_theta, sin_theta, p):
     return Motion(cos_theta, sin_theta, sin_phi, cos_phi, rate, spin_up, x, v, a)
 
 
-@inlined
+@inline_numba
 def small_angle(angle, p):
     """Return sine and cosine of an angle (rad); up to SMALL by their series, which are exact there.
 
@@ -66,26 +66,26 @@ def small_angle(angle, p):
         return math.sin(angle), math.cos(angle)
     s = angle * angle
     q = s * s
-    sine = fused(angle * s, fused(q, fused(s, S9, S7), fused(s, S5, S3)), angle)
-    cosine = 1.0 - fused(-q, fused(q, C8, fused(s, C6, C4)), 0.5 * s)
+    sine = fma(angle * s, fma(q, fma(s, S9, S7), fma(s, S5, S3)), angle)
+    cosine = 1.0 - fma(-q, fma(q, C8, fma(s, C6, C4)), 0.5 * s)
     return sine, cosine
 
 
-@inlined
+@inline_numba
 def crank_direction(t, p):
     """Return the cosine and sine of the crank angle at time t (s)."""
     return direction(p.omega * t)
 
 
-@inlined
+@inline_numba
 def ideal_after(base, span, p):
     """Return the ideal `Motion` a time (s) after the crank angle whose (cosine, sine) is the base.
 
     A step turns the crank by little, so that these need no sine and cosine of their own.
     """
     sine, cosine = small_angle(p.omega * span, p)
-    cos_theta = fused(base[0], cosine, -(base[1] * sine))
-    return ideal_at(cos_theta, fused(base[1], cosine, base[0] * sine), p)
+    cos_theta = fma(base[0], cosine, -(base[1] * sine))
+    return ideal_at(cos_theta, fma(base[1], cosine, base[0] * sine), p)
 
 
 def exact_motion(theta, crank_radius, rod_length, omega):

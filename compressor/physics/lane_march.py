@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import fused, inlined, jit
+from compressor.physics._jit import fma, inline_numba, jit
 from compressor.physics.kinematics import SMALL, crank_direction
 from compressor.physics.lane_steps import (
     ALIVE,
@@ -99,7 +99,7 @@ class Runs(NamedTuple):
     works: Work  # each array with a first axis more, (m,)
 
 
-@inlined
+@inline_numba
 def end_of(runs, job):
     """Return when the segment ends that a run is in."""
     return runs.edges[runs.places[job, 0] + job + runs.walkers[job].segment + 1]
@@ -236,8 +236,8 @@ def sample_lane(W, j, runs, job, work):
         for i in range(runs.size.shape[1]):
             total = 0.0
             for stage in range(STAGES):
-                total = fused(work.weights[stage], W[K + (stage * STATE + i) * LANES + j], total)
-            runs.states[begin + w.sample, i] = fused(h, total, W[Z + i * LANES + j])
+                total = fma(work.weights[stage], W[K + (stage * STATE + i) * LANES + j], total)
+            runs.states[begin + w.sample, i] = fma(h, total, W[Z + i * LANES + j])
         w.sample += 1
     W[NEXT_SAMPLE + j] = next_sample(runs, job)
 
@@ -345,7 +345,7 @@ def march_side_by_side(runs: Sequence[Run], most: int) -> list[Run | None]:
     ended: list[Run | None] = [None] * len(runs)
     if not fitting:
         return ended
-    whole = gathered([runs[i] for i in fitting])
+    whole = gather_runs([runs[i] for i in fitting])
     scene = (0,) * int(runs[0].p["scene"])
     march_lanes(scene, new_lanes(), LANES, whole, np.full(LANES, -1), most)
     for k, i in enumerate(fitting):
@@ -358,7 +358,7 @@ def march_side_by_side(runs: Sequence[Run], most: int) -> list[Run | None]:
     return ended
 
 
-def gathered(runs: Sequence[Run]) -> Runs:
+def gather_runs(runs: Sequence[Run]) -> Runs:
     """Return the runs in arrays."""
     m, n = len(runs), runs[0].size.size
     records = np.array([run.p for run in runs], RECORD).view(np.recarray)

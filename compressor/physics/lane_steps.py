@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from compressor.physics._jit import borrowed, fused, inlined, jit, square_root
+from compressor.physics._jit import fma, inline_numba, jit, square_root, without_refcount
 from compressor.physics.contact_laws import Law
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.march import NODE_WEIGHTS as ALL_NODE_WEIGHTS
 from compressor.physics.march import NODES
 from compressor.physics.motion import deviating, evaluate
-from compressor.physics.observe import energies, glanced, joint_forces, powers
+from compressor.physics.observe import energies, joint_forces, observed_columns, powers
 from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import STAGES, A, C, E, Pair
 
@@ -93,7 +93,7 @@ ROW = SEEN_COUNT * LANES
 R0, R1, R2, R3, R4 = (NODE_ROWS + i * ROW for i in range(5))
 
 
-@inlined
+@inline_numba
 def record_of(scene, W, j):
     """Return the record of lane j, its scene being the length of the tuple.
 
@@ -119,29 +119,29 @@ def record_of(scene, W, j):
     )  # fmt: skip
 
 
-@inlined
-def combined(W, i, j, w):
+@inline_numba
+def combine_stages(W, i, j, w):
     """Return the number i of the state of lane j where the stages have the weights w, (7,)."""
     u = LANES * i + j
-    total = fused(w[1], W[K + 12 * LANES + u], fused(w[0], W[K + u], 0.0))
-    total = fused(w[3], W[K + 36 * LANES + u], fused(w[2], W[K + 24 * LANES + u], total))
-    total = fused(w[5], W[K + 60 * LANES + u], fused(w[4], W[K + 48 * LANES + u], total))
-    return fused(W[H + j], fused(w[6], W[K + 72 * LANES + u], total), W[Z + u])
+    total = fma(w[1], W[K + 12 * LANES + u], fma(w[0], W[K + u], 0.0))
+    total = fma(w[3], W[K + 36 * LANES + u], fma(w[2], W[K + 24 * LANES + u], total))
+    total = fma(w[5], W[K + 60 * LANES + u], fma(w[4], W[K + 48 * LANES + u], total))
+    return fma(W[H + j], fma(w[6], W[K + 72 * LANES + u], total), W[Z + u])
 
 
-@inlined
+@inline_numba
 def state_of(scene, W, j, w):
     """Return the motion of lane j where the stages have the weights w, eight numbers."""
-    y0, y1 = combined(W, 0, j, w), combined(W, 1, j, w)
-    y2, y3 = combined(W, 2, j, w), combined(W, 3, j, w)
+    y0, y1 = combine_stages(W, 0, j, w), combine_stages(W, 1, j, w)
+    y2, y3 = combine_stages(W, 2, j, w), combine_stages(W, 3, j, w)
     y4, y5, y6, y7 = 0.0, 0.0, 0.0, 0.0
     if len(scene) == 3:
-        y4, y5 = combined(W, 4, j, w), combined(W, 5, j, w)
-        y6, y7 = combined(W, 6, j, w), combined(W, 7, j, w)
+        y4, y5 = combine_stages(W, 4, j, w), combine_stages(W, 5, j, w)
+        y6, y7 = combine_stages(W, 6, j, w), combine_stages(W, 7, j, w)
     return y0, y1, y2, y3, y4, y5, y6, y7
 
 
-@inlined
+@inline_numba
 def put_rates(scene, W, j, y, d, q):
     """Write dz/dt into OUT: rates, accelerations, powers."""
     if len(scene) == 3:
@@ -174,7 +174,7 @@ def put_rates(scene, W, j, y, d, q):
         ) = q
 
 
-@inlined
+@inline_numba
 def put_seen(W, j, g, energy):
     s = SEEN + j
     W[s], W[s + 1 * LANES], W[s + 2 * LANES], W[s + 3 * LANES] = g[0], g[1], g[2], g[3]
@@ -190,7 +190,7 @@ def put_seen(W, j, g, energy):
     W[s + 16 * LANES], W[s + 17 * LANES] = energy
 
 
-@inlined
+@inline_numba
 def move(W, k, a, o):
     """Copy eight rows from o to a: constants, or LLVM takes one number at a time."""
     for j in range(k):
@@ -204,7 +204,7 @@ def move(W, k, a, o):
         W[a + 7 * LANES + j] = W[o + 7 * LANES + j]
 
 
-@inlined
+@inline_numba
 def keep(scene, W, k, a):
     move(W, k, a, OUT)
     if len(scene) == 3:
@@ -213,7 +213,7 @@ def keep(scene, W, k, a):
 
 @jit
 def keep_stage(scene, W, k, s):
-    W = borrowed(W)
+    W = without_refcount(W)
     if s == 1:
         keep(scene, W, k, K + STATE * LANES)
     elif s == 2:
@@ -228,7 +228,7 @@ def keep_stage(scene, W, k, s):
         keep(scene, W, k, K + 6 * STATE * LANES)
 
 
-@inlined
+@inline_numba
 def keep_glance(W, k, a):
     move(W, k, a, SEEN)
     move(W, k, a + 8 * LANES, SEEN + 8 * LANES)
@@ -239,7 +239,7 @@ def keep_glance(W, k, a):
 
 @jit
 def keep_seen(W, k, i):
-    W = borrowed(W)
+    W = without_refcount(W)
     if i == 1:
         keep_glance(W, k, R1)
     elif i == 2:
@@ -253,7 +253,7 @@ def keep_seen(W, k, i):
 @jit
 def stage_rates(scene, W, k, fraction, w, s):
     """dz/dt where the stages have the weights w, at a fraction of the steps: stage s."""
-    W = borrowed(W)
+    W = without_refcount(W)
     for j in range(k):
         p = record_of(scene, W, j)
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
@@ -266,34 +266,34 @@ def stage_rates(scene, W, k, fraction, w, s):
 @jit
 def look_at_node(scene, W, k, fraction, w, i):
     """What is seen at node i of the steps."""
-    W = borrowed(W)
+    W = without_refcount(W)
     for j in range(k):
         p = record_of(scene, W, j)
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
         y = state_of(scene, W, j, w)
         now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
-        put_seen(W, j, glanced(now, y, joint_forces(now, y, p), p), energies(now, y, p))
+        put_seen(W, j, observed_columns(now, y, joint_forces(now, y, p), p), energies(now, y, p))
     keep_seen(W, k, i)
 
 
 @jit
 def finish_step(scene, W, k, w):
     """State, flows and crank direction at the ends of the steps, and their errors."""
-    W = borrowed(W)
+    W = without_refcount(W)
     n = 8 if len(scene) == 3 else 4
     for j in range(k):
-        W[NEW + j], W[NEW + LANES + j] = combined(W, 0, j, w), combined(W, 1, j, w)
-        W[NEW + 2 * LANES + j] = combined(W, 2, j, w)
-        W[NEW + 3 * LANES + j] = combined(W, 3, j, w)
-        W[NEW + 4 * LANES + j] = combined(W, 4, j, w)
-        W[NEW + 5 * LANES + j] = combined(W, 5, j, w)
-        W[NEW + 6 * LANES + j] = combined(W, 6, j, w)
-        W[NEW + 7 * LANES + j] = combined(W, 7, j, w)
+        W[NEW + j], W[NEW + LANES + j] = combine_stages(W, 0, j, w), combine_stages(W, 1, j, w)
+        W[NEW + 2 * LANES + j] = combine_stages(W, 2, j, w)
+        W[NEW + 3 * LANES + j] = combine_stages(W, 3, j, w)
+        W[NEW + 4 * LANES + j] = combine_stages(W, 4, j, w)
+        W[NEW + 5 * LANES + j] = combine_stages(W, 5, j, w)
+        W[NEW + 6 * LANES + j] = combine_stages(W, 6, j, w)
+        W[NEW + 7 * LANES + j] = combine_stages(W, 7, j, w)
         if len(scene) == 3:
-            W[NEW + 8 * LANES + j] = combined(W, 8, j, w)
-            W[NEW + 9 * LANES + j] = combined(W, 9, j, w)
-            W[NEW + 10 * LANES + j] = combined(W, 10, j, w)
-            W[NEW + 11 * LANES + j] = combined(W, 11, j, w)
+            W[NEW + 8 * LANES + j] = combine_stages(W, 8, j, w)
+            W[NEW + 9 * LANES + j] = combine_stages(W, 9, j, w)
+            W[NEW + 10 * LANES + j] = combine_stages(W, 10, j, w)
+            W[NEW + 11 * LANES + j] = combine_stages(W, 11, j, w)
     for j in range(k):
         e = part_of_error(W, 1, j, part_of_error(W, 0, j, 0.0))
         e = part_of_error(W, 3, j, part_of_error(W, 2, j, e))
@@ -303,21 +303,21 @@ def finish_step(scene, W, k, w):
         W[ERROR + j] = W[H + j] * square_root(e / n)
 
 
-@inlined
+@inline_numba
 def part_of_error(W, i, j, total):
     """Return a total and the square of number i's estimated error over its tolerance and the
     step.
     """
     u, w = LANES * i + j, ERROR_WEIGHTS
-    e = fused(w[1], W[K + 12 * LANES + u], fused(w[0], W[K + u], 0.0))
-    e = fused(w[3], W[K + 36 * LANES + u], fused(w[2], W[K + 24 * LANES + u], e))
-    e = fused(w[5], W[K + 60 * LANES + u], fused(w[4], W[K + 48 * LANES + u], e))
-    e = fused(w[6], W[K + 72 * LANES + u], e)
-    e /= fused(W[RTOL + j], max(abs(W[Z + u]), abs(W[NEW + u])), W[ATOL + u])
-    return fused(e, e, total)
+    e = fma(w[1], W[K + 12 * LANES + u], fma(w[0], W[K + u], 0.0))
+    e = fma(w[3], W[K + 36 * LANES + u], fma(w[2], W[K + 24 * LANES + u], e))
+    e = fma(w[5], W[K + 60 * LANES + u], fma(w[4], W[K + 48 * LANES + u], e))
+    e = fma(w[6], W[K + 72 * LANES + u], e)
+    e /= fma(W[RTOL + j], max(abs(W[Z + u]), abs(W[NEW + u])), W[ATOL + u])
+    return fma(e, e, total)
 
 
-@inlined
+@inline_numba
 def weights_of(table, i):
     """Return the row i of a table of weights of the stages as a tuple."""
     return (

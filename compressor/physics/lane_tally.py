@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import borrowed, inlined, jit, square_root
+from compressor.physics._jit import inline_numba, jit, square_root, without_refcount
 from compressor.physics.contact_laws import in_contact
 from compressor.physics.elementary import direction, exponential, logarithm
 from compressor.physics.kinematics import SMALL
@@ -85,7 +85,7 @@ from compressor.physics.tally import NEAR as NEAR_SHARE
 from compressor.physics.tally import vertex
 
 
-@inlined
+@inline_numba
 def added_late(W, i, j, total):
     """Return the number i of what the state at the step's end is more than at its fifth stage,
     squared.
@@ -101,7 +101,7 @@ def added_late(W, i, j, total):
     return total + (change / W[SIZE + u]) ** 2
 
 
-@inlined
+@inline_numba
 def added_rate(W, i, j, total):
     """Return the same of dz/dt."""
     u = LANES * i + j
@@ -109,7 +109,7 @@ def added_rate(W, i, j, total):
     return total + (change / W[SIZE + u]) ** 2
 
 
-@inlined
+@inline_numba
 def stiffness(scene, W, j):
     """Return the step's length over what stability allows, as `step_control.stiff_rate` has it."""
     above = added_rate(W, 1, j, added_rate(W, 0, j, 0.0))
@@ -131,7 +131,7 @@ def control(scene, W, k):
 
     A lane CALLs for `march` where the next step is not a plain one.
     """
-    W = borrowed(W)
+    W = without_refcount(W)
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
         rests = W[REST + j] > 0.0
@@ -167,7 +167,7 @@ def control(scene, W, k):
         W[CALL + j] = 1.0 if call & alive else 0.0
 
 
-@inlined
+@inline_numba
 def pass_on(W, j, plain, target, source):
     """Four rows from source to target in a plain lane; both are read, or no vector code comes."""
     t, s = target + j, source + j
@@ -182,7 +182,7 @@ def pass_on(W, j, plain, target, source):
 @jit
 def move_on(scene, W, k):
     """The end of a plain lane's step is the begin of its next: state, rates, what is seen."""
-    W = borrowed(W)
+    W = without_refcount(W)
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
         pass_on(W, j, plain, Z, NEW)
@@ -212,13 +212,13 @@ TORQUE, MOMENT = 14 * LANES, 15 * LANES
 KINETIC, POTENTIAL = 16 * LANES, 17 * LANES
 
 
-@inlined
+@inline_numba
 def touches(scene, joint):
     """Return whether a joint of the scene has clearance."""
     return len(scene) == 3 or len(scene) == joint + 1
 
 
-@inlined
+@inline_numba
 def nears(W, j, column):
     """Return whether the greatest size of a column may be beaten within the step."""
     c = column * LANES + j
@@ -226,7 +226,7 @@ def nears(W, j, column):
     return (top >= NEAR_SHARE * W[PEAK + c]) & (top > 0.0)
 
 
-@inlined
+@inline_numba
 def deepens(W, j, joint):
     """Return whether the greatest penetration of a joint may be beaten within the step."""
     c = joint * LANES + j
@@ -234,7 +234,7 @@ def deepens(W, j, joint):
     return (top > 0.0) & (top >= NEAR_SHARE * W[MAX_PENETRATION + c])
 
 
-@inlined
+@inline_numba
 def changes(W, j, joint):
     """Return whether contact may begin or end at a joint within the step, as `march.may_change`."""
     c = NEARNESS + joint * LANES + j
@@ -251,7 +251,7 @@ def judge(scene, W, k):
 
     Returns whether any is.
     """
-    W = borrowed(W)
+    W = without_refcount(W)
     for j in range(k):
         near = nears(W, j, 0) | nears(W, j, 1) | nears(W, j, 2) | nears(W, j, 3)
         near = near | nears(W, j, 4) | nears(W, j, 5) | nears(W, j, 6)
@@ -272,7 +272,7 @@ def judge(scene, W, k):
     return total > 0.0
 
 
-@inlined
+@inline_numba
 def may_touch(W, j, joint):
     """Return `march.may_touch` at a joint, by all nodes."""
     c = NEARNESS + joint * LANES + j
@@ -284,7 +284,7 @@ def may_touch(W, j, joint):
 @jit
 def judge_closer(scene, W, k):
     """After a closer look at the lanes that are NEAR: they are left alone if contact may begin."""
-    W = borrowed(W)
+    W = without_refcount(W)
     for j in range(k):
         near = W[NEAR + j] > 0.0
         touch = False
@@ -297,7 +297,7 @@ def judge_closer(scene, W, k):
         W[NEAR + j] = 1.0 if near & (not touch) else 0.0
 
 
-@inlined
+@inline_numba
 def rises(a, b, c, d, e, fine):
     """As `tally.peak_of`: the top of the nodes' values and of the parabola through the best."""
     top = max(max(a, e), c)
@@ -316,8 +316,8 @@ def rises(a, b, c, d, e, fine):
     return top, vertex(left, right, before, here, after)
 
 
-@inlined
-def passed(touching, flown, impacts, releases, normal, depth, counts, measured):
+@inline_numba
+def count_events(touching, flown, impacts, releases, normal, depth, counts, measured):
     """Return the touching, flown, impacts and releases after a node, if it counts."""
     now = in_contact(normal)
     off = flown | (depth < 0.0)
@@ -329,26 +329,26 @@ def passed(touching, flown, impacts, releases, normal, depth, counts, measured):
     return touching, flown, impacts, releases
 
 
-@inlined
+@inline_numba
 def tally_joint(W, j, joint, plain, fine, measured):
     """Contact loss, impacts, releases and penetration of a step at one joint."""
     c = joint * LANES + j
     d, n, x = PENETRATION + c, NORMAL + c, NEARNESS + c
     touching, flown = W[TOUCHING + c] > 0.0, W[FLOWN + c] > 0.0
     hits, leaves = W[IMPACTS + c], W[RELEASES + c]
-    touching, flown, hits, leaves = passed(
+    touching, flown, hits, leaves = count_events(
         touching, flown, hits, leaves, W[R0 + n], W[R0 + d], True, measured
     )
-    touching, flown, hits, leaves = passed(
+    touching, flown, hits, leaves = count_events(
         touching, flown, hits, leaves, W[R1 + n], W[R1 + d], fine, measured
     )
-    touching, flown, hits, leaves = passed(
+    touching, flown, hits, leaves = count_events(
         touching, flown, hits, leaves, W[R2 + n], W[R2 + d], True, measured
     )
-    touching, flown, hits, leaves = passed(
+    touching, flown, hits, leaves = count_events(
         touching, flown, hits, leaves, W[R3 + n], W[R3 + d], fine, measured
     )
-    touching, flown, hits, leaves = passed(
+    touching, flown, hits, leaves = count_events(
         touching, flown, hits, leaves, W[R4 + n], W[R4 + d], True, measured
     )
     W[TOUCHING + c] = (1.0 if touching else 0.0) if plain else W[TOUCHING + c]
@@ -367,8 +367,8 @@ def tally_joint(W, j, joint, plain, fine, measured):
     W[LOSS_SECONDS + c] += more if plain & measured else 0.0
 
 
-@inlined
-def squared(W, c, total, h, fine):
+@inline_numba
+def add_squares(W, c, total, h, fine):
     """Return the square of a column added to a total at the nodes, by their weights."""
     b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
     total += h * (F0 if fine else G0) * W[R0 + c] ** 2
@@ -378,8 +378,8 @@ def squared(W, c, total, h, fine):
     return total + h * (F4 if fine else G4) * W[R4 + c] ** 2
 
 
-@inlined
-def integrated(W, c, total, h, fine):
+@inline_numba
+def add_integral(W, c, total, h, fine):
     """Return a column added to a total at the nodes, by their weights."""
     b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
     total += h * (F0 if fine else G0) * W[R0 + c]
@@ -392,7 +392,7 @@ def integrated(W, c, total, h, fine):
 @jit
 def tally_lanes(scene, W, k):
     """Tally the steps of plain lanes: as `tally_energy` and `tally_step`."""
-    W = borrowed(W)
+    W = without_refcount(W)
     f = (8 if len(scene) == 3 else 4) * LANES
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
@@ -416,10 +416,10 @@ def tally_lanes(scene, W, k):
         fine = W[NEAR + j] > 0.0
         h = W[H + j] if counts else 0.0
         W[SECONDS + j] += h
-        W[SQUARE_ACCELERATION + j] = squared(W, j, W[SQUARE_ACCELERATION + j], h, fine)
-        W[SQUARE_DEVIATION + j] = squared(W, DEVIATION + j, W[SQUARE_DEVIATION + j], h, fine)
-        W[TORQUE_SUM + j] = integrated(W, TORQUE + j, W[TORQUE_SUM + j], h, fine)
-        W[MOMENT_SUM + j] = integrated(W, MOMENT + j, W[MOMENT_SUM + j], h, fine)
+        W[SQUARE_ACCELERATION + j] = add_squares(W, j, W[SQUARE_ACCELERATION + j], h, fine)
+        W[SQUARE_DEVIATION + j] = add_squares(W, DEVIATION + j, W[SQUARE_DEVIATION + j], h, fine)
+        W[TORQUE_SUM + j] = add_integral(W, TORQUE + j, W[TORQUE_SUM + j], h, fine)
+        W[MOMENT_SUM + j] = add_integral(W, MOMENT + j, W[MOMENT_SUM + j], h, fine)
     for column in range(PEAKED):
         o = column * LANES
         for j in range(k):

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import merged
+from compressor.physics._jit import inline_llvm
 from compressor.physics.kinematics import angle_at
 from compressor.physics.record import Load, derive
 
@@ -19,7 +19,7 @@ SPRING = int(Load.SPRING)
 EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
 
 
-@merged
+@inline_llvm
 def gas_force(phase, x, p):
     """Return the gas force (N) with the crosshead at x (m): Eq. 6, isentropic, less the back
     pressure.
@@ -38,7 +38,7 @@ def gas_force(phase, x, p):
     return force * (full / space) ** p.gas_exponent - p.back_force
 
 
-@merged
+@inline_llvm
 def spring_force(phase, x, v, deviation, deviation_rate, p):
     """Return the spring force (N) between piston and cam follower: Eq. 8-10, with the cam closed.
 
@@ -57,7 +57,7 @@ def spring_force(phase, x, v, deviation, deviation_rate, p):
     return p.preload + p.spring_stiffness * shortening + p.spring_damping * rate
 
 
-@merged
+@inline_llvm
 def piston_force(phase, x, v, deviation, deviation_rate, p):
     """Return the piston force (N), positive towards the crank, of the record's load."""
     if p.load == SPRING:

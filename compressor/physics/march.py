@@ -19,7 +19,13 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import borrowed, by_kind, jit, merged, square_root
+from compressor.physics._jit import (
+    dispatch_on_record,
+    inline_llvm,
+    jit,
+    square_root,
+    without_refcount,
+)
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
 from compressor.physics.mechanism_rows import wear_at
@@ -50,8 +56,8 @@ from compressor.physics.step_control import (
     REST,
     Mode,
     choose_method,
-    controlled,
     first_step,
+    next_step_length,
     refuse,
 )
 from compressor.physics.systems import (
@@ -185,7 +191,7 @@ def wear_by_step(w, base, h, z, work, phase, p, tally):
         wear_at(ideal_after(base, NODES[i] * h, p), work.y, phase, WEIGHTS[i] * h, p, tally)
 
 
-wear_step = by_kind(MECHANISM, wear_by_step, nothing_worn)
+wear_step = dispatch_on_record(MECHANISM, wear_by_step, nothing_worn)
 
 
 MIDDLE = NODES.size // 2
@@ -195,7 +201,7 @@ rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
 rosenbrock_extend = rosenbrock.extend
 
 
-@merged
+@inline_llvm
 def attempt(w, base, h, z, work, atol, size, phase, p):
     """Take a step of length h by the walker's present method; returns its error norm."""
     if w.stiff:
@@ -211,7 +217,7 @@ def attempt(w, base, h, z, work, atol, size, phase, p):
     return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
 
 
-@merged
+@inline_llvm
 def may_change(rows, p):
     """Return whether contact may begin or end within a step, by the nearness at its ends and
     middle.
@@ -229,7 +235,7 @@ def may_change(rows, p):
     return False
 
 
-@merged
+@inline_llvm
 def may_touch(rows, p):
     """Return whether contact may begin within a step, by the nearness at its nodes.
 
@@ -247,7 +253,7 @@ def may_touch(rows, p):
     return False
 
 
-@merged
+@inline_llvm
 def look_at_step(w, base, h, z, work, phase, p, tally):
     """Observe the step's interpolant at its nodes; returns every which one.
 
@@ -288,7 +294,7 @@ def look_at_step(w, base, h, z, work, phase, p, tally):
     return every
 
 
-@merged
+@inline_llvm
 def onset_ahead(w, h, every, work, phase, p):
     """Return whether contact begins within the step just taken; it is then to be taken again, to
     there.
@@ -308,7 +314,7 @@ def onset_ahead(w, h, every, work, phase, p):
     return found
 
 
-@merged
+@inline_llvm
 def sample_grid(w, t_end, h, z, work, times, states):
     """Fill the output samples up to t_end.
 
@@ -324,7 +330,7 @@ def sample_grid(w, t_end, h, z, work, times, states):
         w.sample += 1
 
 
-@merged
+@inline_llvm
 def measure_apart(w, h, every, work, phase, p):
     """Write the share of a step that each joint is without contact.
 
@@ -347,7 +353,7 @@ def measure_apart(w, h, every, work, phase, p):
         work.apart[joint] = apart
 
 
-@merged
+@inline_llvm
 def take_in(w, h, every, work, phase, p, tally):
     """Tally an accepted step that has been looked at, and audit its energy."""
     last = NODES.size - 1
@@ -363,7 +369,7 @@ def take_in(w, h, every, work, phase, p, tally):
     tally_step(h, NODES, weights, work.rows, every, work.apart, measured, tally, p)
 
 
-@merged
+@inline_llvm
 def land(w, h, work, phase, p, tally):
     """Note that a step of length h has ended on an onset; whether joints carry new speeds."""
     w.landing = 0.0
@@ -381,7 +387,7 @@ def finite(new):
     return math.isfinite(total)
 
 
-@merged
+@inline_llvm
 def advance(w, z, work, reached, fresh, at_edge, segments):
     """Move the walker to the end of the step that was taken, and into the next segment.
 
@@ -400,7 +406,7 @@ def advance(w, z, work, reached, fresh, at_edge, segments):
             w.status = DONE
 
 
-@merged
+@inline_llvm
 def stop_beyond(w, z, tally, p):
     """Stop a walker whose motion has left what the model describes."""
     if tally.deepest > w.deepest:
@@ -421,12 +427,13 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
     metrics. z, w, work, states and tally are written.
     """
     work = Work(
-        borrowed(work.k), borrowed(work.new), borrowed(work.column), borrowed(work.jacobian),
-        borrowed(work.dense), borrowed(work.weights), borrowed(work.y), borrowed(work.rows),
-        borrowed(work.apart), borrowed(work.row),
+        without_refcount(work.k), without_refcount(work.new), without_refcount(work.column),
+        without_refcount(work.jacobian), without_refcount(work.dense),
+        without_refcount(work.weights), without_refcount(work.y), without_refcount(work.rows),
+        without_refcount(work.apart), without_refcount(work.row),
     )  # fmt: skip
-    z, atol, size = borrowed(z), borrowed(atol), borrowed(size)
-    times, states = borrowed(times), borrowed(states)
+    z, atol, size = without_refcount(z), without_refcount(atol), without_refcount(size)
+    times, states = without_refcount(times), without_refcount(states)
     for _ in range(limit):
         if w.status != RUNNING:
             return
@@ -451,7 +458,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
                 if w.h < LEAST_STEP * (w.t + 1.0 / p.omega):
                     w.status = STEP_UNDERFLOW if finite(work.k[0]) else NON_FINITE
                 continue
-            longer = controlled(w, h, error)
+            longer = next_step_length(w, h, error)
             w.h = max(w.h, longer) if h < w.h else longer
         every = look_at_step(w, base, h, z, work, phase, p, tally)
         met = landing and land(w, h, work, phase, p, tally)
@@ -487,7 +494,7 @@ def separation(t, y, other, p, rows):
     return worst
 
 
-@merged
+@inline_llvm
 def follow(w, fellow, twin, work, atol, size, phase, p):
     """Take the step that a walker took, from fellow.t on, in the twin's motion."""
     if fellow.fresh:
@@ -500,7 +507,7 @@ def follow(w, fellow, twin, work, atol, size, phase, p):
     fellow.fresh = w.fresh
 
 
-@merged
+@inline_llvm
 def meet(w, z, twin, work, phase, p):
     """Have the twin's contacts carry the speeds at which they meet where the first motion's do."""
     n = work.y.size

@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import fused, jit, square_root
+from compressor.physics._jit import fma, jit, square_root
 from compressor.physics.contact import NO_CONTACT, Contact, carried_by, joint_contact
 from compressor.physics.contact_laws import power, rise
 from compressor.physics.film import film
@@ -68,7 +68,7 @@ FIRST, MOMENT, PRODUCT = integrals()
 
 
 @jit
-def summed(row, begin, end, q):
+def dot_rows(row, begin, end, q):
     """Return the sum of a row of numbers times those of q, from begin to end."""
     total = 0.0
     for i in range(begin, end):
@@ -85,17 +85,17 @@ def add_rod(axes, spin, q, rates, p, mass, force):
     """
     ux, uy, vx, vy = axes
     m, length = p.rod_mass, p.rod_length
-    along = m * (p.rod_centre + summed(FIRST, ACROSS, MODES, q))
-    across = m * summed(FIRST, 0, ACROSS, q)
-    along_rate = m * summed(FIRST, ACROSS, MODES, rates)
-    across_rate = m * summed(FIRST, 0, ACROSS, rates)
+    along = m * (p.rod_centre + dot_rows(FIRST, ACROSS, MODES, q))
+    across = m * dot_rows(FIRST, 0, ACROSS, q)
+    along_rate = m * dot_rows(FIRST, ACROSS, MODES, rates)
+    across_rate = m * dot_rows(FIRST, 0, ACROSS, rates)
     polar = p.rod_inertia + m * p.rod_centre * p.rod_centre
-    polar += 2.0 * m * length * summed(MOMENT, ACROSS, MODES, q)
-    swelling = m * length * summed(MOMENT, ACROSS, MODES, rates)  # half the polar inertia's rate
+    polar += 2.0 * m * length * dot_rows(MOMENT, ACROSS, MODES, q)
+    swelling = m * length * dot_rows(MOMENT, ACROSS, MODES, rates)  # half the polar inertia's rate
     for i in range(MODES):
         begin, end = (0, ACROSS) if i < ACROSS else (ACROSS, MODES)
-        polar += m * q[i] * summed(PRODUCT[i], begin, end, q)
-        swelling += m * q[i] * summed(PRODUCT[i], begin, end, rates)
+        polar += m * q[i] * dot_rows(PRODUCT[i], begin, end, q)
+        swelling += m * q[i] * dot_rows(PRODUCT[i], begin, end, rates)
     mass[1, 1], mass[2, 2], mass[3, 3] = m, m, polar
     mass[1, 3] = mass[3, 1] = along * vx - across * ux
     mass[2, 3] = mass[3, 2] = along * vy - across * uy
@@ -116,14 +116,14 @@ def add_modes(axes, spin, q, rates, p, mass, force):
     for i in range(MODES):
         if i < ACROSS:
             x, y, begin, end, others, last = vx, vy, 0, ACROSS, ACROSS, MODES
-            arm = p.rod_length * MOMENT[i] + summed(PRODUCT[i], others, last, q)
-            turning = spin * summed(PRODUCT[i], begin, end, q)
-            turning -= 2.0 * summed(PRODUCT[i], others, last, rates)
+            arm = p.rod_length * MOMENT[i] + dot_rows(PRODUCT[i], others, last, q)
+            turning = spin * dot_rows(PRODUCT[i], begin, end, q)
+            turning -= 2.0 * dot_rows(PRODUCT[i], others, last, rates)
         else:
             x, y, begin, end, others, last = ux, uy, ACROSS, MODES, 0, ACROSS
-            arm = -summed(PRODUCT[i], others, last, q)
-            turning = spin * (p.rod_length * MOMENT[i] + summed(PRODUCT[i], begin, end, q))
-            turning += 2.0 * summed(PRODUCT[i], others, last, rates)
+            arm = -dot_rows(PRODUCT[i], others, last, q)
+            turning = spin * (p.rod_length * MOMENT[i] + dot_rows(PRODUCT[i], begin, end, q))
+            turning += 2.0 * dot_rows(PRODUCT[i], others, last, rates)
         row = 4 + i
         mass[1, row] = mass[row, 1] = m * FIRST[i] * x
         mass[2, row] = mass[row, 2] = m * FIRST[i] * y
@@ -230,7 +230,7 @@ def corner_force(penetration, rate, lever, p):
         damping = elastic * p.guide_hysteresis / speed
     else:
         damping = p.guide_damping * rise(penetration * p.per_guide_full_damping)
-    return max(0.0, fused(damping, rate, elastic)), elastic
+    return max(0.0, fma(damping, rate, elastic)), elastic
 
 
 @jit
@@ -407,7 +407,7 @@ def fill_bias(pose, rates, p, bias):
 
 
 @jit
-def oiled(joint, contact, eccentricity, spins, p):
+def oiled_contact(joint, contact, eccentricity, spins, p):
     """Return a joint's `Contact` with its film's force and moment on the rod, and the `Film`."""
     if p.viscosity == 0.0:
         return contact, NO_FILM
@@ -424,7 +424,7 @@ def bore_axes(slope, modes, pose, p):
     """Return the cosine and sine of a bore's angle, counter-clockwise, by the slope of the rod's
     end there.
     """
-    turned = summed(slope, 0, MODES, modes) / p.rod_length
+    turned = dot_rows(slope, 0, MODES, modes) / p.rod_length
     c, s = math.cos(turned), math.sin(turned)
     return pose.cos_phi * c + pose.sin_phi * s, pose.cos_phi * s - pose.sin_phi * c
 
@@ -442,8 +442,8 @@ def touching(joint, eccentricity, axes, spins, carried, p):
 def joints_of(phase, y, motion, pose, w, velocity, p):
     """Return the `Joints` at a state; w: coordinates, (11,); velocity: of the bodies, (11,)."""
     n, modes = p.freedoms, velocity[4:8]
-    big_spin = pose.spin + summed(BIG_SLOPE, 0, MODES, modes) / p.rod_length
-    small_spin = pose.spin + summed(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
+    big_spin = pose.spin + dot_rows(BIG_SLOPE, 0, MODES, modes) / p.rod_length
+    small_spin = pose.spin + dot_rows(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
     pin_spin = velocity[10]
     big, small = NO_CONTACT, NO_CONTACT
     big_film, small_film = NO_FILM, NO_FILM
@@ -454,7 +454,7 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         spins = pose.speed, big_spin
         axes = bore_axes(BIG_SLOPE, w[7:11], pose, p)
         big = touching(BIG_END, off, axes, spins, kept, p)
-        big, big_film = oiled(BIG_END, big, off, spins, p)
+        big, big_film = oiled_contact(BIG_END, big, off, spins, p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
         off = y[place], y[place + 1], y[n + place], y[n + place + 1]
@@ -462,7 +462,7 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         spins = pin_spin, small_spin
         axes = bore_axes(SMALL_SLOPE, w[7:11], pose, p)
         small = touching(SMALL_END, off, axes, spins, kept, p)
-        small, small_film = oiled(SMALL_END, small, off, spins, p)
+        small, small_film = oiled_contact(SMALL_END, small, off, spins, p)
     guide = UNGUIDED
     if p.tilting:
         rates = velocity[8], velocity[9], velocity[10]

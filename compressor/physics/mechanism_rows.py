@@ -19,9 +19,9 @@ from compressor.physics.mechanism import (
     SMALL_SLOPE,
     bore_axes,
     corner_depth,
+    dot_rows,
     material_work,
     motor_torque,
-    summed,
 )
 from compressor.physics.mechanism_motion import solve
 from compressor.physics.observe import (
@@ -142,15 +142,15 @@ def write_energies(now, p, row):
     pose, joints, modes = now.pose, now.joints, now.w[7:11]
     kinetic = 0.0
     for i in range(ROWS):
-        kinetic += 0.5 * now.velocity[i] * summed(now.mass[i], 0, ROWS, now.velocity)
+        kinetic += 0.5 * now.velocity[i] * dot_rows(now.mass[i], 0, ROWS, now.velocity)
     row[KINETIC] = kinetic
     stored = joints.guide.stored + 0.5 * material_work(modes, modes, p)
     big, small = joints.big, joints.small
     stored += elastic_energy(big.elastic, big.penetration, p.stiffness[0], p.clearance[0], p)
     stored += elastic_energy(small.elastic, small.penetration, p.stiffness[1], p.clearance[1], p)
-    along = p.rod_centre + summed(FIRST, ACROSS, MODES, modes)
+    along = p.rod_centre + dot_rows(FIRST, ACROSS, MODES, modes)
     height = p.crank_radius * pose.sin_theta - now.w[2] - along * pose.sin_phi
-    height += summed(FIRST, 0, ACROSS, modes) * pose.cos_phi
+    height += dot_rows(FIRST, 0, ACROSS, modes) * pose.cos_phi
     weight = p.rod_mass * height + p.reciprocating_mass * pose.height
     row[POTENTIAL] = stored + p.gravity * (weight + p.unbalance * pose.sin_theta)
 

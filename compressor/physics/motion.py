@@ -13,7 +13,7 @@ nanometre keeps its digits.
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import fused, inlined, jit, merged
+from compressor.physics._jit import fma, inline_llvm, inline_numba, jit
 from compressor.physics.contact import (
     LUGRE,
     NO_CONTACT,
@@ -43,68 +43,68 @@ class Turn(NamedTuple):
     ds_rate: float
 
 
-@merged
-def turned(motion, eta, eta_rate, p):
+@inline_llvm
+def rod_turn(motion, eta, eta_rate, p):
     """Return `Turn` of the rod from the ideal angle phi by the deviation eta, without
     cancellation.
     """
     sin_half, cos_half = small_angle(0.5 * eta, p)
-    dc = -2.0 * sin_half * fused(motion.sin_phi, cos_half, motion.cos_phi * sin_half)
-    ds = 2.0 * sin_half * fused(motion.cos_phi, cos_half, -(motion.sin_phi * sin_half))
-    dc_rate = -fused(ds, motion.rate, (motion.sin_phi + ds) * eta_rate)
-    ds_rate = fused(dc, motion.rate, (motion.cos_phi + dc) * eta_rate)
+    dc = -2.0 * sin_half * fma(motion.sin_phi, cos_half, motion.cos_phi * sin_half)
+    ds = 2.0 * sin_half * fma(motion.cos_phi, cos_half, -(motion.sin_phi * sin_half))
+    dc_rate = -fma(ds, motion.rate, (motion.sin_phi + ds) * eta_rate)
+    ds_rate = fma(dc, motion.rate, (motion.cos_phi + dc) * eta_rate)
     return Turn(dc, ds, dc_rate, ds_rate)
 
 
-@merged
+@inline_llvm
 def eccentricity_big_end(y, turn, p):
     """Return the journal centre less bore centre at the big end and its rate, small end ideal
     (m, m/s).
     """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
-    return fused(length, dc, -y[0]), -length * ds, fused(length, dc_rate, -y[2]), -length * ds_rate
+    return fma(length, dc, -y[0]), -length * ds, fma(length, dc_rate, -y[2]), -length * ds_rate
 
 
-@merged
+@inline_llvm
 def eccentricity_small_end(y, turn, p):
     """Return the journal centre less bore centre at the small end and its rate, big end ideal
     (m, m/s).
     """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
-    return fused(-length, dc, y[0]), length * ds, fused(-length, dc_rate, y[2]), length * ds_rate
+    return fma(-length, dc, y[0]), length * ds, fma(-length, dc_rate, y[2]), length * ds_rate
 
 
-@merged
+@inline_llvm
 def eccentricities_both(y, turn, p):
     """Return the same at the big end, then the small end, of a rod that is free in the plane."""
     dc, ds, dc_rate, ds_rate = turn
     a = p.rod_centre
     b = p.rod_length - a
     big = (
-        fused(a, dc, -y[1]),
-        fused(-a, ds, -y[2]),
-        fused(a, dc_rate, -y[5]),
-        fused(-a, ds_rate, -y[6]),
+        fma(a, dc, -y[1]),
+        fma(-a, ds, -y[2]),
+        fma(a, dc_rate, -y[5]),
+        fma(-a, ds_rate, -y[6]),
     )
     small = (
-        fused(-b, dc, y[0] - y[1]),
-        fused(b, ds, -y[2]),
-        fused(-b, dc_rate, y[4] - y[5]),
-        fused(b, ds_rate, -y[6]),
+        fma(-b, dc, y[0] - y[1]),
+        fma(b, ds, -y[2]),
+        fma(-b, dc_rate, y[4] - y[5]),
+        fma(b, ds_rate, -y[6]),
     )
     return big, small
 
 
-@merged
+@inline_llvm
 def load_force(phase, y, motion, p):
     """Return the piston force (N) in the state y around the ideal motion."""
     n = p.freedoms
     return piston_force(phase, motion.x + y[0], motion.v + y[n], y[0], y[n], p)
 
 
-@merged
+@inline_llvm
 def solve_big_end(y, motion, turn, load, contact, p):
     """Return accelerations (x, phi) of the rod hung on the crosshead and struck at the big end."""
     sin_phi = motion.sin_phi + turn.ds
@@ -115,21 +115,21 @@ def solve_big_end(y, motion, turn, load, contact, p):
     mass = p.reciprocating_mass + p.rod_mass
     inertia = p.rod_inertia + p.rod_mass * b * b
     push = contact.fx - load - p.rod_mass * b * cos_phi * rate * rate
-    moment = p.rod_length * fused(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
+    moment = p.rod_length * fma(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
     moment -= p.rod_mass * p.gravity * b * cos_phi
-    per_determinant = 1.0 / fused(mass, inertia, -(coupling * coupling))
-    a = fused(inertia, push, -(coupling * moment)) * per_determinant
-    spin_up = fused(mass, moment, -(coupling * push)) * per_determinant
+    per_determinant = 1.0 / fma(mass, inertia, -(coupling * coupling))
+    a = fma(inertia, push, -(coupling * moment)) * per_determinant
+    spin_up = fma(mass, moment, -(coupling * push)) * per_determinant
     return a, spin_up
 
 
-@merged
+@inline_llvm
 def solve_small_end(motion, turn, load, contact, p):
     """Return accelerations (x, phi) of the rod hung on the crankpin and struck at the small end."""
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
     a = (-load - contact.fx) * p.per_reciprocating_mass
-    moment = -p.rod_length * fused(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
+    moment = -p.rod_length * fma(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
     pin = p.crank_radius * p.omega * p.omega  # the crankpin's centripetal acceleration
     carried = pin * (sin_phi * motion.cos_theta + cos_phi * motion.sin_theta)
     moment += p.rod_mass * p.rod_centre * (p.gravity * cos_phi - carried)
@@ -137,7 +137,7 @@ def solve_small_end(motion, turn, load, contact, p):
     return a, moment / inertia
 
 
-@merged
+@inline_llvm
 def solve_both(motion, turn, load, big, small, p):
     """Return the accelerations (x, X, Y, phi) of a rod between two clearance joints."""
     sin_phi = motion.sin_phi + turn.ds
@@ -146,13 +146,13 @@ def solve_both(motion, turn, load, big, small, p):
     per_mass = p.per_rod_mass
     centre_x = (big.fx + small.fx) * per_mass
     centre_y = (big.fy + small.fy) * per_mass - p.gravity
-    moment = p.rod_centre * fused(cos_phi, big.fy, sin_phi * big.fx)
-    moment -= (p.rod_length - p.rod_centre) * fused(cos_phi, small.fy, sin_phi * small.fx)
+    moment = p.rod_centre * fma(cos_phi, big.fy, sin_phi * big.fx)
+    moment -= (p.rod_length - p.rod_centre) * fma(cos_phi, small.fy, sin_phi * small.fx)
     moment -= big.moment + small.moment
     return a, centre_x, centre_y, moment * p.per_rod_inertia
 
 
-@inlined
+@inline_numba
 def contact_big_end(y, motion, turn, p):
     """Return `joint_contact` of the big end in scene big_end."""
     big = eccentricity_big_end(y, turn, p)
@@ -161,7 +161,7 @@ def contact_big_end(y, motion, turn, p):
     return joint_contact(big, spins, bearing, carried_by(AT_BIG_END, y, p), p)
 
 
-@inlined
+@inline_numba
 def contact_small_end(y, motion, turn, p):
     """Return `joint_contact` of the small end in scene small_end."""
     small = eccentricity_small_end(y, turn, p)
@@ -170,7 +170,7 @@ def contact_small_end(y, motion, turn, p):
     return joint_contact(small, spins, bearing, carried_by(AT_SMALL_END, y, p), p)
 
 
-@inlined
+@inline_numba
 def contacts_both(y, motion, turn, p):
     """Return `joint_contact` of the big end and of the small end in scene both."""
     big, small = eccentricities_both(y, turn, p)
@@ -182,7 +182,7 @@ def contacts_both(y, motion, turn, p):
     return at_big, at_small
 
 
-@merged
+@inline_llvm
 def ideal_centre_acceleration(motion, p):
     """Return the acceleration (m/s^2) of the rod's centre in the ideal motion, x and y."""
     pin = p.crank_radius * p.omega * p.omega
@@ -206,14 +206,14 @@ class Instant(NamedTuple):
     centre_y: float
 
 
-@inlined
+@inline_numba
 def evaluate(motion, y, phase, p):
     """Return the `Instant` of a state around the ideal motion, in the load's phase.
 
     motion: `Motion` at the time; y: zeros (4) in the ideal scene.
     """
     n = p.freedoms
-    turn = turned(motion, y[n - 1], y[2 * n - 1], p)
+    turn = rod_turn(motion, y[n - 1], y[2 * n - 1], p)
     load = load_force(phase, y, motion, p)
     big = NO_CONTACT
     small = NO_CONTACT
@@ -233,7 +233,7 @@ def evaluate(motion, y, phase, p):
     return Instant(motion, turn, load, big, small, a, spin_up, centre_x, centre_y)
 
 
-@inlined
+@inline_numba
 def deviating(now, p):
     """Return the accelerations (x, X, Y, phi) at an evaluated instant less the ideal motion's.
 
@@ -246,7 +246,7 @@ def deviating(now, p):
     return now.a - now.motion.a, x, y, now.spin_up - now.motion.spin_up
 
 
-@inlined
+@inline_numba
 def write_carried_rates(now, y, p, out):
     """Write the rates of what contacts carry: an approach speed stays until the bodies meet again.
 
@@ -261,7 +261,7 @@ def write_carried_rates(now, y, p, out):
             out[place + 3] = bristle_rate(now.small.slip, y[place + 3], p)
 
 
-@inlined
+@inline_numba
 def write_derivative(now, y, p, out):
     """Write dy/dt at an evaluated instant into out."""
     n = p.freedoms

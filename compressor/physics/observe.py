@@ -7,7 +7,7 @@ The right-hand side records nothing. `observe` writes one row of quantities; the
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import inlined, jit, merged, square_root
+from compressor.physics._jit import inline_llvm, inline_numba, jit, square_root
 from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
@@ -16,7 +16,7 @@ from compressor.physics.motion import (
     eccentricity_big_end,
     eccentricity_small_end,
     evaluate,
-    turned,
+    rod_turn,
     write_derivative,
 )
 from compressor.physics.record import Scene
@@ -94,10 +94,10 @@ def eccentricity_row(y, turn, p, row):
 def write_eccentricities(t, y, p, row):
     """Write both eccentricities (m) at a time (s) and state into the row."""
     n = p.freedoms
-    eccentricity_row(y, turned(ideal(t, p), y[n - 1], y[2 * n - 1], p), p, row)
+    eccentricity_row(y, rod_turn(ideal(t, p), y[n - 1], y[2 * n - 1], p), p, row)
 
 
-@inlined
+@inline_numba
 def centre_velocity(now, y, p):
     """Return the rod centre's velocity (m/s), x and y, and its height (m)."""
     motion = now.motion
@@ -119,7 +119,7 @@ def centre_velocity(now, y, p):
     return vx, vy, height - c * now.turn.ds
 
 
-@inlined
+@inline_numba
 def centre_acceleration(now, y, p):
     """Return rod centre's acceleration (m/s^2), x and y, of a rod that hangs on an ideal joint."""
     motion = now.motion
@@ -136,7 +136,7 @@ def centre_acceleration(now, y, p):
     return ax, c * (sin_phi * rate * rate - cos_phi * now.spin_up) - pin * motion.sin_theta
 
 
-@inlined
+@inline_numba
 def joint_forces(now, y, p):
     """Return the forces on the rod at both joints: the contact's, or by inverse dynamics at an
     ideal joint.
@@ -164,7 +164,7 @@ def joint_forces(now, y, p):
     return big_x, up - small_y, small_x, small_y
 
 
-@merged
+@inline_llvm
 def damping_power(contact):
     """Return the power (W) a contact loses in its normal direction, the clamp's included; never
     negative.
@@ -172,7 +172,7 @@ def damping_power(contact):
     return (contact.normal - contact.elastic) * contact.rate
 
 
-@inlined
+@inline_numba
 def torque_and_moment(now, y, forces, p):
     """Return the torque (N m) that drives the crank, and moment of the crosshead on its guide.
 
@@ -189,7 +189,7 @@ def torque_and_moment(now, y, forces, p):
     return torque, moment
 
 
-@inlined
+@inline_numba
 def powers(now, y, forces, p):
     """Return the four powers (W): of crank and load, lost to damping and friction."""
     motion, big, small = now.motion, now.big, now.small
@@ -202,13 +202,13 @@ def powers(now, y, forces, p):
     return turning, pressing, damping, -big.friction * big.slip - small.friction * small.slip
 
 
-@inlined
+@inline_numba
 def write_powers(now, y, forces, p, out):
     """Write the four `powers` (W) into out[0:4]."""
     out[0], out[1], out[2], out[3] = powers(now, y, forces, p)
 
 
-@inlined
+@inline_numba
 def energies(now, y, p):
     """Return the kinetic and potential energy (J)."""
     v = now.motion.v + y[p.freedoms]
@@ -222,8 +222,8 @@ def energies(now, y, p):
     return 0.5 * kinetic, potential + p.rod_mass * p.gravity * height
 
 
-@inlined
-def glanced(now, y, forces, p):
+@inline_numba
+def observed_columns(now, y, forces, p):
     """Return the columns from ACCELERATION to GUIDE_MOMENT."""
     big, small = now.big, now.small
     torque, moment = torque_and_moment(now, y, forces, p)
@@ -237,15 +237,15 @@ def glanced(now, y, forces, p):
     )  # fmt: skip
 
 
-@inlined
+@inline_numba
 def write_glanced(now, y, forces, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT into the row."""
-    columns = glanced(now, y, forces, p)
+    columns = observed_columns(now, y, forces, p)
     for i in range(CRANK_POWER - ACCELERATION):
         row[ACCELERATION + i] = columns[i]
 
 
-@inlined
+@inline_numba
 def write_gauged(now, y, forces, p, row):
     """Write the columns from ACCELERATION on into the row."""
     write_glanced(now, y, forces, p, row)
@@ -271,14 +271,14 @@ def observe(t, y, phase, p, row):
     row[PACE] = 1.0
 
 
-@merged
+@inline_llvm
 def glance(motion, y, phase, p, row):
     """The columns from ACCELERATION to GUIDE_MOMENT: what a step is tallied by within its ends."""
     now = evaluate(motion, y, phase, p)
     write_glanced(now, y, joint_forces(now, y, p), p, row)
 
 
-@merged
+@inline_llvm
 def gauge(motion, y, phase, p, row):
     """The columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     now = evaluate(motion, y, phase, p)
@@ -298,7 +298,7 @@ def derivative_with_flows(t, z, phase, p, out):
     write_flowing_derivative(ideal(t, p), z, phase, p, out)
 
 
-@merged
+@inline_llvm
 def write_flowing_derivative(motion, z, phase, p, out):
     """`derivative_with_flows` around an ideal motion that is known, written into its caller."""
     n = z.size - 4
@@ -308,7 +308,7 @@ def write_flowing_derivative(motion, z, phase, p, out):
     write_powers(now, y, joint_forces(now, y, p), p, out[n:])
 
 
-@merged
+@inline_llvm
 def derivative_and_gauge(motion, z, phase, p, out, row):
     """`derivative_with_flows` and `gauge` from one evaluation."""
     n = z.size - 4

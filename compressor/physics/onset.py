@@ -6,7 +6,7 @@ turns positive. Both are watched on the step's interpolant while F_N = 0. Where 
 step goes on; how much of it was without contact is told to the metrics.
 """
 
-from compressor.physics._jit import jit, merged
+from compressor.physics._jit import inline_llvm, jit
 from compressor.physics.contact import nearness
 from compressor.physics.observe import PENETRATION
 from compressor.physics.runge_kutta import interpolate
@@ -164,7 +164,7 @@ def meeting(joint, t, y, phase, p, rates, before):
     return now.penetration, contact_at(joint, t - since, before, phase, p).rate
 
 
-@merged
+@inline_llvm
 def remember(w, t, work, phase, p, tally):
     """Have joints that meet again after a flight carry the speed at which they do.
 

@@ -188,7 +188,7 @@ FEATURES: list[tuple] = [
     ("rod_loss", "i8"),  # place in a state of what that has taken; -1 of a rigid rod
 ]
 # The last field's length tells compiled functions, by its type alone, which kind a record is of:
-# those for the default one hold nothing of the others (`_jit.by_kind`).
+# those for the default one hold nothing of the others (`_jit.dispatch_on_record`).
 CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
 CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (CHOICE,))], align=True)

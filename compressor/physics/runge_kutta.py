@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import fused, merged, square_root
+from compressor.physics._jit import fma, inline_llvm, square_root
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.systems import derivative_and_gauge, write_flowing_derivative
 
@@ -100,7 +100,7 @@ P = np.array(
 )  # fmt: skip
 
 
-@merged
+@inline_llvm
 def take_step(pair, base, h, z, k, phase, p, new, row):
     """Stages 1 to 6 of a step from z of length h into k, and the state at its end into new.
 
@@ -117,21 +117,21 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
             for j in range(stage):
                 weight = A[pair, stage, j]
-                a = fused(weight, k[j, i], a)
-                b = fused(weight, k[j, i + 1], b)
-                c = fused(weight, k[j, i + 2], c)
-                d = fused(weight, k[j, i + 3], d)
-            new[i] = fused(h, a, z[i])
-            new[i + 1] = fused(h, b, z[i + 1])
-            new[i + 2] = fused(h, c, z[i + 2])
-            new[i + 3] = fused(h, d, z[i + 3])
+                a = fma(weight, k[j, i], a)
+                b = fma(weight, k[j, i + 1], b)
+                c = fma(weight, k[j, i + 2], c)
+                d = fma(weight, k[j, i + 3], d)
+            new[i] = fma(h, a, z[i])
+            new[i + 1] = fma(h, b, z[i + 1])
+            new[i + 2] = fma(h, c, z[i + 2])
+            new[i + 3] = fma(h, d, z[i + 3])
         if stage < STAGES - 1:
             write_flowing_derivative(motion, new, phase, p, k[stage])
         else:
             derivative_and_gauge(motion, new, phase, p, k[stage], row)
 
 
-@merged
+@inline_llvm
 def error_norm(pair, h, z, new, k, rtol, atol):
     """Return the root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
@@ -140,45 +140,45 @@ def error_norm(pair, h, z, new, k, rtol, atol):
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for j in range(STAGES):
             weight = E[pair, j]
-            a = fused(weight, k[j, i], a)
-            b = fused(weight, k[j, i + 1], b)
-            c = fused(weight, k[j, i + 2], c)
-            d = fused(weight, k[j, i + 3], d)
-        a /= fused(rtol, max(abs(z[i]), abs(new[i])), atol[i])
-        b /= fused(rtol, max(abs(z[i + 1]), abs(new[i + 1])), atol[i + 1])
-        c /= fused(rtol, max(abs(z[i + 2]), abs(new[i + 2])), atol[i + 2])
-        d /= fused(rtol, max(abs(z[i + 3]), abs(new[i + 3])), atol[i + 3])
-        total = fused(d, d, fused(c, c, fused(b, b, fused(a, a, total))))
+            a = fma(weight, k[j, i], a)
+            b = fma(weight, k[j, i + 1], b)
+            c = fma(weight, k[j, i + 2], c)
+            d = fma(weight, k[j, i + 3], d)
+        a /= fma(rtol, max(abs(z[i]), abs(new[i])), atol[i])
+        b /= fma(rtol, max(abs(z[i + 1]), abs(new[i + 1])), atol[i + 1])
+        c /= fma(rtol, max(abs(z[i + 2]), abs(new[i + 2])), atol[i + 2])
+        d /= fma(rtol, max(abs(z[i + 3]), abs(new[i + 3])), atol[i + 3])
+        total = fma(d, d, fma(c, c, fma(b, b, fma(a, a, total))))
     return h * square_root(total / n)
 
 
-@merged
+@inline_llvm
 def weights_at(pair, s, weights):
     """Weights of the stages at the fraction s of a step into weights, (STAGES,)."""
     for stage in range(STAGES):
         a, b = P[pair, stage, 0], P[pair, stage, 1]
         c, d = P[pair, stage, 2], P[pair, stage, 3]
-        weights[stage] = s * fused(s, fused(s, fused(s, d, c), b), a)
+        weights[stage] = s * fma(s, fma(s, fma(s, d, c), b), a)
 
 
-@merged
+@inline_llvm
 def combine(weights, h, z, k, out):
     """The motion where the stages have these weights into out, (n,): no interpolant is laid."""
     for i in range(0, out.size, LANES):
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for stage in range(STAGES):
             weight = weights[stage]
-            a = fused(weight, k[stage, i], a)
-            b = fused(weight, k[stage, i + 1], b)
-            c = fused(weight, k[stage, i + 2], c)
-            d = fused(weight, k[stage, i + 3], d)
-        out[i] = fused(h, a, z[i])
-        out[i + 1] = fused(h, b, z[i + 1])
-        out[i + 2] = fused(h, c, z[i + 2])
-        out[i + 3] = fused(h, d, z[i + 3])
+            a = fma(weight, k[stage, i], a)
+            b = fma(weight, k[stage, i + 1], b)
+            c = fma(weight, k[stage, i + 2], c)
+            d = fma(weight, k[stage, i + 3], d)
+        out[i] = fma(h, a, z[i])
+        out[i + 1] = fma(h, b, z[i + 1])
+        out[i + 2] = fma(h, c, z[i + 2])
+        out[i + 3] = fma(h, d, z[i + 3])
 
 
-@merged
+@inline_llvm
 def extend(pair, h, z, k, dense):
     """Coefficients of a step's interpolant into dense, (5, n): y(s) = sum_j dense[j] s^j."""
     for i in range(0, dense.shape[1], LANES):
@@ -188,24 +188,24 @@ def extend(pair, h, z, k, dense):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
             for stage in range(STAGES):
                 weight = P[pair, stage, j]
-                a = fused(weight, k[stage, i], a)
-                b = fused(weight, k[stage, i + 1], b)
-                c = fused(weight, k[stage, i + 2], c)
-                d = fused(weight, k[stage, i + 3], d)
+                a = fma(weight, k[stage, i], a)
+                b = fma(weight, k[stage, i + 1], b)
+                c = fma(weight, k[stage, i + 2], c)
+                d = fma(weight, k[stage, i + 3], d)
             dense[j + 1, i] = h * a
             dense[j + 1, i + 1] = h * b
             dense[j + 1, i + 2] = h * c
             dense[j + 1, i + 3] = h * d
 
 
-@merged
+@inline_llvm
 def interpolate(s, dense, out):
     """The motion at the fraction s of a step into out, shape (n,)."""
     for i in range(0, out.size, LANES):
         a, b, c, d = dense[4, i], dense[4, i + 1], dense[4, i + 2], dense[4, i + 3]
         for j in range(3, -1, -1):
-            a = fused(a, s, dense[j, i])
-            b = fused(b, s, dense[j, i + 1])
-            c = fused(c, s, dense[j, i + 2])
-            d = fused(d, s, dense[j, i + 3])
+            a = fma(a, s, dense[j, i])
+            b = fma(b, s, dense[j, i + 1])
+            c = fma(c, s, dense[j, i + 2])
+            d = fma(d, s, dense[j, i + 3])
         out[i], out[i + 1], out[i + 2], out[i + 3] = a, b, c, d

@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import jit, merged, square_root
+from compressor.physics._jit import inline_llvm, jit, square_root
 from compressor.physics.elementary import exponential, logarithm
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
 from compressor.physics.systems import derivative_with_flows
@@ -82,8 +82,8 @@ def first_step(w, z, work, atol, phase, p, end):
     return min(100.0 * guess, bold, end - w.t)
 
 
-@merged
-def controlled(w, h, error):
+@inline_llvm
+def next_step_length(w, h, error):
     """Return the next step's length after an accepted step (PI control)."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
     now = logarithm(max(error, 1e-10))
@@ -92,7 +92,7 @@ def controlled(w, h, error):
     return h * min(GROW, max(SHRINK, factor))
 
 
-@merged
+@inline_llvm
 def refuse(w, h, error):
     """Shorten the step after a refused attempt; a step that makes no way ends the walk."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
@@ -125,7 +125,7 @@ def stiff_rate(w, h, z, work, size):
     return square_root(above / below) if below > 0.0 else 0.0
 
 
-@merged
+@inline_llvm
 def choose_method(w, h, z, work, size):
     """Change to the stiff partner where stability holds the explicit steps, and back.
 

@@ -5,7 +5,7 @@ speed; that both agree is a test.
 """
 
 from compressor.physics import mechanism_rows
-from compressor.physics._jit import by_kind, jit
+from compressor.physics._jit import dispatch_on_record, jit
 from compressor.physics.motion import contact_at as scene_contact_at
 from compressor.physics.motion import derivative as scene_derivative
 from compressor.physics.motion import start as scene_start
@@ -25,20 +25,22 @@ def within_model(y, p):
     return 0
 
 
-beyond_model = by_kind(MECHANISM, mechanism_rows.beyond_model, within_model)
-derivative = by_kind(MECHANISM, mechanism_rows.derivative, scene_derivative)
-derivative_with_flows = by_kind(
+beyond_model = dispatch_on_record(MECHANISM, mechanism_rows.beyond_model, within_model)
+derivative = dispatch_on_record(MECHANISM, mechanism_rows.derivative, scene_derivative)
+derivative_with_flows = dispatch_on_record(
     MECHANISM, mechanism_rows.derivative_with_flows, scene_derivative_with_flows
 )
-write_flowing_derivative = by_kind(
+write_flowing_derivative = dispatch_on_record(
     MECHANISM, mechanism_rows.write_flowing_derivative, scene_flowing_derivative
 )
-derivative_and_gauge = by_kind(
+derivative_and_gauge = dispatch_on_record(
     MECHANISM, mechanism_rows.derivative_and_gauge, scene_derivative_and_gauge
 )
-glance = by_kind(MECHANISM, mechanism_rows.glance, scene_glance)
-gauge = by_kind(MECHANISM, mechanism_rows.gauge, scene_gauge)
-observe_all = by_kind(MECHANISM, mechanism_rows.observe_all, scene_observe_all)
-contact_at = by_kind(MECHANISM, mechanism_rows.contact_at, scene_contact_at)
-write_eccentricities = by_kind(MECHANISM, mechanism_rows.write_eccentricities, scene_eccentricities)
-start = by_kind(MECHANISM, mechanism_rows.start, scene_start)
+glance = dispatch_on_record(MECHANISM, mechanism_rows.glance, scene_glance)
+gauge = dispatch_on_record(MECHANISM, mechanism_rows.gauge, scene_gauge)
+observe_all = dispatch_on_record(MECHANISM, mechanism_rows.observe_all, scene_observe_all)
+contact_at = dispatch_on_record(MECHANISM, mechanism_rows.contact_at, scene_contact_at)
+write_eccentricities = dispatch_on_record(
+    MECHANISM, mechanism_rows.write_eccentricities, scene_eccentricities
+)
+start = dispatch_on_record(MECHANISM, mechanism_rows.start, scene_start)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import by_kind, jit, merged
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
 from compressor.physics.contact_laws import in_contact
 from compressor.physics.observe import (
     ACCELERATION,
@@ -148,7 +148,7 @@ def deepest_of(nodes, rows, every, column, known):
     return max(top, known, vertex(left, right, before, here, after))
 
 
-@merged
+@inline_llvm
 def tally_energy(row, flows, tally):
     """Keep the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
 
@@ -175,7 +175,7 @@ def add_flows(rows, weights, span, flows):
             flows[k] += span * weights[i] * rows[i, CRANK_POWER + k]
 
 
-@merged
+@inline_llvm
 def near_record(rows, middle, tally):
     """Return whether a peak may be beaten within a step, by the rows at its ends and in its
     middle.
@@ -194,7 +194,7 @@ def near_record(rows, middle, tally):
     return False
 
 
-@merged
+@inline_llvm
 def share_apart(before, after):
     """Return the share of the way from one nearness to another that is without contact, by a
     straight line.
@@ -226,7 +226,7 @@ def contact_within(rows, joint):
     return inside and not ends
 
 
-@merged
+@inline_llvm
 def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
     """Add a step's contact loss, impacts, releases and penetration at one joint."""
     for i in range(0, nodes.size, every):
@@ -259,7 +259,7 @@ def crank_pace(rows, i, p):
     return rows[i, PACE] if p.driven else 1.0
 
 
-pace_at = by_kind(MECHANISM, crank_pace, steady_pace)
+pace_at = dispatch_on_record(MECHANISM, crank_pace, steady_pace)
 
 
 @jit
@@ -279,7 +279,7 @@ def crank_pace_of_step(weights, rows, every, p):
     return pace
 
 
-pace_of_step = by_kind(MECHANISM, crank_pace_of_step, steady_pace_of_step)
+pace_of_step = dispatch_on_record(MECHANISM, crank_pace_of_step, steady_pace_of_step)
 
 
 @jit
@@ -295,10 +295,10 @@ def add_both_seconds(span, passing, tally, p):
     tally.steady_seconds += span
 
 
-add_time = by_kind(MECHANISM, add_both_seconds, add_seconds)
+add_time = dispatch_on_record(MECHANISM, add_both_seconds, add_seconds)
 
 
-@merged
+@inline_llvm
 def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
 

@@ -10,10 +10,10 @@ from compressor.report.figures.style import (
     GREY,
     RED,
     Line,
+    in_style,
     legend_above,
     render,
     sheet,
-    styled,
 )
 from compressor.report.figures.sweep_data import (
     FOOT,
@@ -37,6 +37,13 @@ from compressor.report.page import (
     Table,
     column_title,
 )
-from compressor.report.plots import PlotChoice, PlotError, Plotted, chosen, published, write_plots
+from compressor.report.plots import (
+    PlotChoice,
+    PlotError,
+    Plotted,
+    choose_figures,
+    publish_drawings,
+    write_plots,
+)
 from compressor.report.report import restate, write_report
 from compressor.report.study_section import file_name

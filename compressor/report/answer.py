@@ -22,7 +22,7 @@ from compressor.digits import is_known
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import Measure, measures
-from compressor.report.page import Section, measured, templates
+from compressor.report.page import Section, format_measure, templates
 from compressor.store import Folder, Stored, StoredStudy
 
 MASSES = {
@@ -248,13 +248,13 @@ def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[Finding]:
     known = list(dict.fromkeys(m for _, job in named for m in measures(job)))
     names = [name for name, _ in named]
     rows = [(m, *_columns(m, [job for _, job in named])) for m in known]
-    return ranked(rows, names)
+    return rank_findings(rows, names)
 
 
 def study_findings(data: xr.Dataset) -> list[Finding]:
     """Return what changes most over the jobs of a study, as `open_study` gives it."""
     rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in measures(data)]
-    return ranked(rows, Points(data))
+    return rank_findings(rows, Points(data))
 
 
 class Points(Sequence[str]):
@@ -279,11 +279,11 @@ class Points(Sequence[str]):
             of = self.data[name]
             if len({*of.values.ravel().tolist()}) > 1:
                 value = of.isel({d: n for d, n in place.items() if d in of.dims}).item()
-                parts.append(worded(name, value, of.attrs.get("units", "")))
+                parts.append(word_value(name, value, of.attrs.get("units", "")))
         return ", ".join(part for part in parts if part)
 
 
-def worded(name: str, value: object, unit: str) -> str:
+def word_value(name: str, value: object, unit: str) -> str:
     """Return a swept value in words: clearance 0.2 mm; "" where the job has none."""
     words = name.removesuffix("_" + unit.replace("/", "_per_").replace(" ", "_")).replace("_", " ")
     if isinstance(value, int | float):
@@ -305,7 +305,7 @@ def _columns(measure: Measure, jobs: Sequence[xr.Dataset]) -> tuple[np.ndarray, 
     return values, bars
 
 
-def ranked(
+def rank_findings(
     rows: Iterable[tuple[Measure, np.ndarray, np.ndarray]], names: Sequence[str]
 ) -> list[Finding]:
     """Return the findings of measures over jobs, the greatest change first, one a metric."""
@@ -338,7 +338,9 @@ def finding(
     low, high = (pick(sure, key=lambda n: values[n]) for pick in (min, max))
 
     def told(n: int) -> str:
-        return f"{measured(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
+        return (
+            f"{format_measure(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
+        )
 
     title = measure.title[0].upper() + measure.title[1:]
     if len(values) == 1:

@@ -49,7 +49,10 @@ def content(sheet: Sheet) -> dict[str, Any]:
 
     `unified`: all curves go from left to right, so that the values at one x are told together.
     """
-    links = linked([panel.x for panel in sheet.panels]), linked([p.y for p in sheet.panels], "y")
+    links = (
+        link_scales([panel.x for panel in sheet.panels]),
+        link_scales([p.y for p in sheet.panels], "y"),
+    )
     words = [*(panel.y.words for panel in sheet.panels)]
     width, height = sheet.size
     return {
@@ -65,12 +68,12 @@ def content(sheet: Sheet) -> dict[str, Any]:
         "panels": [
             {
                 "title": panel.title,
-                "x": axis(panel.x) | {"link": x, "unit": unit(titled(sheet, panel))},
+                "x": axis(panel.x) | {"link": x, "unit": unit(axis_title(sheet, panel))},
                 "y": axis(panel.y, words[y]) | {"link": y, "unit": unit(panel.y.title)},
                 "row": panel.row,
                 "column": panel.column,
                 "square": panel.is_square,
-                "traces": [shown(trace, panel) for trace in panel.traces],
+                "traces": [trace_data(trace, panel) for trace in panel.traces],
                 "notes": [note(one) for one in panel.notes],
             }
             for panel, x, y in zip(sheet.panels, *links, strict=True)
@@ -78,7 +81,7 @@ def content(sheet: Sheet) -> dict[str, Any]:
     }
 
 
-def titled(sheet: Sheet, panel: Panel) -> str:
+def axis_title(sheet: Sheet, panel: Panel) -> str:
     """Return the title of a panel's x axis, or of one below it in the same column."""
     below = [one for one in sheet.panels if one.column == panel.column and one.row >= panel.row]
     return next((one.x.title for one in below if one.x.title), "")
@@ -90,7 +93,7 @@ def unit(title: str) -> str:
     return found[1] if found else ""
 
 
-def linked(scales: Sequence[Scale], way: str = "x") -> list[int]:
+def link_scales(scales: Sequence[Scale], way: str = "x") -> list[int]:
     """Return a number for each scale, the same where scales show the same span of the same
     quantity.
 
@@ -117,7 +120,7 @@ def note(one: Note) -> dict[str, Any]:
     return {"text": one.text, **place, "color": one.color, "dash": one.dash, "inside": one.inside}
 
 
-def shown(trace: Trace, panel: Panel) -> dict[str, Any]:
+def trace_data(trace: Trace, panel: Panel) -> dict[str, Any]:
     """Return a trace as plain data, with the points that its panel can show."""
     found: dict[str, Any] = {
         "kind": trace.kind, "name": trace.name, "color": trace.color,
@@ -190,7 +193,7 @@ def numbers(values: np.ndarray) -> Any:
     return base64.b64encode(values.astype(FLOAT).tobytes()).decode()
 
 
-def described(sheet: Sheet) -> str:
+def describe_figure(sheet: Sheet) -> str:
     """Return what is seen in a figure, in words: its panels, their axes and curves."""
     told = []
     for panel in sheet.panels:

@@ -72,7 +72,7 @@ def number_cell(value: float) -> Cell:
     return Cell(number(value), "number", None if math.isnan(value) else value)
 
 
-def measured(measure: Measure, value: float, bar: float) -> str:
+def format_measure(measure: Measure, value: float, bar: float) -> str:
     """Return a metric and its error bar, both in its unit, to the digits that the bar allows."""
     if math.isnan(bar):
         return number(value)
@@ -81,7 +81,7 @@ def measured(measure: Measure, value: float, bar: float) -> str:
 
 def measured_cell(measure: Measure, value: float, bar: float) -> Cell:
     """Return a metric and its error bar."""
-    return Cell(measured(measure, value, bar), "number", None if math.isnan(value) else value)
+    return Cell(format_measure(measure, value, bar), "number", None if math.isnan(value) else value)
 
 
 def value_cell(value: Any) -> Cell:
@@ -214,7 +214,7 @@ def document(
     return page.render(sections=sections, jobs=facts, running=running)
 
 
-def restated(page: str, before: Running, now: Running) -> str:
+def restate_page(page: str, before: Running, now: Running) -> str:
     """Return a page that was written beside a run, with how the run stands now."""
     status = templates().get_template("status.html")
     return page.replace(status.render(running=before), status.render(running=now))

@@ -26,7 +26,7 @@ from compressor.analysis import (
     diagnosis_caption,
     label,
     paper_cases,
-    settled,
+    settled_part,
     shaking,
 )
 from compressor.cases import Case, CaseError, points, table, value_in
@@ -296,7 +296,9 @@ def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSe
     if not runs.usable.keys() >= {*WORN} or not comparable(runs.usable.values()):
         return None
     case = case_of(runs.usable[WORN[-1]])
-    drawn, judged = (borrowed(case, paper, loads) | runs.usable for loads in (False, True))
+    drawn, judged = (
+        default_machine_runs(case, paper, loads) | runs.usable for loads in (False, True)
+    )
     keys = frozenset(run.attrs["key"] for run in runs.stored.values())
     return SecondSet(study.name, case, keys, drawn, judged)
 
@@ -337,13 +339,13 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
     They settle at one crank angle and have samples at the same ones, for a revolution or more, and
     so close that the lines above `ORDER`, which claim 7 reads, can be told.
     """
-    grids = [settled(run)["crank_angle"].values for run in runs]
+    grids = [settled_part(run)["crank_angle"].values for run in runs]
     turns = (grids[0][-1] - grids[0][0]) / (2.0 * np.pi)
     fine = grids[0].size - 1 > 2 * (ORDER + 1) * turns
     return turns > 1.0 - WHOLE and fine and all(np.array_equal(g, grids[0]) for g in grids)
 
 
-def borrowed(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]:
+def default_machine_runs(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]:
     """Return the default machine's runs without clearance, where those of a case's machine are the
     same.
 
@@ -398,14 +400,14 @@ def second_section(
         Pair(counterparts.get(f"figure-{names[plate.name].number:02d}"), plate) for plate in plates
     ]
     lacking = [item for name, item in names.items() if name not in {p.name for p in plates}]
-    notes = [NO_IDEAL.format(numbered(lacking))] if lacking else []
+    notes = [NO_IDEAL.format(number_figures(lacking))] if lacking else []
     said = [one.said for one in differences(found.case, ("name", "load", "joint", "clearance_mm"))]
     content = SecondSetContent(found.study, table, said, notes, pairs, claims(found.judged))
     title = f"{found.study}: Figures 8 to 16 of another machine"
     return Section(second_anchor(found.study), title, "second_set.html", content)
 
 
-def numbered(figures: Sequence[PaperFigure]) -> str:
+def number_figures(figures: Sequence[PaperFigure]) -> str:
     """Return the figures by their numbers, such as `Figures 8, 11, 14`."""
     return f"Figures {', '.join(str(figure.number) for figure in figures)}"
 
@@ -443,12 +445,12 @@ def cases_table(paper: PaperRuns) -> Table:
     for name in paper_cases():
         run = paper.stored.get(name)
         if run is None:
-            cells = [Cell(spoken(name)), Cell("not stored"), *[Cell("")] * (len(head) - 2)]
+            cells = [Cell(label_in_words(name)), Cell("not stored"), *[Cell("")] * (len(head) - 2)]
             rows.append(Row(cells, "missing"))
             continue
         status, key = str(run["status"].item()), run.attrs["key"]
         regime = run.attrs.get("regime", "")
-        start = [Cell(spoken(name)), Cell(ending(status, run["reason"].item(), regime))]
+        start = [Cell(label_in_words(name)), Cell(ending(status, run["reason"].item(), regime))]
         metrics = [measured_cell(m, *value_of(m, run)) for m in shown]
         residual = number_cell(float(run.get("energy_residual", math.nan)))
         tolerance = value_cell(run.attrs.get("rtol", ""))
@@ -464,7 +466,7 @@ def value_of(measure: Measure, run: xr.Dataset) -> tuple[float, float]:
     return float(measure.of(run)), float(measure.bar(run))
 
 
-def spoken(name: str) -> str:
+def label_in_words(name: str) -> str:
     """Return a label of `paper_cases` in words."""
     fault, _, clearance = name.partition(" ")
     return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
@@ -491,7 +493,7 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
         for item in FIGURES
     }
     figures = [
-        f"{title}: " + "; ".join(f"{spoken(name)} ({paper.absent[name]})" for name in names)
+        f"{title}: " + "; ".join(f"{label_in_words(name)} ({paper.absent[name]})" for name in names)
         for title, names in lacking.items()
         if names
     ]

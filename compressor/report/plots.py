@@ -70,7 +70,7 @@ class Plotted:
     caption: str
 
 
-def chosen(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
+def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
     """Return the figures that are wanted; PlotError where one is none of this thing."""
     wrong = [name for name in what if name not in known]
     if wrong:
@@ -78,7 +78,7 @@ def chosen(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, 
     return tuple(what) or tuple(known)
 
 
-def published(
+def publish_drawings(
     drawn: Iterable[tuple[str, str, Drawing]], output: Folder, stem: str, kinds: Sequence[str]
 ) -> Iterator[Plotted]:
     """Write drawings with their names and captions as files; yields each. Raises StoreError."""
@@ -116,14 +116,14 @@ def write_plots(
         key = find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:SHORT]
-    yield from published(drawn, output, stem, choice.kinds)
+    yield from publish_drawings(drawn, output, stem, choice.kinds)
 
 
 def job_figures(
     stored: Stored, studies: Sequence[StoredStudy], key: str, choice: PlotChoice
 ) -> Iterator[tuple[str, str, Drawing]]:
     """Yield the names, captions and drawings of a job that has time series."""
-    wanted = chosen(choice.what, [*JOB], f"job {key}")
+    wanted = choose_figures(choice.what, [*JOB], f"job {key}")
     if choice.over or choice.at:
         raise PlotError(f"{key} is one job: --over and --at are for studies")
     run = drawable(stored, studies, key)
@@ -170,9 +170,9 @@ def study_figures(
         raise PlotError(
             f"{study.name} is a study: for {choice.what[0]} name a job, such as {first}"
         )
-    wanted = chosen(choice.what, [*STUDY], f"study {study.name}")
+    wanted = choose_figures(choice.what, [*STUDY], f"study {study.name}")
     over = axis_of(study, choice.over)
-    jobs, where = selected(study, over, choice.at)
+    jobs, where = select_jobs(study, over, choice.at)
     if len(jobs) > MOST_ROWS:
         where += f" {MOST_ROWS} of {len(jobs)} jobs, evenly chosen."
         jobs = [jobs[n * len(jobs) // MOST_ROWS] for n in range(MOST_ROWS)]
@@ -216,7 +216,9 @@ def axis_of(study: StoredStudy, wanted: str) -> str:
     return found[0]
 
 
-def selected(study: StoredStudy, over: str, at: Sequence[str]) -> tuple[list[tuple[Any, str]], str]:
+def select_jobs(
+    study: StoredStudy, over: str, at: Sequence[str]
+) -> tuple[list[tuple[Any, str]], str]:
     """(value, key) of the jobs along an axis in its order, and what of the others is told."""
     fixed = {}
     for text in at:
@@ -237,7 +239,7 @@ def selected(study: StoredStudy, over: str, at: Sequence[str]) -> tuple[list[tup
         raise PlotError(f"no job of {study.name} has {', '.join(at)}")
     numbers = all(isinstance(value, int | float) for value, _ in jobs)
     jobs.sort(key=lambda job: job[0] if numbers else 0)
-    told = ", ".join(f"{name} {shown(value)}" for name, value in fixed.items())
+    told = ", ".join(f"{name} {format_swept_value(value)}" for name, value in fixed.items())
     where = f" Here {told}." if told else ""
     varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
     return jobs, where + (f" Along with it vary {', '.join(varied)}." if varied else "")
@@ -247,15 +249,15 @@ def value_of(study: StoredStudy, key: str, text: str) -> Any:
     """Return the value of an axis that a text means; PlotError lists them."""
     (values,) = (axis.values for axis in study.axes if axis.key == key)
     for value in values:
-        if text in (str(value), shown(value)):
+        if text in (str(value), format_swept_value(value)):
             return value
-    listed = ", ".join(shown(value) for value in dict.fromkeys(values))
+    listed = ", ".join(format_swept_value(value) for value in dict.fromkeys(values))
     raise PlotError(f"--at {key}={text}: the axis has {listed}")
 
 
 def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
     """Return what one job tells, or why it tells nothing."""
-    name, status = shown(value) if value != "" else key[:SHORT], stored.status(key)
+    name, status = format_swept_value(value) if value != "" else key[:SHORT], stored.status(key)
     if status is None or status.status != "ok" or not status.samples:
         problem = "not run" if status is None else "failed" if status.reason else "no series"
         return SweptRow(name, problem=problem)
@@ -272,7 +274,7 @@ def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
         return SweptRow(name, found, chaotic=chaotic)
 
 
-def shown(value: Any) -> str:
+def format_swept_value(value: Any) -> str:
     """Return a swept value in few characters."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return f"{value:g}" if number else str(value)

@@ -30,13 +30,22 @@ from compressor.report.figures.extract import as_csv, extract
 from compressor.report.figures.pictures import pictures
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
-    described,
+    describe_figure,
     job_scripts,
     publish_library,
     script,
     series_name,
 )
-from compressor.report.page import Add, Additions, Note, Plate, Running, Section, document, restated
+from compressor.report.page import (
+    Add,
+    Additions,
+    Note,
+    Plate,
+    Running,
+    Section,
+    document,
+    restate_page,
+)
 from compressor.report.paper_sections import (
     SET,
     TITLES,
@@ -46,6 +55,7 @@ from compressor.report.paper_sections import (
     diagnosis_sections,
     find_paper_runs,
     is_of_paper,
+    label_in_words,
     missing_sections,
     paper_sections,
     second_anchor,
@@ -54,7 +64,6 @@ from compressor.report.paper_sections import (
     second_section,
     second_sets,
     shakings,
-    spoken,
 )
 from compressor.report.study_section import (
     MOST_ROWS,
@@ -116,7 +125,7 @@ def restate(report: Folder, before: Running, now: Running) -> None:
     Raises OSError where the page cannot be read, StoreError where it cannot be written.
     """
     path = Path(report) / "index.html"
-    text = restated(path.read_text(encoding="utf-8"), before, now)
+    text = restate_page(path.read_text(encoding="utf-8"), before, now)
     publish(path, text.encode(errors="backslashreplace"))
 
 
@@ -156,7 +165,7 @@ def compose(
     chapters = [chapter for one in added for chapter in one.chapters]
     figures, tables = paper_sections(paper, of_paper)
     sections = [
-        answer_section(summarised(stored, own, paper, drawn)),
+        answer_section(summarise(stored, own, paper, drawn)),
         *(one.figures for one in drawn),
         *figures,
         *sets,
@@ -219,7 +228,7 @@ def drawn_study(
         )  # fmt: skip
 
 
-def summarised(
+def summarise(
     stored: Stored, own: Sequence[StoredStudy], paper: PaperRuns, drawn: Sequence[DrawnStudy]
 ) -> Answer:
     """Return the page's first screen."""
@@ -229,13 +238,15 @@ def summarised(
         failed = [n for n, run in paper.stored.items() if str(run["status"].item()) != "ok"]
         said = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")
         lines.append(Line("The paper's cases", "cases", said, bool(failed)))
-        worn = ((spoken(name), run) for name, run in paper.stored.items() if name != "typical")
+        worn = (
+            (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
+        )
         each.append(("The paper's cases", findings(worn)))
     found = claims(paper.usable) if paper.stored else []
     shown = [(f"The last job of {study.name}", last_case(stored, study)) for study in own[:1]]
     if paper.stored and not shown:
         name, run = [*paper.stored.items()][-1]
-        shown = [(spoken(name), case_of(run))]
+        shown = [(label_in_words(name), case_of(run))]
     pictures = [
         (mechanism_svg(case), f"{name[0].upper()}{name[1:]}: {mechanism_words(case)}")
         for name, case in shown
@@ -273,6 +284,6 @@ def draw(name: str, heading: str, caption: str, drawing: Drawing) -> Plate:
     sheet = extract(drawing)
     jobs = dict.fromkeys(key for panel in sheet.panels for t in panel.traces for key in t.jobs)
     return Plate(
-        name, heading, caption, drawing, as_csv(sheet), script(name, sheet), described(sheet),
+        name, heading, caption, drawing, as_csv(sheet), script(name, sheet), describe_figure(sheet),
         tuple(jobs),
     )  # fmt: skip

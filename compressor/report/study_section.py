@@ -170,7 +170,7 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
 def jobs_table(data: xr.Dataset) -> Table:
     """Return a row for every job of a study, as far as a page can hold them."""
     swept, shown = swept_values(data), measures(data)
-    metrics = [(m, ravelled(m.of(data)), ravelled(m.bar(data))) for m in shown]
+    metrics = [(m, ravel_jobs(m.of(data)), ravel_jobs(m.bar(data))) for m in shown]
     words = ("status", "reason", "regime", "key")
     ends = zip(*(data[name].values.flat for name in words), strict=True)
     rows = []
@@ -183,7 +183,7 @@ def jobs_table(data: xr.Dataset) -> Table:
     return Table([*swept, "status", *map(column_title, shown), "job"], rows)
 
 
-def ravelled(values: xr.DataArray) -> np.ndarray:
+def ravel_jobs(values: xr.DataArray) -> np.ndarray:
     """Return a study's values in a row, a job after the other."""
     return values.values.ravel()
 

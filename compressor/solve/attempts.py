@@ -34,12 +34,12 @@ from compressor.solve.error_bars import (
     Metrics,
     bars,
     energy_residual,
-    enlarged,
+    is_amplified,
     longest,
     series_errors,
 )
 from compressor.solve.march_driver import COMPILED, march_through
-from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merged, overdue
+from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merge_turns, overdue
 from compressor.solve.run_metrics import metrics, reversal, reversal_bars, reversal_times
 from compressor.solve.scipy_driver import step_through
 from compressor.solve.series import (
@@ -203,14 +203,16 @@ def attempt(
     p, times = record(case), times_of(case, sampled)
     if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER)
-        return concluded(rtol, p, times, closed_form(p, times.all, case.settle, pieces, timeout))
+        return solution_of_trajectory(
+            rtol, p, times, closed_form(p, times.all, case.settle, pieces, timeout)
+        )
     asked = request(case, rtol, p, times, state)
     asked.timeout, asked.cuts = timeout, cuts
     trajectory = integrate(asked)
     turns = cuts.turns if cuts else []
     if turns:
-        trajectory.tally = merged([*turns, trajectory.tally])
-    made = concluded(rtol, p, times, trajectory)
+        trajectory.tally = merge_turns([*turns, trajectory.tally])
+    made = solution_of_trajectory(rtol, p, times, trajectory)
     made.turns = turns
     return made
 
@@ -251,7 +253,9 @@ def request(
     return Request(p, y, times.all, times.settle, rtol, how.method, how.max_steps)
 
 
-def concluded(rtol: float, p: np.record, times: Times, trajectory: Trajectory) -> Solution:
+def solution_of_trajectory(
+    rtol: float, p: np.record, times: Times, trajectory: Trajectory
+) -> Solution:
     """Return what an attempt's trajectory tells."""
     loads = np.empty((0, COLUMNS))
     if times.loaded.size:
@@ -309,7 +313,7 @@ def witness(case: Case, solution: Solution, other: Solution, timeout: float) -> 
 
     other: its `companion`. None where there is no need, or the run does not reach its end.
     """
-    if other.reason or not enlarged(solution.rtol, distances(solution.samples, other.samples)):
+    if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
     found = attempt(case, LOOSER * solution.rtol, timeout, False)
     return None if found.reason else found

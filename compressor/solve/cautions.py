@@ -219,7 +219,7 @@ def slips(cases: Sequence[Case]) -> list[Slip]:
         values = sorted({value for several in read for value in several})
         unit = other_unit(key, usual, values)
         if unit:
-            found.append(Slip(key, said(key, usual, values, unit), len(read)))
+            found.append(Slip(key, describe_slip(key, usual, values, unit), len(read)))
     return found
 
 
@@ -261,7 +261,7 @@ def other_unit(key: str, usual: Usual, values: Iterable[float]) -> str:
     )
 
 
-def said(key: str, usual: Usual, values: Sequence[float], other: str) -> str:
+def describe_slip(key: str, usual: Usual, values: Sequence[float], other: str) -> str:
     """Return what is said of values that look like another unit's."""
     row, factor = row_of(key), usual.units[other]
     unit = (row.unit if row else "").replace("^p", "^1.5")

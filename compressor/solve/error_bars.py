@@ -8,9 +8,9 @@ The difference from a tighter run is mostly the run's own error, and a little mo
 that; of the difference from a looser run, which is mostly the looser one's error, a share does
 (`closeness`). A metric's own difference may be small by chance: the distance of the time series
 that it is taken from stands beside it. The energy residual is a floor. Where a motion enlarges the
-errors of its steps (`enlarged`), two runs may agree by chance in all numbers; there a third one is
-asked, and the longest bars count. Where a series or the acceleration may be wrong by all of itself,
-no metric with a unit that is taken from it is known.
+errors of its steps (`is_amplified`), two runs may agree by chance in all numbers; there a third one
+is made, and the longest bars count. Where a series or the acceleration may be wrong by all of
+itself, no metric with a unit that is taken from it is known.
 
 Shares stand in `compressor.metrics`; those and the ones below were chosen on random cases that
 judge nothing (tests/results/README.md, "Calibration").
@@ -37,7 +37,7 @@ def energy_residual(tally: np.record) -> float:
     return float(tally["worst_imbalance"] / max(lost, 1e-3 * tally["peak_kinetic"]))
 
 
-def allowed(rtol: float, revolutions: float) -> float:
+def allowed_residual(rtol: float, revolutions: float) -> float:
     """Return the greatest energy residual of a run that can be trusted at a tolerance.
 
     The 200 random cases of tests/random_cases.py leave a quarter of it at most at rtol 1e-4, a
@@ -81,7 +81,7 @@ def closeness(ratio: float) -> float:
     return 1.0 if ratio < 1.0 else LOOSER * (ratio / TEN) ** -FALL
 
 
-def enlarged(rtol: float, apart: Mapping[str, Any]) -> bool:
+def is_amplified(rtol: float, apart: Mapping[str, Any]) -> bool:
     """Return whether a motion enlarges errors, by how far a run is apart from one at a like
     tolerance.
     """
@@ -112,17 +112,17 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
         row = METRICS[name]
         bar, size = row.bar, np.ones(np.shape(value)) if row.is_pure_number else np.abs(value)
         own = bar.own * np.abs(np.asarray(value) - other.metrics[name])
-        path = bar.path * spread(other.apart[row.series], np.ndim(value)) * size
+        path = bar.path * to_metric_shape(other.apart[row.series], np.ndim(value)) * size
         found[name] = other.closeness * np.hypot(own, path)
         if not row.is_pure_number:
             found[name] = np.maximum(found[name], max(FLOOR * residual, bar.least) * size)
             farthest = np.maximum(other.apart[row.series], other.apart["acceleration"])
             lost = WHOLE * other.closeness * farthest >= 1.0
-            found[name] = np.where(spread(lost, np.ndim(value)), np.inf, found[name])
+            found[name] = np.where(to_metric_shape(lost, np.ndim(value)), np.inf, found[name])
     return found
 
 
-def spread(apart: Any, ndim: int) -> np.ndarray:
+def to_metric_shape(apart: Any, ndim: int) -> np.ndarray:
     """Return a number, or one of each joint, in the shape of a metric over joints, and axes."""
     return np.reshape(apart, np.shape(apart) + (1,) * (ndim - np.ndim(apart)))
 

@@ -20,11 +20,11 @@ from compressor.outcome import Table
 from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe_all
 from compressor.reasons import Reason
 from compressor.solve.attempts import Solution, attempt, integrate, request, times_of
-from compressor.solve.error_bars import RUNGS, Metrics, allowed, energy_residual
-from compressor.solve.regime import least_promise, spanned, steady
-from compressor.solve.request import Cuts, Turns, merged, revolutions
+from compressor.solve.error_bars import RUNGS, Metrics, allowed_residual, energy_residual
+from compressor.solve.regime import least_promise, steady, with_settle_rev
+from compressor.solve.request import Cuts, Turns, merge_turns, revolutions
 from compressor.solve.run_metrics import metrics, statistics
-from compressor.solve.series import passed
+from compressor.solve.series import passed_time
 from compressor.solve.si_record import record
 from compressor.solve.simulate import with_series
 
@@ -51,7 +51,7 @@ class Leg:
 
     def numbers(self, last: int) -> Metrics:
         """Return the metrics of the last so many revolutions together."""
-        return metrics(self.p, merged(self.turns[-last:]))
+        return metrics(self.p, merge_turns(self.turns[-last:]))
 
     def rms_error(self, last: int) -> float:
         """Return the standard error of rms_acceleration over the last so many revolutions (m/s2).
@@ -90,7 +90,7 @@ def follow(
         run = attempt(of, rtol, left, False, course.cuts, state)
         found = course.leg(run)
         residual = energy_residual(run.trajectory.tally)
-        most = allowed(case.rtol, len(found.turns))
+        most = allowed_residual(case.rtol, len(found.turns))
         if found.reason or residual <= most:
             return found
         if rung == RUNGS or rtol < 9.9 * TIGHTEST:
@@ -134,7 +134,7 @@ def leg_case(case: Case, count: int) -> Case:
     """Return a case over so many revolutions, all of them measured, of which nothing else is
     wanted.
     """
-    of = spanned(case, 0.0, 1, float(count))
+    of = with_settle_rev(case, 0.0, 1, float(count))
     how = replace(of.solve, error_bars=False, accuracy="standard", horizon=False)
     return replace(of, solve=how, output=replace(of.output, keep="series", signals=False))
 
@@ -162,7 +162,7 @@ class Course:
             self.points.append(eccentricities(self.p, at, self.cuts.states[-1]))
         if count % self.step:
             return False
-        self.turns.append(merged(turns[-self.step :]))
+        self.turns.append(merge_turns(turns[-self.step :]))
         return self.enough(self.turns, np.array(self.points))
 
     def leg(self, run: Solution) -> Leg:
@@ -226,7 +226,7 @@ def rub(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed:
         asked.timeout, asked.cuts = max(deadline - time.monotonic(), 0.0), cuts
         run = integrate(asked)
         residual = energy_residual(run.tally)
-        most = allowed(case.rtol, case.duration / case.turn)
+        most = allowed_residual(case.rtol, case.duration / case.turn)
         if run.reason or residual <= most:
             break
         if rung == RUNGS or rtol < 9.9 * TIGHTEST:
@@ -239,8 +239,8 @@ def rub(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed:
         nothing = np.full((len(JOINTS), worn.shape[1]), np.nan)
         return Rubbed(nothing, nothing[:, 0], np.nan, {}, asked.start, run.reason, run.detail)
     slid = np.array([turn["slid"] for turn in turns])
-    whole = merged(turns)
+    whole = merge_turns(turns)
     work = whole["worn"][:, : worn.shape[1]] / len(turns)
-    began, ended = passed(p, run.times, run.states)[[0, -1]]
+    began, ended = passed_time(p, run.times, run.states)[[0, -1]]
     turn = case.turn * float(ended - began) / case.duration
     return Rubbed(work, slid.std(axis=0), turn, metrics(p, whole), run.states[-1])

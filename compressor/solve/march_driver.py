@@ -97,14 +97,14 @@ class Snapshot(NamedTuple):
         work = new_work(self.z.size - FLOWS)
         work.k[0], work.row[:] = self.rates, self.row
         return Standing(
-            unpacked(self.walker, new_walker(0).dtype),
+            unpack_record(self.walker, new_walker(0).dtype),
             self.z.copy(),
             work,
-            unpacked(self.tally, self.kind),
+            unpack_record(self.tally, self.kind),
         )
 
 
-def unpacked(data: bytes, kind: np.dtype) -> np.record:
+def unpack_record(data: bytes, kind: np.dtype) -> np.record:
     """Return a record of a kind, that compiled code may write, from its bytes."""
     return np.frombuffer(bytearray(data), kind).view(np.recarray)[0]
 
@@ -162,15 +162,15 @@ def retrace(before: Standing, after: Standing, march: March) -> History:
             phase = int(march.phases[w.segment])
             derivative_with_flows(w.t, now.z, phase, march.request.p, now.work.k[0])
         march.advance(before, 1)
-        step = attempted(now.walker, before.walker, float(march.edges[w.segment + 1]))
+        step = attempted_length(now.walker, before.walker, float(march.edges[w.segment + 1]))
         scaled = scaled_error(now, before, step, march.request.rtol, march.size)
         error = math.sqrt(float(np.mean(scaled**2)))
-        found.add(float(w.t), step, error, described(now.walker, before.walker))
+        found.add(float(w.t), step, error, describe_attempt(now.walker, before.walker))
         found.dominant = dominant(scaled, before.work.new[: march.size.size])
     return found
 
 
-def attempted(now: np.record, then: np.record, end: float) -> float:
+def attempted_length(now: np.record, then: np.record, end: float) -> float:
     """Return the length (s) of the step that was attempted, by the rules of `march`."""
     if then.steps > now.steps:
         return float(then.t - now.t)
@@ -196,7 +196,7 @@ def dominant(scaled: np.ndarray, new: np.ndarray) -> int:
     return int(bad[0]) if bad.size else int(np.abs(scaled).argmax())
 
 
-def described(now: np.record, then: np.record) -> str:
+def describe_attempt(now: np.record, then: np.record) -> str:
     """Return the method of an attempt, and what became of it."""
     method = "RODAS" if now.stiff else Pair(int(now.pair)).name
     if then.steps > now.steps:

@@ -216,16 +216,16 @@ class Settling:
 def with_span(case: Case, search: Search) -> Settling:
     """Give numbers to `settle_rev: auto` and `duration_rev: auto`, within the case's wall time."""
     if case.solve.settle_rev != "auto":
-        return Settling(spanned(case, float(case.solve.settle_rev), 1))
+        return Settling(with_settle_rev(case, float(case.solve.settle_rev), 1))
     if is_ideal(case):
-        return Settling(spanned(case, 0.0, 1), 0.0)
+        return Settling(with_settle_rev(case, 0.0, 1), 0.0)
     most = int(case.duration / case.turn * (1 + 1e-12))
     p, within = record(case), least_promise(case)
 
     def enough(turns: Turns) -> bool:
         return steady([metrics(p, turn) for turn in turns], within) is not None
 
-    scout = spanned(case, 0.0, 1, float(most))
+    scout = with_settle_rev(case, 0.0, 1, float(most))
     scout = replace(scout, solve=replace(scout.solve, error_bars=False, accuracy="standard"))
     cuts = Cuts(revolutions(0.0, scout.duration, case.turn), enough)
     attempt(scout, case.rtol, search.left, False, cuts)
@@ -234,12 +234,12 @@ def with_span(case: Case, search: Search) -> Settling:
     if found is None:
         half = float(most // 2)
         text = f"in {most} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
-        return Settling(spanned(case, half, 1, float(most)), math.nan, text)
+        return Settling(with_settle_rev(case, half, 1, float(most)), math.nan, text)
     first, period = found
-    return Settling(spanned(case, float(first), period), float(first))
+    return Settling(with_settle_rev(case, float(first), period), float(first))
 
 
-def spanned(case: Case, settle: float, period: int, duration: float | None = None) -> Case:
+def with_settle_rev(case: Case, settle: float, period: int, duration: float | None = None) -> Case:
     """Return a case with a number for where it settles (rev), and for its duration where that is a
     word.
 

@@ -59,7 +59,7 @@ def worn_sums(tally: np.record) -> tuple[str, ...]:
     return WORN if "worn" in (tally.dtype.names or ()) else ()
 
 
-def merged(turns: Sequence[np.record]) -> np.record:
+def merge_turns(turns: Sequence[np.record]) -> np.record:
     """Return one tally of several revolutions in a row."""
     whole = turns[-1].copy()
     for name in (*SUMS, *worn_sums(whole)):

@@ -20,7 +20,7 @@ from compressor.cases import Case
 from compressor.metrics import METRICS, QUANTILES, ROD_LOAD
 from compressor.physics import Column, is_featured
 from compressor.solve.error_bars import Companion, Metrics, energy_residual
-from compressor.solve.request import Trajectory, last_state, merged
+from compressor.solve.request import Trajectory, last_state, merge_turns
 
 ROUNDING = 1e-12
 
@@ -142,9 +142,9 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
     A standard error is inf where there are too few revolutions to tell.
     """
     found: Metrics = {"revolutions": float(len(turns))}
-    whole = metrics(p, merged(turns))
+    whole = metrics(p, merge_turns(turns))
     each = [metrics(p, turn) for turn in turns]
-    batches = [metrics(p, merged(part)) for part in parts(turns, MOST_BATCHES, 1)]
+    batches = [metrics(p, merge_turns(part)) for part in parts(turns, MOST_BATCHES, 1)]
     for name, row in METRICS.items():
         if row.kind == "greatest":
             found |= of_peaks(name, np.array([one[name] for one in each]))

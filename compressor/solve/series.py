@@ -210,7 +210,7 @@ def features(
     return found
 
 
-def passed(p: np.record, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+def passed_time(p: np.record, times: np.ndarray, states: np.ndarray) -> np.ndarray:
     """Return time (s) that has passed when the crank is where a steady one were at these times."""
     driven = is_featured(p) and p["driven"]
     return times + states[:, p["at"][Coordinate.CRANK] - 1] if driven else times

@@ -15,7 +15,7 @@ from compressor.reasons import Reason
 from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
 from compressor.solve.request import NONE, Trajectory, last_state
 from compressor.solve.run_metrics import ledger
-from compressor.solve.series import SIGNALS, block, features, finer, passed, rows_of, signals
+from compressor.solve.series import SIGNALS, block, features, finer, passed_time, rows_of, signals
 from compressor.solve.solution import solve
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ def as_dataset(table: Table) -> "xr.Dataset":
 def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, Table]:
     """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
     if case.problems:
-        found = refused(case)
+        found = refused_outcome(case)
         return found, found.table({})
     return with_series(case, solve(case, ahead))
 
@@ -208,10 +208,10 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
 
 def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
     """Simulate one case for its `Outcome` alone: what `simulate` gives less the time series."""
-    return refused(case) if case.problems else outcome(case, solve(case, ahead))
+    return refused_outcome(case) if case.problems else outcome(case, solve(case, ahead))
 
 
-def refused(case: Case) -> Outcome:
+def refused_outcome(case: Case) -> Outcome:
     """Return the outcome of a case that no case file could ask for."""
     detail = "; ".join(map(str, case.problems))
     return without_run(case.attributes(), Reason.INVALID_INPUT, detail)
@@ -226,7 +226,7 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     rows, times = whole[::every], solution.trajectory.times[::every]
     states = solution.trajectory.states[::every]
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
-    time = passed(p, times, states)
+    time = passed_time(p, times, states)
     turned = np.where(np.isnan(time), np.nan, p.omega * times)  # a stalled crank turns no further
     variables: dict[str, tuple] = {
         "time": (("time",), time, {"units": "s", "long_name": "time"}),
@@ -295,14 +295,14 @@ def settle_time(solution: Solution) -> float:
     inside = np.isfinite(run.states[:, 0])
     if run.times.size > 2 and inside.any() and run.times[inside][-1] >= solution.settle:
         times = run.times[inside]
-        return float(np.interp(solution.settle, times, passed(p, times, run.states[inside])))
+        return float(np.interp(solution.settle, times, passed_time(p, times, run.states[inside])))
     return stop_time(p, run) - float(run.tally["seconds"])
 
 
 def stop_time(p: np.record, run: Trajectory) -> float:
     """Return the time (s) at which a run stopped or ended."""
     at = run.stop_time if run.reason else float(run.times[-1])
-    return float(passed(p, np.array([at]), last_state(run)[np.newaxis])[0])
+    return float(passed_time(p, np.array([at]), last_state(run)[np.newaxis])[0])
 
 
 def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:

@@ -24,17 +24,17 @@ from compressor.solve.attempts import (
     attempt,
     companion,
     companion_rtol,
-    concluded,
     estimate_errors,
     ready,
     request,
+    solution_of_trajectory,
     times_of,
     witness,
 )
 from compressor.solve.error_bars import (
     ORDER,
     RUNGS,
-    allowed,
+    allowed_residual,
     beyond,
     closeness,
     energy_residual,
@@ -43,7 +43,7 @@ from compressor.solve.error_bars import (
 )
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.march_driver import LANE_METHODS, ready_walker
-from compressor.solve.regime import DOUBTFUL, Search, doubtful, repeats, spanned, with_span
+from compressor.solve.regime import DOUBTFUL, Search, doubtful, repeats, with_settle_rev, with_span
 from compressor.solve.request import Cuts, Trajectory, revolutions, with_edge
 from compressor.solve.run_metrics import chaotic_bars, statistics
 from compressor.solve.si_record import natural_sizes, record, scene
@@ -81,7 +81,7 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
         each = (time.perf_counter() - began) / max(whole, 1)
         for one, run in zip(attempts, ended, strict=True):
             if run:
-                found[one.case][one.rtol] = made(one, run, each)
+                found[one.case][one.rtol] = lane_solution(one, run, each)
     return list(found)
 
 
@@ -95,18 +95,18 @@ def suits(case: Case) -> bool:
 
 def attempts_of(number: int, case: Case) -> list[Asked]:
     """Return what a case's first attempt needs, and its companion's."""
-    case = spanned(case, float(case.solve.settle_rev), 1)
+    case = with_settle_rev(case, float(case.solve.settle_rev), 1)
     p, sampled = record(case), case.output.keep == "series"
-    found = [asked(number, case, case.rtol, p, times_of(case, sampled))]
+    found = [lane_request(number, case, case.rtol, p, times_of(case, sampled))]
     if case.wants_bars and (tighter := companion_rtol(p, case.rtol)):
         if sampled:
-            found.append(asked(number, case, tighter, p, times_of(case, False)))
+            found.append(lane_request(number, case, tighter, p, times_of(case, False)))
         else:  # all but the tolerance is the same
-            found.append(tightened(found[0], tighter))
+            found.append(with_tolerance(found[0], tighter))
     return [one for one in found if one.times.all.size <= MOST_SAMPLES]
 
 
-def tightened(one: Asked, rtol: float) -> Asked:
+def with_tolerance(one: Asked, rtol: float) -> Asked:
     """Return the same attempt at another tolerance."""
     walker = one.run.walker.copy()
     walker["rtol"] = rtol
@@ -114,7 +114,7 @@ def tightened(one: Asked, rtol: float) -> Asked:
     return one._replace(rtol=rtol, run=run, trajectory=trajectory)
 
 
-def asked(number: int, case: Case, rtol: float, p: np.record, times: Times) -> Asked:
+def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Times) -> Asked:
     """Return an attempt made ready."""
     wanted = request(case, rtol, p, times)
     trajectory, edges, phases, z = ready(wanted)
@@ -125,14 +125,14 @@ def asked(number: int, case: Case, rtol: float, p: np.record, times: Times) -> A
     return Asked(number, rtol, times, run, trajectory)
 
 
-def made(one: Asked, run: Run, each: float) -> Solution:
+def lane_solution(one: Asked, run: Run, each: float) -> Solution:
     """Return an attempt whose run has reached its end; each: wall time (s) of an evaluation."""
     walker, trajectory = run.walker, one.trajectory
     trajectory.states, trajectory.tally = run.states, run.tally
     trajectory.steps, trajectory.rejected = int(walker["steps"]), int(walker["rejected"])
     trajectory.evaluations = int(walker["evaluations"])
     trajectory.seconds = each * trajectory.evaluations
-    return concluded(one.rtol, run.p, one.times, trajectory)
+    return solution_of_trajectory(one.rtol, run.p, one.times, trajectory)
 
 
 OUT_OF_BUDGET = (
@@ -168,10 +168,10 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
             return cut_short(case, best, now, search)
         search.count(now.trajectory)
         best = now
-        if not balanced(case, now):
+        if not energy_balances(case, now):
             unsound += 1
             if unsound > RUNGS or rtol < 9.9 * TIGHTEST:
-                return unbalanced(case, now, f"at rtol {rtol:.2g}")
+                return fail_energy_audit(case, now, f"at rtol {rtol:.2g}")
             rtol /= 10.0
             continue
         if not case.wants_bars:
@@ -188,7 +188,7 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
         if excess <= 1.0:
             now.promise = "kept" if promises(case) else "none"
             return now
-        if lost(now) and search.look(whole=before is not None):
+        if looks_chaotic(now) and search.look(whole=before is not None):
             return now
         if other.reason or min(rtol, other.rtol) < 1.01 * TIGHTEST:
             return short_of(case, now, other.detail or "no run is tighter")
@@ -199,7 +199,7 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
 
 def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
     """Return the tightest of some runs that balances, and than which one can be tighter."""
-    fit = [one for one in others if one.rtol > 1.01 * TIGHTEST and balanced(case, one)]
+    fit = [one for one in others if one.rtol > 1.01 * TIGHTEST and energy_balances(case, one)]
     return min([now, *fit], key=lambda run: run.rtol)
 
 
@@ -244,7 +244,7 @@ def over_promise(case: Case, solution: Solution) -> float:
     return solution.series_errors["acceleration"] / case.promise if promises(case) else 0.0
 
 
-def lost(solution: Solution) -> bool:
+def looks_chaotic(solution: Solution) -> bool:
     """Return whether a run's acceleration is as far from another's as chaotic motions are."""
     return solution.series_errors["acceleration"] >= DOUBTFUL
 
@@ -263,9 +263,9 @@ def short(rtol: float) -> float:
     return float(f"{rtol:.1e}")
 
 
-def balanced(case: Case, solution: Solution) -> bool:
+def energy_balances(case: Case, solution: Solution) -> bool:
     """Return whether the energy of a whole run balances as well as the case asks for."""
-    return energy_residual(solution.trajectory.tally) <= allowed(
+    return energy_residual(solution.trajectory.tally) <= allowed_residual(
         case.rtol, case.duration / case.turn
     )
 
@@ -275,15 +275,15 @@ def cut_short(case: Case, best: Solution | None, now: Solution, search: Search) 
     if best is None or now.reason not in OUT_OF_BUDGET:
         return now
     detail = f"the next run: {search.limit_of(now.trajectory) or now.detail}"
-    if not balanced(case, best):
-        return unbalanced(case, best, detail, now.reason)
+    if not energy_balances(case, best):
+        return fail_energy_audit(case, best, detail, now.reason)
     return short_of(case, best, detail, now.reason)
 
 
-def unbalanced(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
+def fail_energy_audit(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
     """Return a whole run as a failed job: its series and energies are kept, its metrics are not."""
     residual = energy_residual(best.trajectory.tally)
-    most = allowed(case.rtol, case.duration / case.turn)
+    most = allowed_residual(case.rtol, case.duration / case.turn)
     best.metrics, best.bars, best.series_errors = {}, {}, {}
     best.reversal, best.reversal_bars = {}, {}
     timed_out = reason == Reason.BUDGET_SECONDS
@@ -296,11 +296,11 @@ def short_of(case: Case, best: Solution, detail: str, reason: str = "") -> Solut
     """Return a run with its errors as a failed job, since they are larger than promised."""
     timed_out = reason == Reason.BUDGET_SECONDS
     best.reason = reason if timed_out else Reason.ACCURACY_NOT_REACHED
-    best.detail = "; ".join([*missed(case, best), f"at rtol {best.rtol:.2g}", detail])
+    best.detail = "; ".join([*missed_promises(case, best), f"at rtol {best.rtol:.2g}", detail])
     return best
 
 
-def missed(case: Case, solution: Solution) -> list[str]:
+def missed_promises(case: Case, solution: Solution) -> list[str]:
     """Return what a run promised and does not keep, a message each."""
     if case.targets:
         return unmet(case.targets, solution.metrics, solution.bars)
@@ -355,7 +355,11 @@ def in_doubt(case: Case, solution: Solution) -> bool:
     """
     if math.isfinite(case.promise) and solution.promise == "kept":
         return False
-    return bool(solution.reason) or lost(solution) or doubtful(solution.metrics, solution.bars)
+    return (
+        bool(solution.reason)
+        or looks_chaotic(solution)
+        or doubtful(solution.metrics, solution.bars)
+    )
 
 
 def name_regime(case: Case, solution: Solution, search: Search) -> None:
@@ -382,12 +386,12 @@ def chaotic(case: Case, solution: Solution, search: Search) -> Solution:
     for rtol in sorted({loosest, min(loosest, solution.rtol)}, reverse=True):
         now = attempt(case, rtol, search.left, case.output.keep == "series", Cuts(ends))
         now.horizon, now.settled, now.regime = horizon, solution.settled, Regime.CHAOTIC
-        if now.reason or balanced(case, now):
+        if now.reason or energy_balances(case, now):
             break
     if now.reason:
         return now
-    if not balanced(case, now):
-        return unbalanced(case, now, f"at rtol {now.rtol:.2g}")
+    if not energy_balances(case, now):
+        return fail_energy_audit(case, now, f"at rtol {now.rtol:.2g}")
     if case.wants_bars:
         estimate_errors(now)
         if now.turns:

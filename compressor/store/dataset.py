@@ -69,7 +69,7 @@ def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
         missing = np.nan if units[key] else ""
         swept = {study.name: any(axis.key == key for axis in study.axes) for study in studies}
         values = [
-            point.get(key, missing) if swept[study.name] else _fixed(study, key, missing)
+            point.get(key, missing) if swept[study.name] else _fixed_value(study, key, missing)
             for study, point in rows
         ]
         coordinates[name] = _coordinate(("job",), key, values, units[key])
@@ -77,7 +77,7 @@ def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
     return Layout(("job",), np.array(keys), coordinates)
 
 
-def _fixed(study: StoredStudy, key: str, missing: Any) -> Any:
+def _fixed_value(study: StoredStudy, key: str, missing: Any) -> Any:
     """Return the value of a key in all jobs of a study; `missing` where it has no single one."""
     value = value_in(study.fixed, key)
     return missing if value is None else value
@@ -95,7 +95,7 @@ def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
     return _with_coordinates(variables, layout)
 
 
-def labelled(
+def label_dataset(
     layout: Layout, rows: Rows, job: Callable[[str], xr.Dataset], values: Values
 ) -> xr.Dataset:
     """Return the Dataset of a layout, from the rows of a store and its jobs with time series."""
@@ -109,7 +109,7 @@ def labelled(
     return _with_coordinates(dict(dataset.variables) | series, layout)
 
 
-def trusted(dataset: xr.Dataset) -> xr.Dataset:
+def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
     """Return a Dataset of jobs in which metrics are nan where their error bars do not vouch for
     them.
 

@@ -93,7 +93,7 @@ def export(
     ExportError before anything is written, StoreError where the store or the disk gives way.
     """
     stored, known = read_store(folder), read_studies(folder, former=True)
-    studies, keys = _named(folder, names, stored, known)
+    studies, keys = _named_jobs(folder, names, stored, known)
     target = Path(output)
     options = options or ExportOptions()
     form, is_file = _form(output, options.form)
@@ -115,7 +115,7 @@ def export(
     return found, damaged
 
 
-def _named(
+def _named_jobs(
     folder: Folder, names: Sequence[str], stored: Stored, known: Sequence[StoredStudy]
 ) -> tuple[list[StoredStudy], list[str]]:
     """Return the studies and the keys of the jobs that are named, each once; all studies by
@@ -205,7 +205,7 @@ def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
         is_grid = len(studies) == 1 and studies[0].is_grid
         layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
         table = outcomes(layout, stored.rows).assign_attrs(_attributes(studies))
-        data = image_of(_linked(table))
+        data = image_of(_link_coordinates(table))
         publish(task.path, data)
         size = len(data)
     jobs = sum(study.jobs for study in studies)
@@ -294,7 +294,7 @@ def _cells(values: np.ndarray) -> list[Any]:
     return cells.tolist()
 
 
-def _linked(table: "xr.Dataset") -> "xr.Dataset":
+def _link_coordinates(table: "xr.Dataset") -> "xr.Dataset":
     """Return a table whose variables name their coordinates, as netCDF's readers expect."""
     others = [name for name in table.coords if name not in table.dims]
     linked = table.copy()

@@ -284,7 +284,7 @@ def no_results(folder: Folder) -> WrongName:
         )
     if not place.exists():
         return WrongName(folder, "there is no such folder of results", remedy_for(place))
-    followed = listed(sorted(path.parent.name for path in place.glob("regimes/*/*.json")))
+    followed = list_few(sorted(path.parent.name for path in place.glob("regimes/*/*.json")))
     if followed:
         problem = f"holds no study of jobs, only machines that were followed: {followed}"
         return WrongName(folder, problem, "compsim plot STUDY draws one")
@@ -311,7 +311,7 @@ def remedy_for(place: Path) -> str:
     if near:
         return near
     if beside:
-        return f"there are results in {listed([*map(str, beside.values())])}; or {MAKE}"
+        return f"there are results in {list_few([*map(str, beside.values())])}; or {MAKE}"
     return f"choose the folder of a sweep, or {MAKE}"
 
 
@@ -329,6 +329,6 @@ def models_file(folder: Folder, study: str) -> Path:
     return Path(folder) / "models" / f"{study}.nc"
 
 
-def listed(names: list[str]) -> str:
+def list_few(names: list[str]) -> str:
     """Return a few names, and whether there are more."""
     return ", ".join(names[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")

@@ -61,13 +61,13 @@ def digest(data: bytes) -> str:
     return hashlib.blake2b(data, digest_size=DIGITS // 2).hexdigest()
 
 
-def sealed(data: bytes) -> bytes:
+def seal(data: bytes) -> bytes:
     """Return a file's bytes with their digest behind them, which HDF5 does not look at."""
     return data + SEAL + digest(data).encode()
 
 
-def unsealed(data: bytes, path: Folder, remedy: str = REMEDY) -> bytes:
-    """Return what `sealed` was given; files of former versions have no seal. Raises DamagedJob."""
+def unseal(data: bytes, path: Folder, remedy: str = REMEDY) -> bytes:
+    """Return what `seal` was given; files of former versions have no seal. Raises DamagedJob."""
     at = data.rfind(SEAL, -len(SEAL) - DIGITS)
     if at < 0:
         return data
@@ -129,7 +129,7 @@ def _image(data: bytes) -> h5py.File:
 
 
 @contextlib.contextmanager
-def opened(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.File]:
+def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.File]:
     """The HDF5 file that `data` is, every part of it checked; `path` is named in errors.
 
     Raises DamagedJob for what is no HDF5 file or holds what ours never do: groups, links, data in

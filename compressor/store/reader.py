@@ -66,14 +66,14 @@ def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
         if lack.any():
             found[name] = {key.decode() for key in rows.columns["key"][old[lack]]}
     for position in old.tolist():
-        for what in _changed(rows, position):
+        for what in _changed_by_revision(rows, position):
             found.setdefault(f"this version's {what}", set()).add(
                 rows.columns["key"][position].decode()
             )
     return found
 
 
-def _changed(rows: Rows, position: int) -> list[str]:
+def _changed_by_revision(rows: Rows, position: int) -> list[str]:
     """Return what a revision of the model has changed since a job was stored."""
     if not SUSPECT.search(rows.text(position)):
         return []
@@ -414,8 +414,8 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     stored = read_store(folder).warned()
     is_grid = len(studies) == 1 and studies[0].is_grid
     layout = datasets.grid(studies[0]) if is_grid else datasets.table_of_jobs(studies)
-    dataset = datasets.labelled(layout, stored.rows, stored.job, stored.values)
+    dataset = datasets.label_dataset(layout, stored.rows, stored.job, stored.values)
     if trusted:
-        dataset = datasets.trusted(dataset)
+        dataset = datasets.mask_untrusted(dataset)
     dataset.attrs = {"folder": folder, "studies": [study.name for study in studies]}
     return dataset

@@ -4,8 +4,9 @@ Segments: files that each hold the outcomes of many jobs as columns, a row a job
 written once, as `<folder>/rows/<number>-<digest>.h5`, netCDF-4 like a job's file. The digest of its
 bytes is in its name, and compared whenever it is read.
 
-Of several rows of one job the one that is worth most counts (`worth`): runs that write at the same
-time, each its own shard, take nothing from each other. Among equals it is the one with the greatest
+Of several rows of one job the most complete one counts (`completeness`): runs that write at the
+same time, each its own shard, take nothing from each other. Among equals it is the one with the
+greatest
 `serial`: the number of the segment that it was first written to.
 """
 
@@ -25,7 +26,7 @@ from compressor.metrics import HORIZON, METRICS, NUMBERS, ROD_LOAD, SOMETIMES
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
 from compressor.program import PROGRAM
 from compressor.store.files import HEX20, pending_path
-from compressor.store.hdf5 import DamagedJob, digest, image, opened, storable
+from compressor.store.hdf5 import DamagedJob, digest, image, open_file, storable
 from compressor.store.series_file import intact, series_path
 
 NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
@@ -87,7 +88,7 @@ class Segment:
         if isinstance(self.held, np.ndarray):
             return self.held[[*names]] if names else self.held
         found = np.full(len(self), np.nan, kind)
-        with opened(self.held, self.path, REMEDY) as file:
+        with open_file(self.held, self.path, REMEDY) as file:
             for name in kind.names or ():
                 if name in file:
                     found[name] = file[name][()]
@@ -101,7 +102,7 @@ class Segment:
     @cached_property
     def details(self) -> list[bytes]:
         """What is known of each failure, as JSON."""
-        return unpacked(self.notes, self)
+        return unpack_lines(self.notes, self)
 
 
 def segment_name(number: int, data: bytes) -> str:
@@ -130,8 +131,8 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
     columns["samples"] = np.array([item.samples for item in series], int)
     columns["end"] = np.array([item.end for item in series], float)
     numbers = np.array([outcome.numbers for outcome in outcomes], ROW)
-    texts = packed(_line(outcome.attributes) for outcome in outcomes)
-    return Segment(Path(), columns, numbers, texts, packed(_line(o.detail) for o in outcomes))
+    texts = pack_lines(_line(outcome.attributes) for outcome in outcomes)
+    return Segment(Path(), columns, numbers, texts, pack_lines(_line(o.detail) for o in outcomes))
 
 
 def has_signals(outcome: Outcome) -> bool:
@@ -147,11 +148,11 @@ def _line(value: Any) -> bytes:
     return json.dumps(value, default=lambda array: array.tolist()).encode()
 
 
-def packed(lines: Iterable[bytes]) -> bytes:
+def pack_lines(lines: Iterable[bytes]) -> bytes:
     return zlib.compress(b"\n".join(lines), level=1)
 
 
-def unpacked(packed: bytes, segment: Segment) -> list[bytes]:
+def unpack_lines(packed: bytes, segment: Segment) -> list[bytes]:
     """Return a line for each row of a segment. Raises DamagedJob."""
     try:
         inflater = zlib.decompressobj()
@@ -204,7 +205,7 @@ def decode(data: bytes, path: Path) -> Segment:
 
     Raises DamagedJob for what is no segment.
     """
-    with opened(data, path, REMEDY) as file:
+    with open_file(data, path, REMEDY) as file:
         rows = len(file["key"])
         absent = np.full(rows, b"", "S1")
         columns = {
@@ -257,23 +258,23 @@ def merge(segments: Sequence[Segment]) -> Segment:
     """Return one segment with the rows that count of several segments, without a path."""
     rows = Rows.of(segments)
     chosen = [*zip(rows.source.tolist(), rows.row.tolist(), strict=True)]
-    texts = [unpacked(segment.texts, segment) for segment in segments]
+    texts = [unpack_lines(segment.texts, segment) for segment in segments]
     return Segment(
         Path(),
         rows.columns,
         rows.numbers,
-        packed(texts[source][row] for source, row in chosen),
-        packed(segments[source].details[row] for source, row in chosen),
+        pack_lines(texts[source][row] for source, row in chosen),
+        pack_lines(segments[source].details[row] for source, row in chosen),
     )
 
 
 @lru_cache(maxsize=4)
 def _lines(segment: Segment) -> list[bytes]:
     """Return the attributes of each row of a segment, as JSON."""
-    return unpacked(segment.texts, segment)
+    return unpack_lines(segment.texts, segment)
 
 
-def worth(columns: dict[str, np.ndarray]) -> np.ndarray:
+def completeness(columns: dict[str, np.ndarray]) -> np.ndarray:
     """Return how much rows of one job tell: failed 0, ok 1, with time series 3, in double precision
     5.
 
@@ -306,7 +307,7 @@ class Rows:
             )
             for name, (kind, _) in COLUMNS.items()
         }
-        order = np.lexsort((columns["serial"], worth(columns), columns["key"]))
+        order = np.lexsort((columns["serial"], completeness(columns), columns["key"]))
         keys = columns["key"][order]
         chosen = order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]
         chosen_columns = {name: values[chosen] for name, values in columns.items()}

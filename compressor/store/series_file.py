@@ -30,7 +30,7 @@ from compressor.store.files import (
     system_error,
     write_pending,
 )
-from compressor.store.hdf5 import REMEDY, DamagedJob, digest, opened, sealed, unsealed
+from compressor.store.hdf5 import REMEDY, DamagedJob, digest, open_file, seal, unseal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +73,7 @@ def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:
 
 def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
     """Store a Dataset that is no job as netCDF-4, with the digest of its bytes, durably."""
-    publish(path, sealed(image_of(dataset)))
+    publish(path, seal(image_of(dataset)))
     return path
 
 
@@ -83,7 +83,7 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
     """
     import xarray as xr
 
-    with opened(unsealed(path.read_bytes(), path, remedy), path, remedy) as file:
+    with open_file(unseal(path.read_bytes(), path, remedy), path, remedy) as file:
         return xr.Dataset(hdf5.variables(file), attrs=hdf5.attributes(file))
 
 
@@ -143,7 +143,7 @@ def read_series(path: Path) -> "xr.Dataset":
     """Return a job's Dataset, from a file. Raises DamagedJob."""
     import xarray as xr
 
-    with opened(read_bytes(path), path) as file:
+    with open_file(read_bytes(path), path) as file:
         attributes = hdf5.attributes(file)
         if attributes["key"] != final_path(path).name[:20]:
             raise ValueError
@@ -160,5 +160,5 @@ def read_series(path: Path) -> "xr.Dataset":
 
 def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Return some variables of a job's file by name, without those that it does not have."""
-    with opened(read_bytes(path), path) as file:
+    with open_file(read_bytes(path), path) as file:
         return {name: file[name][()] for name in names if name in file}

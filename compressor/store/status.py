@@ -257,7 +257,7 @@ def verify(
         progress(position + 1, len(rows))
     busy |= {place for place in places(folder) if is_locked(place)}
     found += _gone(folder, rows, studies, {key for damage in found for key in damage.keys}, busy)
-    return _owned(found, studies)
+    return _name_owners(found, studies)
 
 
 def _gone(
@@ -294,7 +294,7 @@ def _gone(
             )
 
 
-def _owned(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:
+def _name_owners(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:
     """Return the damage with the studies of its jobs."""
     belong = owners(studies, (key for damage in found for key in damage.keys))
     owned = []

@@ -33,7 +33,7 @@ from compressor.store.files import (
     StoreError,
     StoreWarning,
     WrongName,
-    listed,
+    list_few,
     no_results,
     publish,
     refusals,
@@ -381,9 +381,9 @@ def find_study(
     if name is None and len(studies) == 1:
         return next(iter(studies.values()))
     if name is None:
-        raise WrongName(folder, "holds several studies", f"name one: {listed([*studies])}")
+        raise WrongName(folder, "holds several studies", f"name one: {list_few([*studies])}")
     if name not in studies:
-        holds = f"it holds {listed([*studies]) or 'none'}"
+        holds = f"it holds {list_few([*studies]) or 'none'}"
         near = did_you_mean(name, studies) or holds
         raise WrongName(folder, f"holds no study {name!r}", near)
     return studies[name]
@@ -414,7 +414,7 @@ def whole_key(
     if len(like) == 1:
         return like[0]
     if like:
-        problem = f"{len(like)} jobs' keys begin with {beginning!r}: {listed(like)}"
+        problem = f"{len(like)} jobs' keys begin with {beginning!r}: {list_few(like)}"
         raise WrongName(folder, problem, "give more of the key")
     near = did_you_mean(beginning, [study.name for study in studies]) or _near_keys(
         beginning, known
@@ -460,7 +460,7 @@ def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
         if told
         else (f"{study.name} is a study of {len(found)} jobs")
     )
-    left = _varied([point for _, point in jobs])
+    left = _varied_axes([point for _, point in jobs])
     more = "; ".join(f"{key}=… of {_some(values)}" for key, values in left.items())
     raise WrongName(folder, problem, f"choose one by {more}" if more else "give a job's key")
 
@@ -511,13 +511,13 @@ def _axes(study: StoredStudy) -> str:
     """Return what a study's jobs are told apart by."""
     axes = [f"{axis.key}={in_words(axis.values[0])}" for axis in study.axes]
     return (
-        f"its axes are {listed([axis.key for axis in study.axes])}, as in {axes[0]}"
+        f"its axes are {list_few([axis.key for axis in study.axes])}, as in {axes[0]}"
         if axes
         else ("it is one job: leave the values out")
     )
 
 
-def _varied(jobs: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
+def _varied_axes(jobs: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
     """Return the axes in which jobs differ, and their values."""
     keys = dict.fromkeys(key for point in jobs for key in point)
     values = {key: [*dict.fromkeys(point.get(key) for point in jobs)] for key in keys}
@@ -532,4 +532,4 @@ def _some(values: Sequence[Any], near: str = "") -> str:
     if number is not None and numeric and len(found) > MOST_LIKE:
         found = sorted(sorted(found, key=lambda value: abs(value - number))[:MOST_LIKE])
         return f"{', '.join(map(in_words, found))} next to it"
-    return listed([*map(in_words, found)])
+    return list_few([*map(in_words, found)])

@@ -78,7 +78,7 @@ class Writer:
         self.small: dict[Path, int] = {}  # segments below MOST_ROWS -> their rows
 
     def __enter__(self) -> "Writer":
-        self.lock = _locked(self.place / LOCK_NAME, self.wait, self.command)
+        self.lock = _lock(self.place / LOCK_NAME, self.wait, self.command)
         try:
             self.found = read_store(self.folder)
             self.number = max(map(_number, self._all_paths()), default=0)
@@ -186,7 +186,7 @@ class Writer:
             damaged = self._damaged(place)
             if damaged:
                 with contextlib.suppress(StoreError):  # another process writes there
-                    lock = _locked(place / LOCK_NAME, False, self.command)
+                    lock = _lock(place / LOCK_NAME, False, self.command)
                     _set_aside(damaged)
                     os.close(lock)
 
@@ -243,7 +243,7 @@ def _holder(descriptor: int) -> str:
     return text.decode(errors="replace").strip() or "another process"
 
 
-def _locked(path: Path, wait: bool, command: str) -> int:
+def _lock(path: Path, wait: bool, command: str) -> int:
     """Take a lock for this process, for as long as the descriptor stays open."""
     import fcntl  # not on Windows, where nothing is run
 

@@ -51,7 +51,7 @@ def visible(place: Path) -> Iterator[tuple[Path, str]]:
             token.unlink()
 
 
-def received(place: Path, result: Any) -> Any:
+def receive_result(place: Path, result: Any) -> Any:
     """Return a result from a worker, its time series stored if they came with it."""
     if not isinstance(result, Carried):
         return result
@@ -130,7 +130,7 @@ class Cluster:
             work = partial(run_near, place, token, text)
             remote = Remote(self.client, work, rules, Jobs(cases))
             remote.remark = remark
-            remote.decode = lambda result: received(place, pickle.loads(result))
+            remote.decode = lambda result: receive_result(place, pickle.loads(result))
             yield from remote.ends(pulse)
 
 

@@ -185,7 +185,7 @@ class Remote(Batches):
         try:
             threads = [*self.client.nthreads().values()]
         except (OSError, TimeoutError, ValueError) as error:
-            raise lost(self.client) from error
+            raise describe_lost_scheduler(self.client) from error
         if not threads and self.threads:
             self.remark(WAITING)
         self.renew = self.renew or sum(threads) != self.threads
@@ -216,7 +216,7 @@ class Remote(Batches):
             self.suspects.extend([[job] for job in batch] if self.alone else [batch])
 
     def fail(self, error: BaseException) -> Iterable[Lost]:
-        raise error if self.client.status == "running" else lost(self.client)
+        raise error if self.client.status == "running" else describe_lost_scheduler(self.client)
 
     def discard(self) -> None:
         """Nothing is shared with a suspect: no other batch is at work."""
@@ -231,7 +231,7 @@ class Remote(Batches):
         self.thread.shutdown()
 
 
-def lost(client: Any) -> ClusterError:
+def describe_lost_scheduler(client: Any) -> ClusterError:
     """Return the scheduler has gone."""
     address = client.scheduler.address if client.scheduler else "the scheduler"
     return ClusterError(f"{address}: the scheduler was lost; the same command goes on with another")

@@ -44,7 +44,7 @@ from compressor.sweep.worker import (
     Done,
     Lost,
     Workers,
-    described,
+    describe_error,
     do_batch,
     settle,
 )
@@ -188,7 +188,7 @@ class Batches:
             try:
                 return Job(name, pickle.dumps(payload, pickle.HIGHEST_PROTOCOL), timeout)
             except Exception as error:
-                lost = Lost(None, Reason.INTERNAL_ERROR, *described(error))
+                lost = Lost(None, Reason.INTERNAL_ERROR, *describe_error(error))
                 self.arrived.put(([Job(name, b"", timeout)], [lost]))
         return None
 
@@ -205,7 +205,7 @@ class Batches:
             try:
                 end = replace(end, id=job.id, result=self.decode(end.result))
             except Exception as error:
-                end = Lost(job.id, Reason.INTERNAL_ERROR, *described(error))
+                end = Lost(job.id, Reason.INTERNAL_ERROR, *describe_error(error))
             yield end
 
     def lose(self, job: Job, end: Lost, again: bool) -> Iterator[Lost]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, read_store, series_file
-from compressor.sweep.wanted import Wanted, revolutions, stored
+from compressor.sweep.wanted import Wanted, revolutions, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
 
 ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
@@ -135,7 +135,7 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
     """
     store = read_store(folder)
     keys = {study.name: dict.fromkeys(study.keys[n] for n in study.selected) for study in studies}
-    done = {*stored(store, Wanted(studies, store.keys()))}
+    done = {*stored_ends(store, Wanted(studies, store.keys()))}
     missing: dict[str, list[str]] = {}
     looked_at: set[str] = set()
     ahead: list[Next] = []
@@ -196,7 +196,7 @@ def timed_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[s
     for number in range(DRAWN):
         for study, cases in drawn.items():
             if number < len(cases) and (number == 0 or time.perf_counter() < end):
-                costs[study].append(measured(cases[number]))
+                costs[study].append(measure_cost(cases[number]))
     return costs
 
 
@@ -218,7 +218,7 @@ def mean_with_range(values: Sequence[float], of: int) -> tuple[float, float, flo
     return mean, max(mean - error, min(values)), mean + error
 
 
-def measured(case: Case) -> Cost:
+def measure_cost(case: Case) -> Cost:
     """Return what a job costs. It runs again where its search for chaos had to load machine code
     first.
     """

@@ -18,7 +18,7 @@ from compressor.outcome import Outcome, without_run
 from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.execution import Input, require_posix, rest, run_batches
 from compressor.sweep.run_job import run_ahead, run_job
-from compressor.sweep.wanted import End, Missing, Now, Wanted, Work, stored
+from compressor.sweep.wanted import End, Missing, Now, Wanted, Work, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.worker import Done, Lost, Workers
 
@@ -136,7 +136,7 @@ def sweep(
                 f"{writer.place / 'jobs'}: no row knows the jobs of {writer.unowned} of its files"
             )
             progress(0, len(cases), f"{files}; they stay, and compsim verify tells more")
-        ends = stored(writer.found, cases)
+        ends = stored_ends(writer.found, cases)
         if options.rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}
         stale = writer.found.stale(ends)

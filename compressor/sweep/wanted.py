@@ -115,7 +115,7 @@ def serving_both(first: Case, second: Case) -> Case:
     return replace(first, output=output, solve=solve)
 
 
-def stored(store: Stored, wanted: Wanted) -> dict[str, End]:
+def stored_ends(store: Stored, wanted: Wanted) -> dict[str, End]:
     """Return how the jobs ended that need no new run: stored ones that serve, with intact files.
 
     A case whose job is to be run again goes on keeping the time series that its job has, as exact

@@ -138,7 +138,7 @@ def load_telling(needs: Needs, told: str, remark: Callable[[str], None]) -> None
         remark(f"compiled in {seconds:.0f} s")
 
 
-def named(part: str) -> tuple[str, int]:
+def name_part(part: str) -> tuple[str, int]:
     """Return what a part of the equations is, in words, and the seconds that compiling it takes."""
     what, seconds = WHAT.get(part, WHAT[METHOD])
     return what.format(part), seconds
@@ -146,7 +146,7 @@ def named(part: str) -> tuple[str, int]:
 
 def compile_seconds(needs: Needs) -> int:
     """Return seconds of compiling that are ahead of a run with these needs, on an idle machine."""
-    return sum(named(part)[1] for part in needs.uncompiled)
+    return sum(name_part(part)[1] for part in needs.uncompiled)
 
 
 def marker(part: str) -> Path:
@@ -164,7 +164,7 @@ def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
     """
     ahead = needs.uncompiled
     for number, (part, alone) in enumerate(ahead.items(), 1):
-        what, seconds = named(part)
+        what, seconds = name_part(part)
         told = COMPILING.format(number=number, count=len(ahead), what=what, seconds=seconds)
         load_telling(alone, told, remark)
         path = marker(part)

@@ -91,7 +91,7 @@ def settle(work: Callable[[Any], Any], rules: Workers, notes: str, parent: int) 
     except BaseException as error:  # which joblib would print from each worker
         with open(notes, "r+b") as file:
             file.seek(-WHY, os.SEEK_END)
-            file.write(described(error)[0].encode()[:WHY])
+            file.write(describe_error(error)[0].encode()[:WHY])
         os._exit(1)
     gc.freeze()  # what is there by now stays: looking at it took a thirtieth of short jobs' time
     assert rules.memory
@@ -164,10 +164,10 @@ def perform(job: Callable[[], tuple[Any, ...]], start: float) -> Done | Lost:
         most = f"needs more than the {HERE['rules'].memory / 1e9:.3g} GB that a worker may add"
         return Lost(None, Reason.OUT_OF_MEMORY, most)
     except BaseException as error:  # work may even call sys.exit
-        return Lost(None, Reason.INTERNAL_ERROR, *described(error))
+        return Lost(None, Reason.INTERNAL_ERROR, *describe_error(error))
 
 
-def described(error: BaseException) -> tuple[str, str]:
+def describe_error(error: BaseException) -> tuple[str, str]:
     """Return an exception in a line, and its traceback."""
     what = traceback.format_exception_only(error)[-1].strip()
     return what[:MOST_TEXT], "".join(traceback.format_exception(error))[-MOST_TEXT:]

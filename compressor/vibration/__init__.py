@@ -9,4 +9,9 @@ from compressor.vibration.envelope import (
     kurtogram,
     shape,
 )
-from compressor.vibration.spectra import line_amplitudes, resampled, rms_above, smooth_pulses
+from compressor.vibration.spectra import (
+    line_amplitudes,
+    resample_angle,
+    rms_above,
+    smooth_pulses,
+)

@@ -79,15 +79,15 @@ def listen(
     pace = paces(sensor, rng, times, turn)
     rigid = motion or body_motion(body, forces, steady)
     heard = rigid.acceleration(sensor.direction, point_of(body, sensor, guide))
-    heard = repeated(heard, forces.step, pace) if steady else heard
+    heard = interpolate_periodic(heard, forces.step, pace) if steady else heard
     if body.casing and sensor.place != "body":
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
-        force = repeated(force, forces.step, pace) if steady else force
+        force = interpolate_periodic(force, forces.step, pace) if steady else force
         heard = heard + casing_acceleration(body, force, forces.step)
-    return recorded(sensor, heard, times, pace / turn, rng)
+    return record_signal(sensor, heard, times, pace / turn, rng)
 
 
-def repeated(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
+def interpolate_periodic(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
     """Return a sampled curve that repeats itself at any times (s), by a cubic spline."""
     where = step * np.arange(len(values))
     spline = CubicSpline(where, np.append(values[:-1], values[0]), bc_type="periodic")
@@ -110,7 +110,7 @@ def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: flo
     return times + course(times) - course(0.0)
 
 
-def recorded(
+def record_signal(
     sensor: Sensor,
     heard: np.ndarray,
     times: np.ndarray,

@@ -176,13 +176,13 @@ def rms(values: np.ndarray) -> float:
     band-pass filter has left: for reciprocating compressors of displacement, velocity and
     acceleration (ISO 20816-8). Raises SignalError as all here: values must be finite, in one row.
     """
-    found, size = _scaled(values)
+    found, size = _scale_signal(values)
     return size * math.sqrt(float(np.mean(found**2)))
 
 
 def crest_factor(values: np.ndarray) -> float:
     """Return greatest magnitude over rms of samples (m,): sqrt(2) of a sine, 1 of a square wave."""
-    found, size = _scaled(values)
+    found, size = _scale_signal(values)
     return 1.0 / math.sqrt(float(np.mean(found**2))) if size else math.nan
 
 
@@ -193,7 +193,7 @@ def kurtosis(values: np.ndarray) -> float:
     3 of Gaussian noise, 1.5 of a sine, 1 of a square wave. Moments of the samples themselves,
     without correction of bias; nan of a constant.
     """
-    found, _ = _scaled(values)
+    found, _ = _scale_signal(values)
     if np.ptp(found) == 0.0:
         return math.nan
     square = (found - found.mean()) ** 2
@@ -208,7 +208,7 @@ def gini(values: np.ndarray) -> float:
     Transactions on Information Theory 55, 2009, Eq. 1). For impulses pass the squared envelope
     (`compressor.vibration.envelope.band_envelope`).
     """
-    found, size = _scaled(values)
+    found, size = _scale_signal(values)
     if not size:
         return math.nan
     ordered = np.sort(np.abs(found))
@@ -226,7 +226,7 @@ def energy_angle(values: np.ndarray, share: float = 0.9) -> float:
     """
     if not 0.0 < share <= 1.0:
         raise SignalError(f"the share is {share}: choose one above 0, and 1 at most")
-    found, size = _scaled(values)
+    found, size = _scale_signal(values)
     if not size:
         return math.nan
     energy = np.sort(found**2)[::-1]
@@ -255,7 +255,7 @@ def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarra
     return irfft(lines, found.size)
 
 
-def _scaled(values: np.ndarray) -> tuple[np.ndarray, float]:
+def _scale_signal(values: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the checked signal over its greatest magnitude, so that no power overflows, and
     that.
     """

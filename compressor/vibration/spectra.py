@@ -89,7 +89,7 @@ def whole_revolutions(count: int, a_turn: int) -> int:
     a_turn = checked_count(a_turn, 2, "the number of samples a revolution")
     if count % a_turn:
         rest = f"{count} samples are no whole number of revolutions of {a_turn} samples"
-        raise SignalError(f"{rest}: resample the signal at equal angles by `resampled`")
+        raise SignalError(f"{rest}: resample the signal at equal angles by `resample_angle`")
     return count // a_turn
 
 
@@ -160,7 +160,7 @@ def samples_a_turn(angle: np.ndarray) -> int:
     return 2 * math.ceil(round(TURN / float(np.median(np.diff(angle)))) / 2)
 
 
-def resampled(angle: np.ndarray, values: np.ndarray, a_turn: int) -> np.ndarray:
+def resample_angle(angle: np.ndarray, values: np.ndarray, a_turn: int) -> np.ndarray:
     """Return the signal at equal crank angles, whole revolutions only: (revolutions * a_turn,).
 
     angle (rad) and values: (m,), at any increasing angles. Sample i is at angle[0] + 2 pi i /
@@ -200,12 +200,12 @@ def order_spectrum(
     what repeats after each block; hann (1.5) or flattop (3.77) for what does not.
 
     With a rectangular window and one block, the squares of rms amplitudes add up to the mean square
-    of the resampled signal (Parseval). Raises SignalError as `resampled` does, or for a block of
-    more revolutions than there are, or an unknown window.
+    of the resampled signal (Parseval). Raises SignalError as `resample_angle` does, or for a block
+    of more revolutions than there are, or an unknown window.
     """
     at, found = checked_angle(angle, values)
     a_turn = samples_a_turn(at) if a_turn is None else a_turn
-    even = resampled(at, found, a_turn)
+    even = resample_angle(at, found, a_turn)
     revolutions = even.size // a_turn
     turns = checked_count(revolutions if turns is None else turns, 1, "the block of revolutions")
     if turns > revolutions:
@@ -237,13 +237,13 @@ def synchronous_average(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean revolution, (a_turn,), and what is left: (revolutions * a_turn,).
 
-    angle (rad) and values: (m,). Both are at the points of `resampled`, so that sample 0 of the
-    mean revolution is at angle[0]. What is left is the resampled signal less the mean revolution.
-    Orders that are whole numbers are kept; white noise falls by sqrt(revolutions); half an order
-    vanishes for an even number of revolutions (McFadden, Mechanical Systems and Signal Processing
-    1, 1987). Raises SignalError as `resampled` does.
+    angle (rad) and values: (m,). Both are at the points of `resample_angle`, so that sample 0 of
+    the mean revolution is at angle[0]. What is left is the resampled signal less the mean
+    revolution. Orders that are whole numbers are kept; white noise falls by sqrt(revolutions); half
+    an order vanishes for an even number of revolutions (McFadden, Mechanical Systems and Signal
+    Processing 1, 1987). Raises SignalError as `resample_angle` does.
     """
-    each = resampled(angle, values, a_turn).reshape(-1, a_turn)
+    each = resample_angle(angle, values, a_turn).reshape(-1, a_turn)
     mean = each.mean(axis=0)
     return mean, (each - mean).ravel()
 

@@ -143,7 +143,7 @@ def test_the_cam_and_the_gas_are_described_by_their_numbers(paper_runs):
     ],
 )
 def test_changes_about_top_dead_centre_belong_together(turns, told):
-    assert [captions.said(span) for span in captions.spanned(turns)] == told
+    assert [captions.format_span(span) for span in captions.angle_spans(turns)] == told
 
 
 def courses(*turns, rings=(600.0, 500.0, 400.0)):
@@ -182,10 +182,10 @@ def test_two_digits_are_told_without_a_power_of_ten(value, told):
 
 
 def test_small_numbers_keep_two_digits():
-    assert captions.listed([8.714, 15.95, 0.4], 2) == "8.71, 15.95, 0.40"
-    assert captions.listed([-0.01234, 0.5], 2) == "-0.012, 0.500"
-    assert captions.listed([0.0, 3.0], 1) == "0.0, 3.0"
-    assert captions.listed([533.2, 1181.4], 0) == "533, 1181"
+    assert captions.list_by_clearance([8.714, 15.95, 0.4], 2) == "8.71, 15.95, 0.40"
+    assert captions.list_by_clearance([-0.01234, 0.5], 2) == "-0.012, 0.500"
+    assert captions.list_by_clearance([0.0, 3.0], 1) == "0.0, 3.0"
+    assert captions.list_by_clearance([533.2, 1181.4], 0) == "533, 1181"
 
 
 @pytest.mark.parametrize("number", range(8, 17))

@@ -16,7 +16,7 @@ from compressor.analysis.runs import (
     load_phases,
     paper_cases,
     record_of,
-    settled,
+    settled_part,
 )
 
 
@@ -38,7 +38,7 @@ def test_eleven_cases_in_the_paper():
 
 
 def test_settled_leaves_out_the_first_revolution(run):
-    kept = settled(run)
+    kept = settled_part(run)
     assert kept["time"].values[0] == pytest.approx(0.12)
     assert kept.sizes["time"] == 3601
 

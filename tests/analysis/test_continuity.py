@@ -7,7 +7,7 @@ import xarray as xr
 from compressor.analysis.margins import (
     SLOWEST,
     Continuity,
-    compared,
+    compare_continuity,
     continuity,
     evidence,
     hit_error,
@@ -113,7 +113,9 @@ def test_a_chaotic_run_s_shares_have_the_scatter_of_its_revolutions(paper_runs):
 
 def test_what_is_said_of_two_joints():
     big, small = Continuity(0.2, 0.3, 0.5, 0.4), Continuity(0.1, 0.2, 0.4, 0.6)
-    assert compared(big, small).startswith("flight and impact 20.0% and 10.0% of the angle; 10°")
+    assert compare_continuity(big, small).startswith(
+        "flight and impact 20.0% and 10.0% of the angle; 10°"
+    )
 
 
 def test_the_paper_s_default_machine_is_not_more_continuous_at_the_big_end(paper_runs):

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from compressor.analysis.orbit import course, ringing, turning_points
-from compressor.analysis.runs import CLEARANCES, ideal_motion, label, settled
+from compressor.analysis.runs import CLEARANCES, ideal_motion, label, settled_part
 from compressor.cases.case import Case
 from compressor.solve.cautions import contact_scales
 from compressor.solve.simulate import simulate
@@ -35,7 +35,7 @@ def test_turns_about_top_dead_centre_are_one():
 
 @pytest.mark.parametrize("frequency", [250.0, 727.0])
 def test_ringing_of_a_known_frequency(paper_runs, frequency):
-    kept = settled(paper_runs["design"])
+    kept = settled_part(paper_runs["design"])
     time = kept["time"].values
     bursts = 50.0 * np.exp(-(time % 0.12 - 0.03) * 40) * np.sin(2 * np.pi * frequency * time)
     ideal = ideal_motion(kept)[2]
@@ -47,7 +47,7 @@ def test_ringing_of_a_known_frequency(paper_runs, frequency):
 def test_a_slow_motion_s_foot_does_not_ring(rpm):
     """A motion of order 8, ten times as high as a burst of order 80, leaks beyond order 12."""
     run = simulate(Case.from_values({"machine": {"speed_rpm": rpm}}))
-    kept = settled(run)
+    kept = settled_part(run)
     angle = kept["crank_angle"].values
     slow = 100.0 * np.sin(8.0 * angle)
     burst = 10.0 * np.sin(80.0 * angle)
@@ -76,7 +76,7 @@ def test_what_rings_is_the_journal_s_swing_in_its_bearing(paper_runs, clearance)
     case = Case.from_attribute(run.attrs["case"])
     (scales,) = contact_scales(case)
     assert scales.damping_ratio > 1
-    kept = settled(run)
+    kept = settled_part(run)
     after = (np.degrees(kept["crank_angle"].values) % 360.0 - found.turns[0]) % 360.0
     seen = (after > 5.0) & (after < 95.0)
     force = np.linalg.norm(kept["contact_force"].sel(joint="big_end").values[seen], axis=1)

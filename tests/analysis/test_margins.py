@@ -14,7 +14,7 @@ from compressor.analysis.margins import (
     at_least,
     at_most,
     least,
-    measured,
+    measure,
     peak,
     revolutions,
 )
@@ -91,10 +91,10 @@ def test_the_scatter_of_revolutions_is_a_chaotic_value_s_error():
         return float(part["a"].median())
 
     assert len([*revolutions(run)]) == 3
-    found = measured(run, middle, 0.1)
+    found = measure(run, middle, 0.1)
     assert found == pytest.approx((2.0, 4.303 * 2.646 / math.sqrt(3)), rel=1e-3)
     run.attrs["regime"] = "periodic"
-    assert measured(run, middle, 0.1) == (2.0, 0.1)
+    assert measure(run, middle, 0.1) == (2.0, 0.1)
 
 
 def test_error_bars_are_carried_through(paper_runs):

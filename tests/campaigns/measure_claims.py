@@ -27,12 +27,12 @@ from compressor.studies.claims.findings import (
     change,
     changes,
     consistency,
-    counted,
+    coordinate_in_words,
+    count_claims,
     deciding,
     flips,
     most_consistent,
     sensitivity,
-    spoken,
     summary,
 )
 from compressor.studies.claims.search import least_change
@@ -79,7 +79,7 @@ def main(target):
     found["assumptions"] = {
         **told(judged),
         "deciding": [*deciding(table)], "unknown": table["unknown"].item(),
-        "names": [spoken(str(name)) for name in table["assumption"].values],
+        "names": [coordinate_in_words(str(name)) for name in table["assumption"].values],
         **{name: table[name].values.round(4).tolist() for name in table if table[name].ndim == 2},
     }  # fmt: skip
     search = least_change(drawn, FOLDER, 2, GENERATIONS)
@@ -99,7 +99,7 @@ def main(target):
 
 def told(found):
     """Machines counted, and what is said of them."""
-    judged, each, whole = counted(found)
+    judged, each, whole = count_claims(found)
     failed = int((found["status"] == "failed").sum())
     held = (found["held"] == 1).sel(claim=[1, 2, 3, 4, 5, 6, 8]).all("claim")
     return {"judged": judged, "failed": failed, "each": each, "all": whole,

@@ -21,7 +21,7 @@ from compressor.cases.groups import Contact
 from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
 from compressor.report.figures.style import render
 from compressor.solve.attempts import attempt
-from compressor.solve.error_bars import allowed
+from compressor.solve.error_bars import allowed_residual
 from compressor.solve.simulate import simulate, with_series
 from compressor.studies.tradeoff.work_precision import (
     REFERENCES,
@@ -29,7 +29,7 @@ from compressor.studies.tradeoff.work_precision import (
     errors,
     faulty,
     reference,
-    solved,
+    solve_by_method,
     stored_values,
 )
 
@@ -54,7 +54,7 @@ def alone(case):
 
 def rung(case, rtol, truth):
     """One tolerance of the ladder: the variables of RUNGS."""
-    run = alone(solved(case, "auto", rtol))
+    run = alone(solve_by_method(case, "auto", rtol))
     found = errors(stored_values(run, faulty(case)), truth)
     numbers = {name: found[name.removeprefix("error_")] for name in list(RUNGS)[:2]}
     return {**numbers, "energy_residual": float(run["energy_residual"])}
@@ -135,7 +135,7 @@ def figures(kept):
     rungs = table(kept["ladder"], "rtol", tolerance=kept["tolerances"])
     rungs["reference_uncertainty"] = "scene", [*kept["references_apart"].values()]
     revolutions = next(iter(default_cases().values())).solve.duration_rev
-    bound = [allowed(rtol, revolutions) for rtol in kept["tolerances"]]
+    bound = [allowed_residual(rtol, revolutions) for rtol in kept["tolerances"]]
     rungs["residual_bound"] = "tolerance", bound
     clearances = [*dict.fromkeys(row["clearance"] for row in kept["limit"])]
     vanishing = table(kept["limit"], "clearance", clearance=clearances)

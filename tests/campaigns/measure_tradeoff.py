@@ -23,7 +23,7 @@ from compressor.studies.tradeoff.work_precision import (
     default_cases,
     fastest,
     faulty,
-    solved,
+    solve_by_method,
 )
 
 SERIES = "series kinematics (Eq. 3-4)"
@@ -34,7 +34,7 @@ def fingerprint():
     """Evaluations of the default cases by the compiled methods, and the tolerances of the words."""
     counts = {
         f"{name}, {method}": int(
-            simulate(solved(case, method, ACCURACY["standard"].rtol))["evaluations"]
+            simulate(solve_by_method(case, method, ACCURACY["standard"].rtol))["evaluations"]
         )
         for name, case in default_cases().items()
         for method in COMPILED

@@ -12,7 +12,7 @@ from compressor.cases.case import Case
 from compressor.cases.groups import Machine
 from compressor.cases.laws import USUAL
 from compressor.cases.load import load_cases
-from compressor.cases.parameter import ACCURACY, CaseError, Problem, shown, to_si
+from compressor.cases.parameter import ACCURACY, CaseError, Problem, quote_value, to_si
 from compressor.cases.table import table
 from compressor.metrics import JOINTS
 from compressor.program import CompsimError
@@ -290,8 +290,8 @@ def test_an_error_survives_the_way_between_processes():
 
 
 def test_quoted_values_cannot_write_to_a_terminal():
-    assert shown("\x1b[31m") == r"'\x1b[31m'"
-    assert len(shown("x" * 10_000)) <= 60
+    assert quote_value("\x1b[31m") == r"'\x1b[31m'"
+    assert len(quote_value("x" * 10_000)) <= 60
 
 
 # Values

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import NO_SWEEP, Case
-from compressor.cases.checks import known
+from compressor.cases.checks import known_keys
 from compressor.cases.load import CaseFileError, load_cases
 from compressor.cases.parameter import CaseError
 from compressor.program import CompsimError
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
-AT_TOP = ", ".join(known("", file=False))
-IN_MACHINE = ", ".join(known("machine"))
+AT_TOP = ", ".join(known_keys("", file=False))
+IN_MACHINE = ", ".join(known_keys("machine"))
 
 
 def told(values) -> list[str]:

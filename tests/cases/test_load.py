@@ -12,14 +12,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case, to_yaml
-from compressor.cases.checks import known
+from compressor.cases.checks import known_keys
 from compressor.cases.conflicts import values_read
 from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import parameter_table
 from compressor.cases.study import Axis
 from compressor.cases.table import table
-from compressor.cases.yaml_reader import MAX_BYTES, resolved
+from compressor.cases.yaml_reader import MAX_BYTES, resolve_scalar
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
 one_file = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=3000)
@@ -59,13 +59,13 @@ def mistakes(*paths, overrides=()) -> list[str]:
     ],
 )  # fmt: skip
 def test_plain_scalars_follow_yaml_1_2(text, value):
-    assert resolved(text) == value
-    assert type(resolved(text)) is type(value)
+    assert resolve_scalar(text) == value
+    assert type(resolve_scalar(text)) is type(value)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())
 def test_numbers_read_as_python_writes_them(number):
-    assert resolved(repr(number)) == number
+    assert resolve_scalar(repr(number)) == number
 
 
 # What a file means
@@ -216,7 +216,7 @@ qqq: wet
         "case.yaml:9:9: spring: anchors (&) are not allowed; write the value out",
         "case.yaml:9:36: spring.stiffness_N_per_mm: must be finite: "
         "needs a number in [0, 1e+06] N/mm, not inf",
-        f"case.yaml:10:1: qqq: unknown key; a case file has {', '.join(known(''))}",
+        f"case.yaml:10:1: qqq: unknown key; a case file has {', '.join(known_keys(''))}",
     ]
 
 
@@ -298,14 +298,14 @@ def test_one_mistake_is_one_message(write, text, expected):
         ("exponent: 1", "; did you mean gas.exponent or contact.exponent or guide.exponent?"),
         ("solve.accuracy: fine", "; write accuracy inside solve"),
         ("machine: {speed_rpm:500: 1}", "; put a space after the colon"),
-        ("qqq: 1", f"; a case file has {', '.join(known(''))}"),
+        ("qqq: 1", f"; a case file has {', '.join(known_keys(''))}"),
         ("JOINT: both", "; did you mean joint?"),
         ("rpm: 700", "; did you mean machine.speed_rpm?"),
         (
             "machine: {mass: 1}",
             "; did you mean machine.rod_mass_kg or machine.reciprocating_mass_kg?",
         ),
-        ("body: {qqq: 1}", f"; body has {', '.join(known('body'))}"),
+        ("body: {qqq: 1}", f"; body has {', '.join(known_keys('body'))}"),
     ],
 )
 def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):

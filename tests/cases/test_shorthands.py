@@ -8,7 +8,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.checks import (
     SHORTHANDS,
-    expanded,
+    expand_shorthands,
     row_of,
     single,
     stands_for,
@@ -40,8 +40,8 @@ def test_a_shorthand_has_the_row_of_the_keys_that_it_stands_for():
 
 def test_a_shorthand_is_written_out_and_all_else_is_left():
     other = {"joint": "both", "machine": {"speed_rpm": 1}, "friction": False}
-    assert expanded({"clearance_mm": 0.1} | other) == {"clearance_mm": BOTH} | other
-    assert expanded({"clearance_mm": {"big_end": 1}}) == {"clearance_mm": {"big_end": 1}}
+    assert expand_shorthands({"clearance_mm": 0.1} | other) == {"clearance_mm": BOTH} | other
+    assert expand_shorthands({"clearance_mm": {"big_end": 1}}) == {"clearance_mm": {"big_end": 1}}
 
 
 @pytest.mark.parametrize(("values", "one"), [([1, 1.0], 1), ([1, 2], None), ([], None)])

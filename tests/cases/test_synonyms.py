@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.checks import DOUBLES, meant
+from compressor.cases.checks import DOUBLES, probable_keys
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.parameter import CaseError
 from compressor.cases.study import Axis
@@ -117,8 +117,8 @@ def test_no_hint_points_to_another_group(group):
     words = [key.rpartition(".")[2] for key in (*table(), *DOUBLES)]
     stems = [word.rpartition("_")[0] for word in words]
     for word in [*words, *stems, "bore", "stroke", "mass"]:
-        assert all(key.startswith(f"{group}.") for key in meant(word, group)), word
-    assert meant("stroke_mm", "contact") == meant("bore_mm", "wear") == []
+        assert all(key.startswith(f"{group}.") for key in probable_keys(word, group)), word
+    assert probable_keys("stroke_mm", "contact") == probable_keys("bore_mm", "wear") == []
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def test_output_that_does_not_fit_is_told_in_one_line(words, compsim):
     ],
 )
 def test_a_lack_of_memory_is_told_in_one_line(error, capsys):
-    assert cli.told(error) == 1
+    assert cli.report_error(error) == 1
     assert capsys.readouterr().err.startswith("compsim: not enough memory: allow more (ulimit -v)")
 
 

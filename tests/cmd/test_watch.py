@@ -56,7 +56,7 @@ def watched(tmp_path, monkeypatch):
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
             )  # fmt: skip
 
-        monkeypatch.setattr(watch, "started", started)
+        monkeypatch.setattr(watch, "start_process", started)
         return Watch("results", "report", "compsim run a.yaml --watch")
 
     def noted():

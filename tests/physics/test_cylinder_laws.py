@@ -20,7 +20,7 @@ from compressor.physics.contact_laws import (
     liu,
     liu_energy,
     liu_form,
-    solved,
+    solve_rising,
 )
 from compressor.solve.request import greatest_depth
 from compressor.solve.si_record import record
@@ -114,8 +114,8 @@ def test_the_page_has_the_forces_of_the_laws():
 
 def test_what_rises_is_solved_to_rounding():
     for length in np.logspace(-12, -2, 6):
-        assert solved(lambda x: x**2.5, length**2.5) == pytest.approx(length, rel=1e-14)
-    assert solved(lambda x: x, 0.0) == 0.0
+        assert solve_rising(lambda x: x**2.5, length**2.5) == pytest.approx(length, rel=1e-14)
+    assert solve_rising(lambda x: x, 0.0) == 0.0
 
 
 @pytest.mark.parametrize(("law", "share"), [("johnson", 0.5e-4), ("liu", 1e-3)])

@@ -16,7 +16,7 @@ from compressor.physics.motion import (
     eccentricities_both,
     eccentricity_big_end,
     eccentricity_small_end,
-    turned,
+    rod_turn,
 )
 from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.observe import observe as scene_observe
@@ -198,7 +198,7 @@ def test_a_scene_is_the_mechanism_without_features(joint, gravity):
 def scene_eccentricities(joint, t, y, n, p):
     if joint == "none":
         return []
-    turn = turned(ideal(t, p), y[n - 1], y[2 * n - 1], p)
+    turn = rod_turn(ideal(t, p), y[n - 1], y[2 * n - 1], p)
     if joint == "both":
         return eccentricities_both(y, turn, p)
     one = eccentricity_big_end if joint == "big_end" else eccentricity_small_end

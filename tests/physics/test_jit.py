@@ -14,7 +14,7 @@ import pytest
 
 from compressor import program
 from compressor.physics import _jit
-from compressor.physics._jit import by_kind, fused, jit, merged
+from compressor.physics._jit import dispatch_on_record, fma, inline_llvm, jit
 from compressor.physics.record import new_record
 
 COMPRESSOR = Path(program.__file__).parent
@@ -147,7 +147,7 @@ def test_a_fused_product_is_rounded_once():
 
     @numba.njit
     def compiled(a, b, c):
-        return fused(a, b, c)
+        return fma(a, b, c)
 
     draw = np.random.default_rng(7)
     for _ in range(200):
@@ -155,20 +155,20 @@ def test_a_fused_product_is_rounded_once():
         c = -a * b * (1 + draw.integers(-3, 4) * 2.0**-50)  # most of the sum cancels
         exact = float(Fraction(a) * Fraction(b) + Fraction(c))
         assert compiled(a, b, c) == exact
-        assert fused(a, b, c) == a * b + c  # from Python
+        assert fma(a, b, c) == a * b + c  # from Python
 
 
-@merged
+@inline_llvm
 def product(x, p):
     return x * p.omega
 
 
-@merged
+@inline_llvm
 def of_no_field(x, p):
     return x + p.no_such_field
 
 
-either = by_kind(2, of_no_field, product)
+either = dispatch_on_record(2, of_no_field, product)
 
 
 @jit

@@ -21,8 +21,8 @@ from compressor.physics.step_control import (
     SUSPECT,
     Mode,
     choose_method,
-    controlled,
     first_step,
+    next_step_length,
     refuse,
     stiff_rate,
 )
@@ -45,17 +45,19 @@ def walker(mode=Mode.AUTO, **fields):
 def test_an_accepted_step_is_followed_by_pi_control(stiff, order, before, error):
     """h' / h = 0.9 error^(-0.7 / k) before^(0.4 / k)."""
     w = walker(stiff=stiff, error=math.log(before))
-    found = controlled(w, H, error)
+    found = next_step_length(w, H, error)
     assert found == pytest.approx(H * 0.9 * error ** (-0.7 / order) * before ** (0.4 / order))
     assert w.error == pytest.approx(math.log(error))
 
 
 def test_a_step_grows_and_shrinks_within_limits():
-    assert controlled(walker(), H, 0.0) == pytest.approx(5 * H)
-    assert controlled(walker(error=math.log(1e-4)), H, 1.0) == pytest.approx(0.9 * 10**-0.32 * H)
-    assert controlled(walker(error=math.log(1e-30)), H, 1.0) == pytest.approx(0.2 * H)
+    assert next_step_length(walker(), H, 0.0) == pytest.approx(5 * H)
+    assert next_step_length(walker(error=math.log(1e-4)), H, 1.0) == pytest.approx(
+        0.9 * 10**-0.32 * H
+    )
+    assert next_step_length(walker(error=math.log(1e-30)), H, 1.0) == pytest.approx(0.2 * H)
     w = walker()
-    controlled(w, H, 1e-9)
+    next_step_length(w, H, 1e-9)
     assert w.error == LEAST_ERROR == pytest.approx(math.log(1e-4))
 
 

@@ -8,13 +8,13 @@ from compressor.report.answer import (
     Finding,
     Points,
     finding,
-    ranked,
+    rank_findings,
     round_robin,
     study_findings,
-    worded,
+    word_value,
 )
 from compressor.report.figures.sweep_data import MEASURES
-from compressor.report.page import measured
+from compressor.report.page import format_measure
 
 PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
 FORCE = next(m for m in MEASURES if m.variable == "peak_contact_force")
@@ -54,7 +54,7 @@ def test_what_appears_ranks_before_what_grows():
         (RATE, np.array([0.0, 0.0, 999.0]), np.full(3, 1.0)),
         (FORCE, np.array([1.0, 2.0, 2.0]), np.full(3, 0.001)),
     ]
-    found = ranked(rows, NAMES)
+    found = rank_findings(rows, NAMES)
     assert [one.title.partition(",")[0] for one in found] == [
         "Time without dry contact", "Peak acceleration", "Peak contact force",
     ]  # fmt: skip
@@ -67,7 +67,7 @@ def test_what_appears_ranks_before_what_grows():
      (1234.5678, np.nan, "1235"), (1234.5678, 2000.0, "unknown")],
 )  # fmt: skip
 def test_numbers_have_the_digits_of_their_bars(value, bar, text):
-    assert measured(PEAK, value, bar) == text
+    assert format_measure(PEAK, value, bar) == text
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_numbers_have_the_digits_of_their_bars(value, bar, text):
      ("fault", "none", "", "fault none")],
 )  # fmt: skip
 def test_swept_values_in_words(name, value, unit, text):
-    assert worded(name, value, unit) == text
+    assert word_value(name, value, unit) == text
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ from compressor.report.figures.extract import Sheet, as_csv, extract, with_jobs
 from compressor.report.interactive import (
     MOST_POINTS,
     content,
-    described,
+    describe_figure,
     extremes,
-    linked,
+    link_scales,
     publish_library,
     script,
 )
@@ -156,7 +156,7 @@ def test_panels_of_the_same_span_are_zoomed_together():
         panel.plot([0, 1], [0, 1])
     figure.axes[1].set_xlim(0.2, 0.4)
     panels = extract(figure).panels
-    assert linked([panel.x for panel in panels]) == [0, 1, 0]
+    assert link_scales([panel.x for panel in panels]) == [0, 1, 0]
 
 
 def test_long_curves_keep_their_extremes():
@@ -183,8 +183,10 @@ def test_a_script_breaks_out_of_nothing():
 
 
 def test_what_is_seen_is_said_in_words(figure):
-    assert described(extract(figure)).startswith("4 panels. whole: sine, cosine; enlarged: sine")
-    assert described(Sheet((), (1.0,), (1.0,), (1.0, 1.0))) == ""
+    assert describe_figure(extract(figure)).startswith(
+        "4 panels. whole: sine, cosine; enlarged: sine"
+    )
+    assert describe_figure(Sheet((), (1.0,), (1.0,), (1.0, 1.0))) == ""
 
 
 def test_the_library_lies_beside_the_page(tmp_path):

@@ -24,8 +24,8 @@ from compressor.report import paper_sections, report
 from compressor.report.figures import Drawing, pictures
 from compressor.report.paper_sections import (
     PaperRuns,
-    borrowed,
     comparable,
+    default_machine_runs,
     find_paper_runs,
     is_other,
     second_drawings,
@@ -199,8 +199,8 @@ LENT = PaperRuns({}, {load: xr.Dataset() for load in ("design", "typical")}, {})
 )  # fmt: skip
 def test_the_default_machine_lends_the_same_motion_and_no_other(values, drawn, judged):
     case = Case.resolve({**values, "joint": "both", "clearance_mm": 0.1})
-    assert len(borrowed(case, LENT, loads=False)) == drawn
-    assert len(borrowed(case, LENT, loads=True)) == judged
+    assert len(default_machine_runs(case, LENT, loads=False)) == drawn
+    assert len(default_machine_runs(case, LENT, loads=True)) == judged
 
 
 def test_the_study_s_own_ideal_run_goes_first(paper_store, heavy):

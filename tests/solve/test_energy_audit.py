@@ -6,7 +6,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.solve import attempts
-from compressor.solve.error_bars import GREATEST, ROUNDING, RUNGS, allowed, energy_residual
+from compressor.solve.error_bars import GREATEST, ROUNDING, RUNGS, allowed_residual, energy_residual
 from compressor.solve.simulate import measure, simulate
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}
@@ -29,7 +29,7 @@ def unbalance(monkeypatch):
             if request.rtol <= 1e-5 * (1 + 1e-9):  # the bars' own run apart
                 factor = times[min(len(asked), len(times) - 1)]
                 asked.append(request.rtol)
-                ratio = factor * allowed(1e-5, 0.5) / energy_residual(found.tally)
+                ratio = factor * allowed_residual(1e-5, 0.5) / energy_residual(found.tally)
                 found.tally.worst_imbalance *= ratio
             return found
 
@@ -40,9 +40,11 @@ def unbalance(monkeypatch):
 
 
 def test_what_is_allowed_follows_the_tolerance():
-    assert allowed(1e-6, 4) == pytest.approx(4e-5)
-    assert allowed(1e-6, 0.25) == pytest.approx(1e-5)  # an impact costs as much in a short run
-    assert (allowed(1e-13, 4), allowed(1e-2, 4)) == (ROUNDING, GREATEST)
+    assert allowed_residual(1e-6, 4) == pytest.approx(4e-5)
+    assert allowed_residual(1e-6, 0.25) == pytest.approx(
+        1e-5
+    )  # an impact costs as much in a short run
+    assert (allowed_residual(1e-13, 4), allowed_residual(1e-2, 4)) == (ROUNDING, GREATEST)
 
 
 def test_a_run_that_balances_is_run_once(unbalance):
@@ -133,4 +135,4 @@ def test_good_runs_of_extremes_pass(extreme, joint):
     solve = SHORT | {"error_bars": False}
     found = measure(Case.from_values({**values, "solve": solve}))
     assert (found.status, found.reason) == ("ok", "")
-    assert found.numbers["energy_residual"] <= allowed(4e-6, 0.5)
+    assert found.numbers["energy_residual"] <= allowed_residual(4e-6, 0.5)

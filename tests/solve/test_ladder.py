@@ -12,7 +12,7 @@ from compressor.cases.parameter import ACCURACY, TIGHTEST, first_rung
 from compressor.metrics import ERRORS, METRICS, SERIES_ERRORS
 from compressor.physics import Column
 from compressor.solve import attempts, solution
-from compressor.solve.error_bars import ENLARGED, ORDER, closeness, enlarged, unmet
+from compressor.solve.error_bars import ENLARGED, ORDER, closeness, is_amplified, unmet
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import AIM, LEAST, MOST, further, solve
@@ -108,7 +108,7 @@ def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
     expected = [rtol, rtol / attempts.TIGHTER, rtol * attempts.LOOSER]
     assert asked == pytest.approx(expected)
     again, *others = (attempts.attempt(case, one, 60.0, False) for one in expected)
-    assert enlarged(rtol, distances(again.samples, others[0].samples))
+    assert is_amplified(rtol, distances(again.samples, others[0].samples))
     by_each = []
     for other in others:
         attempts.estimate_errors(again, other)
@@ -191,7 +191,7 @@ def test_of_some_runs_the_tightest_that_balances_is_compared_with(monkeypatch):
     one = attempts.attempt(case, 1e-5, 60.0, False)
     other, third, last = (replace(one, rtol=rtol) for rtol in (4e-6, 1e-6, TIGHTEST))
     assert solution.tightest(case, one, other, third, last) is third
-    monkeypatch.setattr(solution, "balanced", lambda _, run: run is not third)
+    monkeypatch.setattr(solution, "energy_balances", lambda _, run: run is not third)
     assert solution.tightest(case, one, other, third) is other
     assert solution.tightest(case, one, third) is one
 
@@ -213,9 +213,9 @@ def test_errors_are_enlarged_beyond_ten_times_the_usual(word):
     """By the random cases of `make accuracy`, and the paper's nine, which are far from it."""
     row, rtol = kept("accuracy.json")["words"][word], ACCURACY[word].rtol
     usual, worst = row["error"][0], row["error"][-1]
-    assert not enlarged(rtol, {"acceleration": 10.0 * usual})
-    assert not enlarged(rtol, {"acceleration": row["nine"]["error"]})
-    assert enlarged(rtol, {"acceleration": worst})
+    assert not is_amplified(rtol, {"acceleration": 10.0 * usual})
+    assert not is_amplified(rtol, {"acceleration": row["nine"]["error"]})
+    assert is_amplified(rtol, {"acceleration": worst})
 
 
 def test_a_budget_that_ends_a_tighter_run_is_told():

@@ -7,7 +7,7 @@ import pytest
 
 from compressor.metrics import METRICS, QUANTILES, STATISTICS
 from compressor.physics import new_record, new_tally
-from compressor.solve.request import merged
+from compressor.solve.request import merge_turns
 from compressor.solve.run_metrics import (
     LEAST_SECTION,
     MOST_BATCHES,
@@ -56,7 +56,7 @@ def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     held = dict.fromkeys(exact, 0)
     for _ in range(200):
         each = turns(rng, count, pull)
-        found, numbers = statistics(record, each), metrics(record, merged(each))
+        found, numbers = statistics(record, each), metrics(record, merge_turns(each))
         bars = chaotic_bars(found, numbers)
         for name, value in exact.items():
             held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
@@ -90,7 +90,7 @@ def test_a_single_revolution_tells_no_error(record):
     for name, value in found.items():
         if name.endswith("error") or name == "revolutions_to_one_percent":
             assert np.isposinf(value).all(), name
-    bars = chaotic_bars(found, metrics(record, merged(each)))
+    bars = chaotic_bars(found, metrics(record, merge_turns(each)))
     assert bars.keys() == METRICS.keys()
     assert all(np.isposinf(bar).all() for bar in bars.values())
 
@@ -98,7 +98,7 @@ def test_a_single_revolution_tells_no_error(record):
 def test_greatest_values_have_no_bar_but_an_ideal_joint_has_none_to_err_in(record):
     record["clearance"][1] = 0.0
     each = turns(np.random.default_rng(5), 40)
-    bars = chaotic_bars(statistics(record, each), metrics(record, merged(each)))
+    bars = chaotic_bars(statistics(record, each), metrics(record, merge_turns(each)))
     assert np.isposinf(bars["peak_acceleration"])
     assert bars["max_penetration"].tolist() == [math.inf, 0.0]
     assert 0 < bars["rms_acceleration"] < 1

@@ -40,11 +40,11 @@ def made_older(monkeypatch, without=(), words=()):
     fewer = {name: value for name, value in segments.NUMBERS.items() if name not in without}
     for path in sorted(Path("results/rows").glob("*.h5")):
         segment = read_segment(path)
-        lines = segments.unpacked(segment.texts, segment)
+        lines = segments.unpack_lines(segment.texts, segment)
         texts = [line.replace(PROGRAM.encode(), b"compsim 0.0.9") for line in lines]
         blank = np.full(len(segment), b"", "S1")
         columns = segment.columns | dict.fromkeys(("given", *words), blank)
-        old = replace(segment, columns=columns, texts=segments.packed(texts))
+        old = replace(segment, columns=columns, texts=segments.pack_lines(texts))
         with monkeypatch.context() as patch:
             patch.setattr(segments, "NUMBERS", fewer)
             data = encode(old)

@@ -9,7 +9,7 @@ from test_reader import fill, study
 
 from compressor.report import write_report
 from compressor.store.export import ExportOptions, export
-from compressor.store.hdf5 import image, opened
+from compressor.store.hdf5 import image, open_file
 from compressor.store.reader import open_study, read_job
 from compressor.store.series_file import read_bytes, read_values
 
@@ -64,9 +64,9 @@ def test_an_image_opened_within_another_is_its_own(folder, alone):
     paths = sorted(folder.glob("jobs/*.h5"))
     apart = [read_values(path, ["acceleration"])["acceleration"] for path in paths]
     one, other = (read_bytes(path) for path in paths[:2])
-    with opened(one, paths[0]) as outer, opened(other, paths[1]) as inner:
+    with open_file(one, paths[0]) as outer, open_file(other, paths[1]) as inner:
         made = image({"x": (("x",), np.arange(3.0), {})}, {})
-        with opened(made, paths[0]) as innermost:
+        with open_file(made, paths[0]) as innermost:
             assert innermost["x"][()].tolist() == [0, 1, 2]
         np.testing.assert_array_equal(inner["acceleration"], apart[1])
         np.testing.assert_array_equal(outer["acceleration"], apart[0])

@@ -155,7 +155,7 @@ def test_loading_the_search_for_chaos_is_no_part_of_a_job_s_time(studies, monkey
     monkeypatch.setattr(plan, "SEARCHED", [])
     (case,) = studies(one={})[0].cases
     turns = case.duration / case.turn
-    assert [plan.measured(case).turn * turns for _ in range(2)] == pytest.approx([2.0, 3.0])
+    assert [plan.measure_cost(case).turn * turns for _ in range(2)] == pytest.approx([2.0, 3.0])
 
 
 def test_compiling_that_is_ahead_is_told(studies, monkeypatch, tmp_path, capsys):

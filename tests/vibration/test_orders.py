@@ -9,7 +9,7 @@ from compressor.vibration.spectra import (
     SignalError,
     angle_window,
     order_spectrum,
-    resampled,
+    resample_angle,
     rms_above,
     samples_a_turn,
     synchronous_average,
@@ -37,14 +37,14 @@ def noise(size: int, seed: int = 1) -> np.ndarray:
 @pytest.mark.parametrize("begin", [0.0, 0.7, -40.0])
 def test_even_samples_stay_as_they_are(begin):
     values = noise(3 * M)
-    found = resampled(even(3, begin=begin), values, M)
+    found = resample_angle(even(3, begin=begin), values, M)
     assert found == pytest.approx(values, abs=1e-9)
 
 
 @pytest.mark.parametrize(("extra", "turns"), [(-1, 2), (0, 3), (1, 3), (M - 1, 3), (M, 4)])
 def test_only_whole_revolutions_are_kept(extra, turns):
     angle = TURN * np.arange(3 * M + extra) / M
-    assert resampled(angle, np.cos(angle), M).shape == (turns * M,)
+    assert resample_angle(angle, np.cos(angle), M).shape == (turns * M,)
 
 
 def test_a_sine_is_restored_from_unequal_angles():
@@ -52,7 +52,7 @@ def test_a_sine_is_restored_from_unequal_angles():
     errors = []
     for samples in (4001, 8001):
         angle = at_varying_speed(10, samples)
-        found = resampled(angle, np.sin(5 * angle), 600)
+        found = resample_angle(angle, np.sin(5 * angle), 600)
         error = np.abs(found - np.sin(5 * even(found.size / 600, 600)))
         errors.append(np.max(error[600:-600]))  # the ends are worse
     assert errors[0] < 1e-4
@@ -184,15 +184,15 @@ def test_rms_in_a_window_is_over_angle_not_over_samples():
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: resampled(even(0.9), even(0.9), M), "pass at least one revolution"),
-        (lambda: resampled(even(2) % TURN, even(2), M), "after index 359: unwrap it"),
-        (lambda: resampled(even(2), even(3), M), "720 angles and 1080 values"),
-        (lambda: resampled(even(2), np.full(2 * M, np.nan), M), "cut these samples off"),
-        (lambda: resampled(even(2), np.ones((2 * M, 2)), M), "pass one component"),
-        (lambda: resampled(even(2), 1j * even(2), M), "complex"),
-        (lambda: resampled(np.arange(3.0), np.arange(3.0), M), "at least 4"),
-        (lambda: resampled(even(2), even(2), 3.5), "pass a whole number"),
-        (lambda: resampled(even(2), even(2), 1), "pass at least 2"),
+        (lambda: resample_angle(even(0.9), even(0.9), M), "pass at least one revolution"),
+        (lambda: resample_angle(even(2) % TURN, even(2), M), "after index 359: unwrap it"),
+        (lambda: resample_angle(even(2), even(3), M), "720 angles and 1080 values"),
+        (lambda: resample_angle(even(2), np.full(2 * M, np.nan), M), "cut these samples off"),
+        (lambda: resample_angle(even(2), np.ones((2 * M, 2)), M), "pass one component"),
+        (lambda: resample_angle(even(2), 1j * even(2), M), "complex"),
+        (lambda: resample_angle(np.arange(3.0), np.arange(3.0), M), "at least 4"),
+        (lambda: resample_angle(even(2), even(2), 3.5), "pass a whole number"),
+        (lambda: resample_angle(even(2), even(2), 1), "pass at least 2"),
         (lambda: order_spectrum(even(2), even(2), 3), "choose fewer turns"),
         (lambda: order_spectrum(even(2), even(2), 0), "pass at least 1"),
         (lambda: order_spectrum(even(2), even(2), window="kaiser"), "choose one of"),

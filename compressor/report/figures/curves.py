@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MultipleLocator
 from numpy.lib.stride_tricks import sliding_window_view
 
-from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled
+from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled_part
 from compressor.report.figures.style import BY_CLEARANCE, BY_LOAD, IDEAL, Line
 
 Runs = Mapping[str, xr.Dataset]
@@ -89,7 +89,7 @@ def turn(run: xr.Dataset) -> xr.Dataset:
     try:
         return last_revolution(run)[1]
     except NoSeriesError:
-        return settled(run)
+        return settled_part(run)
 
 
 def plot(panel: Axes, curves: Sequence[Curve], quantity: Quantity) -> None:

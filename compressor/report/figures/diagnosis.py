@@ -37,9 +37,9 @@ from compressor.report.figures.style import (
     IDEAL,
     RED,
     Line,
+    in_style,
     legend_above,
     sheet,
-    styled,
 )
 
 Shakings = Mapping[str, Shaking]  # by label of the paper's cases
@@ -54,7 +54,7 @@ BIN = 5.0  # degrees over which the rms is taken
 NEAR = "#f2ead9"
 
 
-@styled
+@in_style
 def draw_diagnosis_spectra(found: Shakings) -> Figure:
     """Return X over orders: healthy, and each joint at the greatest clearance; rms over
     clearance.
@@ -88,7 +88,7 @@ def draw_diagnosis_spectra(found: Shakings) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def draw_diagnosis_orbits(runs: Runs) -> Figure:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
     figure, panels = sheet(len(ALONE), len(CLEARANCES), 7.2, sharex=True, sharey=True)
@@ -104,7 +104,7 @@ def draw_diagnosis_orbits(runs: Runs) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Figure:
     """Return when X has its high orders, and the joints' contact modes, over the crank angle."""
     figure, panels = sheet(2 * len(ALONE), 1, 8.4, sharex=True, height_ratios=(2.6, 1) * 2)

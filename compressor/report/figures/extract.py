@@ -364,7 +364,7 @@ def outline(axes: Axes, artist: Any, named: Names) -> Trace | None:
         return None
     rings = [path.vertices for path in artist.get_paths() if len(path.vertices)]
     colors = artist.get_facecolor()
-    joined = broken(rings)
+    joined = join_with_gaps(rings)
     return Trace("band", label_of(artist), joined[:, 0], joined[:, 1],
                  color=first_color(colors),
                  opacity=float(colors[0][3]) if len(colors) else 0.3)  # fmt: skip
@@ -374,7 +374,7 @@ def segments(axes: Axes, artist: Any, named: Names) -> Trace | None:
     """Return many straight lines, such as those of an impact's time and speed."""
     if artist.get_transform().contains_branch_seperately(axes.transData) != (True, True):
         return None
-    joined = broken([np.asarray(s, float) for s in artist.get_segments()])
+    joined = join_with_gaps([np.asarray(s, float) for s in artist.get_segments()])
     colors = artist.get_color()
     return Trace("line", label_of(artist), joined[:, 0], joined[:, 1],
                  color=first_color(colors), width=float(artist.get_linewidth()[0]))  # fmt: skip
@@ -385,7 +385,7 @@ def contour(axes: Axes, artist: Any, named: Names) -> Trace | None:
     on.
     """
     parts = [part for path in artist.get_paths() for part in path.to_polygons(closed_only=False)]
-    joined = broken([np.asarray(part, float) for part in parts])
+    joined = join_with_gaps([np.asarray(part, float) for part in parts])
     colors = artist.get_edgecolor()
     return Trace("line", "", joined[:, 0], joined[:, 1], color=first_color(colors), width=0.8)
 
@@ -396,7 +396,7 @@ def shape(axes: Axes, artist: Any, named: Names) -> Trace | None:
         return None
     transform = artist.get_transform() - axes.transData
     rings = artist.get_path().transformed(transform).to_polygons(closed_only=False)
-    joined = broken([np.asarray(ring, float) for ring in rings])
+    joined = join_with_gaps([np.asarray(ring, float) for ring in rings])
     filled = bool(artist.get_fill())
     color = artist.get_facecolor() if filled else artist.get_edgecolor()
     return Trace("band" if filled else "line", name_of(artist, named) if filled else "",
@@ -404,7 +404,7 @@ def shape(axes: Axes, artist: Any, named: Names) -> Trace | None:
                  width=artist.get_linewidth(), opacity=float(color[3]))  # fmt: skip
 
 
-def broken(parts: list[np.ndarray]) -> np.ndarray:
+def join_with_gaps(parts: list[np.ndarray]) -> np.ndarray:
     """Return the lines one after the other with a gap of nan between them, shape (n, 2)."""
     gap = np.full((1, 2), np.nan)
     joined = [array for part in parts for array in (part, gap)][:-1]

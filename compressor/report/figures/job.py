@@ -38,9 +38,9 @@ from compressor.report.figures.style import (
     GREY,
     RED,
     Line,
+    in_style,
     legend_above,
     sheet,
-    styled,
 )
 
 # flight, impact, following: lightness 30, 54, 90
@@ -53,7 +53,7 @@ CORNERS = {0: ("top dead centre", "o"), 90: ("90°", "^"), 180: ("bottom dead ce
 MICROMETRE = 1e6
 
 
-@styled
+@in_style
 def draw_orbits(run: xr.Dataset) -> Figure:
     """Return the journal's centre in the bore of each joint with clearance, over the last
     revolution.
@@ -92,7 +92,7 @@ def corner(shape: str) -> dict[str, Any]:
             "linestyle": "none", "zorder": 4}  # fmt: skip
 
 
-@styled
+@in_style
 def draw_modes(run: xr.Dataset) -> Figure:
     """Return contact modes over the crank angle, as shares of the revolutions, and penetration."""
     joints = joints_with_clearance(run)
@@ -138,7 +138,7 @@ def mode_handles() -> list[Patch]:
     ]
 
 
-@styled
+@in_style
 def draw_impacts(run: xr.Dataset) -> Figure:
     """Return the approach speed of the impacts of all settled revolutions over the crank angle."""
     found = impacts(run)
@@ -215,7 +215,7 @@ SIGNALS = (
 )  # fmt: skip
 
 
-@styled
+@in_style
 def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
     """Return the last settled revolution of a run, and of its machine without clearance, six
     panels.
@@ -247,7 +247,7 @@ def legend() -> list[Line2D]:
     return [Line2D([], [], label=name, **line.properties()) for name, line in pairs]
 
 
-@styled
+@in_style
 def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
     """Return the order spectra of X and of the crosshead's deviation; with a sensor, of its
     envelope.
@@ -326,7 +326,7 @@ MAP_DECADES = 3  # below the greatest line above `ORDER`
 ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
 
-@styled
+@in_style
 def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
     """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
     figure, panels = sheet(1, 2, height(len(rows)) + 0.9, width_ratios=(3, 1), sharey=True)
@@ -358,7 +358,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def draw_map(rows: Sequence[SweptRow], title: str) -> Figure:
     """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)

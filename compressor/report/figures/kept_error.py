@@ -5,7 +5,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from compressor.report.figures.ladders import line_handles, loglog
-from compressor.report.figures.style import CYCLE, GREY, Line, sheet, styled
+from compressor.report.figures.style import CYCLE, GREY, Line, in_style, sheet
 
 PROMISED = Line(GREY, "--", 1.2, 1.0)
 SHOWN = {
@@ -17,7 +17,7 @@ SHOWN = {
 }
 
 
-@styled
+@in_style
 def draw_kept_error(cases: xr.Dataset) -> Figure:
     """Return the error of acceleration against the time that its run took with its check, a colour
     a word.

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from compressor.report.figures.style import BLACK, CYCLE, GREY, Line, legend_above, sheet, styled
+from compressor.report.figures.style import BLACK, CYCLE, GREY, Line, in_style, legend_above, sheet
 
 MARKERS = ("o", "s", "D")
 GUIDE = Line(GREY, (0, (1, 1.2)), 1.3, 1.5)
@@ -18,7 +18,7 @@ RUNGS = {
 }
 
 
-@styled
+@in_style
 def draw_tolerance_ladder(ladder: xr.Dataset) -> Figure:
     """Return the relative errors and the energy residual against rtol, a line a scene.
 
@@ -45,7 +45,7 @@ def draw_tolerance_ladder(ladder: xr.Dataset) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def draw_scaled_limit(limit: xr.Dataset) -> Figure:
     """Return greatest |x - x_ideal| against clearance, the contact scaled along; a line a scene.
 

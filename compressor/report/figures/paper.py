@@ -18,7 +18,7 @@ from compressor.analysis import (
     force_relation,
     label,
     load_phases,
-    settled,
+    settled_part,
 )
 from compressor.report.figures.curves import (
     ANGLE_AXIS,
@@ -41,9 +41,9 @@ from compressor.report.figures.style import (
     GREY,
     RED,
     Line,
+    in_style,
     legend_above,
     sheet,
-    styled,
 )
 
 MOTION = (
@@ -53,7 +53,7 @@ MOTION = (
 )
 
 
-@styled
+@in_style
 def draw_load_response(runs: Runs) -> Figure:
     """Return the figure 6: the design and the typical model without clearance."""
     curves = load_curves(runs)
@@ -61,10 +61,10 @@ def draw_load_response(runs: Runs) -> Figure:
     for (full, enlarged), quantity, letters in zip(panels, MOTION, ("ab", "cd", "ef"), strict=True):
         plot(full, curves, quantity)
         enlarge([full], enlarged, curves, quantity, letters)
-    return finished(figure, panels[-1], curves)
+    return finish_figure(figure, panels[-1], curves)
 
 
-@styled
+@in_style
 def draw_fault_response(runs: Runs, fault: str) -> Figure:
     """Return the figures 8, 11, 14: no clearance and three clearances of one fault.
 
@@ -78,7 +78,7 @@ def draw_fault_response(runs: Runs, fault: str) -> Figure:
     enlarged = beside(figure, panels, slice(2, 5))
     plot_rows(panels[2:, 0], curves, MOTION[2])
     enlarge(panels[2:, 0], enlarged, curves, MOTION[2], "ef")
-    return finished(figure, [panels[-1, 0], enlarged], curves)
+    return finish_figure(figure, [panels[-1, 0], enlarged], curves)
 
 
 def beside(figure: Figure, panels: np.ndarray, rows: slice) -> Axes:
@@ -104,7 +104,7 @@ def enlarge(
     enlarged.set_title(f"({letters[1]}) {quantity.title}, enlarged{remark}")
 
 
-def finished(
+def finish_figure(
     figure: Figure, lowest: Sequence[Axes] | np.ndarray, curves: Sequence[Curve]
 ) -> Figure:
     """Return the figure with the titles of its lowest axes and a legend."""
@@ -117,7 +117,7 @@ def finished(
 PISTON = Quantity("piston_force", "", "force on the piston, towards the crank (kN)", KILONEWTON)
 
 
-@styled
+@in_style
 def draw_piston_force(runs: Runs) -> Figure:
     """Return the figure 7: the piston force of the design and the typical model."""
     figure, panels = sheet(1, 1, 4.2)
@@ -130,7 +130,7 @@ def draw_piston_force(runs: Runs) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def draw_contact_force(runs: Runs, fault: str, joint: str) -> Figure:
     """Return the figures 9, 12, 15, 16: contact force at one joint, both ways, a row a clearance.
 
@@ -149,7 +149,7 @@ def draw_contact_force(runs: Runs, fault: str, joint: str) -> Figure:
         top.set_title(f"({letter}) {top.get_title('left')}")
         enlarged.set_title("enlarged")
         enlarged.set_ylabel("")
-    return finished(figure, [panels[-1, 0], enlarged], curves)
+    return finish_figure(figure, [panels[-1, 0], enlarged], curves)
 
 
 def first_joint(fault: str) -> str:
@@ -164,14 +164,14 @@ def contact_force(joint: str, axis: str) -> Quantity:
     return Quantity("contact_force", title, "force (kN)", KILONEWTON, where=where)
 
 
-@styled
+@in_style
 def draw_relation(runs: Runs, joint: str) -> Figure:
     """Return one panel a clearance: every stored sample, the regression line, r and r²."""
     figure, panels = sheet(1, 3, 4.0, sharex=True, sharey=True)
     for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
         run = runs[label(joint, clearance)]
         name = f"{clearance:g} mm"
-        scatter(panel, settled(run), joint, BY_CLEARANCE[clearance].color, name)
+        scatter(panel, settled_part(run), joint, BY_CLEARANCE[clearance].color, name)
         regress(panel, run, joint)
         panel.set_title(f"({letter}) {name}")
         panel.set_xlabel("horizontal force on the rod (kN)")
@@ -199,7 +199,7 @@ def scatter(panel: Axes, run: xr.Dataset, joint: str, color: str, name: str) -> 
 def regress(panel: Axes, run: xr.Dataset, joint: str) -> None:
     """The line of `force_relation` over the data's accelerations, and its numbers."""
     relation = force_relation(run, joint)
-    a = settled(run)["acceleration"].values
+    a = settled_part(run)["acceleration"].values
     ends = np.array([a.min(), a.max()])
     force = (relation.slope * ends + relation.intercept) * KILONEWTON
     panel.plot(force, ends, color=BLACK, linewidth=1.1, label="fit")
@@ -219,10 +219,10 @@ PRINTED = Line(GOLD, "-", 1.6, 2.2)
 BASE = Line("#707070", (0, (1, 1.2)), 1.2, 2.1)
 
 
-@styled
+@in_style
 def draw_pressure_volume(runs: Runs) -> Figure:
     """Return the figure 3: cylinder pressure over volume, phases named, with their direction."""
-    run = settled(runs["typical"])
+    run = settled_part(runs["typical"])
     volume, pressure = gas_state(run)
     figure, panels = sheet(1, 1, 5.2)
     (panel,) = panels.flat
@@ -271,7 +271,7 @@ def name_phases(panel: Axes, run: xr.Dataset, volume: np.ndarray, pressure: np.n
         )
 
 
-@styled
+@in_style
 def draw_cam(runs: Runs) -> Figure:
     """Return the figure 4: the cam's contour, and its follower's displacement beside the printed
     one.

@@ -72,7 +72,7 @@ def by_two(
         """Give the copy the next figure, when it has made one."""
         with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
             name = waiting.popleft()
-            sent[name] = pool.submit(inherited, name, headings[name])
+            sent[name] = pool.submit(draw_inherited, name, headings[name])
             sent[name].add_done_callback(send)
 
     try:
@@ -92,7 +92,7 @@ def by_two(
     return made | one_by_one(lost, headings)
 
 
-def inherited(name: str, heading: str) -> tuple[bytes, ...]:
+def draw_inherited(name: str, heading: str) -> tuple[bytes, ...]:
     """Return the pictures of a figure, in the copied process."""
     tell(heading)
     return both(_inherited[name])

@@ -87,7 +87,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def styled(draw: Callable[P, R]) -> Callable[P, R]:
+def in_style(draw: Callable[P, R]) -> Callable[P, R]:
     """Run a drawing function in this module's style, whatever the user's defaults are."""
 
     @functools.wraps(draw)
@@ -113,7 +113,7 @@ def legend_above(figure: Figure, handles: list[Any]) -> None:
     figure.legend(handles=handles, loc="outside upper center", ncols=columns)
 
 
-@styled
+@in_style
 def render(figure: Figure, kind: str) -> bytes:
     """Return a figure as the bytes of a `png` or `svg` file, which tell nothing of when they were
     made.

@@ -50,16 +50,16 @@ def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
     sweep = sweep_of(data)
     if not known or not sweep.axes:
         return []
-    shown, same = captions.parted(sweep, known)
+    shown, same = captions.split_measures(sweep, known)
     if not shown:
         shown, same = known, []
     marks = captions.marks_told(sweep), captions.same_told(sweep, same)
     if not sweep.is_grid:
-        return [*sampled(sweep, shown, marks)]
+        return [*draw_sampled(sweep, shown, marks)]
     if len(sweep.axes) == 1:
         (axis,) = sweep.axes
         title = f"metrics against {axis.phrase}"
-        caption = captions.joined(captions.curves(sweep), *marks)
+        caption = captions.join_sentences(captions.curves(sweep), *marks)
         return [SweepFigure(axis.name, title, caption, draw_curves(sweep, shown))]
     return [*several(sweep, shown, marks)]
 
@@ -73,17 +73,17 @@ def several(
     Two axes of numbers, or of words, are a map.
     """
     found = ranking(sweep, shown)
-    yield from ranked(sweep, found, shown)
+    yield from draw_ranked(sweep, found, shown)
     order = overall(found) if found else [*range(len(sweep.axes))]
     first, second = (sweep.axes[n] for n in order[:2])
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
-        caption = captions.joined(captions.maps(sweep), *marks)
+        caption = captions.join_sentences(captions.maps(sweep), *marks)
         yield SweepFigure("map", title, caption, draw_maps(sweep, shown))
         return
     role = roles_of(sweep, order, False)
     title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"
-    caption = captions.joined(captions.overview(sweep, role), marks[1])
+    caption = captions.join_sentences(captions.overview(sweep, role), marks[1])
     yield SweepFigure("overview", title, caption, draw_overview(sweep, role, shown))
     if len(sweep.axes) == 2:
         return
@@ -98,33 +98,33 @@ def several(
         yield SweepFigure(name, title, caption, draw_multiples(sweep, role, group))
 
 
-def sampled(
+def draw_sampled(
     sweep: Sweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
     """Yield a list of jobs: a ranking, each metric against its strongest key, and some against
     all.
     """
     found = ranking(sweep, shown)
-    yield from ranked(sweep, found, shown)
+    yield from draw_ranked(sweep, found, shown)
     order = overall(found) if found else [*range(len(sweep.axes))]
     numbers = [n for n in order if not sweep.axes[n].is_words] or order
     strongest = []
     for measure in shown:
         own = order_of(found[measure]) if measure in found else order
         strongest.append(next(n for n in own if n in numbers))
-    caption = captions.joined(captions.points(sweep, bool(found)), *marks)
+    caption = captions.join_sentences(captions.points(sweep, bool(found)), *marks)
     yield SweepFigure("points", "metrics over the key that matters most for each", caption,
                       draw_points(sweep, strongest, shown))  # fmt: skip
     if len(numbers) < 2:
         return
     columns = numbers[:MOST_COLUMNS]
     group = leading(sweep, shown, MOST_ROWS)
-    caption = captions.joined(captions.scatter(sweep, columns, len(numbers)), marks[0])
+    caption = captions.join_sentences(captions.scatter(sweep, columns, len(numbers)), marks[0])
     title = f"{', '.join(one.title for one in group)} over each key"
     yield SweepFigure("scatter", title, caption, draw_scatter(sweep, columns, group))
 
 
-def ranked(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> Iterator[SweepFigure]:
+def draw_ranked(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> Iterator[SweepFigure]:
     """Yield the ranking of the axes, if enough is known for one."""
     if found and len(sweep.axes) > 1:
         caption = captions.ranking(sweep, found, shown)

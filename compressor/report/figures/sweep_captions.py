@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from compressor.report.figures.sweep_data import Axis, Measure, Sweep, shown_value
-from compressor.report.figures.sweep_maps import MOST_CELLS, Ranking, told
+from compressor.report.figures.sweep_maps import MOST_CELLS, Ranking, describe_ranking
 from compressor.report.figures.sweep_panels import (
     MOST_COLUMNS,
     MOST_JOBS,
@@ -41,12 +41,12 @@ TREND = (
 )
 
 
-def joined(*parts: str) -> str:
+def join_sentences(*parts: str) -> str:
     """Return the sentences one after the other."""
     return " ".join(part for part in parts if part)
 
 
-def parted(sweep: Sweep, known: Sequence[Measure]) -> tuple[list[Measure], list[Measure]]:
+def split_measures(sweep: Sweep, known: Sequence[Measure]) -> tuple[list[Measure], list[Measure]]:
     """Return the measures that differ between jobs, and those that do not."""
     varied = [bool(np.ptp(v[np.isfinite(v)])) for v in (sweep.values(m) for m in known)]
     both = [*zip(known, varied, strict=True)]
@@ -72,7 +72,7 @@ def same_told(sweep: Sweep, same: Sequence[Measure]) -> str:
 
 def curves(sweep: Sweep) -> str:
     """Return a sweep along one axis."""
-    return joined(
+    return join_sentences(
         f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
         "is long enough to be seen.",
         thinned_told(sweep.axes[0], MOST_JOBS),
@@ -81,7 +81,7 @@ def curves(sweep: Sweep) -> str:
 
 def maps(sweep: Sweep) -> str:
     """Return a sweep along two axes."""
-    return joined(
+    return join_sentences(
         "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
         *(thinned_told(axis, MOST_CELLS) for axis in sweep.axes),
     )
@@ -97,19 +97,19 @@ def points_told(sweep: Sweep, role: Roles) -> str:
     """Return what a point is: a job, with what its marks mean, or a mean over which axes."""
     others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
     if not others:
-        return joined("A point a job.", marks_told(sweep))
+        return join_sentences("A point a job.", marks_told(sweep))
     whole = (sweep.status == "ok") & ~sweep.chaotic
     left = "" if whole.all() else (
         f"Up to {int((~whole).sum())} of {whole.size} jobs lack a value that is known within its "
         "error bar, and are no part of a mean."
     )  # fmt: skip
-    return joined(f"Each point is the mean over {' and '.join(others)}.", left)
+    return join_sentences(f"Each point is the mean over {' and '.join(others)}.", left)
 
 
 def overview(sweep: Sweep, role: Roles) -> str:
     """Return every metric over two of the axes."""
     color = sweep.axes[role.color]
-    return joined(
+    return join_sentences(
         f"Every metric over {sweep.axes[role.x].phrase}, a colour for each value of "
         f"{color.phrase}: the axes that matter most on the mean of all metrics."
         if len(sweep.axes) > 2
@@ -124,7 +124,7 @@ def multiples(sweep: Sweep, role: Roles) -> str:
     """Return the panels for the values of an axis, or of two."""
     places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
     limits = zip(role, (MOST_PLACES, MOST_LINES, MOST_COLUMNS, MOST_ROWS), strict=True)
-    return joined(
+    return join_sentences(
         f"A panel for each {' and '.join(places)}, a colour for each value of "
         f"{sweep.axes[role.color].phrase}.",
         points_told(sweep, role),
@@ -135,16 +135,18 @@ def multiples(sweep: Sweep, role: Roles) -> str:
 def points(sweep: Sweep, is_ranked: bool) -> str:
     """Return each metric of a list of jobs over a key."""
     which = "the key that matters most for it" if is_ranked else "a key"
-    return joined(f"Every metric over {which}, a point a job.", *fitted(sweep))
+    return join_sentences(f"Every metric over {which}, a point a job.", *describe_trends(sweep))
 
 
 def scatter(sweep: Sweep, columns: Sequence[int], keys: int) -> str:
     """Return some metrics of a list of jobs over several keys."""
     some = f"the {len(columns)} strongest of {keys} keys" if keys > len(columns) else "each key"
-    return joined(f"The metrics that change most over {some}, a point a job.", *fitted(sweep))
+    return join_sentences(
+        f"The metrics that change most over {some}, a point a job.", *describe_trends(sweep)
+    )
 
 
-def fitted(sweep: Sweep) -> Iterator[str]:
+def describe_trends(sweep: Sweep) -> Iterator[str]:
     """Yield what is said of trends and of colours, and how many points are drawn."""
     yield TREND
     phrase, _, _ = grouping(sweep)
@@ -170,10 +172,10 @@ def ranking(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> str:
         "rank": "is left out",
     }
     gaps = f"Up to {most} jobs lack a value that is known within its error bar: such a job "
-    return joined(
+    return join_sentences(
         {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
         f"They are of the first {base:,} points of the design's sequence." if base else "",
-        f"{told(sweep, found)} In parentheses: {unit}.",
+        f"{describe_ranking(sweep, found)} In parentheses: {unit}.",
         gaps + f"{stands[kind]}." if most else "",
         f"Not ranked, since too few jobs tell of it: {'; '.join(left)}." if left else "",
     )

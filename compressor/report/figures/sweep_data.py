@@ -60,7 +60,7 @@ class Measure:
         return (values.sel(joint=self.joint, drop=True) if self.joint else values) * self.factor
 
 
-def shown(name: str) -> Iterator[Measure]:
+def shown_variables(name: str) -> Iterator[Measure]:
     """Yield a metric as the report draws it, if it does: of each joint apart."""
     metric = METRICS[name]
     if metric.shown and not metric.dims:
@@ -71,7 +71,7 @@ def shown(name: str) -> Iterator[Measure]:
             yield Measure(name, f"{title}, {joint.replace('_', ' ')}", unit, factor, joint)
 
 
-MEASURES = tuple(measure for name in METRICS for measure in shown(name))
+MEASURES = tuple(measure for name in METRICS for measure in shown_variables(name))
 
 
 def measures(data: xr.Dataset) -> list[Measure]:
@@ -80,7 +80,7 @@ def measures(data: xr.Dataset) -> list[Measure]:
     return [measure for measure in there if measure.of(data).notnull().any()]
 
 
-def swept(study: xr.Dataset) -> list[str]:
+def swept_axes(study: xr.Dataset) -> list[str]:
     """Return the axes of a study that have more than one value; of a list of jobs, the
     coordinates.
     """
@@ -129,7 +129,7 @@ class Axis:
     @property
     def words(self) -> list[str]:
         """Its different values as words, in their order."""
-        return [spoken(value) for value in dict.fromkeys(self.values.tolist())]
+        return [format_swept(value) for value in dict.fromkeys(self.values.tolist())]
 
     @property
     def places(self) -> np.ndarray:
@@ -153,8 +153,10 @@ class Axis:
         """Return one of its values in words, such as `rod mass 3 kg`."""
         value = self.values[number]
         if self.is_words:
-            return named(self.phrase, spoken(value))
-        return f"{self.phrase} {spoken(value)}" + (f" {self.unit}" if self.unit != "1" else "")
+            return name_value(self.phrase, format_swept(value))
+        return f"{self.phrase} {format_swept(value)}" + (
+            f" {self.unit}" if self.unit != "1" else ""
+        )
 
 
 @dataclass(frozen=True)
@@ -224,10 +226,10 @@ def sweep_of(data: xr.Dataset) -> Sweep:
     Axes that advance together are one, which is named after both. Numbers of a grid are sorted.
     """
     status = data["status"]
-    names = swept(data)
+    names = swept_axes(data)
     if status.dims == ("job",):
         axes = [axis_of(data, name, data[name].values) for name in names]
-        return gridded(data, axes) or Sweep(data, tuple(axes), np.arange(status.size), False)
+        return grid_jobs(data, axes) or Sweep(data, tuple(axes), np.arange(status.size), False)
     place = np.arange(status.size).reshape(status.shape)
     found = []
     for name in names:
@@ -264,7 +266,7 @@ def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:
     return Axis(name, phrase, unit, values)
 
 
-def gridded(data: xr.Dataset, columns: Sequence[Axis]) -> Sweep | None:
+def grid_jobs(data: xr.Dataset, columns: Sequence[Axis]) -> Sweep | None:
     """Return a list of jobs as a grid; None where it leaves out too much of it, as samples do."""
     if any(has_gaps(axis) for axis in columns) or not columns:
         return None
@@ -320,14 +322,14 @@ def spans_decades(values: np.ndarray) -> bool:
     return bool(finite.size and finite.min() > 0.0 and finite.max() >= LOG_RATIO * finite.min())
 
 
-def named(phrase: str, word: str) -> str:
+def name_value(phrase: str, word: str) -> str:
     """Return a word with what it is a value of, unless it says that: `load design`, but `both
     joints`.
     """
     return word if phrase in word else f"{phrase} {word}"
 
 
-def spoken(value: object) -> str:
+def format_swept(value: object) -> str:
     """Return a swept value in few characters."""
     return SPOKEN.get(value, shown_value(value).replace("_", " ")) if isinstance(value, str) else (
         shown_value(value)

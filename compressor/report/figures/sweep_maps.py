@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from compressor.analysis import Effects, grid_effects, sampled_effects
 from compressor.metrics import METRICS
 from compressor.report.figures.extract import with_jobs
-from compressor.report.figures.style import BLUE, GOLD, GREY, legend_above, sheet, styled
+from compressor.report.figures.style import BLUE, GOLD, GREY, in_style, legend_above, sheet
 from compressor.report.figures.sweep_data import MARKS, NAMES, Axis, Measure, Sweep, spans_decades
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
@@ -25,7 +25,7 @@ from compressor.report.figures.sweep_panels import (
     mark_points,
     marks_shown,
     metric_panels,
-    thinned,
+    thin_places,
 )
 
 COLORS = "cividis"
@@ -52,14 +52,14 @@ class Cells(NamedTuple):
     keys: np.ndarray | None
 
 
-@styled
+@in_style
 def draw_maps(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
     """Return every measure over both axes of a grid, a cell a job, at most MOST_CELLS along an
     axis.
     """
     in_x, in_y = across(sweep)
     x, y = sweep.axes[in_x], sweep.axes[in_y]
-    chosen = [thinned(axis.values.size, MOST_CELLS) for axis in (y, x)]
+    chosen = [thin_places(axis.values.size, MOST_CELLS) for axis in (y, x)]
 
     def table(values: np.ndarray) -> np.ndarray:
         return values.transpose(in_y, in_x)[np.ix_(*chosen)]
@@ -206,7 +206,7 @@ def overall(found: Ranking) -> list[int]:
     return np.argsort(-np.mean(strengths, axis=0), kind="stable").tolist()
 
 
-@styled
+@in_style
 def draw_ranking(sweep: Sweep, found: Ranking) -> Figure:
     """Return a panel an axis, the strongest first, with a row a measure; bars with 95 %
     intervals.
@@ -259,7 +259,7 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
     return float(values[axis]) * factor, float(low), float(high)
 
 
-def told(sweep: Sweep, found: Ranking) -> str:
+def describe_ranking(sweep: Sweep, found: Ranking) -> str:
     """Return the strongest axis of each measure, a sentence an axis; or axes that are not told
     apart.
     """

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from compressor.analysis import trend
 from compressor.report.figures.extract import with_jobs
-from compressor.report.figures.style import BLUE, CYCLE, Line, legend_above, sheet, styled
+from compressor.report.figures.style import BLUE, CYCLE, Line, in_style, legend_above, sheet
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -23,7 +23,7 @@ from compressor.report.figures.sweep_data import (
     Measure,
     Sweep,
     coarse,
-    named,
+    name_value,
     spans_decades,
 )
 
@@ -150,7 +150,7 @@ def lines_for(axis: Axis, chosen: Iterable[int]) -> list[Line]:
     return [Line(to_hex(colormaps["viridis"](share)), "-", 1.5) for share in shares]
 
 
-def thinned(size: int, most: int) -> np.ndarray:
+def thin_places(size: int, most: int) -> np.ndarray:
     """Evenly chosen numbers below a size, the ends among them."""
     return (
         np.arange(size) if size <= most else np.unique(np.linspace(0, size - 1, most).astype(int))
@@ -163,7 +163,7 @@ PLAIN_LINE = Line(BLUE, "-", 1.4).properties() | {"marker": "o", "markersize": 3
 MOST_JOBS = 1000
 
 
-@styled
+@in_style
 def draw_curves(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
     """Return every measure over the one axis of a grid, a point a job; over words without a line.
 
@@ -233,10 +233,10 @@ def roles_of(sweep: Sweep, order: Sequence[int], detailed: bool) -> Roles:
 
 def chosen_of(axis: Axis, most: int) -> np.ndarray:
     """Return the numbers of an axis' values that are shown."""
-    return thinned(axis.values.size, most)
+    return thin_places(axis.values.size, most)
 
 
-@styled
+@in_style
 def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
     """Return every measure over two axes, as lines; means over the others, if there are any.
 
@@ -266,7 +266,7 @@ def marks_of(sweep: Sweep, role: Roles) -> list[Line2D]:
     return [] if is_averaged(sweep, role) else marks_shown(sweep.status, sweep.chaotic)
 
 
-@styled
+@in_style
 def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
     """Return a panel for each value of one axis and, in rows, of another, or for each measure."""
     sweep = coarse(sweep, role.x, MOST_PLACES)
@@ -370,7 +370,7 @@ MOST_POINTS = 2000  # in a panel
 PLACES = 60  # of a trend
 
 
-@styled
+@in_style
 def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
     """Return every measure over the axis that matters most for it; axes: their numbers, one a
     measure.
@@ -384,7 +384,7 @@ def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) 
     return figure
 
 
-@styled
+@in_style
 def draw_scatter(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
     """Return the measures in rows over axes in columns."""
     figure, grid = sheet(
@@ -420,9 +420,9 @@ def plot_points(panel: Axes, sweep: Sweep, axis: int, measure: Measure) -> None:
     scale_y(panel, y)
     phrase, words, group = grouping(sweep)
     shown = np.zeros(y.size, bool)
-    shown[thinned(y.size, MOST_POINTS)] = True
+    shown[thin_places(y.size, MOST_POINTS)] = True
     for n, word in enumerate(words):
-        name = named(phrase, word) if phrase else "a job"
+        name = name_value(phrase, word) if phrase else "a job"
         here = shown & (group == n)
         color = CYCLE[n].color if phrase else BLUE
         mark = {"linestyle": "none", "marker": MARKERS[n], "markersize": 3.0, "color": color,
@@ -466,7 +466,7 @@ def _entries(sweep: Sweep) -> Iterator[Any]:
     for n, word in enumerate(words):
         color = CYCLE[n].color if phrase else BLUE
         yield Line2D([], [], color=color, linestyle="none", marker=MARKERS[n], markersize=4.5,
-                     label=named(phrase, word) if phrase else "a job")  # fmt: skip
+                     label=name_value(phrase, word) if phrase else "a job")  # fmt: skip
     color = BLUE if not phrase else "#606060"
     yield Line2D([], [], color=color, linewidth=1.8, label="trend")
     yield Patch(facecolor=color, alpha=0.3, label="its 95 % interval")

@@ -7,14 +7,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from compressor.report import BLACK, BLUE, GREY, RED, sheet, styled
+from compressor.report import BLACK, BLUE, GREY, RED, in_style, sheet
 
 REACH = 0.5  # of the threshold: margins beyond it have the same colour
 ROD, RECIPROCATING = "rod_mass_kg", "reciprocating_mass_kg"
 OF_MASSES = (3, 4, 5, 6, 7, 8)  # claims that masses can decide
 
 
-@styled
+@in_style
 def draw_claims_map(found: xr.Dataset, place: tuple[float, float]) -> Figure:
     """Return each claim's margin over rod and reciprocating mass, and how many claims hold.
 
@@ -71,7 +71,7 @@ def border(panel: Axes, found: xr.Dataset, inside: np.ndarray, color: str) -> No
                       linewidths=1.0)  # fmt: skip
 
 
-@styled
+@in_style
 def draw_sensitivity(table: xr.Dataset, names: list[str]) -> Figure:
     """Return main and total effect of each assumption on each claim's margin, with 95 % intervals.
 

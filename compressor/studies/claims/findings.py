@@ -59,7 +59,7 @@ def is_mass_plane(found: xr.Dataset) -> bool:
     return {*keys} == {*MASSES} and len(keys) == found["status"].ndim
 
 
-def counted(found: xr.Dataset) -> tuple[int, dict[int, int], int]:
+def count_claims(found: xr.Dataset) -> tuple[int, dict[int, int], int]:
     """Return how many machines were judged, in how many each claim holds, and in how many all
     do.
     """
@@ -71,7 +71,7 @@ def counted(found: xr.Dataset) -> tuple[int, dict[int, int], int]:
 
 def summary(found: xr.Dataset) -> Iterator[str]:
     """Yield what machines say: how many hold which claims, where, and what claim 7 lacks."""
-    judged, each, whole = counted(found)
+    judged, each, whole = count_claims(found)
     failed = int((found["status"] == "failed").sum())
     some = ", ".join(f"{claim} in {count}" for claim, count in each.items())
     yield f"Of {judged} machines each claim holds in so many: {some}."
@@ -108,7 +108,9 @@ def region(found: xr.Dataset) -> Iterator[str]:
             inside = found[key].where(there)
             unit = coordinate.attrs.get("units", "").removeprefix("1")
             low, high = float(inside.min()), float(inside.max())
-            ranges.append(f"{spoken(str(key))} from {low:.3g} to {high:.3g} {unit}".rstrip())
+            ranges.append(
+                f"{coordinate_in_words(str(key))} from {low:.3g} to {high:.3g} {unit}".rstrip()
+            )
         yield f"{name} hold in {count}, with {', '.join(ranges)}."
         return
 
@@ -157,7 +159,7 @@ def consistency(found: xr.Dataset) -> str:
 
 def deciding(table: xr.Dataset) -> Iterator[str]:
     """Yield which assumption has most of each margin's variance, of `sensitivity`."""
-    names = [spoken(str(name)) for name in table["assumption"].values]
+    names = [coordinate_in_words(str(name)) for name in table["assumption"].values]
     for claim in table["claim"].values.tolist():
         one = table.sel(claim=claim)
         total = one["total_order"].values
@@ -223,13 +225,13 @@ def changes(machine: xr.Dataset) -> str:
         if isinstance(default, int | float) and float(coordinate) != float(default):
             unit = coordinate.attrs.get("units", "").removeprefix("1")
             parts.append(
-                f"{spoken(str(name))} {float(coordinate):.4g} {unit}".rstrip()
+                f"{coordinate_in_words(str(name))} {float(coordinate):.4g} {unit}".rstrip()
                 + f" (not {default:g})"
             )
     return ", ".join(parts) or "nothing"
 
 
-def spoken(name: str) -> str:
+def coordinate_in_words(name: str) -> str:
     """Return a coordinate's name in words, without its unit."""
     words = name.split("_")
     units = {"kg", "mm", "per", "s", "N", "MPa", "rpm", "mm15"}

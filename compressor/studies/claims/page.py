@@ -13,12 +13,12 @@ from compressor.studies.claims.figures import OF_MASSES, draw_claims_map, draw_s
 from compressor.studies.claims.findings import (
     change,
     consistency,
-    counted,
+    coordinate_in_words,
+    count_claims,
     deciding,
     flips,
     is_mass_plane,
     sensitivity,
-    spoken,
     summary,
 )
 from compressor.studies.claims.study import read_machines
@@ -72,7 +72,7 @@ def machine_drawings(
             if table is None:
                 yield name, [*summary(found)], *NO_FIGURE
             else:
-                names = [spoken(str(one)) for one in table["assumption"].values]
+                names = [coordinate_in_words(str(one)) for one in table["assumption"].values]
                 heading = "Which assumption decides which claim"
                 sentences = [*summary(found), *deciding(table)]
                 yield name, sentences, heading, BARS, draw_sensitivity(table, names)
@@ -82,7 +82,7 @@ def plane(found: xr.Dataset) -> tuple[str, str, Drawing]:
     """Return the heading, the caption and the map of a mass plane."""
     default = Case.from_values({}).machine
     place = default.rod_mass_kg, default.reciprocating_mass_kg
-    held = counted(found)
+    held = count_claims(found)
     caption = MAP if held[1][1] == held[1][2] == held[0] else MAP.partition(" Claims 1")[0]
     return "The paper's claims over the mass plane", caption, draw_claims_map(found, place)
 

@@ -23,8 +23,8 @@ from compressor.studies.claims.study import (
     ClaimsError,
     Judged,
     judge_machines,
-    kept,
     machine_key,
+    read_kept_machines,
     read_machines,
     rows_of,
 )
@@ -228,9 +228,9 @@ def least_change(
         tol=0.0, vectorized=True, updating="deferred", polish=False,
         rng=np.random.default_rng(SEED),
     )  # fmt: skip
-    near = descended(search, min(search.asked, key=search.cost), STEP)
+    near = descend(search, min(search.asked, key=search.cost), STEP)
     longer = Search(study, folder, workers, progress, LONGER)
-    best = descended(longer, near, STEP / 2.0)
+    best = descend(longer, near, STEP / 2.0)
     if holds := longer.cost(best) < 1.0:
         taken_back(longer, best)
     best = min(longer.points, key=longer.cost)
@@ -255,7 +255,7 @@ def beginning(search: Search) -> np.ndarray:
     takes the same way.
     """
     study, spans = search.study, search.spans
-    known = kept(Path(search.folder) / f"{study.name}.nc")
+    known = read_kept_machines(Path(search.folder) / f"{study.name}.nc")
     found = []
     for number, case in enumerate(study.cases):
         verdict = known.get(machine_key(case))
@@ -268,7 +268,7 @@ def beginning(search: Search) -> np.ndarray:
     return np.array([search.home.tolist(), *best, *drawn])
 
 
-def descended(search: Search, best: tuple[float, ...], step: float) -> tuple[float, ...]:
+def descend(search: Search, best: tuple[float, ...], step: float) -> tuple[float, ...]:
     """Return the best machine of a compass search that begins at one; until claims hold, or steps
     end.
 

@@ -57,7 +57,7 @@ def judge(machine: Case) -> Judged:
     for name, case in cases_of(machine).items():
         if name in IDEAL:
             continue
-        run = simulated(case)
+        run = simulate_quietly(case)
         if str(run["status"].item()) != "ok":
             problems.append(f"{name}: {run['reason'].item()}")
         runs[name] = run
@@ -80,7 +80,7 @@ def cases_judged(machine: Case) -> Iterable[Case]:
     return cases_of(machine).values()
 
 
-def simulated(case: Case) -> xr.Dataset:
+def simulate_quietly(case: Case) -> xr.Dataset:
     """Return a case's run; a solver's remarks are left aside."""
     from compressor.solve import simulate  # needs numba: only to simulate
 
@@ -103,7 +103,7 @@ def ideal_text(machine: Case) -> str:
 def ideal_runs(text: str) -> dict[str, xr.Dataset]:
     """Return both ideal machines' runs, which most machines of a study share."""
     cases = cases_of(Case.resolve(json.loads(text)))
-    return {name: simulated(cases[name]) for name in IDEAL}
+    return {name: simulate_quietly(cases[name]) for name in IDEAL}
 
 
 FLUSH = 3.0  # s between two writings of what is finished
@@ -157,7 +157,7 @@ def judge_machines(
     """
     cases, path = machines(study), Path(folder) / f"{study.name}.nc"
     keys = [machine_key(case) for case in cases]
-    known = kept(path)
+    known = read_kept_machines(path)
     if not known.keys() <= {*keys}:
         raise StoreError(path, OTHERS, ELSEWHERE)
     missing = [number for number, key in enumerate(keys) if key not in known]
@@ -168,7 +168,7 @@ def judge_machines(
     running = run_here(judge, tasks, needs, workers, partial(progress, done, total))
     try:
         for end in running:
-            known[keys[end.id]] = judged(end)
+            known[keys[end.id]] = judge_end(end)
             done += 1
             progress(done, total, "")
             if time.monotonic() - written > FLUSH:
@@ -189,7 +189,7 @@ def machine_key(case: Case) -> str:
     return hashlib.sha256(f"{case.key} {rules}".encode()).hexdigest()[:20]
 
 
-def judged(end: Done | Lost) -> Judged:
+def judge_end(end: Done | Lost) -> Judged:
     """Return what a job says of its machine, also one that took its worker with it."""
     return end.result if isinstance(end, Done) else Judged(failed=f"{end.reason}: {end.detail}")
 
@@ -254,7 +254,7 @@ def dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr
     return xr.Dataset(variables, coordinates, attrs)
 
 
-def kept(path: Path) -> dict[str, Judged]:
+def read_kept_machines(path: Path) -> dict[str, Judged]:
     """Return the machines of a file by key; none where there is no file. Raises StoreError."""
     if not path.exists():
         return {}

@@ -77,7 +77,7 @@ def dataset(
         made, written = build_data_set(folder, study, output, options, screen)
     finally:
         screen.end()
-    for line in told(made):
+    for line in describe_dataset(made):
         print_text(line)
     for name, count in written.files.items():
         print_text(f"{os.path.join(output, name)}  {size(count)}")
@@ -88,7 +88,7 @@ def dataset(
     return DONE
 
 
-def told(made: "xr.Dataset") -> list[str]:
+def describe_dataset(made: "xr.Dataset") -> list[str]:
     """Return what was made: windows and machines by joint and split, and what was left out."""
     from compressor.studies.diagnosis.data_card import counts
 

@@ -44,11 +44,11 @@ def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
     parts = [
         f"# {dataset.attrs['title'].removeprefix('compsim: ').capitalize()}",
         made_by(dataset),
-        "## What was simulated", simulated(dataset, fixed),
+        "## What was simulated", describe_simulation(dataset, fixed),
         "The model of these jobs, by part:",
         table(("part", "kind, and how many jobs have it"), model_rows(models)),
-        "## Windows, noise and split", cut(dataset),
-        table(("joint", "split", "machines", "windows"), counted(dataset)),
+        "## Windows, noise and split", describe_cuts(dataset),
+        table(("joint", "split", "machines", "windows"), count_rows(dataset)),
         "## The body and its sensor", groups(fixed),
         "## Labels", labels(dataset),
         "## Features", feature_table(dataset),
@@ -61,10 +61,10 @@ def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """Return a table of Markdown."""
     lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(escaped(cell) for cell in line)} |" for line in lines)
+    return "\n".join(f"| {' | '.join(escape_cell(cell) for cell in line)} |" for line in lines)
 
 
-def escaped(cell: Any) -> str:
+def escape_cell(cell: Any) -> str:
     """Return a cell's text: whatever it holds does not end the cell."""
     return str(cell).replace("|", r"\|").replace("\n", " ")
 
@@ -79,7 +79,7 @@ def made_by(dataset: "xr.Dataset") -> str:
     )
 
 
-def simulated(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
+def describe_simulation(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
     """Return how many jobs and machines, what was swept, how the motions are, what was left out."""
     machines = len({*dataset["machine"].values.tolist()})
     jobs = len({*dataset["key"].values.tolist()})
@@ -125,7 +125,7 @@ def _meaning(reason: str) -> str:
     return f": {LEFT_OUT[reason]}" if reason in LEFT_OUT else ": failed (`compsim status`)"
 
 
-def cut(dataset: "xr.Dataset") -> str:
+def describe_cuts(dataset: "xr.Dataset") -> str:
     """Return how records were cut, disturbed and split."""
     attrs = dataset.attrs
     levels = ", ".join(f"{rms:g}" for rms in dataset["noise"].values)
@@ -144,7 +144,7 @@ def cut(dataset: "xr.Dataset") -> str:
     )
 
 
-def counted(dataset: "xr.Dataset") -> list[tuple[str, str, str, str]]:
+def count_rows(dataset: "xr.Dataset") -> list[tuple[str, str, str, str]]:
     """Return the rows of machines and windows by joint and split."""
     return [(a, b, f"{m:,}", f"{w:,}") for a, b, m, w in counts(dataset)]
 
@@ -217,7 +217,7 @@ def model_rows(models: dict[str, dict[str, int]]) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
-def unmodelled(models: dict[str, dict[str, int]]) -> Iterator[str]:
+def unmodelled_parts(models: dict[str, dict[str, int]]) -> Iterator[str]:
     """Yield what the chosen models leave out, each with the jobs that it is said of."""
 
     def of_jobs(part: str, kind: str) -> str:
@@ -247,7 +247,7 @@ def unmodelled(models: dict[str, dict[str, int]]) -> Iterator[str]:
 def absent(fixed: dict[str, Any], models: dict[str, dict[str, int]]) -> list[str]:
     """Return what the data set does not have."""
     body, sensor = fixed.get("body") or {}, fixed.get("sensor") or {}
-    found = [*ABSENT, *unmodelled(models)]
+    found = [*ABSENT, *unmodelled_parts(models)]
     if body:
         found.append(
             f"**Other foundations.** The body of the first job has {body['mass_kg']:g} kg and "

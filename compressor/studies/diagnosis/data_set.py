@@ -213,7 +213,7 @@ def make_data_set(
         more = f"sensor.length_rev: {options.revolutions + 1} or more"
         raise DataSetError(f"{text}; run what is missing, or with {more}")
     clipped = [*{row["key"]: row["clipped"] for row in rows}.values()]
-    return labelled(rows, options).assign_attrs(
+    return label_rows(rows, options).assign_attrs(
         clipped_records=sum(share >= Sensor.REPORTED for share in clipped),
         clipped_most=float(np.nanmax([0.0, *clipped])),
         title=f"compsim: labelled windows of {of.name}", program=PROGRAM, study=of.name,
@@ -306,7 +306,7 @@ def features_by_noise(window: Window, key: int, options: DataSetOptions) -> np.n
     return found
 
 
-def labelled(rows: Sequence[dict[str, Any]], options: DataSetOptions) -> "xr.Dataset":
+def label_rows(rows: Sequence[dict[str, Any]], options: DataSetOptions) -> "xr.Dataset":
     """Return the rows of `job_rows` as a Dataset."""
     import xarray as xr
 

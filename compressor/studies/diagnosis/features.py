@@ -16,7 +16,7 @@ from compressor.vibration import (
     envelope_spectrum,
     high_pass_orders,
     line_amplitudes,
-    resampled,
+    resample_angle,
     shape,
 )
 
@@ -84,8 +84,8 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     than two revolutions, pulses that do not increase or lie beyond the samples, and values that are
     not all numbers, or all zero.
     """
-    whole = checked(times, values, tacho)
-    turns = turned(times, tacho)
+    whole = check_record(times, values, tacho)
+    turns = turns_at(times, tacho)
     # from the last sample that is not after the first pulse: the rest then reach over all turns
     first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
     inside = slice(first, int(np.searchsorted(turns, whole)) + 1)
@@ -94,7 +94,7 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     rate = 1.0 / (times[1] - times[0])
     speed = whole / (tacho[-1] - tacho[0])
     a_turn = SECTORS * math.ceil(rate / speed / SECTORS)
-    even = resampled(2.0 * math.pi * turns[inside], values[inside], a_turn)[: whole * a_turn]
+    even = resample_angle(2.0 * math.pi * turns[inside], values[inside], a_turn)[: whole * a_turn]
     size, *shapes = shape(even)
     found = {"level": math.log10(size), "speed": math.log10(speed)}
     found |= dict(zip(("crest_factor", "kurtosis", "gini"), shapes, strict=True))
@@ -112,7 +112,7 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     return {name: float(found[name]) for name in FEATURES}
 
 
-def checked(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
+def check_record(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
     """Return the whole revolutions of a record. Raises RecordError for one that tells nothing."""
     whole = len(tacho) - 1
     if whole < FEWEST:
@@ -131,7 +131,7 @@ def checked(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
     return whole
 
 
-def turned(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
+def turns_at(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
     """Return the revolutions since the first pulse at each time, at the nearest one's pace
     beyond pulses.
     """

@@ -88,7 +88,7 @@ def run_chain(task: Task) -> Ended | StoreError:
     """
     chain, path = task.chain, task.chain.path(task.folder)
     try:
-        rows = kept(chain, path)
+        rows = read_kept_rows(chain, path)
         if task.rerun:
             rows = rows[: first_failed(rows)]
         written, stored = time.monotonic(), len(rows)
@@ -101,7 +101,7 @@ def run_chain(task: Task) -> Ended | StoreError:
             write_dataset(path, dataset(chain, rows))
     except StoreError as error:
         return error
-    return ended(chain, rows)
+    return chain_end(chain, rows)
 
 
 def first_failed(rows: Sequence[Row]) -> int:
@@ -109,7 +109,7 @@ def first_failed(rows: Sequence[Row]) -> int:
     return next((n for n, row in enumerate(rows) if row["status"] != "ok"), len(rows))
 
 
-def ended(chain: Chain, rows: Sequence[Row]) -> Ended:
+def chain_end(chain: Chain, rows: Sequence[Row]) -> Ended:
     """Return how far a chain has come."""
     paired = zip(chain.values, rows, strict=False)
     bad = [(v, row["reason"], row["detail"]) for v, row in paired if row["status"] != "ok"]
@@ -160,7 +160,7 @@ def read_chain(chain_path: Path) -> xr.Dataset:
     return read_dataset(chain_path, REMEDY)
 
 
-def kept(chain: Chain, path: Path) -> list[Row]:
+def read_kept_rows(chain: Chain, path: Path) -> list[Row]:
     """Return the rows of an earlier run, none where there is no file. Raises StoreError."""
     if not path.exists():
         return []

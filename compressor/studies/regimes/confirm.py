@@ -25,13 +25,13 @@ from compressor.outcome import Regime
 from compressor.program import PROGRAM
 from compressor.solve import follow, record
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
-from compressor.studies.regimes.chains import FOLDER, REMEDY, Chain, kept
+from compressor.studies.regimes.chains import FOLDER, REMEDY, Chain, read_kept_rows
 from compressor.studies.regimes.values import (
     Clock,
     Motion,
     Row,
     apart,
-    measured,
+    measure_motion,
     places,
     stretch,
     tolerance,
@@ -145,8 +145,8 @@ AGREED = Verdict(0, 0, 0, 0, 0)
 
 def doubts(pair: Pair, folder: Folder) -> list[Doubt]:
     """Return the values at which the stored chains of a pair differ."""
-    up = kept(pair.up, pair.up.path(folder))
-    down = kept(pair.down, pair.down.path(folder))
+    up = read_kept_rows(pair.up, pair.up.path(folder))
+    down = read_kept_rows(pair.down, pair.down.path(folder))
     if min(len(up), len(down)) < len(pair.up.cases):
         return []
     found = []
@@ -187,7 +187,7 @@ def later(case: Case, state: np.ndarray | None, chain: Chain) -> Seen:
     leg = follow(case, state, stretch(chain.asked, FURTHER, clock))
     if leg.reason:
         return Seen("", math.nan, leg.points[:0, :, :2], math.nan, math.nan)
-    return seen_in_motion(measured(case, leg.state, chain.asked, clock), case)
+    return seen_in_motion(measure_motion(case, leg.state, chain.asked, clock), case)
 
 
 def other_starts(case: Case) -> list[Case]:
@@ -248,7 +248,7 @@ class Book:
     def __init__(self, pair: Pair, folder: Folder, flush: float):
         self.pair, self.folder, self.flush = pair, folder, flush
         self.known = read_verdicts(pair, folder)
-        stored = (len(kept(chain, chain.path(folder))) for chain in (pair.up, pair.down))
+        stored = (len(read_kept_rows(chain, chain.path(folder))) for chain in (pair.up, pair.down))
         whole = min(stored) == len(pair.up.cases)
         doubted = doubts(pair, folder)
         self.numbers = {doubt.number for doubt in doubted}

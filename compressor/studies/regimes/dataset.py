@@ -33,7 +33,7 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     folder = Path(results) / FOLDER / study
     manifest = read_manifest(folder)
     asked = Regimes(**manifest["regimes"])
-    chains = [[stored(folder / f"{key}.nc") for key in keys] for keys in manifest["chains"]]
+    chains = [[read_stored(folder / f"{key}.nc") for key in keys] for keys in manifest["chains"]]
     axes = {axis["key"]: axis["values"] for axis in manifest["axes"]}
     names = coordinate_names([*axes, asked.over])
     over = names[asked.over]
@@ -50,14 +50,14 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
         dims = ("job", "direction", over)
     variables: dict[str, tuple] = {}
     for name, phrase in TEXTS.items():
-        values = stacked(chains, asked, name).reshape(*shape, len(asked.directions), asked.n)
+        values = stack_chains(chains, asked, name).reshape(*shape, len(asked.directions), asked.n)
         variables[name] = dims, values, {"long_name": phrase}
     for name, (inner, unit, phrase) in NUMBERS.items():
-        values = stacked(chains, asked, name, inner)
+        values = stack_chains(chains, asked, name, inner)
         values = values.reshape(*shape, len(asked.directions), asked.n, *values.shape[3:])
         variables[name] = (*dims, *inner), values, {"units": unit, "long_name": phrase}
     if manifest["pairs"]:
-        every = [stored(folder / f"pair-{key}.nc") for key in manifest["pairs"]]
+        every = [read_stored(folder / f"pair-{key}.nc") for key in manifest["pairs"]]
         variables |= verdicts(every, (*dims[:-2], over), (*shape, asked.n))
     turns = variables["section"][1].shape[len(dims)]
     number = {"long_name": "Poincaré point, one a revolution", "units": "1"}
@@ -94,7 +94,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise StoreError(path, f"cannot be read: {error}", REMEDY) from error
 
 
-def stored(path: Path) -> xr.Dataset | None:
+def read_stored(path: Path) -> xr.Dataset | None:
     """Return a stored chain or pair; None where there is none."""
     if not path.exists():
         return None
@@ -117,7 +117,7 @@ def layout(
     return found, (len(manifest["chains"]),)
 
 
-def stacked(
+def stack_chains(
     chains: Sequence[Sequence[xr.Dataset | None]],
     asked: Regimes,
     name: str,

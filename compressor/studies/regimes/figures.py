@@ -26,11 +26,11 @@ from compressor.report import (
     MODE_COLORS,
     RED,
     UNSEEN,
+    in_style,
     legend_above,
     mode_handles,
     positions,
     sheet,
-    styled,
 )
 
 # the second is smaller and lies on the first, so that both are seen where they agree
@@ -45,13 +45,13 @@ COLUMNS = 3
 HATCH: dict[str, Any] = {"facecolor": UNSEEN, "edgecolor": GREY, "hatch": "////"}
 
 
-@styled
+@in_style
 def draw_bifurcation(pair: xr.Dataset) -> Figure:
     """Return one machine along a parameter: Poincaré points, period, exponent, contact modes.
 
     pair: dims direction, the followed one, and the variables' own; some value has a result.
     """
-    joints, x = worn(pair), positions(pair, pair.attrs["over"])
+    joints, x = joints_with_points(pair), positions(pair, pair.attrs["over"])
     rows = 2 * len(joints) + 2
     ratios = [2.2] * len(joints) + [1.2, 1.4] + [0.8] * len(joints)
     figure, grid = sheet(rows, 1, 1.35 * sum(ratios) + 1.2, sharex=True, height_ratios=ratios)
@@ -145,14 +145,14 @@ def plot_shares(panel: Axes, pair: xr.Dataset, joint: str) -> None:
     panel.grid(visible=False)
 
 
-@styled
+@in_style
 def draw_sections(shown: xr.Dataset) -> Figure:
     """Return the Poincaré sections, one panel a value: the journal's place along the cylinder, and
     its rate.
 
     shown: as for `draw_bifurcation`, at the values that are to be drawn.
     """
-    over, joints, unit = shown.attrs["over"], worn(shown), unit_of(shown)
+    over, joints, unit = shown.attrs["over"], joints_with_points(shown), unit_of(shown)
     rows = -(-shown.sizes[over] // COLUMNS)
     figure, grid = sheet(rows * len(joints), COLUMNS, 2.9 * rows * len(joints) + 0.7)
     for joint, part in zip(joints, np.split(grid, len(joints)), strict=True):
@@ -213,7 +213,7 @@ def regimes_of(one: xr.Dataset) -> str:
     return words[0] if len(words) == 1 else ",\n".join(f"{w} {d}" for d, w in found.items())
 
 
-def worn(data: xr.Dataset) -> list[str]:
+def joints_with_points(data: xr.Dataset) -> list[str]:
     """Return the joints that have Poincaré points."""
     others = [dim for dim in data["section"].dims if dim != "joint"]
     there = data["section"].notnull().any(others).values
@@ -306,7 +306,7 @@ CLASSES = {
 }  # fmt: skip
 
 
-@styled
+@in_style
 def draw_periods(plane: xr.Dataset, other: str) -> Figure:
     """Return the regime over the followed parameter and another one, a panel a direction.
 

@@ -12,8 +12,8 @@ from compressor.report import (
     PlotChoice,
     PlotError,
     Plotted,
-    chosen,
-    published,
+    choose_figures,
+    publish_drawings,
     shown_value,
 )
 from compressor.store import Folder
@@ -35,7 +35,7 @@ def write(results: Folder, name: str, output: Folder, choice: PlotChoice) -> Ite
     Raises PlotError where there is nothing to draw; StoreError where files cannot be written.
     """
     named = open_regimes(results, name).assign_attrs(study=name)
-    yield from published(regime_figures(named, choice), output, name, choice.kinds)
+    yield from publish_drawings(regime_figures(named, choice), output, name, choice.kinds)
 
 
 def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[str, str, Drawing]]:
@@ -47,7 +47,7 @@ def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[st
     where there is none. Raises PlotError where there is nothing to draw.
     """
     study = f"study {dataset.attrs.get('study', '')} of regimes".replace("  ", " ")
-    wanted = chosen(choice.what, [*CAPTIONS], study)
+    wanted = choose_figures(choice.what, [*CAPTIONS], study)
     over, axes = dataset.attrs["over"], other_axes(dataset)
     fixed = fixed_values(dataset, axes, choice.at)
     if choice.over:
@@ -57,18 +57,22 @@ def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[st
         if name == "periods":
             if not axes and not choice.what:
                 continue
-            other = mapped(dataset, axes, choice, study)
+            other = map_axis(dataset, axes, choice, study)
             part = at(dataset, {axis: value for axis, value in fixed.items() if axis != other})
             check_any(part, study)
             caption = CAPTIONS[name](part, other)
-            yield name, caption + told(fixed, leave=other), draw_periods(part, other)
+            yield name, caption + describe_fixed_axes(fixed, leave=other), draw_periods(part, other)
         elif name == "sections":
             check_any(pair, study)
             shown = pair.isel({over: chosen_values(pair)})
-            yield name, CAPTIONS[name](shown, pair.sizes[over]) + told(fixed), draw_sections(shown)
+            yield (
+                name,
+                CAPTIONS[name](shown, pair.sizes[over]) + describe_fixed_axes(fixed),
+                draw_sections(shown),
+            )
         else:
             check_any(pair, study)
-            yield name, CAPTIONS[name](pair) + told(fixed), draw_bifurcation(pair)
+            yield name, CAPTIONS[name](pair) + describe_fixed_axes(fixed), draw_bifurcation(pair)
 
 
 def other_axes(dataset: xr.Dataset) -> list[str]:
@@ -105,7 +109,7 @@ def fixed_values(dataset: xr.Dataset, axes: Sequence[str], chosen_at: Sequence[s
     return fixed
 
 
-def mapped(dataset: xr.Dataset, axes: Sequence[str], choice: PlotChoice, study: str) -> str:
+def map_axis(dataset: xr.Dataset, axes: Sequence[str], choice: PlotChoice, study: str) -> str:
     """Return the second axis of the period map."""
     if not axes:
         raise PlotError(f"{study} follows one parameter: a period map needs another, swept")
@@ -122,7 +126,7 @@ def at(dataset: xr.Dataset, fixed: dict) -> xr.Dataset:
     return dataset.isel(place).transpose("direction", over, ...)
 
 
-def told(fixed: dict, leave: str = "") -> str:
+def describe_fixed_axes(fixed: dict, leave: str = "") -> str:
     """Return what other axes a figure is of, in words."""
     words = [f"{axis} {shown_value(value)}" for axis, value in fixed.items() if axis != leave]
     return f" Here {', '.join(words)}." if words else ""
@@ -153,7 +157,7 @@ def chosen_values(pair: xr.Dataset) -> list[int]:
         by_regime.setdefault(label, []).append(int(i))
     groups = [*by_regime.values()]
     if len(groups) > MOST_SECTIONS:
-        groups = [groups[i] for i in spread(len(groups), MOST_SECTIONS)]
+        groups = [groups[i] for i in spread_places(len(groups), MOST_SECTIONS)]
     quota = [0] * len(groups)
     while sum(quota) < min(MOST_SECTIONS, sum(map(len, groups))):
         free = [i for i, group in enumerate(groups) if quota[i] < len(group)]
@@ -161,10 +165,10 @@ def chosen_values(pair: xr.Dataset) -> list[int]:
     return sorted(
         group[i]
         for group, count in zip(groups, quota, strict=True)
-        for i in spread(len(group), count)
+        for i in spread_places(len(group), count)
     )
 
 
-def spread(size: int, count: int) -> list[int]:
+def spread_places(size: int, count: int) -> list[int]:
     """Return some of so many places, evenly: the middles of equal parts."""
     return [(2 * i + 1) * size // (2 * count) for i in range(count)]

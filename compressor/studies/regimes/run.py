@@ -107,7 +107,7 @@ def run_regimes(
     tasks = [Task(str(folder), chain, rerun) for chain in chains]
     ends = run_chains(tasks, workers, Watch(chains, folder, total, progress))
     books = look_again(machines, ends, folder, workers, progress)
-    counts, failures = told(studies, machines, ends, books)
+    counts, failures = describe_progress(studies, machines, ends, books)
     return RegimesSummary(total, before, counts, failures, time.monotonic() - began)
 
 
@@ -263,7 +263,7 @@ def look_again(
     return books
 
 
-def told(
+def describe_progress(
     studies: Sequence[Study],
     machines: Sequence[Machine],
     ends: dict[str, Ended | Lost],
@@ -274,7 +274,7 @@ def told(
     for study in studies:
         own = [machine for machine in machines if machine.study == study.name]
         chains = [chain for machine in own for chain in machine.chains]
-        bad = [failure for machine in own for failure in failed(machine, ends)]
+        bad = [failure for machine in own for failure in failed_values(machine, ends)]
         finished = [end for c in chains if isinstance(end := ends[c.key], Ended)]
         kept = [books[pair.key].count() for m in own if (pair := m.pair) and pair.key in books]
         differ, confirmed = (sum(column) for column in zip(*kept, strict=True)) if kept else (0, 0)
@@ -285,7 +285,7 @@ def told(
     return tuple(counts), tuple(failures)
 
 
-def failed(machine: Machine, ends: dict[str, Ended | Lost]) -> Iterator[Failure]:
+def failed_values(machine: Machine, ends: dict[str, Ended | Lost]) -> Iterator[Failure]:
     """Yield the failed values of a machine; of a chain that was lost, its first value without a
     run.
     """

@@ -187,14 +187,14 @@ def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
         row["end_state"] = state
     settled, since = settle(case, state, stretch(asked, asked.settle_rev, clock))
     if settled.reason:
-        return failed(row, settled.reason, settled.detail)
+        return failed_row(row, settled.reason, settled.detail)
     row["settled_rev"] = np.asarray(since)
-    motion = measured(case, settled.state, asked, clock)
+    motion = measure_motion(case, settled.state, asked, clock)
     if motion.reason:
-        return failed(row, motion.leg.reason, motion.leg.detail)
+        return failed_row(row, motion.leg.reason, motion.leg.detail)
     reason, detail = contacts(case, motion, asked, clock, row)
     if reason:
-        return failed(row, reason, detail)
+        return failed_row(row, reason, detail)
     end, found = motion.leg.state, motion.leg.numbers(motion.count)
     worn = record(case)["clearance"] > 0.0  # an ideal joint's journal does not move
     row["section"][: len(motion.points), worn] = motion.points[:, worn]
@@ -211,7 +211,7 @@ def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
     return row | {"status": "ok", "regime": motion.regime}
 
 
-def failed(row: Row, reason: str, detail: str) -> Row:
+def failed_row(row: Row, reason: str, detail: str) -> Row:
     """Return a row of a value whose run stopped."""
     return row | {"status": "failed", "reason": str(reason), "detail": detail}
 
@@ -221,7 +221,7 @@ def stretch(asked: Regimes, revolutions: int, clock: Clock) -> Stretch:
     return Stretch(revolutions, math.radians(asked.section_deg), clock.left)
 
 
-def measured(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> Motion:
+def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> Motion:
     """Return the motion from a settled state on, followed until its Poincaré points repeat or
     suffice.
     """

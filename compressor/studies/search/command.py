@@ -109,7 +109,7 @@ def lines(question: "Question", answer: "Answer", folder: str) -> Iterator[str]:
     told = comparison_lines if answer.best is None else extremum_lines
     yield from told(question, answer)
     for point in answer.blind[:MOST_TOLD]:
-        yield f"  {at(question, point)}: {undecided(question, point)}  job {point.key[:8]}"
+        yield f"  {at(question, point)}: {why_undecided(question, point)}  job {point.key[:8]}"
     if len(answer.blind) > MOST_TOLD:
         yield f"  and {len(answer.blind) - MOST_TOLD} more"
     outside = [point for point in answer.failed if point not in answer.blind]
@@ -180,7 +180,7 @@ def number(question: "Question", point: Any) -> str:
             + UNBARRED * (not told.barred))  # fmt: skip
 
 
-def undecided(question: "Question", point: Any) -> str:
+def why_undecided(question: "Question", point: Any) -> str:
     """Return why a point does not decide."""
     return point.told.reason or f"{number(question, point)}: within its error bar of the limit"
 

@@ -64,7 +64,7 @@ def stress(
     from compressor.sweep import cores
 
     if scene is not None:
-        print_text("\n".join(repeated(scene, seed, drawn or "")))
+        print_text("\n".join(write_scene(scene, seed, drawn or "")))
         return DONE
     from compressor.report import render
     from compressor.store import publish, writable_folder
@@ -90,7 +90,7 @@ def stress(
     return SOME_FAILED if doubtful else DONE
 
 
-def repeated(number: int, seed: int, drawn: str) -> Iterator[str]:
+def write_scene(number: int, seed: int, drawn: str) -> Iterator[str]:
     """Yield a scene as a case file, and below it, as comments, how it ends."""
     from compressor.studies.stress.stress import repeat
 

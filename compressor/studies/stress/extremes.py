@@ -24,7 +24,7 @@ from compressor.metrics import JOINTS
 Span = tuple[float, float]
 
 
-def _judged(key: str, factor: float = 1.0) -> Span:
+def _supported(key: str, factor: float = 1.0) -> Span:
     """Return the supported range of a key: the one that the table of parameters has, times a
     factor.
     """
@@ -34,21 +34,21 @@ def _judged(key: str, factor: float = 1.0) -> Span:
 
 # name: (unit, whole range, supported range, log-uniform)
 SPANS: dict[str, tuple[str, Span, Span | None, bool]] = {
-    "clearance_big_end": ("m", (1e-9, 3e-3), _judged("clearance_mm.big_end", 1e-3), True),
-    "clearance_small_end": ("m", (1e-9, 3e-3), _judged("clearance_mm.small_end", 1e-3), True),
+    "clearance_big_end": ("m", (1e-9, 3e-3), _supported("clearance_mm.big_end", 1e-3), True),
+    "clearance_small_end": ("m", (1e-9, 3e-3), _supported("clearance_mm.small_end", 1e-3), True),
     "stiffness": (
-        "N/m^1.5", (1e6, 1e14), _judged("contact.stiffness_N_per_mm15", 1000.0**1.5), True,
+        "N/m^1.5", (1e6, 1e14), _supported("contact.stiffness_N_per_mm15", 1000.0**1.5), True,
     ),
-    "exponent": ("1", _judged("contact.exponent"), None, False),
+    "exponent": ("1", _supported("contact.exponent"), None, False),
     "damping": ("1", (1e-2, 1e2), None, True),  # over the paper's; a tenth of the scenes has none
-    "friction": ("1", (0.0, 1.0), _judged("friction.static"), False),
+    "friction": ("1", (0.0, 1.0), _supported("friction.static"), False),
     "stiction_velocity": (
-        "m/s", (1e-6, 0.1), _judged("friction.stiction_velocity_mm_per_s", 1e-3), True,
+        "m/s", (1e-6, 0.1), _supported("friction.stiction_velocity_mm_per_s", 1e-3), True,
     ),
-    "rod_mass": ("kg", (1e-3, 100.0), _judged("machine.rod_mass_kg"), True),
-    "reciprocating_mass": ("kg", (1e-3, 100.0), _judged("machine.reciprocating_mass_kg"), True),
-    "speed": ("rpm", (1.0, 20_000.0), _judged("machine.speed_rpm"), True),
-    "pin_radius": ("m", _judged("machine.pin_radius_mm", 1e-3), None, True),
+    "rod_mass": ("kg", (1e-3, 100.0), _supported("machine.rod_mass_kg"), True),
+    "reciprocating_mass": ("kg", (1e-3, 100.0), _supported("machine.reciprocating_mass_kg"), True),
+    "speed": ("rpm", (1.0, 20_000.0), _supported("machine.speed_rpm"), True),
+    "pin_radius": ("m", _supported("machine.pin_radius_mm", 1e-3), None, True),
     "rtol": ("1", (1e-10, 1e-2), None, True),
 }  # fmt: skip
 OTHERS = 3 + 3 * len(JOINTS)  # friction's ratio, load, scene; how each journal starts
@@ -64,14 +64,20 @@ CRANK = 0.12  # m
 SAMPLES = 720  # of the output grid
 # (whole range, supported range) of what chosen laws read, drawn evenly in the logarithm
 OF_LAWS = {
-    "contact.restitution": ((0.05, 1.0), _judged("contact.restitution")),
-    "contact.least_approach_mm_per_s": ((0.1, 1000.0), _judged("contact.least_approach_mm_per_s")),
-    "contact.length_mm": ((1.0, 1000.0), _judged("contact.length_mm")),
-    "contact.modulus_GPa": ((0.1, 1000.0), _judged("contact.modulus_GPa")),
-    "friction.bristle_stiffness_per_mm": ((1.0, 1e5), _judged("friction.bristle_stiffness_per_mm")),
+    "contact.restitution": ((0.05, 1.0), _supported("contact.restitution")),
+    "contact.least_approach_mm_per_s": (
+        (0.1, 1000.0),
+        _supported("contact.least_approach_mm_per_s"),
+    ),
+    "contact.length_mm": ((1.0, 1000.0), _supported("contact.length_mm")),
+    "contact.modulus_GPa": ((0.1, 1000.0), _supported("contact.modulus_GPa")),
+    "friction.bristle_stiffness_per_mm": (
+        (1.0, 1e5),
+        _supported("friction.bristle_stiffness_per_mm"),
+    ),
     "friction.bristle_damping_s_per_mm": (
         (1e-4, 0.3),
-        _judged("friction.bristle_damping_s_per_mm"),
+        _supported("friction.bristle_damping_s_per_mm"),
     ),
     "friction.viscous_s_per_mm": ((1e-6, 1e-2), (1e-5, 1e-3)),
 }
@@ -92,7 +98,7 @@ class Budget:
     seconds: float = 30.0
 
 
-def supported(number: int) -> bool:
+def is_supported(number: int) -> bool:
     """Return whether a scene lies inside the range that is documented as supported."""
     return number % 2 == 0
 
@@ -100,7 +106,7 @@ def supported(number: int) -> bool:
 def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
     """Return the scene `number` of a seed as the values of a case file."""
     point = iter(_points(seed, number % 2, 1 << (number // 2).bit_length())[number // 2])
-    found = _numbers(point, supported(number))
+    found = _numbers(point, is_supported(number))
     ratio, load, joint = next(point), LOADS[_which(point)], SCENES[_which(point)]
     exponent = found["exponent"]
     stiffness = found["stiffness"] * FULL_DAMPING ** (1.5 - exponent)
@@ -141,10 +147,10 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
     if budget.drawn:
         draw = random.Random(f"{seed} {number}")
         for group in ("contact", "friction"):
-            made[group] |= chosen(group, draw, supported(number))
+            made[group] |= choose_law(group, draw, is_supported(number))
         if budget.drawn == FEATURES:
-            made |= features(made, draw, supported(number))
-    return _rounded(made) | {
+            made |= features(made, draw, is_supported(number))
+    return _round_numbers(made) | {
         "output": {"keep": "series"},
         "solve": {
             "duration_rev": budget.revolutions,
@@ -158,7 +164,7 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
     }
 
 
-def chosen(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
+def choose_law(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
     """Return a law of contact or friction, and all that any law reads beside the default one's
     numbers.
     """
@@ -238,10 +244,10 @@ def _start(
     return {f"{joint}_x": radius * math.cos(angle), f"{joint}_y": radius * math.sin(angle)}
 
 
-def _rounded(made: Any) -> Any:
+def _round_numbers(made: Any) -> Any:
     """Return the numbers to five digits, so that a case can be written into a file."""
     if isinstance(made, dict):
-        return {key: _rounded(value) for key, value in made.items()}
+        return {key: _round_numbers(value) for key, value in made.items()}
     return float(f"{made:.5g}") if isinstance(made, float) else made
 
 

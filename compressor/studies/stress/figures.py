@@ -17,9 +17,9 @@ from compressor.report import (
     GOLD,
     GREY,
     RED,
+    in_style,
     legend_above,
     sheet,
-    styled,
 )
 
 PLANES = (
@@ -43,7 +43,7 @@ LOOKS = {
 UNDAMPED = 5e-3  # where scenes without damping are drawn
 
 
-@styled
+@in_style
 def draw_outcomes(study: xr.Dataset) -> Figure:
     """Return a panel a plane of parameters, a mark a scene; the supported range is framed."""
     ends = np.array([*outcomes(study)], object)
@@ -55,11 +55,11 @@ def draw_outcomes(study: xr.Dataset) -> Figure:
             panel.plot(x[some], y[some], marker, color=color, markersize=size, zorder=height,
                        markeredgewidth=0.8 if marker == "x" else 0.0)  # fmt: skip
         for scale, parameter in ((panel.set_xscale, first), (panel.set_yscale, second)):
-            scale("log" if drawn(study, parameter)["logarithmic"] else "linear")
-        panel.set_xlabel(worded(study, first))
-        panel.set_ylabel(worded(study, second))
+            scale("log" if describe_draw(study, parameter)["logarithmic"] else "linear")
+        panel.set_xlabel(axis_label(study, first))
+        panel.set_ylabel(axis_label(study, second))
         panel.margins(0.03)
-        frame(panel, drawn(study, first), drawn(study, second))
+        frame(panel, describe_draw(study, first), describe_draw(study, second))
     present = [name for name in LOOKS if (ends == name).any()]
     legend_above(figure, [handle(name, int((ends == name).sum())) for name in present])
     return figure
@@ -82,14 +82,14 @@ def coordinate(study: xr.Dataset, name: str) -> np.ndarray:
     return np.where(values > 0, values, UNDAMPED) if name == "damping" else values
 
 
-def drawn(study: xr.Dataset, name: str) -> Mapping[str, Any]:
+def describe_draw(study: xr.Dataset, name: str) -> Mapping[str, Any]:
     """Return how a parameter was drawn: the attributes of its variable in a campaign."""
     return study["clearance_big_end" if name == "clearance" else name].attrs
 
 
-def worded(study: xr.Dataset, name: str) -> str:
+def axis_label(study: xr.Dataset, name: str) -> str:
     """Return a parameter's name and unit on an axis."""
-    unit = {"damping": "times the paper's"}.get(name, drawn(study, name)["units"])
+    unit = {"damping": "times the paper's"}.get(name, describe_draw(study, name)["units"])
     return name.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
 
 

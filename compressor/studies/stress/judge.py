@@ -117,7 +117,7 @@ def judge(case: Case) -> Finding:
 def by_numbers(case: Case, result: Finding) -> None:
     """Judge the numbers up to the horizon, or of as much of it as a judge can do."""
     for parts in sorted({min(share, result.horizon) for share in LENGTHS}, reverse=True):
-        claim = shortened(case, parts)
+        claim = shorten_case(case, parts)
         found = result.found if parts == PARTS else solve(claim)
         if found.reason:
             result.detail = f"{found.reason} when cut to {parts}/{PARTS} of its span"
@@ -155,7 +155,7 @@ def agreed_verdict(
     statistics = measured is compare_statistics
     for method in judges(found, statistics):
         rtol = tolerance(found.rtol, TENTH if statistics else TIGHTER)
-        other = asked(claim, method, rtol, result)
+        other = run_judge(claim, method, rtol, result)
         if other is None:
             continue
         excess = measured(found, other)
@@ -187,7 +187,7 @@ def tolerance(rtol: float, share: float = TIGHTER) -> float:
     return max(share * rtol, TIGHTEST)
 
 
-def asked(case: Case, method: str, rtol: float, result: Finding) -> Solution | None:
+def run_judge(case: Case, method: str, rtol: float, result: Finding) -> Solution | None:
     """Return a judge's run of a case, if it reaches its end."""
     seconds = SECONDS if method in COMPILED else SCIPY_SECONDS
     how = replace(
@@ -199,7 +199,7 @@ def asked(case: Case, method: str, rtol: float, result: Finding) -> Solution | N
     return None if other.reason else other
 
 
-def shortened(case: Case, parts: int) -> Case:
+def shorten_case(case: Case, parts: int) -> Case:
     """Return a case over the first parts of its span."""
     whole = float(case.solve.duration_rev or 0.0)
     return replace(case, solve=replace(case.solve, duration_rev=whole * parts / PARTS))

@@ -134,7 +134,7 @@ def campaign(
     Raises StoreError where it holds other scenes.
     """
     path = Path(folder) / FILE
-    rows = {row["scene"]: row for row in kept(path, seed, budget)}
+    rows = {row["scene"]: row for row in read_kept_rows(path, seed, budget)}
     missing = [number for number in range(count) if number not in rows]
     total, written = count, time.monotonic()
     progress(total - len(missing), total, "")
@@ -145,7 +145,7 @@ def campaign(
     running = run_here(run_scene, tasks, needs, workers, remark)
     try:
         for end in running:
-            rows[end.id] = ended(end)
+            rows[end.id] = scene_row(end)
             progress(sum(number < count for number in rows), total, "")
             if time.monotonic() - written > FLUSH:
                 write_dataset(path, dataset(rows.values(), seed, budget))
@@ -159,7 +159,7 @@ def campaign(
     return found
 
 
-def ended(end: Done | Lost) -> Row:
+def scene_row(end: Done | Lost) -> Row:
     """Return the row of a scene, also of one that took its worker with it."""
     if isinstance(end, Done):
         return dict(end.result)
@@ -183,7 +183,7 @@ def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset
     for name, attrs in (drawn_ranges() | of_numbers).items():
         values = np.array([row.get(name, math.nan) for row in rows], float)
         found[name] = "scene", values, attrs
-    inside = np.array([int(extremes.supported(number)) for number in numbers])
+    inside = np.array([int(extremes.is_supported(number)) for number in numbers])
     phrase = "1: drawn inside the range that is documented as supported"
     found["supported"] = "scene", inside, {"units": "1", "long_name": phrase}
     coordinates = {"scene": ("scene", np.array(numbers, np.int64), {"long_name": "scene"})}
@@ -223,7 +223,7 @@ def settings(budget: Budget) -> str:
     )
 
 
-def kept(path: Path, seed: int, budget: Budget) -> list[Row]:
+def read_kept_rows(path: Path, seed: int, budget: Budget) -> list[Row]:
     """Return the rows of an earlier run. Raises StoreError if they are of other scenes."""
     if not path.exists():
         return []

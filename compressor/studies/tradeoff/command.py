@@ -60,14 +60,14 @@ def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterato
     stacked = [[""] * (depth - len(head)) + head for head in heads]
     above = [[FIRST * (n == depth - 1), *(head[n] for head in stacked)] for n in range(depth)]
     notes = [""] * (depth - 1) + ["assumed", "", *(row.note for row in table.rows), ""]
-    yield from aligned([*above, *rows], notes)
+    yield from align_rows([*above, *rows], notes)
     if table.unknown:
         yield f"  not known of the case itself: {', '.join(table.unknown)}"
     if not times:
         yield headline(table)
 
 
-def aligned(rows: Sequence[Sequence[str]], notes: Sequence[str]) -> Iterator[str]:
+def align_rows(rows: Sequence[Sequence[str]], notes: Sequence[str]) -> Iterator[str]:
     """Yield rows with their first cell to the left, the others to the right, a note behind."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for (first, *cells), note in zip(rows, notes, strict=True):
@@ -100,7 +100,7 @@ def tradeoff(
     xarray and h5py read, and the figure tradeoff.png and tradeoff.svg; the fastest methods and
     the effects of the features go to stdout.
     """
-    cases = chosen(configs, overrides)
+    cases = cases_of_files(configs, overrides)
     from compressor.store import writable_folder, write_dataset
     from compressor.studies.tradeoff.model_choices import trade as feature_trade
     from compressor.studies.tradeoff.work_precision import work_precision
@@ -137,7 +137,7 @@ def write_study(folder: Path, study: "xr.Dataset") -> None:
         publish(folder / f"tradeoff.{kind}", render(drawing, kind))
 
 
-def chosen(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, Case]":
+def cases_of_files(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, Case]":
     """Return the cases to be studied, by label; each needs a joint with clearance."""
     from compressor.cases import load_studies, points
     from compressor.studies.tradeoff.work_precision import default_cases, faulty
@@ -319,7 +319,7 @@ def lines(told: "Explanation") -> Iterator[str]:
         return
     yield from cost_lines(told)
     for number in range(len(told.advice)):
-        yield heading("" if number else "without", advised(told, number))
+        yield heading("" if number else "without", describe_advice(told, number))
 
 
 def scale_lines(joint: "JointScales") -> Iterator[str]:
@@ -357,7 +357,7 @@ def cost_lines(told: "Explanation") -> Iterator[str]:
                       "if all cost the same")  # fmt: skip
 
 
-def advised(told: "Explanation", number: int) -> str:
+def describe_advice(told: "Explanation", number: int) -> str:
     """Return what leaving a feature out does, and whether it is worth while: of one of the
     advice.
     """

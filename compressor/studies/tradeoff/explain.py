@@ -100,7 +100,7 @@ def explain(
     many features have been tried, of how many.
     """
     case = study.cases[0]
-    run, seconds, solution_seconds = timed(case, repeats)
+    run, seconds, solution_seconds = time_case(case, repeats)
     repeats = repeats if seconds < SLOW else 1
     ended = complete(run)
     active, absent = terms(case)
@@ -118,7 +118,7 @@ def explain(
         scales=joints,
         expected_steps=steps,
         expected_seconds=expected,
-        accuracy=asked(case),
+        accuracy=asked_accuracy(case),
         rtol=case.rtol,
         promise=promise(case),
         method=case.solve.method,
@@ -148,7 +148,7 @@ def unknowns(case: Case) -> tuple[str, ...]:
     return found + tuple(name for name in names[2 * n + 4 :] if name.startswith("crank's lag"))
 
 
-def timed(case: Case, repeats: int) -> tuple[xr.Dataset, float, float]:
+def time_case(case: Case, repeats: int) -> tuple[xr.Dataset, float, float]:
     """Run a case and return it, its wall time and that of its solution alone (s), both medians.
 
     Compiled code is there already.
@@ -171,7 +171,7 @@ def other_work(case: Case) -> tuple[str, ...]:
     return (*found, "the record of its sensor") if case.sensor else (*found,)
 
 
-def asked(case: Case) -> str:
+def asked_accuracy(case: Case) -> str:
     """Return the accuracy as the case file asks for it; "" where it gives a tolerance."""
     if case.targets:
         return ", ".join(f"{name} to {target:g}" for name, target in case.targets)
@@ -196,7 +196,7 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     told = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
     shown = [feature for feature in FEATURES if not feature.key.startswith(told)]
     used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
-    active = {feature.name: spoken(case, feature) for feature in used}
+    active = {feature.name: paid_value(case, feature) for feature in used}
     absent = tuple(feature.name for feature in shown if feature not in used)
     if ideal:
         return active, (*absent, "clearance", "contact")
@@ -236,7 +236,7 @@ def contact_words(case: Case) -> str:
     return f"{contact.law}, {material}, {shape}, {damped}"
 
 
-def spoken(case: Case, feature: Feature) -> str:
+def paid_value(case: Case, feature: Feature) -> str:
     """Return the value by which a case pays for a feature."""
     group, dot, name = feature.key.partition(".")
     if feature.key == "friction" and case.friction:

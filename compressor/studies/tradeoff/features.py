@@ -18,7 +18,7 @@ from compressor.studies.tradeoff.work_precision import (
     complete,
     faulty,
     grid_values,
-    solved,
+    solve_by_method,
     stored_values,
 )
 
@@ -95,7 +95,7 @@ def clearance_feature(joint: str) -> Feature:
     )
 
 
-def changed(case: Case, group: str, **values: Any) -> Case:
+def with_values(case: Case, group: str, **values: Any) -> Case:
     """Return a case with some values of a group replaced."""
     return replace(case, **{group: replace(getattr(case, group), **values)})
 
@@ -134,7 +134,7 @@ def with_contact(case: Case, law: str) -> Case | None:
             values |= {"materials": STEEL, "stiffness_N_per_mm15": None}
     elif not (contact.materials or contact.stiffness_N_per_mm15):
         values["stiffness_N_per_mm15"] = type(contact)().stiffness_N_per_mm15
-    return changed(case, "contact", **values)
+    return with_values(case, "contact", **values)
 
 
 def bearing_length(case: Case) -> float:
@@ -150,7 +150,7 @@ def friction_feature(law: str) -> Feature:
         f"friction law {law}",
         "friction.law",
         lambda case: bool(case.friction and case.friction.law == law),
-        lambda case: changed(case, "friction", law=None),
+        lambda case: with_values(case, "friction", law=None),
         lambda case: with_friction(case, law),
         f"friction law: {FRICTION_LAWS['adams']}",
         f"friction law: {FRICTION_LAWS[law]}",
@@ -165,14 +165,14 @@ def with_friction(case: Case, law: str) -> Case | None:
         return None
     if law == "lugre" and case.friction.ideal_joints:  # which have no bristles
         return None
-    return changed(case, "friction", law=law)
+    return with_values(case, "friction", law=law)
 
 
-def oiled(case: Case) -> Case | None:
+def with_oil(case: Case) -> Case | None:
     """Return a case with an oil film in its bearings; None without any clearance."""
     if not faulty(case):
         return None
-    film = named("lubricant", True)
+    film = group_of_value("lubricant", True)
     return replace(case, lubricant=replace(film, bearing_length_mm=bearing_length(case)))
 
 
@@ -184,7 +184,7 @@ def with_elastic_rod(case: Case) -> Case:
     machine, usual = case.machine, Case().machine
     mass = machine.rod_mass_kg / usual.rod_mass_kg
     scale = (mass * usual.rod_length_mm / machine.rod_length_mm) ** 0.5
-    bar = named("rod", True)
+    bar = group_of_value("rod", True)
     size = {name: round(scale * getattr(bar, name), 2) for name in ("depth_mm", "width_mm")}
     return replace(case, rod=replace(bar, **size))
 
@@ -192,11 +192,11 @@ def with_elastic_rod(case: Case) -> Case:
 def with_play(case: Case) -> Case:
     """Return a case with play of the crosshead in its guide."""
     if case.guide:
-        return changed(case, "guide", clearance_mm=PLAY)
-    return with_group(case, "guide", named("guide", {"clearance_mm": PLAY}))
+        return with_values(case, "guide", clearance_mm=PLAY)
+    return with_group(case, "guide", group_of_value("guide", {"clearance_mm": PLAY}))
 
 
-def named(key: str, value: Any) -> Any:
+def group_of_value(key: str, value: Any) -> Any:
     """Return the group that a case file's value stands for."""
     worn = {"joint": "both", "clearance_mm": 0.1}  # for a group that needs it
     return getattr(Case.from_values({**worn, key: value}), key)
@@ -227,14 +227,14 @@ def group_feature(
 
 def with_defaults(key: str, case: Case) -> Case:
     """Return a case with a group of the mechanism, as its defaults are."""
-    return with_group(case, key, named(key, True))
+    return with_group(case, key, group_of_value(key, True))
 
 
 def rubbing(case: Case) -> Case | None:
     """Return a case whose ideal joints rub as its worn ones do; None where none is ideal."""
     if not case.friction or case.friction.law == "lugre" or len(faulty(case)) == len(JOINTS):
         return None
-    return changed(case, "friction", ideal_joints=True)
+    return with_values(case, "friction", ideal_joints=True)
 
 
 FEATURES = (
@@ -252,8 +252,8 @@ FEATURES = (
         "spring damping",
         "spring.damping_N_s_per_mm",
         lambda case: case.load == "spring" and case.spring.damping_N_s_per_mm > 0,
-        lambda case: changed(case, "spring", damping_N_s_per_mm=0.0),
-        lambda case: None if case.load != "spring" else changed(
+        lambda case: with_values(case, "spring", damping_N_s_per_mm=0.0),
+        lambda case: None if case.load != "spring" else with_values(
             case, "spring", damping_N_s_per_mm=type(case.spring)().damping_N_s_per_mm
         ),
         "no spring damping",
@@ -264,8 +264,8 @@ FEATURES = (
         "gravity",
         "machine.gravity_m_per_s2",
         lambda case: case.machine.gravity_m_per_s2 > 0,
-        lambda case: changed(case, "machine", gravity_m_per_s2=0.0),
-        lambda case: changed(case, "machine", gravity_m_per_s2=GRAVITY),
+        lambda case: with_values(case, "machine", gravity_m_per_s2=0.0),
+        lambda case: with_values(case, "machine", gravity_m_per_s2=GRAVITY),
         "no gravity",
         f"gravity {GRAVITY:g} m/s²",
         "machine.gravity_m_per_s2: 0",
@@ -274,7 +274,7 @@ FEATURES = (
         "back pressure",
         "gas.back_pressure_MPa",
         lambda case: case.load == "gas" and case.gas.back_pressure_MPa > 0,
-        lambda case: changed(case, "gas", back_pressure_MPa=0.0),
+        lambda case: with_values(case, "gas", back_pressure_MPa=0.0),
         lambda case: None,
         "no back pressure",
         "back pressure",
@@ -297,7 +297,7 @@ FEATURES = (
         "play of the guide",
         "guide.clearance_mm",
         lambda case: bool(case.guide and case.guide.clearance_mm > 0),
-        lambda case: changed(case, "guide", clearance_mm=0.0),
+        lambda case: with_values(case, "guide", clearance_mm=0.0),
         with_play,
         "guide without play",
         f"{1000 * PLAY:g} µm of play in the guide",
@@ -308,13 +308,13 @@ FEATURES = (
         "friction of ideal joints",
         "friction.ideal_joints",
         lambda case: bool(case.friction and case.friction.ideal_joints),
-        lambda case: changed(case, "friction", ideal_joints=None),
+        lambda case: with_values(case, "friction", ideal_joints=None),
         rubbing,
         "ideal joints without friction",
         "friction of ideal joints",
         "friction.ideal_joints: false",
     ),
-    group_feature("oil film", "lubricant", "dry joints", oiled, is_choice=True),
+    group_feature("oil film", "lubricant", "dry joints", with_oil, is_choice=True),
     group_feature(
         "friction of the guide", "guide", "ideal guide", partial(with_defaults, "guide")
     ),
@@ -344,7 +344,7 @@ class Effect:
 
 def comparable(case: Case) -> Case:
     """Return a case solved so exactly that only its model tells in its answer."""
-    return solved(case, "auto", min(case.rtol, ACCURACY[EXACT].rtol))
+    return solve_by_method(case, "auto", min(case.rtol, ACCURACY[EXACT].rtol))
 
 
 def compare(base: Case, other: Case, repeats: int, known: xr.Dataset | None = None) -> Effect:

@@ -16,9 +16,9 @@ from compressor.report import (
     GOLD,
     RED,
     Line,
+    in_style,
     legend_above,
     sheet,
-    styled,
 )
 
 COLUMNS = 3
@@ -44,7 +44,7 @@ UNKNOWN: dict[str, Any] = {"facecolor": "#f0f0f0", "edgecolor": "#c9c9c9", "hatc
                            "linewidth": 0.0, "zorder": 0}  # fmt: skip
 
 
-@styled
+@in_style
 def draw_work_precision(study: xr.Dataset) -> Figure:
     """Return a panel a scene of a study of work and precision; the paper's own point is a star.
 

@@ -29,9 +29,9 @@ from compressor.studies.tradeoff.features import (
     FEATURES,
     SERIES_ERRORS,
     Feature,
-    changed,
     read_from_grid,
     series_errors,
+    with_values,
 )
 from compressor.studies.tradeoff.work_precision import SLOW, Progress, complete, faulty
 
@@ -61,8 +61,8 @@ def model_choices(case: Case) -> list[Choice]:
     rows = [row for row in FEATURES if row.is_choice or (row.key == "friction" and not rubs)]
     contact = [row for row in rows if row.key == "contact.law"]
     others = [row for row in rows if row.key != "contact.law"]
-    found = [*toggled(case, contact), *scaled(case), *toggled(case, others)]
-    return [checked(choice, case) for choice in found]
+    found = [*toggle_features(case, contact), *scale_contact(case), *toggle_features(case, others)]
+    return [check_choice(choice, case) for choice in found]
 
 
 def model_variants(case: Case) -> list[Choice]:
@@ -70,14 +70,14 @@ def model_variants(case: Case) -> list[Choice]:
     chosen = model_choices(case)
     others = [row for row in FEATURES if not row.is_choice and row.key != "load"]
     names = {choice.name for choice in chosen}
-    found = [one for one in toggled(case, others) if one.name not in names]
+    found = [one for one in toggle_features(case, others) if one.name not in names]
     other = {"spring": "gas", "gas": "spring"}.get(case.load)
     if other:
         found.append(Choice(f"{other} load", replace(case, load=other)))
     return [*found, *chosen]
 
 
-def toggled(case: Case, rows: Iterable[Feature]) -> Iterator[Choice]:
+def toggle_features(case: Case, rows: Iterable[Feature]) -> Iterator[Choice]:
     """Yield a case without each feature that it has, and with each that it has not."""
     for feature in rows:
         if feature.paid(case):
@@ -86,29 +86,29 @@ def toggled(case: Case, rows: Iterable[Feature]) -> Iterator[Choice]:
             yield Choice(feature.on, added)
 
 
-def scaled(case: Case) -> Iterator[Choice]:
+def scale_contact(case: Case) -> Iterator[Choice]:
     """Yield a case with twice and half its contact stiffness and damping."""
     if not faulty(case):
         return
     for words, factor in SCALES.items():
-        yield stiffened(case, f"contact stiffness {words}", factor)
+        yield with_stiffness(case, f"contact stiffness {words}", factor)
     contact = case.contact
     for words, factor in SCALES.items():
         name = f"contact damping {words}"
         if contact.law == "impact" and contact.damping_N_s_per_mm > 0.0:
             damping = factor * contact.damping_N_s_per_mm
-            yield Choice(name, changed(case, "contact", damping_N_s_per_mm=damping))
+            yield Choice(name, with_values(case, "contact", damping_N_s_per_mm=damping))
         elif contact.restitution is not None and contact.restitution < 1.0:
             # such laws damp by 1 - e, to the first order
             restitution = 1.0 - factor * (1.0 - contact.restitution)
             if restitution > 0.0:
-                yield Choice(name, changed(case, "contact", restitution=restitution))
+                yield Choice(name, with_values(case, "contact", restitution=restitution))
             else:
                 least = 1.0 - 1.0 / factor
                 yield Choice(name, None, f"needs a restitution above {least:g}")
 
 
-def stiffened(case: Case, name: str, factor: float) -> Choice:
+def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     """Return a case with its contact stiffness, or the modulus that it follows from, scaled."""
     contact, machine = case.contact, case.machine
     if contact.law in ("johnson", "liu"):
@@ -118,7 +118,7 @@ def stiffened(case: Case, name: str, factor: float) -> Choice:
             length = (contact.length_mm or math.nan) / 1000
             modulus = joint_stiffness(line, machine.pin_radius_mm, 0.1) / (math.pi * length) / 1e9
         values: dict[str, Any] = {"materials": None, "modulus_GPa": factor * modulus}
-        return Choice(name, changed(case, "contact", **values))
+        return Choice(name, with_values(case, "contact", **values))
     each = [
         joint_stiffness(contact, machine.pin_radius(joint), getattr(case.clearance_mm, joint))
         for joint in faulty(case)
@@ -127,21 +127,21 @@ def stiffened(case: Case, name: str, factor: float) -> Choice:
     middle = math.prod(each) ** (1.0 / len(each)) / 1000.0**contact.exponent
     values = {"stiffness_N_per_mm15": factor * middle, "materials": None, "geometry": None}
     alike = max(each) <= ALIKE * min(each)
-    return Choice(name, changed(case, "contact", **values), "" if alike else "of both joints")
+    return Choice(name, with_values(case, "contact", **values), "" if alike else "of both joints")
 
 
-def checked(choice: Choice, case: Case) -> Choice:
+def check_choice(choice: Choice, case: Case) -> Choice:
     """Return a choice with what it assumes, or with what forbids it."""
     if choice.case is None:
         return choice
     problems = bare(choice.case).problems
     if problems:
         return Choice(choice.name, None, f"cannot be: {problems[0]}")
-    notes = [*filter(None, [choice.note]), *assumed(case, choice.case)]
+    notes = [*filter(None, [choice.note]), *assumed_values(case, choice.case)]
     return choice._replace(note=", ".join(notes))
 
 
-def assumed(case: Case, other: Case) -> Iterator[str]:
+def assumed_values(case: Case, other: Case) -> Iterator[str]:
     """Yield the values of the other case's groups that the case has not, as `key value`."""
     for name in GROUPS:
         old, new = getattr(case, name), getattr(other, name)
@@ -207,7 +207,7 @@ def run_choices(
     for done, one in enumerate(choices, 1):
         progress(done, total, "")
         other = one.case and bare(one.case, MOST_SECONDS)
-        runs.append(fastest_run(other, repeats) if other else emptied(runs[0]))
+        runs.append(fastest_run(other, repeats) if other else empty_run(runs[0]))
     progress(total, total, "")
     return runs
 
@@ -220,7 +220,7 @@ def fastest_run(case: Case, repeats: int) -> xr.Dataset:
     return min(every, key=lambda one: float(one["seconds"]))
 
 
-def emptied(run: xr.Dataset) -> xr.Dataset:
+def empty_run(run: xr.Dataset) -> xr.Dataset:
     """Return a run without numbers, as of a case that cannot be."""
     lacking = {name: run[name] * math.nan for name in NAMES if run[name].dtype.kind == "f"}
     return run.assign(lacking | {"status": "missing", "reason": ""}).assign_attrs(regime="")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import FAULTS, label, paper_cases, settled
+from compressor.analysis import FAULTS, label, paper_cases, settled_part
 from compressor.cases import ACCURACY, METHODS, Case, Output
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, CompsimError
@@ -56,7 +56,7 @@ def default_cases() -> dict[str, Case]:
     return {label(fault, 0.2): cases[label(fault, 0.2)] for fault in FAULTS}
 
 
-def solved(case: Case, method: str, rtol: float, timeout: float | None = None) -> Case:
+def solve_by_method(case: Case, method: str, rtol: float, timeout: float | None = None) -> Case:
     """Return a case by another method and tolerance: series kept, no error bars, no horizon."""
     solve = replace(
         case.solve, method=method, rtol=rtol, accuracy="standard", error_bars=False, horizon=False
@@ -91,7 +91,7 @@ def grid_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]
 
     Includes the acceleration over the whole run; peaks and rms are those after `settle_rev`.
     """
-    kept = settled(run)
+    kept = settled_part(run)
     a = kept["acceleration"].values
     sizes = np.hypot(*kept["contact_force"].sel(joint=list(joints)).transpose("axis", ...).values)
     return {
@@ -113,7 +113,7 @@ def errors(found: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -> 
 
 def reference(name: str, case: Case, method: str) -> dict[str, np.ndarray]:
     """Return the values of a reference run. Raises ReferenceFailed."""
-    run = simulate(solved(case, method, REFERENCE_RTOL))
+    run = simulate(solve_by_method(case, method, REFERENCE_RTOL))
     if not complete(run):
         reason = f"{run['reason'].item()}: {run.attrs['detail']}"
         raise ReferenceFailed(
@@ -145,7 +145,7 @@ def work_precision(
             raise ValueError(f"{name} has no joint with clearance: nothing is integrated")
     tolerances = sorted(tolerances, reverse=True)
     study = empty(list(cases), methods, tolerances)
-    first = solved(next(iter(cases.values())), "auto", tolerances[0])
+    first = solve_by_method(next(iter(cases.values())), "auto", tolerances[0])
     study["seconds_compile"] = (), seconds_compile(first), {"units": "s", "long_name": COMPILE}
     total = len(cases) * (len(methods) * len(tolerances) * repeats + 3)
     done = itertools.count(1)
@@ -229,7 +229,7 @@ def compare_references(study: xr.Dataset, name: str, truth: Mapping[str, Mapping
 def judge_paper(study: xr.Dataset, name: str, case: Case, truth: Mapping[str, Mapping]) -> None:
     """The paper's own numerics: BDF at 1e-5, read from the output grid (0.1 ms in the paper)."""
     rtol = PAPER_RTOL / LOCAL.get(PAPER_METHOD, 1.0)  # so that SciPy's own tolerance is 1e-5
-    run = simulate(solved(case, PAPER_METHOD, rtol))
+    run = simulate(solve_by_method(case, PAPER_METHOD, rtol))
     if complete(run):
         found = errors(grid_values(run, faulty(case)), truth[REFERENCES[0]])
         for quantity, value in found.items():
@@ -246,7 +246,7 @@ def measure(study: xr.Dataset, point: Point, case: Case, truth: Mapping, budget:
     if out_of_time.any() or seconds[point] > SLOW:
         return
     rtol = float(study["tolerance"].values[point[2]])
-    run = simulate(solved(case, method, rtol, budget))
+    run = simulate(solve_by_method(case, method, rtol, budget))
     seconds[point] = np.fmin(seconds[point], run["seconds"].item())
     if study["status"].values[point] != "missing":
         return

@@ -7,12 +7,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from compressor.metrics import JOINTS
-from compressor.report import BLACK, CYCLE, GREY, legend_above, sheet, styled
+from compressor.report import BLACK, CYCLE, GREY, in_style, legend_above, sheet
 
 MOST_PROFILES = 5
 
 
-@styled
+@in_style
 def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Figure:
     """Return the clearance at the deepest place, greatest force, and what is worn off by place on
     the bore.

@@ -15,8 +15,8 @@ from compressor.studies.wear.stages import (
     dataset,
     first,
     following,
-    kept,
     life,
+    read_kept_stages,
     write,
 )
 from compressor.sweep import Done, Lost, Needs, Progress, run_here
@@ -105,21 +105,21 @@ def run_wear(
                 raise end.result
             ends[end.id] = end.result if isinstance(end, Done) else end
             remark("")
-    ends |= {key: ended(tasks[key].worn, stored(tasks[key])) for key in before}
+    ends |= {key: wear_end(tasks[key].worn, stored_stages(tasks[key])) for key in before}
     found = tuple(machine(*one, ends[Worn(one[2]).key]) for one in listed)
     return WearSummary(found, len(before), time.monotonic() - began)
 
 
-def stored(task: Task) -> list[Stage]:
+def stored_stages(task: Task) -> list[Stage]:
     """Return the stages of a machine that are kept of an earlier run. Raises StoreError."""
-    stages = kept(task.worn, task.worn.path(task.folder))
+    stages = read_kept_stages(task.worn, task.worn.path(task.folder))
     good = [stage for stage in stages if not stage["reason"]]
     return good if task.rerun else stages
 
 
 def complete(task: Task) -> bool:
     """Return whether all stages of a machine are stored. Raises StoreError."""
-    stages = stored(task)
+    stages = stored_stages(task)
     return bool(stages) and task.worn.over(stages[-1])
 
 
@@ -130,7 +130,7 @@ def follow_wear(task: Task) -> Ended | StoreError:
     """
     worn = task.worn
     try:
-        stages = stored(task)
+        stages = stored_stages(task)
         if not stages:
             stages = [first(worn)]
             write(worn, task.folder, stages)
@@ -139,10 +139,10 @@ def follow_wear(task: Task) -> Ended | StoreError:
             write(worn, task.folder, stages)
     except StoreError as error:
         return error
-    return ended(worn, stages)
+    return wear_end(worn, stages)
 
 
-def ended(worn: Worn, stages: list[Stage]) -> Ended:
+def wear_end(worn: Worn, stages: list[Stage]) -> Ended:
     """Return how a machine's wear has ended."""
     last = stages[-1]
     return Ended(len(stages), life(worn, dataset(worn, stages)), last["reason"], last["detail"])

@@ -100,10 +100,10 @@ class Worn:
 def first(of: Worn) -> Stage:
     """Return the stage of unworn bores."""
     unworn = np.zeros((len(JOINTS), of.how.sectors))
-    return staged(0.0, unworn, rub(of.case, unworn, None))
+    return new_stage(0.0, unworn, rub(of.case, unworn, None))
 
 
-def staged(hours: float, worn: np.ndarray, motion: Rubbed) -> Stage:
+def new_stage(hours: float, worn: np.ndarray, motion: Rubbed) -> Stage:
     """Return what is kept of a motion on bores that were worn in some hours."""
     found = {name: motion.metrics.get(name, math.nan) for name in SHOWN}
     shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
@@ -128,7 +128,7 @@ def following(of: Worn, stage: Stage) -> Stage:
     hours = stage["hours"] + span * midway.turn / 3600.0
     hours = of.most_hours if span == left else hours
     worn = stage["worn_depth"] + span * of.depth_per_work[:, np.newaxis] * midway.work
-    return staged(hours, worn, rub(of.case, worn, midway.state))
+    return new_stage(hours, worn, rub(of.case, worn, midway.state))
 
 
 def dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
@@ -158,7 +158,7 @@ def dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
     return xr.Dataset(found, where, attrs)
 
 
-def kept(of: Worn, path: Path) -> list[Stage]:
+def read_kept_stages(of: Worn, path: Path) -> list[Stage]:
     """Return the stages of an earlier run, none where there is no file. Raises StoreError."""
     if not path.exists():
         return []

@@ -20,7 +20,7 @@ from chaos.tally import Tally
 from compressor.cases.load import load_studies
 from compressor.store import writer
 from compressor.store.reader import read_store
-from compressor.sweep.wanted import Wanted, stored
+from compressor.sweep.wanted import Wanted, stored_ends
 
 WHAT = "SIGKILL of the parent, a worker or both at a random moment, then resumed"
 VICTIMS = ("parent", "worker", "both")
@@ -101,7 +101,7 @@ class Scene:
 
     def served(self, folder):
         """The results that a run would not compute again: key -> row."""
-        keys = stored(read_store(folder / "out"), Wanted(self.studies))
+        keys = stored_ends(read_store(folder / "out"), Wanted(self.studies))
         found = rows(folder / "out")
         return {key: found[key] for key in keys}
 

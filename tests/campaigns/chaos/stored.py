@@ -8,7 +8,7 @@ import numpy as np
 from compressor.outcome import ROW
 from compressor.store import hdf5
 from compressor.store.files import StoreError
-from compressor.store.hdf5 import DamagedJob, opened
+from compressor.store.hdf5 import DamagedJob, open_file
 from compressor.store.reader import places, read_store
 from compressor.store.series_file import intact
 from compressor.store.status import verify
@@ -49,7 +49,7 @@ def contents(folder, foreign=()):
         parts += [columns[name][position].tobytes() for name in ("samples", "end")]
         attributes = stored.rows.attributes(position)
         if path := stored.rows.path(position):
-            with opened(path.read_bytes(), path) as file:
+            with open_file(path.read_bytes(), path) as file:
                 held = hdf5.variables(file)
                 attributes |= hdf5.attributes(file)
             for name in sorted(set(held) - {TIMED}):

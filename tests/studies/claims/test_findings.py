@@ -6,12 +6,12 @@ import xarray as xr
 
 from compressor.studies.claims.findings import (
     consistency,
-    counted,
+    coordinate_in_words,
+    count_claims,
     deciding,
     flips,
     is_mass_plane,
     most_consistent,
-    spoken,
     summary,
 )
 
@@ -48,7 +48,7 @@ def plane():
 
 def test_machines_are_counted(plane):
     assert is_mass_plane(plane)
-    assert counted(plane) == (24, {1: 24, 2: 24, 3: 24, 4: 24, 5: 24, 6: 24, 7: 0, 8: 16}, 0)
+    assert count_claims(plane) == (24, {1: 24, 2: 24, 3: 24, 4: 24, 5: 24, 6: 24, 7: 0, 8: 16}, 0)
     said = [*summary(plane)]
     assert said[0].startswith("Of 24 machines each claim holds in so many: 1 in 24, 2 in 24")
     assert said[1] == "All eight claims hold in none of them."
@@ -65,7 +65,7 @@ def test_a_failed_machine_is_no_verdict(plane):
     plane["status"][0, 0] = "failed"
     plane["margin"][0, 0] = np.nan
     plane["held"][0, 0] = -1
-    assert counted(plane)[0] == 23
+    assert count_claims(plane)[0] == 23
     _, said, *_ = summary(plane)
     assert "1 machine has no verdict" in said
 
@@ -125,6 +125,6 @@ def test_who_decides_is_said_with_rivals():
 
 
 def test_names_in_words():
-    assert spoken("friction_velocity_mm_per_s") == "friction velocity"
-    assert spoken("stiffness_N_per_mm15") == "contact stiffness"
-    assert spoken("back_pressure_MPa") == "back pressure"
+    assert coordinate_in_words("friction_velocity_mm_per_s") == "friction velocity"
+    assert coordinate_in_words("stiffness_N_per_mm15") == "contact stiffness"
+    assert coordinate_in_words("back_pressure_MPa") == "back pressure"

@@ -13,8 +13,8 @@ from compressor.studies.claims.study import (
     Judged,
     cases_judged,
     dataset,
+    judge_end,
     judge_machines,
-    judged,
     machines,
     read_machines,
     rows_of,
@@ -75,8 +75,8 @@ def test_what_is_stored_reads_back(plan, tmp_path, text):
 
 
 def test_a_machine_that_took_its_worker_with_it_has_a_reason():
-    assert judged(Done(0, verdict(1.0), 0.1)) == verdict(1.0)
-    assert judged(Lost(0, "worker_died", "exit code 9")).failed == "worker_died: exit code 9"
+    assert judge_end(Done(0, verdict(1.0), 0.1)) == verdict(1.0)
+    assert judge_end(Lost(0, "worker_died", "exit code 9")).failed == "worker_died: exit code 9"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import xarray as xr
 from compsim import cli
 
 from compressor.cases.case import Case
-from compressor.studies.diagnosis.data_card import ABSENT, counts, data_card, escaped
+from compressor.studies.diagnosis.data_card import ABSENT, counts, data_card, escape_cell
 from compressor.studies.diagnosis.data_set import (
     LABELS,
     WORDS,
@@ -147,7 +147,7 @@ def test_counts(made):
 
 
 def test_cells_cannot_break_a_table():
-    assert escaped("a|b\nc") == r"a\|b c"
+    assert escape_cell("a|b\nc") == r"a\|b c"
 
 
 def test_without_pyarrow_the_rest_is_written(made, tmp_path, without_pyarrow):

@@ -12,7 +12,7 @@ import pytest
 from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
 from compressor.studies.regimes import chains
-from compressor.studies.regimes.chains import Chain, Task, kept, read_chain, run_chain
+from compressor.studies.regimes.chains import Chain, Task, read_chain, read_kept_rows, run_chain
 from compressor.studies.regimes.run import chains_of
 
 TEXT = """
@@ -79,7 +79,7 @@ def test_a_killed_chain_goes_on_and_ends_in_the_same_bits(whole, tmp_path, monke
     monkeypatch.setattr(chains, "FLUSH", 0.0)
     rng, stops = np.random.default_rng(7), []
     for _ in range(20):
-        before = len(kept(chain, chain.path(tmp_path)))
+        before = len(read_kept_rows(chain, chain.path(tmp_path)))
         stops.append(before)
         process = multiprocessing.get_context("fork").Process(
             target=run_chain, args=(Task(str(tmp_path), chain),)
@@ -105,7 +105,7 @@ def test_each_value_begins_where_the_last_one_ended(whole, monkeypatch, tmp_path
         begun.append((case, state))
         return rows[len(begun) - 1]
 
-    rows = kept(chain, path)
+    rows = read_kept_rows(chain, path)
     monkeypatch.setattr(chains, "run_value", run)
     run_chain(Task(str(tmp_path), chain))
     assert [case for case, _ in begun] == [*chain.cases]
@@ -119,7 +119,7 @@ def test_a_chain_goes_on_past_a_failed_value_and_is_run_again_from_there(
     whole, monkeypatch, tmp_path
 ):
     chain, path = whole
-    rows, states = kept(chain, path), []
+    rows, states = read_kept_rows(chain, path), []
 
     def run(case, state, asked):
         number = chain.cases.index(case)

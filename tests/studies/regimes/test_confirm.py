@@ -108,7 +108,7 @@ def hysteresis(monkeypatch):
     up = [row(case, 1, at) for case, at in zip(CASES, (0.1, 0.2, 0.9), strict=True)]
     down = [row(case, 1, at) for case, at in zip(CASES, (0.1, 0.8, 0.9), strict=True)]
     rows = {PAIR.up.key: up, PAIR.down.key: down[::-1]}
-    monkeypatch.setattr(module, "kept", lambda chain, path: rows[chain.key])
+    monkeypatch.setattr(module, "read_kept_rows", lambda chain, path: rows[chain.key])
     return rows
 
 

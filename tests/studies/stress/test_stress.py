@@ -14,7 +14,7 @@ from compressor.solve.error_bars import bars
 from compressor.solve.solution import solve
 from compressor.store.files import StoreError
 from compressor.studies.stress.command import summary
-from compressor.studies.stress.extremes import SPANS, Budget, place, supported, values
+from compressor.studies.stress.extremes import SPANS, Budget, is_supported, place, values
 from compressor.studies.stress.figures import draw_outcomes, outcomes
 from compressor.studies.stress.judge import (
     PARTS,
@@ -25,7 +25,7 @@ from compressor.studies.stress.judge import (
     excess,
     judge,
     judges,
-    shortened,
+    shorten_case,
 )
 from compressor.studies.stress.stress import FILE, campaign, counts, dataset, slowest, worst
 
@@ -56,7 +56,7 @@ def test_scenes_lie_in_their_ranges():
         case = Case.from_values(values(number, SEED))
         found = place(case)
         for name, (_, whole, narrow, _) in SPANS.items():
-            low, high = narrow if narrow and supported(number) else whole
+            low, high = narrow if narrow and is_supported(number) else whole
             bounds = low * (1 - 1e-3), high * (1 + 1e-3)
             if (name == "damping" and found[name] == 0) or np.isnan(found[name]):
                 continue
@@ -196,9 +196,9 @@ def test_a_stiff_run_is_not_judged_by_the_stiff_partner(run):
 
 def test_a_claim_is_cut_to_parts_of_its_span():
     case = Case.from_values(CASE)
-    assert shortened(case, PARTS) == case
-    assert shortened(case, 1).duration == pytest.approx(case.duration / 16)
-    assert round(shortened(case, 1).steps) == 45
+    assert shorten_case(case, PARTS) == case
+    assert shorten_case(case, 1).duration == pytest.approx(case.duration / 16)
+    assert round(shorten_case(case, 1).steps) == 45
 
 
 def row(number, verdict, **more):
