@@ -63,7 +63,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "matplotlib": {"compressor.report.figures", "compressor.studies.*.figures",
                    "compressor.studies.regimes.figures"},
     "click": {"compsim", "compressor.studies", "compressor.studies.*command"},
-    "rich": {"compsim.screen"},
+    "rich": {"compsim.live"},
     "pyarrow": {"compressor.studies.diagnosis"},
     "sklearn": set(),  # of campaigns alone
 }  # fmt: skip

@@ -35,5 +35,5 @@ from compressor.cases.parameter import ACCURACY, IMPLAUSIBLE, TIGHTEST, CaseErro
 from compressor.cases.regimes import Regimes
 from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
-from compressor.cases.table import table
+from compressor.cases.table import OF_JOINTS, table
 from compressor.cases.yaml_reader import CaseFileError

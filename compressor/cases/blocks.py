@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from compressor.cases.checks import SWEEP, check_value, row_of, suggestion
+from compressor.cases.combinations import Block, Row
 from compressor.cases.keys import Leaves
 from compressor.cases.parameter import Problem, quote_value
-from compressor.cases.sheet import Block, Row
 from compressor.cases.swept import (
     SAMPLED,
     NoComparison,

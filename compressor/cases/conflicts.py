@@ -19,7 +19,7 @@ from compressor.cases.checks import SHORTHANDS, row_of, value_in
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import GREATEST_RATIO, LEAST_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, Problem, Reader
-from compressor.cases.table import GROUPS, WORDS, Settings, group_readers, table
+from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
 
 
@@ -76,14 +76,15 @@ def unread_values(case: Settings, values: Mapping[str, Any]) -> Iterator[Problem
     """Find the keys of one case that it does not read; values: those given, by dotted key.
 
     A value that the case would have without it passes, so that `Case.values` reads back; a group
-    that a case has only if it is named does not.
+    that a case has only if it is named does not, whatever its values.
     """
     for key, value in values.items():
         for unread, reader in conditions(key):
             if reader.reads(case):
                 continue
             named = unread in WORDS and WORDS[unread]
-            if not is_off(key, value) and (named or value != default_in(case, key)):
+            off = is_off(key, value) and (key == unread or not named)
+            if not off and (named or value != default_in(case, key)):
                 yield problem_of(unread, reader)
             break
 
@@ -138,7 +139,8 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     for key, value, (low, high) in _judged_values(values):
         if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
             unit = f" {table()[key].unit}".replace("^p", "^1.5").rstrip()
-            shared = "clearance_mm" if key.startswith("clearance_mm.") else key
+            group = key.partition(".")[0]
+            shared = group if group in OF_JOINTS else key
             found[shared] = (
                 f"{value:g}{unit} is outside the range that the program was judged on, "
                 f"{low:g} to {high:g}{unit}"

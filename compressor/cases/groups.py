@@ -12,11 +12,15 @@ from compressor.cases.parameter import (
     BIG_CLEARANCE,
     BIG_END,
     CLEARANCE,
+    COEFFICIENT,
     DAMPED,
     IDEAL_JOINT,
+    LAW,
     MATERIALS,
+    PIN,
     RUBBING,
     SERIES,
+    SHARED_PIN,
     SMALL_CLEARANCE,
     SMALL_END,
     SMALL_RUBBING,
@@ -24,6 +28,7 @@ from compressor.cases.parameter import (
     by_law,
     choice,
     document_fields,
+    or_own,
     parameter,
 )
 
@@ -141,13 +146,13 @@ class Machine:
     )
     pin_radius_mm: float = parameter(
         10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",
-        "journal radius R_j of both joints, or of the big end", above=True, read=RUBBING,
-        judged=(10, 100),
+        "journal radius R_j of both joints, or of the big end", above=True,
+        read=(RUBBING, PIN, SHARED_PIN), judged=(10, 100),
     )  # fmt: skip
     gravity_m_per_s2: float = parameter(0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y")
     small_end_pin_radius_mm: float | None = parameter(
         None, "mm", (0, 1e4), "as the big end's", "journal radius of the small end",
-        above=True, optional=True, read=SMALL_RUBBING,
+        above=True, optional=True, read=(SMALL_RUBBING, PIN),
     )  # fmt: skip
 
     def pin_radius(self, joint: str) -> float:
@@ -233,7 +238,7 @@ class Contact:
     ('steel', 'copper')
     """
 
-    law: str = choice("impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)")
+    law: str = choice("impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)", read=LAW)
     stiffness_N_per_mm15: float | None = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True, read=STIFFNESS,
@@ -255,21 +260,22 @@ class Contact:
         (1, 3),
         "Table 3",
         "force exponent p",
-        read=by_law("contact", "exponent"),
+        read=(by_law("contact", "exponent"), or_own("exponent")),
         judged=(1.0, 2.2),
     )
     damping_N_s_per_mm: float = parameter(
         336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max",
-        read=by_law("contact", "damping_N_s_per_mm"),
+        read=(by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
         judged=(0, 33600),
     )  # fmt: skip
     full_damping_mm: float = parameter(
         0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True,
-        read=by_law("contact", "full_damping_mm"),
+        read=(by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
     )  # fmt: skip
     restitution: float | None = parameter(
         None, "", (0, 1), "ours", "coefficient of restitution, of the laws that damp by it",
-        above=True, optional=True, read=by_law("contact", "restitution"),
+        above=True, optional=True,
+        read=by_law("contact", "restitution"),
         judged=(0.3, 0.95),
     )  # fmt: skip
     least_approach_mm_per_s: float | None = parameter(
@@ -327,11 +333,12 @@ class Friction:
         "Table 3",
         "stiction transition velocity",
         above=True,
+        read=COEFFICIENT,
         judged=(0.1, 100),
     )
     friction_velocity_mm_per_s: float = parameter(
         100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True,
-        read=by_law("friction", "friction_velocity_mm_per_s"),
+        read=(by_law("friction", "friction_velocity_mm_per_s"), COEFFICIENT),
     )  # fmt: skip
     law: str | None = choice(
         None, FRICTION_LAWS, "Eq. 16", "friction law (adams where none is named)", optional=True

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from compressor.cases import blocks, regimes
 from compressor.cases.case import Case
 from compressor.cases.checks import SHORTHANDS, row_of
+from compressor.cases.combinations import Block, columns
 from compressor.cases.conflicts import conditions, is_off, problem_of
 from compressor.cases.keys import (
     Leaves,
@@ -29,7 +30,6 @@ from compressor.cases.keys import (
 )
 from compressor.cases.parameter import CaseError, Problem, Reader, quote_value
 from compressor.cases.regimes import GROUP, Regimes
-from compressor.cases.sheet import Block, columns
 from compressor.cases.study import Axis, Cases, Study, Told, unheard
 from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
 from compressor.cases.table import WORDS, table

@@ -56,8 +56,39 @@ def has_ideal_friction(case: Any) -> bool:
 
 
 def hears_casing(case: Any) -> bool:
-    """Return whether a sensor stands where a casing mode is heard."""
-    return bool(case.body and case.sensor and case.sensor.place != "body")
+    """Return whether a sensor hears a casing mode: the guide bears no force along x."""
+    sensor = case.sensor
+    if not case.body or not sensor or sensor.place == "body":
+        return False
+    return bool(sensor.place == "bearing" or sensor.direction == "y")
+
+
+def has_coefficient(case: Any) -> bool:
+    """Return whether friction has a coefficient above 0 that its law reads."""
+    friction = case.friction
+    if not friction:
+        return False
+    reads_static = law_of(friction) in READ_BY["friction"]["static"]
+    return bool(friction.dynamic > 0) or bool(reads_static and friction.static > 0)
+
+
+def needs_pin(case: Any) -> bool:
+    """Return whether something depends on how thick pins are."""
+    return bool(
+        case.lubricant or case.wear or case.contact.materials is not None or has_coefficient(case)
+    )
+
+
+def needs_shared_pin(case: Any) -> bool:
+    """Return whether a joint has the pin of `machine.pin_radius_mm`: not a small end of its own."""
+    if case.machine.small_end_pin_radius_mm is None or has_ideal_friction(case):
+        return True
+    return bool(case.clearance_mm.big_end > 0)
+
+
+def damps_guide(case: Any) -> bool:
+    """Return whether the law of the joints is that of a guide's corners, too."""
+    return bool(case.contact.law == "impact" or case.contact.restitution is not None)
 
 
 GAS = Reader("load: gas", lambda case: case.load == "gas")
@@ -79,6 +110,15 @@ IDEAL_JOINT = Reader(
 PLAY = Reader("guide.clearance_mm above 0", has_play)
 CONTACT = Reader(
     f"{CLEARANCE.words} or in the guide", lambda case: has_clearance(case) or has_play(case)
+)
+PIN = Reader("friction with a coefficient above 0, lubricant, contact.materials or wear", needs_pin)
+SHARED_PIN = Reader(
+    "a joint that rubs without machine.small_end_pin_radius_mm of its own", needs_shared_pin
+)
+COEFFICIENT = Reader("a coefficient of friction above 0", has_coefficient)
+LAW = Reader(
+    f"{CLEARANCE.words}, or a guide with play and a law with a restitution",
+    lambda case: has_clearance(case) or damps_guide(case),
 )
 RUBBING = Reader(
     f"{CLEARANCE.words} or friction.ideal_joints: true",
@@ -126,7 +166,7 @@ ALONG_Y = Reader(
 ROCKING = Reader(
     "body.freedoms: xy_rocking", lambda case: case.body and case.body.freedoms == "xy_rocking"
 )
-CASING_HEARD = Reader("sensor.place: guide or bearing", hears_casing)
+CASING_HEARD = Reader("sensor.place: bearing, or guide with direction: y", hears_casing)
 CASING = (
     CASING_HEARD,
     Reader("body.casing: true", lambda case: case.body and case.body.casing),
@@ -136,6 +176,14 @@ RANDOM = Reader(
     lambda case: case.sensor and (case.sensor.noise_m_per_s2 > 0 or case.sensor.speed_jitter > 0),
 )
 SERIES = Reader("output.keep: series", lambda case: case.output.keep == "series")
+
+
+def or_own(key: str) -> Reader:
+    """Return the reader of a key of `contact` that a guide's corner may have of its own."""
+    return Reader(
+        f"{CLEARANCE.words}, or no guide.{key}",
+        lambda case: has_clearance(case) or not case.guide or getattr(case.guide, key) is None,
+    )
 
 
 def by_law(group: str, key: str) -> Reader:

@@ -8,10 +8,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from compressor.cases.case import Case
+from compressor.cases.combinations import Block
 from compressor.cases.keys import nest_values
 from compressor.cases.parameter import CaseError
 from compressor.cases.regimes import Regimes
-from compressor.cases.sheet import Block
 from compressor.cases.swept import Test
 from compressor.cases.yaml_reader import Node
 

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case, parts_of
 from compressor.cases.checks import value_of, values_given
+from compressor.cases.columns import Column, Mixed, alike, places_where
 from compressor.cases.conflicts import reads
 from compressor.cases.load import MAX_CONFLICTS, CaseFileError, itself, load_studies
 from compressor.cases.parameter import CaseError
-from compressor.cases.sheet import Column, Mixed, alike, places_where
 from compressor.cases.table import GROUPS, outside_identity, table
 from compressor.studies.claims.command import EXAMPLES
 from compressor.studies.claims.study import cases_judged

@@ -88,7 +88,7 @@ def special_cases(source: str) -> list[int]:
 
 def test_only_one_module_knows_of_the_shorthand():
     paths = [*ROOT.glob("compressor/**/*.py"), *ROOT.glob("cmd/**/*.py")]
-    found = {p.name: special_cases(p.read_text(encoding="utf-8")) for p in paths}
+    found = {str(p): special_cases(p.read_text(encoding="utf-8")) for p in paths}
     assert {name: lines for name, lines in found.items() if lines} == {}
 
 

@@ -44,6 +44,12 @@ STARTED = HEARD | {"body": {"start": "rest"}}
 CENTRAL = HEARD | {"sensor": {"place": "body"}}
 BARE = HEARD | {"body": {"casing": False}}
 QUIET = HEARD | {"sensor": {"noise_m_per_s2": 0}}
+SIDEWAYS = HEARD | {"sensor": {"place": "guide", "direction": "x"}}
+SLICK = WORN | {"friction": {"static": 0, "dynamic": 0}}
+DRY = WORN | {"friction": False}
+OWN_PIN = SMALL | {"machine": {"small_end_pin_radius_mm": 11}}
+OWN_CORNER = IDEAL | {"guide": {"clearance_mm": 0.1, "damping_N_s_per_mm": 9, "exponent": 1.4,
+                                "full_damping_mm": 0.01}}  # fmt: skip
 SMALL_FILES = IDEAL | {"output": {"keep": "metrics"}}
 
 
@@ -75,8 +81,8 @@ ENTRIES = {
         machine__rod_mass_kg=5, machine__rod_centre_mm=280, machine__rod_inertia_kg_m2=0.2,
         machine__reciprocating_mass_kg=15, machine__gravity_m_per_s2=9.81,
     ),
-    "machine.pin_radius_mm": Entry(12, WORN, (IDEAL,)),
-    "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG)),
+    "machine.pin_radius_mm": Entry(12, WORN, (IDEAL, SLICK, DRY, OWN_PIN)),
+    "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG, SLICK, DRY)),
     **entries(
         GAS, WORN, FREE, gas__piston_radius_mm=60, gas__head_clearance_mm=25,
         gas__suction_MPa=0.11, gas__discharge_MPa=0.5, gas__exponent=1.3,
@@ -87,18 +93,22 @@ ENTRIES = {
         WORN, GAS, FREE, spring__stiffness_N_per_mm=30, spring__damping_N_s_per_mm=0.1,
         spring__preload_N=700, spring__stroke_mm=110,
     ),
-    "contact.law": Entry("hertz", WORN, (IDEAL,)),
+    "contact.law": Entry("hertz", WORN, (IDEAL, PLAYING)),
     "contact.stiffness_N_per_mm15": Entry(4e5, WORN, (IDEAL, JOHNSON)),
     "contact.materials": Entry(["steel", "copper"], WORN, (IDEAL,)),
     "contact.geometry": Entry("internal", COPPER, (WORN, JOHNSON)),
-    "contact.exponent": Entry(1.4, WORN, (IDEAL, JOHNSON)),
-    **entries(WORN, IDEAL, HERTZ, contact__damping_N_s_per_mm=300, contact__full_damping_mm=0.01),
+    "contact.exponent": Entry(1.4, WORN, (IDEAL, JOHNSON, OWN_CORNER)),
+    **entries(
+        WORN, IDEAL, HERTZ, OWN_CORNER, contact__damping_N_s_per_mm=300,
+        contact__full_damping_mm=0.01,
+    ),
     "contact.restitution": Entry(0.8, DAMPED, (WORN, HERTZ)),
     "contact.least_approach_mm_per_s": Entry(500, DAMPED, (WORN, HERTZ, JOHNSON)),
     **entries(JOHNSON, WORN, IDEAL, contact__length_mm=30, contact__modulus_GPa=90),
     "friction.static": Entry(0.3, WORN, (IDEAL, TANH)),
-    **entries(WORN, IDEAL, friction__dynamic=0.1, friction__stiction_velocity_mm_per_s=20),
-    "friction.friction_velocity_mm_per_s": Entry(200, WORN, (IDEAL, TANH, LUGRE)),
+    "friction.dynamic": Entry(0.1, WORN, (IDEAL,)),
+    "friction.stiction_velocity_mm_per_s": Entry(20, WORN, (IDEAL, SLICK)),
+    "friction.friction_velocity_mm_per_s": Entry(200, WORN, (IDEAL, TANH, LUGRE, SLICK)),
     "friction.law": Entry("threlfall", WORN, (IDEAL,)),
     **entries(
         LUGRE, WORN, friction__bristle_stiffness_per_mm=50, friction__bristle_damping_s_per_mm=0.1,
@@ -144,9 +154,9 @@ ENTRIES = {
     ),
     "body.frequency_x_Hz": Entry(30, HEARD, (IDEAL | {"body": {"freedoms": "y"}},)),
     "body.frequency_y_Hz": Entry(30, HEARD, (IDEAL | {"body": {"freedoms": "x"}},)),
-    "body.casing": Entry(False, HEARD, (CENTRAL, IDEAL | {"body": True})),
+    "body.casing": Entry(False, HEARD, (CENTRAL, SIDEWAYS, IDEAL | {"body": True})),
     **entries(
-        HEARD, CENTRAL, BARE, body__casing_mass_kg=30, body__casing_frequency_Hz=1500,
+        HEARD, CENTRAL, BARE, SIDEWAYS, body__casing_mass_kg=30, body__casing_frequency_Hz=1500,
         body__casing_damping_ratio=0.05,
     ),
     **entries(

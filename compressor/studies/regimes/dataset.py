@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN
-from compressor.cases import Case, Regimes
+from compressor.cases import OF_JOINTS, Case, Regimes
 from compressor.metrics import JOINTS
 from compressor.store import Folder, StoreError, coordinate_names, read_dataset, swept_column
 from compressor.studies.regimes.chains import FOLDER, REMEDY, labels, read_chain
@@ -70,7 +70,7 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
 def of_joint(over: str, chains: Sequence[Sequence[xr.Dataset | None]]) -> str:
     """Return whose clearance is followed, " of the small end"; "" of another key or of several."""
     cases = {str(chain.attrs["case"]) for pair in chains for chain in pair if chain is not None}
-    joints = {Case.from_attribute(case).joint for case in cases if over == "clearance_mm"}
+    joints = {Case.from_attribute(case).joint for case in cases if over in OF_JOINTS}
     if len(joints) != 1:
         return ""
     joint = joints.pop()

@@ -32,6 +32,7 @@ from compressor.solve import (
     stiffness_of,
 )
 from compressor.studies.tradeoff.features import FEATURES, Effect, Feature, comparable, compare
+from compressor.studies.tradeoff.model_choices import shown_words
 from compressor.studies.tradeoff.work_precision import SLOW, Progress, complete, faulty
 
 SCENES = {  # by the joints with clearance
@@ -244,7 +245,8 @@ def paid_value(case: Case, feature: Feature) -> str:
         return f"{law}static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
     value = getattr(getattr(case, group), name) if dot else getattr(case, group)
     if not dot and hasattr(value, "__dataclass_fields__"):
-        value = ", ".join(f"{key} {one:g}" for key, one in vars(value).items())
+        given = {key: one for key, one in vars(value).items() if one is not None}
+        value = ", ".join(f"{key} {shown_words(one)}" for key, one in given.items())
     return f"{feature.key} = {value}"
 
 

@@ -164,7 +164,9 @@ def is_read(name: str, key: str, group: Any) -> bool:
 
 
 def shown_words(value: Any) -> str:
-    """Return a word of a case file, or two materials, as text."""
+    """Return a value of a case file as text: a number in six digits, a word, or two materials."""
+    if isinstance(value, float):
+        return f"{value:g}"
     return " on ".join(value) if isinstance(value, tuple) else str(value)
 
 
