@@ -63,7 +63,8 @@ def stop(found: "JobReport") -> list[Line]:
         lines.append(("driven by", told["stop_dominant"]))
     names = told["stop_state_names"].split("; ")
     for name, value in zip(names, told["stop_state"], strict=False):
-        lines.append((name, f"{value:.6g}"))
+        if name != "unused":
+            lines.append((name, f"{value:.6g}"))
     steps = zip(
         *(told[f"stop_history_{name}"] for name in ("time", "step", "error")),
         told["stop_history_words"].split("; "),
@@ -91,6 +92,8 @@ def numbers(found: "JobReport", names: list[str]) -> list[Line]:
                 continue
             error = math.nan if errors is None else pick_value(errors, place)
             text = format_measured(value * factor, error * factor, relative)
+            if error == 0.0 and name.endswith("_per_rev"):
+                text = f"{value:.3g}"  # a mean of few whole numbers: exact of this run alone
             if text != UNKNOWN:
                 text = " ".join(filter(None, (text, unit, "" if math.isnan(error) else said)))
             elif said:

@@ -63,7 +63,7 @@ def plan(
         studies = load_studies(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
         )
-    caution(studies)
+    caution(studies, None)
     kinds = by_kind(studies)
     studies = kinds.pop(None, [])
     ahead = {kind: kind.module("command").ahead(its, output) for kind, its in kinds.items() if kind}

@@ -296,18 +296,19 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
     return commands
 
 
-def caution(studies: "Sequence[Study]") -> None:
-    """Say once what is odd about case files, in a few lines however many jobs they have."""
+def caution(studies: "Sequence[Study]", most: int | None = MOST_CAUTIONS) -> None:
+    """Say once what is odd about case files, `most` lines a file however many jobs it has."""
     from compressor.solve import cautions
 
     for study in studies:
         found = cautions(study)
-        for one in found[:MOST_CAUTIONS]:
+        for one in found[:most]:
             looked = "" if one.of == len(study.selected) else " that were looked at"
             share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs{looked})"
             say(f"{study.path}: warning: {one.key}: {one.message}{share}")
-        if len(found) > MOST_CAUTIONS:
-            say(f"{study.path}: and {plural(len(found) - MOST_CAUTIONS, 'more warning')}")
+        if most is not None and len(found) > most:
+            more = plural(len(found) - most, "more warning")
+            say(f"{study.path}: and {more}, which compsim plan {study.path} lists")
 
 
 def tell_changes(studies: "Sequence[Study]", folder: str) -> None:

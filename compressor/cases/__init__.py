@@ -29,7 +29,7 @@ from compressor.cases.groups import (
 from compressor.cases.json_schema import case_schema
 from compressor.cases.laws import CYLINDRICAL, READ_BY, law_of
 from compressor.cases.load import load_cases, load_studies
-from compressor.cases.materials import joint_stiffness
+from compressor.cases.materials import joint_stiffness, paper_stiffness_note
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import ACCURACY, IMPLAUSIBLE, TIGHTEST, CaseError, to_si
 from compressor.cases.regimes import Regimes

@@ -20,7 +20,6 @@ from compressor.cases.parameter import (
     PIN,
     RUBBING,
     SERIES,
-    SHARED_PIN,
     SMALL_CLEARANCE,
     SMALL_END,
     SMALL_RUBBING,
@@ -147,7 +146,7 @@ class Machine:
     pin_radius_mm: float = parameter(
         10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",
         "journal radius R_j of both joints, or of the big end", above=True,
-        read=(RUBBING, PIN, SHARED_PIN), judged=(10, 100),
+        read=(RUBBING, PIN), judged=(10, 100),
     )  # fmt: skip
     gravity_m_per_s2: float = parameter(0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y")
     small_end_pin_radius_mm: float | None = parameter(

@@ -5,8 +5,11 @@ from typing import TYPE_CHECKING
 
 from compressor.cases.laws import CYLINDRICAL
 from compressor.cases.parameter import to_si
+from compressor.cases.table import table
+from compressor.metrics import JOINTS
 
 if TYPE_CHECKING:
+    from compressor.cases.case import Case
     from compressor.cases.groups import Contact
 
 # Table 2 of the paper: density (kg/m^3), Young's modulus (Pa), Poisson's ratio
@@ -61,3 +64,36 @@ def joint_stiffness(contact: "Contact", pin_radius_mm: float, clearance_mm: floa
         internal = contact.geometry == "internal" and clearance > 0.0  # an ideal joint has none
         return contact_stiffness(*contact.materials, pin, pin + clearance, internal)
     return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
+
+
+def paper_stiffness_note(case: "Case") -> str:
+    """Return what to know of the paper's contact stiffness at pins that are not the paper's.
+
+    Names Eq. 15's stiffness for each of those pins; "" where no joint has such a pin and stiffness.
+    """
+    contact, key = case.contact, "contact.stiffness_N_per_mm15"
+    usual, radius = table()[key].default, table()["machine.pin_radius_mm"].default
+    if contact.law in CYLINDRICAL or contact.stiffness_N_per_mm15 != usual:
+        return ""
+    pins = {
+        case.machine.pin_radius(joint): getattr(case.clearance_mm, joint)
+        for joint in JOINTS
+        if getattr(case.clearance_mm, joint) > 0
+    }
+    texts = []
+    for pin, clearance in pins.items():
+        if pin != radius:
+            radii = to_si(pin, "mm"), to_si(pin + clearance, "mm")
+            inside, outside = (
+                contact_stiffness("steel", "steel", *radii, internal=internal) / 1000.0**1.5
+                for internal in (True, False)
+            )
+            texts.append(f"{inside:.3g} for one of {pin:g} mm in its bore ({outside:.3g} as of two "
+                         "discs)")  # fmt: skip
+    if not texts:
+        return ""
+    return (
+        f"{usual:g} N/mm^1.5 is the paper's, of a pin of {radius:g} mm radius; of steel on steel "
+        f"Eq. 15 gives {' and '.join(texts)}: give contact.materials, such as [steel, steel], or "
+        "the stiffness"
+    )

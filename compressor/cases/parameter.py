@@ -79,13 +79,6 @@ def needs_pin(case: Any) -> bool:
     )
 
 
-def needs_shared_pin(case: Any) -> bool:
-    """Return whether a joint has the pin of `machine.pin_radius_mm`: not a small end of its own."""
-    if case.machine.small_end_pin_radius_mm is None or has_ideal_friction(case):
-        return True
-    return bool(case.clearance_mm.big_end > 0)
-
-
 def damps_guide(case: Any) -> bool:
     """Return whether the law of the joints is that of a guide's corners, too."""
     return bool(case.contact.law == "impact" or case.contact.restitution is not None)
@@ -112,9 +105,6 @@ CONTACT = Reader(
     f"{CLEARANCE.words} or in the guide", lambda case: has_clearance(case) or has_play(case)
 )
 PIN = Reader("friction with a coefficient above 0, lubricant, contact.materials or wear", needs_pin)
-SHARED_PIN = Reader(
-    "a joint that rubs without machine.small_end_pin_radius_mm of its own", needs_shared_pin
-)
 COEFFICIENT = Reader("a coefficient of friction above 0", has_coefficient)
 LAW = Reader(
     f"{CLEARANCE.words}, or a guide with play and a law with a restitution",

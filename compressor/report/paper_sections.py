@@ -421,17 +421,26 @@ class MissingFigures:
     command: str
 
 
+@dataclass(frozen=True)
+class PaperCasesContent:
+    """What a page says of the paper's cases: what to know beside their numbers, and a table."""
+
+    caveats: list[str]
+    table: Table
+
+
 def paper_sections(
-    paper: PaperRuns, plates: Sequence[Plate]
+    paper: PaperRuns, plates: Sequence[Plate], caveats: list[str]
 ) -> tuple[list[Section], list[Section]]:
     """Return what there is of the paper: figures; claims, cases, and the load's printed numbers."""
     figures = [Section("figures", "The paper's figures", "figures.html", plates)] if plates else []
     if not paper.stored:
         return figures, []
     title = "Spring and cam: what is printed, what follows"
+    cases = PaperCasesContent(caveats, cases_table(paper))
     return figures, [
         Section("claims", "The paper's claims", "claims.html", claims(paper.usable)),
-        Section("cases", "The paper's cases", "cases.html", cases_table(paper)),
+        Section("cases", "The paper's cases", "cases.html", cases),
         Section("printed", title, "printed.html", printed_table()),
     ]
 

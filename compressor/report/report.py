@@ -81,6 +81,7 @@ from compressor.store import (
     publish,
     read_store,
     read_studies,
+    study_caveats,
 )
 
 KINDS = ("png", "svg", "csv", "js")  # of files beside the page
@@ -144,7 +145,8 @@ def compose(
     """Return everything of a report, in memory."""
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
-    if not any(is_of_paper(stored, study) for study in studies):
+    papers = [study for study in studies if is_of_paper(stored, study)]
+    if not papers:
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = draw_paper(paper)
     others = second_sets(stored, studies, paper)
@@ -163,7 +165,8 @@ def compose(
         for name, one in others.items()
     ]
     chapters = [chapter for one in added for chapter in one.chapters]
-    figures, tables = paper_sections(paper, of_paper)
+    caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
+    figures, tables = paper_sections(paper, of_paper, caveats)
     sections = [
         answer_section(summarise(stored, own, paper, drawn)),
         *(one.figures for one in drawn),

@@ -23,13 +23,10 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import (
-    CYLINDRICAL,
     Case,
-    Contact,
-    Machine,
     Study,
-    joint_stiffness,
     outside_judged,
+    paper_stiffness_note,
     reads,
     row_of,
     with_ideal_joints,
@@ -309,8 +306,9 @@ def remarks(case: Case) -> Iterator[Remark]:
     yield from _inertias(case)
     yield from _proportions(case)
     yield from _beyond_judged(case)
+    if note := paper_stiffness_note(case):
+        yield Remark("contact.stiffness_N_per_mm15", note, "default stiffness")
     for joint in joints:
-        yield from _default_stiffness(case, joint.joint)
         yield from _depths(case, joint)
     yield from _rod(case)
     yield from _drive(case)
@@ -374,28 +372,6 @@ def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
         )
 
 
-def _default_stiffness(case: Case, joint: str) -> Iterator[Remark]:
-    """Yield the paper's stiffness at a pin that is not the paper's."""
-    contact, usual = case.contact, Contact()
-    pin, clearance = case.machine.pin_radius(joint), getattr(case.clearance_mm, joint)
-    if pin == Machine().pin_radius_mm or contact.law in CYLINDRICAL:
-        return
-    if contact.stiffness_N_per_mm15 != usual.stiffness_N_per_mm15:
-        return
-    found = []
-    for geometry in ("external", "internal"):
-        steel = replace(contact, materials=("steel", "steel"), geometry=geometry, exponent=1.5)
-        found.append(joint_stiffness(steel, pin, clearance) / 1000.0**1.5)
-    yield Remark(
-        "contact.stiffness_N_per_mm15",
-        f"{usual.stiffness_N_per_mm15:g} N/mm^1.5 is the paper's, of a pin of 10 mm radius; of "
-        f"steel on steel Eq. 15 gives {found[1]:.3g} for one of {pin:g} mm in its bore "
-        f"({found[0]:.3g} as of two discs): give contact.materials, such as [steel, copper], or "
-        "the stiffness",
-        "default stiffness",
-    )
-
-
 def _rod(case: Case) -> Iterator[Remark]:
     """Yield an elastic rod that would buckle, or whose mass is not that of its section."""
     rod, machine = case.rod, case.machine
@@ -405,7 +381,8 @@ def _rod(case: Case) -> Iterator[Remark]:
     euler = math.pi**2 * float(p["bending_stiffness"]) * float(p["rod_length"])
     force = greatest_force(p, "small_end")
     if force > NEAR_BUCKLING * euler:
-        text = f"forces of up to about {force:.3g} N come near Euler's load, {euler:.3g} N"
+        near = "come near" if force < euler else "are above"
+        text = f"forces of up to about {force:.3g} N {near} Euler's load, {euler:.3g} N"
         yield Remark("rod.depth_mm", f"{text}: this rod is linear and does not buckle", "buckling")
     volume = machine.rod_length_mm * rod.depth_mm * rod.width_mm / 1e9
     density = machine.rod_mass_kg / volume
@@ -447,7 +424,8 @@ def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
 def cautions(study: Study, most: int = MOST_JOBS) -> list[Caution]:
     """Return what is odd about the selected jobs of a study, an entry for each oddity.
 
-    A key whose values look like another unit's is told of as that alone. Of more than `most` jobs
+    A key whose values look like another unit's has that remark alone, with the judged range where
+    it leaves that. Of more than `most` jobs
     as many are looked at, drawn evenly and always the same, so that a large sweep takes no longer.
     """
     numbers: Sequence[int] = study.selected
@@ -457,11 +435,14 @@ def cautions(study: Study, most: int = MOST_JOBS) -> list[Caution]:
     units = {one.key: Caution(one.key, one.message, one.jobs, len(cases)) for one in slips(cases)}
     found: dict[tuple[str, str], list[str]] = {}
     for case in cases:
-        once = {(one.key, one.kind): one.message for one in remarks(case) if one.key not in units}
+        once = {(one.key, one.kind): one.message for one in remarks(case)}
         for what, message in once.items():
             found.setdefault(what, []).append(message)
-    others = [
-        Caution(key, texts[0], len(texts), len(cases))
-        for (key, _), texts in sorted(found.items(), key=lambda item: -len(item[1]))
-    ]
+    others = []
+    for (key, kind), texts in sorted(found.items(), key=lambda item: -len(item[1])):
+        if key not in units:
+            others.append(Caution(key, texts[0], len(texts), len(cases)))
+        elif kind == "judged":
+            both = f"{units[key].message}; {texts[0]}"
+            units[key] = replace(units[key], message=both)
     return [*units.values(), *others]

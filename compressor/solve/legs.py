@@ -22,9 +22,8 @@ from compressor.reasons import Reason
 from compressor.solve.attempts import Solution, attempt, integrate, request, times_of
 from compressor.solve.error_bars import RUNGS, Metrics, allowed_residual, energy_residual
 from compressor.solve.regime import least_promise, steady, with_settle_rev
-from compressor.solve.request import Cuts, Turns, merge_turns, revolutions
+from compressor.solve.request import Cuts, Turns, merge_turns, passed_time, revolutions
 from compressor.solve.run_metrics import metrics, statistics
-from compressor.solve.series import passed_time
 from compressor.solve.si_record import record
 from compressor.solve.simulate import with_series
 

@@ -34,6 +34,7 @@ from compressor.solve.request import (
     check_state,
     greatest_depth,
     overdue,
+    passed_time,
     too_deep,
     with_cuts,
     with_edge,
@@ -165,7 +166,9 @@ def retrace(before: Standing, after: Standing, march: March) -> History:
         step = attempted_length(now.walker, before.walker, float(march.edges[w.segment + 1]))
         scaled = scaled_error(now, before, step, march.request.rtol, march.size)
         error = math.sqrt(float(np.mean(scaled**2)))
-        found.add(float(w.t), step, error, describe_attempt(now.walker, before.walker))
+        p, rates = march.request.p, now.work.k[0]
+        time, pace = float(passed_time(p, w.t, now.z)), float(passed_time(p, 1.0, rates))
+        found.add(time, step * pace, error, describe_attempt(now.walker, before.walker))
         found.dominant = dominant(scaled, before.work.new[: march.size.size])
     return found
 

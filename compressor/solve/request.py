@@ -3,11 +3,20 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from compressor.cases import IMPLAUSIBLE
-from compressor.physics import FLOWS, STALLED, beyond_model, elastic_form, new_tally
+from compressor.physics import (
+    FLOWS,
+    STALLED,
+    Coordinate,
+    beyond_model,
+    elastic_form,
+    is_featured,
+    new_tally,
+)
 from compressor.reasons import Reason
 
 Turns = list[np.record]  # tallies, of one revolution each
@@ -100,6 +109,16 @@ def with_edge(
 
 LAST = 16  # attempts that a history keeps
 NONE = -1  # in place of a number of the state
+
+
+def passed_time(p: np.record, times: Any, states: np.ndarray) -> Any:
+    """Return time (s) that has passed when the crank is where a steady one were at these times.
+
+    times: (...) in s; states: (..., n). Of rates in place of states, and of 1 in place of times, it
+    is how fast time passes there.
+    """
+    driven = is_featured(p) and p["driven"]
+    return times + states[..., p["at"][Coordinate.CRANK] - 1] if driven else times
 
 
 @dataclass

@@ -40,6 +40,7 @@ from compressor.solve.request import (
     check_state,
     greatest_depth,
     overdue,
+    passed_time,
     too_deep,
     with_cuts,
 )
@@ -234,8 +235,11 @@ class Segment:
             self.take(solver, dense)
             self.audit(solver)
             result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
-            taken = solver.t - solver.t_old
-            result.history.add(solver.t_old, taken, math.nan, f"{request.method} taken")
+            begin, end = (
+                float(passed_time(request.p, *at))
+                for at in ((solver.t_old, before), (solver.t, solver.y))
+            )
+            result.history.add(begin, end - begin, math.nan, f"{request.method} taken")
             check_state(request.p, solver.y)
             self.check()
         z = solver.y.copy()

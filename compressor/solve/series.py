@@ -210,12 +210,6 @@ def features(
     return found
 
 
-def passed_time(p: np.record, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Return time (s) that has passed when the crank is where a steady one were at these times."""
-    driven = is_featured(p) and p["driven"]
-    return times + states[:, p["at"][Coordinate.CRANK] - 1] if driven else times
-
-
 def signals(p: np.record, rows: np.ndarray) -> dict[str, np.ndarray]:
     """Return the `SIGNALS` by name from observed rows, (m, WIDE) of a mechanism with features."""
     force = block("contact_force", rows)

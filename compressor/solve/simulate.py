@@ -13,9 +13,9 @@ from compressor.physics import FLOWS, is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
 from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
-from compressor.solve.request import NONE, Trajectory, last_state
+from compressor.solve.request import NONE, Trajectory, last_state, passed_time
 from compressor.solve.run_metrics import ledger
-from compressor.solve.series import SIGNALS, block, features, finer, passed_time, rows_of, signals
+from compressor.solve.series import SIGNALS, block, features, finer, rows_of, signals
 from compressor.solve.solution import solve
 
 if TYPE_CHECKING:

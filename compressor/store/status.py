@@ -31,6 +31,7 @@ from compressor.cases import (
     CaseError,
     Sensor,
     outside_judged,
+    paper_stiffness_note,
     points,
     stands_for,
     value_in,
@@ -63,10 +64,8 @@ LONGER = "a longer run may give other numbers, or be chaotic"
 
 def study_caveats(rows: Rows, study: StoredStudy) -> list[str]:
     """Return what to know of a study's finished jobs beside their numbers, a sentence each."""
-    return [
-        *run_caveats(rows, study),
-        *(f"{key}: {text}" for key, text in _outside_of_study(study).items()),
-    ]
+    outside = (f"{key}: {text}" for key, text in _outside_of_study(study).items())
+    return [*run_caveats(rows, study), *_of_stiffness(rows, study), *outside]
 
 
 def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:
@@ -125,19 +124,22 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
         )
     if case.sensor and (text := case.sensor.report_clipping(clipped)):
         found.append(text)
+    if note := paper_stiffness_note(case):
+        found.append(f"contact.stiffness_N_per_mm15: {note}")
     return [*found, *(f"{key}: {text}" for key, text in outside_judged(case.values()).items())]
 
 
 def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
     """Yield what is said of motions that did not repeat, and of those that did too late."""
-    parts = [f"{unrepeated} of {jobs} jobs were not seen to repeat"] if unrepeated else []
+    word = "job" if jobs == 1 else "jobs"
+    if unrepeated:
+        was = "was" if unrepeated == 1 else "were"
+        yield f"{unrepeated} of {jobs} {word} {was} not seen to repeat; {LONGER}; {AUTO}"
     if late:
-        start = "" if unrepeated else f" of {jobs} jobs"
-        parts.append(
-            f"{late}{start} settled after solve.settle_rev, with start-up in their numbers"
+        yield (
+            f"{late} of {jobs} {word} settled after solve.settle_rev, with start-up in the "
+            "metrics; solve.settle_rev: auto leaves it out"
         )
-    if parts:
-        yield f"{'; '.join(parts)}; {LONGER}; {AUTO}"
 
 
 def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
@@ -149,6 +151,23 @@ def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
             f"{clipped.size} of {known.size} sensor records are clipped, at worst "
             f"{100 * clipped.max():.3g} % of their samples: raise sensor.range_m_per_s2"
         )
+
+
+def _of_stiffness(rows: Rows, study: StoredStudy) -> list[str]:
+    """Return what is said of the paper's contact stiffness at other pins, by a stored job's case.
+
+    The first job with clearance that is stored speaks for a study, which seldom sweeps its pins.
+    """
+    for position in rows.find(study.keys).tolist():
+        if position >= 0:
+            try:
+                case = Case.from_attribute(rows.attributes(position)["case"])
+            except (KeyError, CaseError):
+                return []  # of another version of the program
+            if case.joint != "none":
+                note = paper_stiffness_note(case)
+                return [f"contact.stiffness_N_per_mm15: {note}"] if note else []
+    return []
 
 
 def _settle_revs(study: StoredStudy) -> list[float]:

@@ -1,9 +1,15 @@
 """The trial's machine, which is not the paper's: what a newcomer writes is read or answered."""
 
-import pytest
+import html
+from dataclasses import replace
 
+import pytest
+from compsim import cli
+
+from compressor.cases import Solve
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_cases
+from compressor.cases.materials import contact_stiffness, paper_stiffness_note
 
 # single throw, stroke 180 mm, rod 450 mm, 740 rpm, bore 220 mm, 2 to 7 bar
 MACHINE = """
@@ -15,7 +21,7 @@ machine:
   speed_rpm: 740
   reciprocating_mass_kg: 85
   rod_mass_kg: 62
-  pin_radius_mm: 35
+  pin_radius_mm: {big_end: 60, small_end: 35}
 gas:
   bore_mm: 220
   suction_MPa: 0.2
@@ -53,7 +59,8 @@ def test_with_the_load_it_is_the_machine_that_was_meant(read):
     assert case == Case.from_values({
         "name": "nl", "load": "gas", "joint": "small_end", "clearance_mm": 0.2,
         "machine": {"crank_radius_mm": 90, "rod_length_mm": 450, "speed_rpm": 740,
-                    "reciprocating_mass_kg": 85, "rod_mass_kg": 62, "pin_radius_mm": 35},
+                    "reciprocating_mass_kg": 85, "rod_mass_kg": 62, "pin_radius_mm": 60,
+                    "small_end_pin_radius_mm": 35},
         "gas": {"piston_radius_mm": 110, "suction_MPa": 0.2, "discharge_MPa": 0.7,
                 "switching": "exact"},
     })  # fmt: skip
@@ -67,3 +74,26 @@ def test_other_units_of_it_are_answered_with_the_numbers(read):
         "nl.yaml:13:3: gas.suction_bar: unknown key; write suction_MPa: 0.2",
         "nl.yaml:14:3: gas.discharge_bar: unknown key; write discharge_MPa: 0.7",
     ]
+
+
+def test_its_contact_is_told_to_be_of_another_pin(read):
+    (case,) = read("load: gas" + MACHINE)
+    note = paper_stiffness_note(case)
+    inside = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True) / 1000**1.5
+    assert note.startswith("336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius; of steel on")
+    assert f"Eq. 15 gives {inside:.3g} for one of 35 mm in its bore" in note
+    assert "60 mm" not in note  # its big end is ideal
+    given = replace(case, contact=replace(case.contact, stiffness_N_per_mm15=5e6))
+    assert paper_stiffness_note(given) == ""
+
+
+def test_its_page_and_its_status_tell_that_too(read, tmp_path, capsys):
+    case = replace(read("load: gas" + MACHINE)[0], solve=Solve(duration_rev=2, accuracy="draft"))
+    (tmp_path / "nl.yaml").write_text("load: gas" + MACHINE + "solve: {duration_rev: 2}\n")
+    for words in (["run", "nl.yaml", "-j", "1"], ["report"], ["status"]):
+        assert cli.main(words) == 0
+    note = paper_stiffness_note(case)
+    assert note in html.unescape((tmp_path / "report/index.html").read_text())
+    assert note in " ".join(capsys.readouterr().out.split())
+    assert cli.main(["show", "nl"]) == 0
+    assert note in " ".join(capsys.readouterr().out.split())

@@ -88,6 +88,13 @@ def test_the_paper_s_stiffness_at_another_pin_is_told_with_that_of_the_pin():
     assert "contact.materials" in found.message
 
 
+def test_pins_that_differ_have_a_stiffness_each():
+    odd = case(joint="both", machine={"pin_radius_mm": {"big_end": 60, "small_end": 35}})
+    (found,) = (one for one in remarks(odd) if one.kind == "default stiffness")
+    assert "for one of 60 mm in its bore" in found.message
+    assert "for one of 35 mm in its bore" in found.message
+
+
 @pytest.mark.parametrize(
     ("values", "words"),
     [

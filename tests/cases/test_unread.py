@@ -47,7 +47,6 @@ QUIET = HEARD | {"sensor": {"noise_m_per_s2": 0}}
 SIDEWAYS = HEARD | {"sensor": {"place": "guide", "direction": "x"}}
 SLICK = WORN | {"friction": {"static": 0, "dynamic": 0}}
 DRY = WORN | {"friction": False}
-OWN_PIN = SMALL | {"machine": {"small_end_pin_radius_mm": 11}}
 OWN_CORNER = IDEAL | {"guide": {"clearance_mm": 0.1, "damping_N_s_per_mm": 9, "exponent": 1.4,
                                 "full_damping_mm": 0.01}}  # fmt: skip
 SMALL_FILES = IDEAL | {"output": {"keep": "metrics"}}
@@ -81,7 +80,7 @@ ENTRIES = {
         machine__rod_mass_kg=5, machine__rod_centre_mm=280, machine__rod_inertia_kg_m2=0.2,
         machine__reciprocating_mass_kg=15, machine__gravity_m_per_s2=9.81,
     ),
-    "machine.pin_radius_mm": Entry(12, WORN, (IDEAL, SLICK, DRY, OWN_PIN)),
+    "machine.pin_radius_mm": Entry(12, WORN, (IDEAL, SLICK, DRY)),
     "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG, SLICK, DRY)),
     **entries(
         GAS, WORN, FREE, gas__piston_radius_mm=60, gas__head_clearance_mm=25,

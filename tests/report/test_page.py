@@ -32,6 +32,7 @@ from compressor.report.paper_sections import (
     DiagnosisContent,
     MissingFigures,
     Pair,
+    PaperCasesContent,
     SecondSetContent,
 )
 from compressor.report.study_section import JobsContent, StudyContent
@@ -101,7 +102,7 @@ def contents(evil):
     return {
         "answer.html": answer,
         "assumptions.html": Assumptions([evil()], True, True, True),
-        "cases.html": table(evil),
+        "cases.html": PaperCasesContent([evil], table(evil)),
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
@@ -171,7 +172,7 @@ def test_rows_are_marked_and_cells_have_their_class():
     long = "x" * 37
     cells = [Cell("1 ± 2", "number", 1.25), Cell(long[1:]), Cell(long), Cell(long, "code")]
     rows = [Row(cells, "failed", "k1"), Row([Cell("", "word"), Cell("k", "code")])]
-    text = document([Section("a", "A", "cases.html", Table(["head"], rows))], {})
+    text = document([Section("a", "A", "printed.html", Table(["head"], rows))], {})
     assert re.findall("<tr.*?</tr>", text, re.DOTALL)[1:] == [
         '<tr class="failed" data-job="k1"><td class="number" data-value="1.25">1 ± 2</td>'
         f"<td>{long[1:]}</td>"

@@ -2,7 +2,7 @@
 
 import page_tables
 import pytest
-from compsim import cli
+from compsim import cli, screen
 from test_layers import ROOT
 
 from compressor.cases.case import Case
@@ -88,7 +88,8 @@ def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(tmp_path):
     text = "joint: big_end\nclearance_mm: [0.2, 0.3]\ncontact: {stiffness_N_per_mm15: 336}\n"
     told = (
         "336 N/mm^1.5 is unusual (10000 to 1e+07 is usual); read as kN/mm^1.5, it is 3.36e+05 "
-        "N/mm^1.5"
+        "N/mm^1.5; 336 N/mm^1.5 is outside the range that the program was judged on, 3162.28 to "
+        "3.16228e+07 N/mm^1.5"
     )
     assert cautions(study(tmp_path, text)) == [Caution("contact.stiffness_N_per_mm15", told, 2, 2)]
 
@@ -121,14 +122,28 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
         "friction: {stiction_velocity_mm_per_s: 0.01}\nsolve: {max_steps: 1}\n",
         encoding="utf-8",
     )
-    cli.main(["plan", str(path), "-o", str(tmp_path / "results")])
+    screen.caution(load_studies(path))
     told = [line for line in capsys.readouterr().err.splitlines() if str(path) in line]
     assert len(told) == 6
     assert told[0] == (
         f"{path}: warning: machine.crank_radius_mm: 1 mm is unusual (5 to 1000 is usual); read as "
         "m, it is 1000 mm (2 of 2 jobs)"
     )
-    assert told[-1] == f"{path}: and 3 more warnings"
+    assert told[-1] == f"{path}: and 3 more warnings, which compsim plan {path} lists"
+    cli.main(["plan", str(path), "-o", str(tmp_path / "results")])
+    whole = [line for line in capsys.readouterr().err.splitlines() if str(path) in line]
+    assert whole[:5] == told[:5]
+    assert len(whole) == 8
+
+
+def test_a_slip_of_units_hides_no_value_outside_the_judged_range(tmp_path):
+    path = tmp_path / "slow.yaml"
+    path.write_text("joint: big_end\nclearance_mm: 0.2\nmachine: {speed_rpm: 24}\n")
+    (found,) = cautions(*load_studies(path))
+    assert found.message == (
+        "24 rpm is unusual (120 to 6000 is usual); read as rad/s, it is 229.2 rpm; 24 rpm is "
+        "outside the range that the program was judged on, 50 to 6000 rpm"
+    )
 
 
 def test_the_pages_examples_that_are_plain_are_told_nothing(tmp_path):

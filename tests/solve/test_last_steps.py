@@ -39,6 +39,20 @@ def test_the_history_ends_where_the_run_stopped():
     assert (errors[[text.endswith("taken") for text in words(found)]] <= 1).all()
 
 
+@pytest.mark.parametrize("method", ["auto", "RK45"])
+def test_the_history_of_a_slowing_crank_has_the_time_that_passed(method):
+    drive = {"torque_N_m": 1, "flywheel_kg_m2": 1}
+    solve = {"max_steps": 400 if method == "auto" else 100, "method": method}
+    found = stopped(drive=drive, solve=solve)
+    times, steps = found["stop_history_time"], found["stop_history_step"]
+    taken = np.array([text.endswith(("taken", "to an onset")) for text in words(found)])
+    ends = times + np.where(taken, steps, 0)
+    assert ends[-1] == pytest.approx(found["stop_time"], rel=1e-6)
+    assert times[1:] == pytest.approx(ends[:-1], rel=1e-6)
+    turned = found["stop_crank_angle"] / (500 * math.pi / 30)
+    assert found["stop_time"] > 1.0004 * turned  # the crank is behind a steady one
+
+
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "RODAS"])
 def test_a_history_is_that_of_the_run(method, monkeypatch):
     """Looked at step by step from the start, or only from the last chunk on: the same."""

@@ -58,7 +58,8 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
     clipped = f"2 of 2 sensor records are clipped, at worst {worst:.3g} % of their samples"
     for text in (out, err):
         assert counts in text
-        assert "solve: {settle_rev: auto, duration_rev: auto}" in text
+        assert ("solve: {settle_rev: auto, duration_rev: auto}" in text) == bool(unrepeated)
+        assert ("solve.settle_rev: auto leaves it out" in text) == bool(late)
         assert clipped in text
     assert OUTSIDE in out
     assert "warning: machine.rod_mass_kg: 62 kg is outside" in err  # before it runs

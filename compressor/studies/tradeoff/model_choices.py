@@ -21,6 +21,7 @@ from compressor.cases import (
     Study,
     joint_stiffness,
     law_of,
+    paper_stiffness_note,
 )
 from compressor.metrics import METRICS
 from compressor.program import PROGRAM
@@ -93,6 +94,10 @@ def scale_contact(case: Case) -> Iterator[Choice]:
     for words, factor in SCALES.items():
         yield with_stiffness(case, f"contact stiffness {words}", factor)
     contact = case.contact
+    if paper_stiffness_note(case):
+        values: dict[str, Any] = {"stiffness_N_per_mm15": None, "materials": ("steel", "steel")}
+        other = with_values(case, "contact", **values, geometry="internal")
+        yield Choice("contact stiffness of its pins (Eq. 15)", other, "steel on steel, in a bore")
     for words, factor in SCALES.items():
         name = f"contact damping {words}"
         if contact.law == "impact" and contact.damping_N_s_per_mm > 0.0:

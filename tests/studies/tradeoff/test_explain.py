@@ -8,7 +8,15 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.parameter import ACCURACY
-from compressor.studies.tradeoff.explain import explain, ideal_scales, promise, terms, unknowns
+from compressor.studies.tradeoff.explain import (
+    explain,
+    ideal_scales,
+    paid_value,
+    promise,
+    terms,
+    unknowns,
+)
+from compressor.studies.tradeoff.features import FEATURES
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0}
 
@@ -122,6 +130,15 @@ def test_scales_are_those_of_the_machine_without_features():
     assert len(names) == 11
     assert names[4:6] == ("height in the guide, m", "tilt in the guide, rad")
     assert names[-1] == "crank's lag, s"
+
+
+def test_what_a_case_pays_for_is_told_of_every_group():
+    more = {"guide": True, "drive": True, "rod": True, "lubricant": True}
+    case = Case.from_values({"joint": "both", "clearance_mm": 0.2} | more)
+    found = {one.key: paid_value(case, one) for one in FEATURES if one.paid(case)}
+    assert {"guide", "drive", "rod", "lubricant"} <= found.keys()
+    assert "crosshead_length_mm 120" in found["guide"]
+    assert "None" not in " ".join(found.values())
 
 
 def test_freedoms_and_terms():

@@ -10,6 +10,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
+from compressor.cases.materials import contact_stiffness
 from compressor.metrics import JOINTS, METRICS
 from compressor.solve.si_record import stiffness_of
 from compressor.solve.simulate import simulate
@@ -84,6 +85,17 @@ def test_what_a_case_has_is_varied_the_other_way():
     without = by_name(case(friction=False))
     assert without["friction"].case.friction == Case().friction
     assert not [name for name in without if name.startswith("friction law")]
+
+
+def test_pins_that_are_not_the_paper_s_have_a_choice_of_their_own_stiffness():
+    values = {"joint": "small_end", "clearance_mm": 0.2}
+    name = "contact stiffness of its pins (Eq. 15)"
+    assert name not in {one.name for one in model_choices(Case.from_values(values))}
+    odd = Case.from_values(values | {"machine": {"pin_radius_mm": 35}})
+    (one,) = (choice for choice in model_choices(odd) if choice.name == name)
+    assert one.case.contact.materials == ("steel", "steel")
+    expected = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True)
+    assert stiffness_of(one.case, "small_end") == pytest.approx(expected)
 
 
 def test_a_choice_says_what_it_assumes():
