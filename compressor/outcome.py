@@ -93,7 +93,7 @@ class Outcome:
         """What is known of a failure beyond its reason."""
         return str(self.attributes.get("detail", ""))
 
-    def table(self, more: dict[str, tuple]) -> "Table":
+    def table(self, more: dict[str, tuple]) -> "DatasetParts":
         """With more variables, what the job's Dataset is made of."""
         variables = self.variables() | more
         variables |= coordinates(dim for dims, _, _ in variables.values() for dim in dims)
@@ -101,7 +101,7 @@ class Outcome:
             name: Variable(dims, np.asarray(values), attrs)
             for name, (dims, values, attrs) in variables.items()
         }
-        return Table(named, self.attributes)
+        return DatasetParts(named, self.attributes)
 
     def variables(self) -> dict[str, tuple]:
         """Return the status, reason and numbers as xarray variables: (dims, values, attributes).
@@ -142,7 +142,7 @@ class Variable(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
+class DatasetParts:
     """What a Dataset is made of; xarray takes half a second to load, which storing a job spares."""
 
     variables: dict[str, Variable]

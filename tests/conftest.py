@@ -28,7 +28,7 @@ from compressor.store.series_file import series_path, write_series
 from compressor.store.studies import write_study
 from compressor.store.writer import Writer
 from compressor.sweep.run_job import run_job
-from compressor.sweep.worker import Done
+from compressor.sweep.worker import JobResult
 
 hypothesis.settings.register_profile("untimed", deadline=None)  # other work shares the machine
 hypothesis.settings.load_profile("untimed")
@@ -275,7 +275,7 @@ def in_process(monkeypatch):
     def here(workers):
         def run(place, cases, remark, pulse):
             for case in cases:
-                yield Done(case, run_job(place, case), 0.01)
+                yield JobResult(case, run_job(place, case), 0.01)
                 pulse()
 
         return run

@@ -12,7 +12,7 @@ from compressor.cases.case import Case
 from compressor.physics.observe import COLUMNS, Column, observe
 from compressor.physics.record import state_names
 from compressor.solve import simulate
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.si_record import record
 from compressor.solve.simulate import with_series
 
@@ -50,7 +50,7 @@ def drop(joint, speed, method="auto", mass=5.0, rtol=1e-8, **contact):
     state[p["freedoms"]] = speed if joint == "small_end" else -speed
     if state.size > 2 * p["freedoms"]:
         state[2 * p["freedoms"] :][:2] = p["least_approach"]
-    run = attempt(case, case.rtol, 60.0, True, state=state)
+    run = run_at_tolerance(case, case.rtol, 60.0, True, state=state)
     assert run.reason == ""
     rows = np.empty((run.trajectory.times.size, COLUMNS))
     for i, (t, y) in enumerate(zip(run.trajectory.times, run.trajectory.states, strict=True)):
@@ -197,7 +197,9 @@ def rod_apart():
     case = Case.resolve({**SLIDER_CRANK, "solve": solve})
     state = np.zeros(len(state_names(record(case))))
     state[:8] = np.concatenate((POSITION[2:], RATE[2:]))
-    run = with_series(case, attempt(case, case.rtol, math.inf, True, None, state))[1].variables
+    run = with_series(case, run_at_tolerance(case, case.rtol, math.inf, True, None, state))[
+        1
+    ].variables
 
     def flow(t, y):
         return np.concatenate((y[6:], simeon(t, y[:6], y[6:], 1.0)))

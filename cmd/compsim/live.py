@@ -34,7 +34,7 @@ class Words(ProgressColumn):
         return Text.assemble(counts, (failed, "red"), left, no_wrap=True, overflow="ellipsis")
 
 
-class Line:
+class ProgressLine:
     """The line, from its making until `stop`, which takes it away."""
 
     def __init__(self, words: Callable[[], tuple[str, str, str]]):

@@ -10,7 +10,7 @@ import click
 from compressor.studies import by_kind
 from compsim.screen import (
     DONE,
-    Reading,
+    ReadingProgress,
     caution,
     configs_argument,
     duration,
@@ -59,7 +59,7 @@ def plan(
     from compressor.cases import load_studies
     from compressor.sweep import cores
 
-    with Reading() as told:
+    with ReadingProgress() as told:
         studies = load_studies(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
         )

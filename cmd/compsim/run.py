@@ -13,7 +13,7 @@ from compressor.studies import by_kind
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    Reading,
+    ReadingProgress,
     Screen,
     all_stored,
     caution,
@@ -35,13 +35,13 @@ from compsim.screen import (
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-    from compressor.sweep import Now, Summary
-    from compsim.watch import Watch
+    from compressor.sweep import Summary, SweepProgress
+    from compsim.watch import PageWatch
 
 MOST_FAILURES = 20  # listed one by one
 
 
-class Part(click.ParamType):
+class ShardType(click.ParamType):
     """I/N with 1 <= I <= N."""
 
     name = "I/N"
@@ -65,7 +65,7 @@ class Part(click.ParamType):
               help="Run stored jobs again, too: those that failed, or stale ones, which lack a "
               "metric that this version gives. Can be given twice.",
 )  # fmt: skip
-@click.option("--shard", "part", type=Part(), metavar="I/N",
+@click.option("--shard", "part", type=ShardType(), metavar="I/N",
               help="Run part I of N: for machines that share the folder.")  # fmt: skip
 @click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
               show_default=True, help="Where jobs run: here, or on a dask cluster.")  # fmt: skip
@@ -107,7 +107,7 @@ def run(
     from compressor.cases import load_studies
     from compressor.sweep import cores
 
-    with Reading(quiet) as told:
+    with ReadingProgress(quiet) as told:
         studies = load_studies(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
         )
@@ -142,7 +142,7 @@ def run_jobs(
     screen = Screen(quiet)
     with watching(output, page, context.obj, quiet) as watch:
 
-        def stands(now: "Now") -> None:
+        def stands(now: "SweepProgress") -> None:
             screen.stands(now)
             if watch:
                 watch.stands(now)
@@ -166,13 +166,13 @@ def run_jobs(
 
 def watching(
     results: str, page: str, command: str, quiet: bool
-) -> "contextlib.AbstractContextManager[Watch | None]":
+) -> "contextlib.AbstractContextManager[PageWatch | None]":
     """Return what keeps a page fresh in a folder; nothing where the folder is ""."""
     if not page:
         return contextlib.nullcontext()
-    from compsim.watch import Watch
+    from compsim.watch import PageWatch
 
-    return Watch(results, page, command, quiet)
+    return PageWatch(results, page, command, quiet)
 
 
 def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:

@@ -18,8 +18,8 @@ from compsim.results import files, folders
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.store import Again
-    from compressor.sweep import Now
-    from compsim.live import Line
+    from compressor.sweep import SweepProgress
+    from compsim.live import ProgressLine
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 MOST_CAUTIONS = 5  # told of one case file
@@ -114,7 +114,7 @@ class Screen:
         self.told_done = -1
         self.pace = Pace()
         self.known: tuple[float, bool, float] | None = None  # s left, at least, since when
-        self.line: Line | None = None
+        self.line: ProgressLine | None = None
 
     def __call__(self, done: int, total: int, remark: str) -> None:
         """Take note of progress (`compressor.sweep.sweep.Progress`)."""
@@ -129,7 +129,7 @@ class Screen:
         else:
             self.log()
 
-    def stands(self, now: "Now") -> None:
+    def stands(self, now: "SweepProgress") -> None:
         """Take note of how a sweep stands, which knows best how long it will take."""
         self.alike, self.failed = False, now.failed
         since = time.monotonic()
@@ -160,9 +160,9 @@ class Screen:
     def draw(self) -> None:
         """Show the line of progress on a terminal."""
         if self.line is None:
-            from compsim.live import Line  # loads rich: a tenth of a second
+            from compsim.live import ProgressLine  # loads rich: a tenth of a second
 
-            self.line = Line(self.words)
+            self.line = ProgressLine(self.words)
         self.line.show(self.done, self.total)
 
     def log(self) -> None:
@@ -185,13 +185,13 @@ class Screen:
             say("".join(self.words()))
 
 
-class Reading:
+class ReadingProgress:
     """Progress of reading case files, of those that have many jobs; a context manager."""
 
     def __init__(self, quiet: bool = False):
         self.screen = Screen(quiet, "cases read")
 
-    def __enter__(self) -> "Reading":
+    def __enter__(self) -> "ReadingProgress":
         return self
 
     def __exit__(self, *_: object) -> None:

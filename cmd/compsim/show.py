@@ -78,17 +78,17 @@ def show(
     elif only_case:
         print_text(whole_case(found, folder).removesuffix("\n"))
     else:
-        tell(found, folder, reversal)
+        print_report(found, folder, reversal)
     return DONE
 
 
-def tell(found: "JobReport", folder: str, reversal: tuple[float, float]) -> None:
+def print_report(found: "JobReport", folder: str, reversal: tuple[float, float]) -> None:
     """Say what is known of a job."""
     from compressor.cases import Case, to_yaml
     from compressor.reasons import remedy
     from compsim.job_text import sections
 
-    print_text(f"job {found.key}: {printable(ending(found))}")
+    print_text(f"job {found.key}: {printable(stop_text(found))}")
     for study, point in found.studies.items():
         values = "".join(f" {key}={value}" for key, value in point.items())
         print_text(f"  in {study}{printable(values)}")
@@ -124,7 +124,7 @@ def whole_case(found: "JobReport", folder: str) -> str:
     return to_yaml(dataclasses.replace(case, name=name))
 
 
-def ending(found: "JobReport") -> str:
+def stop_text(found: "JobReport") -> str:
     """Return how a job ended, in a line."""
     if found.status == "missing":
         return "not run yet"

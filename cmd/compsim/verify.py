@@ -34,7 +34,7 @@ def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 
     damages = compare(folder)
     if as_json:
-        print_text(json.dumps([plain(damage) for damage in damages], indent=1))
+        print_text(json.dumps([jsonable_damage(damage) for damage in damages], indent=1))
     for damage in () if as_json else damages:
         print_text(f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy))
         for job in damage.jobs:
@@ -52,7 +52,7 @@ def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     return STORE
 
 
-def plain(damage: "Damage") -> dict[str, Any]:
+def jsonable_damage(damage: "Damage") -> dict[str, Any]:
     """Return the damage as JSON has it."""
     return {
         "path": str(damage.path),

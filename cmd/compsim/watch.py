@@ -22,7 +22,7 @@ from compressor.studies import page_additions
 from compsim.screen import say
 
 if TYPE_CHECKING:
-    from compressor.sweep import Now
+    from compressor.sweep import SweepProgress
 
 SECONDS = 5.0  # between two pages, and before the first
 SHARE = 20.0  # times what drawing takes: how long until figures are drawn anew
@@ -30,7 +30,7 @@ NICENESS = 5  # of the process: jobs go first
 MOST_DEATHS = 3  # of the process, before it is given up
 
 
-class Watch:
+class PageWatch:
     """Keeps the page of a run fresh; a context manager around the sweep.
 
     How the run stands is said anew every few seconds, and figures are drawn as often as costs jobs
@@ -50,7 +50,7 @@ class Watch:
         self.deaths = 0
         self.problems: set[str] = set()
 
-    def __enter__(self) -> "Watch":
+    def __enter__(self) -> "PageWatch":
         from compressor.store import writable_folder
 
         writable_folder(self.told["report"])
@@ -72,7 +72,7 @@ class Watch:
         while self.deaths < MOST_DEATHS and not self.finished():
             pass
 
-    def stands(self, now: "Now") -> None:
+    def stands(self, now: "SweepProgress") -> None:
         """Have a page written if it is time; called several times a second."""
         self.hear()
         if not self.idle or time.monotonic() < self.due or self.deaths >= MOST_DEATHS:
@@ -120,7 +120,7 @@ class Watch:
             self.process = None
             if answer["ended"]:
                 self.deaths += 1
-                self.tell(f"what writes it ended with {ending(answer['ended'])}")
+                self.tell(f"what writes it ended with {exit_text(answer['ended'])}")
         self.due = time.monotonic() + SECONDS
         if answer.get("drawn", True):
             self.draw_due = time.monotonic() + SHARE * answer.get("seconds", 0.0)
@@ -157,7 +157,7 @@ def start_process(told: dict[str, str]) -> "subprocess.Popen[str]":
     )  # fmt: skip
 
 
-def ending(code: int) -> str:
+def exit_text(code: int) -> str:
     """Return the end of a process in words."""
     return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
@@ -165,11 +165,11 @@ def ending(code: int) -> str:
 # ---- the process --------------------------------------------------------------------------------
 
 
-class Left(BaseException):
+class PageOutdated(BaseException):
     """The page that is being written is out of date; no handler of errors shall take this."""
 
 
-class Writer:
+class PageWriter:
     """Writes pages; SIGINT leaves the one that is being written."""
 
     def __init__(self, told: dict[str, str]):
@@ -182,7 +182,7 @@ class Writer:
         """Called by the signal."""
         if self.writing:
             self.writing = False
-            raise Left
+            raise PageOutdated
 
     def write(self, running: dict[str, Any] | None, draw: bool = True) -> dict[str, Any]:
         """Write a page, the ordinary one if nothing is running; what to answer.
@@ -208,7 +208,7 @@ class Writer:
                     page_additions({}), now,
                 )  # fmt: skip
             self.shown = now
-        except Left:
+        except PageOutdated:
             answer["left"] = True
         except Exception as error:
             answer["problem"] = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -224,7 +224,7 @@ def spent() -> float:
 def main(told: str) -> None:
     """Write a page for each line of input, and the last one when no more can come."""
     os.nice(NICENESS)
-    writer = Writer(json.loads(told))
+    writer = PageWriter(json.loads(told))
     for line in sys.stdin:
         answer(writer.write(**json.loads(line)))
     answer(writer.write(None))

@@ -18,7 +18,7 @@ import xarray as xr
 
 from compressor.analysis.cam import Cam
 from compressor.analysis.contacts import MODES, contact_modes, mode_shares
-from compressor.analysis.orbit import APART, Course, course, orbit
+from compressor.analysis.orbit import APART, JournalMotion, course, orbit
 from compressor.analysis.plot_captions import newtons
 from compressor.analysis.runs import (
     CLEARANCES,
@@ -141,7 +141,7 @@ def deviations(of: Sequence[xr.Dataset]) -> str:
     )
 
 
-def motion(courses: Sequence[Course]) -> str:
+def motion(courses: Sequence[JournalMotion]) -> str:
     """Return how the journal moves in its bearing."""
     joint = SPOKEN[courses[0].joint]
     apart = [one.apart for one in courses]
@@ -166,7 +166,7 @@ def motion(courses: Sequence[Course]) -> str:
     return f"{reverses} {stays}"
 
 
-def rings(courses: Sequence[Course]) -> list[str]:
+def rings(courses: Sequence[JournalMotion]) -> list[str]:
     """Return the frequencies after the first change of sign, where all runs have the same one."""
     found = [one.rings for one in courses]
     spans = angle_spans([one.turns[:1] for one in courses])
@@ -239,7 +239,7 @@ def format_span(span: tuple[float, float]) -> str:
     return f"{low}°" if low == high else f"{low}–{high}°"
 
 
-def apart_from_each_other(courses: Sequence[Course]) -> str:
+def apart_from_each_other(courses: Sequence[JournalMotion]) -> str:
     """Return the angles of each run, where they are not the same few."""
     of = [", ".join(f"{turn:.0f}°" for turn in one.turns) or "no angle" for one in courses]
     return ", ".join(f"{at} at {c:g} mm" for at, c in zip(of, CLEARANCES, strict=True))

@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis.margins import (
+    BarredNumber,
     Margin,
-    Measure,
     Shares,
     above,
     at_least,
@@ -72,7 +72,7 @@ def same_motion(runs: Runs) -> Verdict:
     for name in MOTION:
         one, other = runs["design"][name].values, runs["typical"][name].values
         apart = float(np.abs(one - other).max() / np.abs(other).max())
-        margins.append(at_most(Measure(apart), 1e-12))
+        margins.append(at_most(BarredNumber(apart), 1e-12))
         rows.append((name, f"{apart:.1e}"))
     return margins, rows
 
@@ -87,8 +87,8 @@ def design_force(runs: Runs) -> Verdict:
         (f"corners, {load}", ", ".join(f"{angle:.2f}°" for angle in angles))
         for load, angles in corners.items()
     ]
-    ratio = Measure(peaks["design"] / peaks["typical"])
-    return [at_least(ratio, 1.01), at_least(Measure(float(apart.min())), 1.0)], rows
+    ratio = BarredNumber(peaks["design"] / peaks["typical"])
+    return [at_least(ratio, 1.01), at_least(BarredNumber(float(apart.min())), 1.0)], rows
 
 
 def acceleration_alone(runs: Runs) -> Verdict:
@@ -145,7 +145,7 @@ def horizontal_force(runs: Runs) -> Verdict:
     return margins, rows
 
 
-def across_over_up(run: xr.Dataset, joint: str) -> Measure:
+def across_over_up(run: xr.Dataset, joint: str) -> BarredNumber:
     """Return the horizontal over the vertical contact force at the same times, weighted by the
     force.
 
@@ -168,7 +168,8 @@ def across_over_up(run: xr.Dataset, joint: str) -> Measure:
     sizes = [math.sqrt(float(np.mean(part**2))) for part in force.T]
     both = math.hypot(*sizes)
     parts = [
-        Measure(mean, error * (size + both)) for mean, size in zip(means(kept), sizes, strict=True)
+        BarredNumber(mean, error * (size + both))
+        for mean, size in zip(means(kept), sizes, strict=True)
     ]
     return measure(kept, ratio, parts[0].over(parts[1]).error)
 
@@ -194,7 +195,7 @@ def proportional_force(runs: Runs) -> Verdict:
     return margins, rows
 
 
-def correlation(run: xr.Dataset, joint: str) -> Measure:
+def correlation(run: xr.Dataset, joint: str) -> BarredNumber:
     """r² of a joint's horizontal force and acceleration.
 
     A correlation changes by at most the sum of the errors' shares of the standard deviations.
@@ -254,7 +255,7 @@ def per_revolution(run: xr.Dataset, count: str, joint: str) -> float:
 def vibrating(runs: Runs) -> Margin:
     """Return the claim 7 by the share of time in which the machine vibrates, beside its verdict."""
     pairs = ([active_share(runs[label(joint, c)]) for joint in JOINTS] for c in CLEARANCES)
-    return least([exceeds(Measure(big), Measure(small), EXCESS) for big, small in pairs])
+    return least([exceeds(BarredNumber(big), BarredNumber(small), EXCESS) for big, small in pairs])
 
 
 def two_are_worse(runs: Runs) -> Verdict:

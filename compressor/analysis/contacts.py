@@ -48,7 +48,7 @@ class ContactSeries:
 
 
 @dataclass(frozen=True)
-class Span:
+class ContactSpan:
     """A contact: the samples `first` to `last`, and `gap` of them without contact before it.
 
     `after_flight`: the journal was off its bore within that gap, as `impact_count` has it.
@@ -104,14 +104,14 @@ def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
     )
 
 
-def contact_spans(series: ContactSeries) -> list[Span]:
+def contact_spans(series: ContactSeries) -> list[ContactSpan]:
     """Return the contacts of a joint in order of time; one between two samples is not seen."""
     touching = series.normal > 0
     edges = np.flatnonzero(np.diff(touching, prepend=False, append=False)).reshape(-1, 2)
     found, before = [], 0
     for first, beyond in edges.tolist():
         flown = bool((series.depth[before:first] < 0).any())
-        found.append(Span(first, beyond - 1, first - before, flown))
+        found.append(ContactSpan(first, beyond - 1, first - before, flown))
         before = beyond
     return found
 
@@ -162,7 +162,7 @@ class Impact:
     impulse: float
     lost_energy: float
     released: bool
-    span: Span
+    span: ContactSpan
     follows: int
 
 
@@ -214,7 +214,7 @@ def impacts_of(run: xr.Dataset, joint: str) -> list[Impact]:
     return found
 
 
-def touch(series: ContactSeries, span: Span) -> tuple[float, float]:
+def touch(series: ContactSeries, span: ContactSpan) -> tuple[float, float]:
     """Return the time (s) and approach speed (m/s) of a contact's first touch.
 
     Without contact the eccentricity is smooth, so that it is taken as the polynomial through the
@@ -241,7 +241,7 @@ def touch(series: ContactSeries, span: Span) -> tuple[float, float]:
     return float(series.time[first] + at * step), max(0.0, speed)
 
 
-def release(series: ContactSeries, span: Span) -> float:
+def release(series: ContactSeries, span: ContactSpan) -> float:
     """Return the time (s) at which the normal force of a contact vanishes: by its last slope.
 
     Known to a part of a sample step. Of a contact of one sample it is half a step later; of one
@@ -259,7 +259,7 @@ def release(series: ContactSeries, span: Span) -> float:
 
 
 def impact(
-    series: ContactSeries, span: Span, touched: tuple[float, float], longest: float
+    series: ContactSeries, span: ContactSpan, touched: tuple[float, float], longest: float
 ) -> Impact:
     """Return the impact of a contact, from its first touch (s, m/s); `longest`: it may last, s."""
     begin, speed = touched
@@ -284,7 +284,7 @@ def impact(
     )  # fmt: skip
 
 
-def following_from(series: ContactSeries, span: Span, until: float) -> int:
+def following_from(series: ContactSeries, span: ContactSpan, until: float) -> int:
     """Return the first sample of a contact that is no longer impact.
 
     An impact is one compression and one restitution. It ends where the penetration has passed a
@@ -302,7 +302,7 @@ def following_from(series: ContactSeries, span: Span, until: float) -> int:
 
 
 def impulse_and_loss(
-    series: ContactSeries, span: Span, begin: float, end: float
+    series: ContactSeries, span: ContactSpan, begin: float, end: float
 ) -> tuple[float, float]:
     """Return the impulse (N s) and lost energy (J) of a contact from `begin` to `end`, s.
 

@@ -19,17 +19,17 @@ from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
 from compressor.solve import mean_bar, sure
 
 
-class Measure(NamedTuple):
+class BarredNumber(NamedTuple):
     """A number and its absolute error: nan where no error is known, as of runs without bars."""
 
     value: float
     error: float = 0.0
 
-    def over(self, other: "Measure") -> "Measure":
+    def over(self, other: "BarredNumber") -> "BarredNumber":
         """Return the ratio of two measures; relative errors add, as errors of one model may."""
         ratio = self.value / other.value if other.value else math.inf
         away = self.error / abs(self.value) if self.value else 0.0
-        return Measure(ratio, ratio * (away + other.error / abs(other.value or math.inf)))
+        return BarredNumber(ratio, ratio * (away + other.error / abs(other.value or math.inf)))
 
 
 class Margin(NamedTuple):
@@ -51,18 +51,18 @@ class Margin(NamedTuple):
         return f"{100 * self.value:+.3g} % ({bar}{doubt})"
 
 
-def at_least(measure: Measure, threshold: float) -> Margin:
+def at_least(measure: BarredNumber, threshold: float) -> Margin:
     """Return the margin of a measure that is to be at least a threshold."""
     return Margin(measure.value / threshold - 1.0, measure.error / threshold)
 
 
-def above(measure: Measure, threshold: float) -> Margin:
+def above(measure: BarredNumber, threshold: float) -> Margin:
     """Return the margin of a measure that is to exceed a threshold: of a tie it is below zero."""
     margin = at_least(measure, threshold)
     return margin._replace(value=math.nextafter(0.0, -1.0)) if margin.value == 0.0 else margin
 
 
-def at_most(measure: Measure, threshold: float) -> Margin:
+def at_most(measure: BarredNumber, threshold: float) -> Margin:
     """Return the margin of a measure that is to be at most a threshold."""
     return Margin(1.0 - measure.value / threshold, measure.error / threshold)
 
@@ -79,7 +79,7 @@ def least(margins: Sequence[Margin]) -> Margin:
     return Margin(smallest, math.nan if unknown else smallest - lowest)
 
 
-def exceeds(one: Measure, other: Measure, by: float) -> Margin:
+def exceeds(one: BarredNumber, other: BarredNumber, by: float) -> Margin:
     """Return the margin, in the measures' own unit, of a measure that is to exceed another one
     by this.
     """
@@ -110,13 +110,13 @@ def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> floa
     return mean_bar(np.array([value(turn) for turn in revolutions(run)]))
 
 
-def measure(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> Measure:
+def measure(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> BarredNumber:
     """Return a value of a run's settled part with an error; of a chaotic run by its revolutions."""
     kept = settled_part(run)
-    return Measure(value(kept), by_revolution(kept, value) if is_chaotic(run) else error)
+    return BarredNumber(value(kept), by_revolution(kept, value) if is_chaotic(run) else error)
 
 
-def peak(run: xr.Dataset, name: str, **where: str) -> Measure:
+def peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
     """Return a greatest value of a run with its error bar; where: its joint.
 
     Of a chaotic run the mean over revolutions of each one's greatest value, since that of the whole
@@ -127,13 +127,13 @@ def peak(run: xr.Dataset, name: str, **where: str) -> Measure:
     value, error = (
         float(run[n].sel(where)) for n in (f"{name}_mean", f"{name}_mean_standard_error")
     )
-    return Measure(value, float(sure(np.array(error), int(run["revolutions"]))))
+    return BarredNumber(value, float(sure(np.array(error), int(run["revolutions"]))))
 
 
-def metric(run: xr.Dataset, name: str, **where: str) -> Measure:
+def metric(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
     """Return a metric of a run with its error bar; where: its joint and axis."""
     value, error = (float(run[n].sel(where)) for n in (name, f"{name}_error"))
-    return Measure(value, error)
+    return BarredNumber(value, error)
 
 
 def series_error(run: xr.Dataset, name: str, values: np.ndarray, **where: str) -> float:
@@ -172,9 +172,9 @@ class Continuity:
 class Shares(NamedTuple):
     """The shares of crank angle of a `Continuity`, each with its error."""
 
-    apart: Measure
-    hit: Measure
-    energy_angle: Measure
+    apart: BarredNumber
+    hit: BarredNumber
+    energy_angle: BarredNumber
 
 
 class Evidence(NamedTuple):
@@ -240,7 +240,7 @@ def measured_shares(run: xr.Dataset, joint: str) -> Shares:
     else:
         errors = [apart_error(by, joint), hit_error(by, joint), angle_error(by, joint)]
     values = (getattr(found, name) for name in Shares._fields)
-    return Shares(*(Measure(*pair) for pair in zip(values, errors, strict=True)))
+    return Shares(*(BarredNumber(*pair) for pair in zip(values, errors, strict=True)))
 
 
 def apart_error(by: Evidence, joint: str) -> float:

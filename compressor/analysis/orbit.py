@@ -22,7 +22,7 @@ LEAST_RING = 12.0  # of the crank's frequency: below it a motion is the machine'
 
 
 @dataclass(frozen=True)
-class Course:
+class JournalMotion:
     """A journal's motion in its bearing after settling.
 
     `apart`: share of time without contact; `least`: least penetration (m) of the samples,
@@ -40,7 +40,7 @@ class Course:
     rings: float
 
 
-def course(run: xr.Dataset, joint: str) -> Course:
+def course(run: xr.Dataset, joint: str) -> JournalMotion:
     """Return the course of a joint with clearance, from a run with time series."""
     kept = settled_part(run)
     angle = np.degrees(kept["crank_angle"].values)
@@ -49,7 +49,7 @@ def course(run: xr.Dataset, joint: str) -> Course:
     depth = kept["penetration"].sel(joint=joint).values
     force = kept["contact_force"].sel(joint=joint, axis="x").values
     turns = turning_points(angle, force)
-    return Course(
+    return JournalMotion(
         joint,
         float(run["contact_loss_fraction"].sel(joint=joint)),
         float(depth.min()),

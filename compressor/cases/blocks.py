@@ -17,7 +17,7 @@ from compressor.cases.parameter import Problem, quote_value
 from compressor.cases.swept import (
     SAMPLED,
     NoComparison,
-    Sweep,
+    SweptKey,
     Test,
     comparison,
     design,
@@ -39,7 +39,7 @@ class Draft:
     leaves: Leaves
     problems: list[FileProblem]
     fixed: dict[str, Node] = field(default_factory=dict)
-    sweeps: dict[str, Sweep] = field(default_factory=dict)
+    sweeps: dict[str, SweptKey] = field(default_factory=dict)
     factors: list[tuple[str, ...]] = field(default_factory=list)  # keys that advance together
     samples: int = 0
     seed: int = 0
@@ -105,7 +105,7 @@ class Draft:
             seen.add(values)
         return rows
 
-    def checked(self, sweep: Sweep, nodes: Sequence[Node]) -> list[Node]:
+    def checked(self, sweep: SweptKey, nodes: Sequence[Node]) -> list[Node]:
         """Return the valid ones of a key's values; of wrong ones that were made, one is told."""
         good = []
         for node in nodes:

@@ -48,7 +48,7 @@ MODEL = f"{MODEL_VERSION}.{REVISION}"  # which results are stored with
 SUSPECT = re.compile(rb'"(drive|lubricant|rod|guide|body)\\?": |lugre|"signals\\?": true')
 
 
-class Change(NamedTuple):
+class Revision(NamedTuple):
     """What a revision has changed, and for which cases, by their nested values."""
 
     revision: int
@@ -75,12 +75,12 @@ def _has_no_lugre_friction(values: Mapping[str, Any]) -> bool:
 
 
 CHANGES = (
-    Change(1, "times, torques and forces of a drive", lambda values: "drive" in values),
-    Change(1, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
-    Change(1, "losses of an elastic rod", lambda values: "rod" in values),
-    Change(1, "damping of the crosshead in its guide", _restitutes),
-    Change(1, "LuGre friction without a coefficient", _has_no_lugre_friction),
-    Change(
+    Revision(1, "times, torques and forces of a drive", lambda values: "drive" in values),
+    Revision(1, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
+    Revision(1, "losses of an elastic rod", lambda values: "rod" in values),
+    Revision(1, "damping of the crosshead in its guide", _restitutes),
+    Revision(1, "LuGre friction without a coefficient", _has_no_lugre_friction),
+    Revision(
         1, "moment on the guide",
         lambda values: ("body" in values or bool(values["output"].get("signals")))
         and _rubs_on_the_pin(values),

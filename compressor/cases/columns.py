@@ -1,6 +1,6 @@
 """Numbers by the column: one for each job of a sweep, so that one call works on all jobs.
 
-A `Column` stands where a case has a number. What is written for one case, such as a rule of
+A `ArrayValue` stands where a case has a number. What is written for one case, such as a rule of
 `conflicts`, then works on all at once, by numpy. Where a condition holds for some jobs alone, it
 raises `Mixed`, and the jobs are cut in two (`places_where`).
 """
@@ -23,7 +23,7 @@ class Mixed(Exception):
 
 
 def _numbers(value: Any) -> Any:
-    return value.numbers if isinstance(value, Column) else value
+    return value.numbers if isinstance(value, ArrayValue) else value
 
 
 def _by(operation: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -31,15 +31,15 @@ def _by(operation: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Calla
     Python.
     """
 
-    def direct(self: "Column", other: Any) -> Any:
-        if not isinstance(other, Column | int | float | complex):
+    def direct(self: "ArrayValue", other: Any) -> Any:
+        if not isinstance(other, ArrayValue | int | float | complex):
             return NotImplemented
-        return Column(operation(self.numbers, _numbers(other)))
+        return ArrayValue(operation(self.numbers, _numbers(other)))
 
-    def reflected(self: "Column", other: Any) -> Any:
+    def reflected(self: "ArrayValue", other: Any) -> Any:
         if not isinstance(other, int | float | complex):
             return NotImplemented
-        return Column(operation(other, self.numbers))
+        return ArrayValue(operation(other, self.numbers))
 
     return direct, reflected
 
@@ -50,7 +50,7 @@ def _power(base: Any, exponent: Any) -> np.ndarray:
     return np.array(list(map(pow, bases.tolist(), exponents.tolist())))
 
 
-class Column:
+class ArrayValue:
     """The numbers of some jobs, (jobs,), which calculate and compare as one number does.
 
     A comparison gives a column of truths; its own truth is theirs where all are equal, and raises
@@ -72,11 +72,11 @@ class Column:
             return False
         raise Mixed(holds)
 
-    def __round__(self) -> "Column":
-        return Column(np.rint(self.numbers).astype(np.int64))
+    def __round__(self) -> "ArrayValue":
+        return ArrayValue(np.rint(self.numbers).astype(np.int64))
 
-    def __abs__(self) -> "Column":
-        return Column(np.abs(self.numbers))
+    def __abs__(self) -> "ArrayValue":
+        return ArrayValue(np.abs(self.numbers))
 
     __add__, __radd__ = _by(operator.add)
     __sub__, __rsub__ = _by(operator.sub)

@@ -14,7 +14,7 @@ from compressor.cases.yaml_reader import Node
 if TYPE_CHECKING:
     import numpy as np
 
-    from compressor.cases.columns import Column
+    from compressor.cases.columns import ArrayValue
 
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 Row = tuple[Node, ...]
@@ -28,13 +28,13 @@ class Alike(NamedTuple):
 
     places: "np.ndarray"
     chosen: dict[str, Node]
-    columns: "dict[str, Column]"
+    columns: "dict[str, ArrayValue]"
 
     def some(self, places: "np.ndarray") -> dict[str, Node]:
         """Return the values of some of them by dotted key, columns where they may differ."""
-        from compressor.cases.columns import Column
+        from compressor.cases.columns import ArrayValue
 
-        some = {key: Column(column.numbers[places]) for key, column in self.columns.items()}
+        some = {key: ArrayValue(column.numbers[places]) for key, column in self.columns.items()}
         return self.chosen | {key: replace(self.chosen[key], value=c) for key, c in some.items()}
 
 
@@ -69,7 +69,7 @@ class Block:
         """Return all jobs, those together that differ in numbers alone."""
         import numpy as np
 
-        from compressor.cases.columns import Column, alike, is_numeric
+        from compressor.cases.columns import ArrayValue, alike, is_numeric
 
         if not len(self.kept):
             return []
@@ -83,7 +83,7 @@ class Block:
         for places in alike(axes.values(), len(self.kept)):
             chosen = self.chosen(self.kept[int(places[0])])
             columns = {
-                key: Column(values[axes[key][1][places]])
+                key: ArrayValue(values[axes[key][1][places]])
                 for key, values in numeric.items()
                 if key in chosen
             }

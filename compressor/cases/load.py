@@ -43,7 +43,7 @@ from compressor.cases.yaml_reader import (
 )
 
 if TYPE_CHECKING:
-    from compressor.cases.sheet import Sheet
+    from compressor.cases.sheet import CaseBatch
 
 Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it
 
@@ -71,7 +71,7 @@ class KeysRead:
             for sheet in cases.sheets:
                 self._note(cases.block_of(int(sheet.numbers[0])).leaves, sheet)
 
-    def _note(self, leaves: Leaves, sheet: "Sheet") -> None:
+    def _note(self, leaves: Leaves, sheet: "CaseBatch") -> None:
         for key, node in leaves.values.items():
             group = key.partition(".")[0]
             where = node.key_place, group if group in SHORTHANDS else key
@@ -86,7 +86,7 @@ class KeysRead:
                 place = _place_of(unread.key, node, leaves)
                 self.unread[where] = FileProblem(place, unread.key, unread.message)
 
-    def _missing(self, key: str, sheet: "Sheet") -> tuple[str, Reader] | None:
+    def _missing(self, key: str, sheet: "CaseBatch") -> tuple[str, Reader] | None:
         """Return the condition that keeps a sheet's jobs from reading a key; None if one reads."""
         needed = conditions(key)
 

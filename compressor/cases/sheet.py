@@ -15,7 +15,7 @@ import numpy as np
 
 from compressor.cases.case import Case, canonical, digest, identity, parts_of
 from compressor.cases.checks import SHORTHANDS, single, stands_for, value_of
-from compressor.cases.columns import Column, Mixed, places_where
+from compressor.cases.columns import ArrayValue, Mixed, places_where
 from compressor.cases.combinations import Alike
 from compressor.cases.conflicts import RULES
 from compressor.cases.keys import nest_values
@@ -24,10 +24,10 @@ HELD = re.compile(r'"@(\d+)"')  # where a column stands in a text
 
 
 @dataclass(frozen=True)
-class Sheet:
+class CaseBatch:
     """Some jobs of a study: `numbers` among them, (m,), and their case, with the keys given.
 
-    The case has a `Column` wherever they may differ.
+    The case has a `ArrayValue` wherever they may differ.
     """
 
     numbers: np.ndarray
@@ -35,14 +35,14 @@ class Sheet:
     given: frozenset[str]
 
     @classmethod
-    def of(cls, name: str, jobs: Alike, before: int) -> "Sheet":
+    def of(cls, name: str, jobs: Alike, before: int) -> "CaseBatch":
         """Return the sheet of jobs of a block, `before` which the study has others; `name`: the
         study's.
 
         Raises CaseError where values do not fit that all jobs share.
         """
         parts, given = parts_of(nest_values(jobs.chosen) | {"name": name})
-        changes: dict[str, dict[str, Column]] = {}
+        changes: dict[str, dict[str, ArrayValue]] = {}
         for key, column in jobs.columns.items():
             for part in stands_for(key) or (key,):
                 group, _, inner = part.rpartition(".")
@@ -55,12 +55,12 @@ class Sheet:
         return len(self.numbers)
 
     @cached_property
-    def _columns(self) -> list[tuple[str, dict[str, Column]]]:
+    def _columns(self) -> list[tuple[str, dict[str, ArrayValue]]]:
         """The columns of each group that has some."""
         found = []
         for item in fields(Case):
             inner = getattr(vars(self.case)[item.name], "__dict__", {})
-            columns = {key: value for key, value in inner.items() if isinstance(value, Column)}
+            columns = {key: value for key, value in inner.items() if isinstance(value, ArrayValue)}
             found += [(item.name, columns)] if columns else []
         return found
 
@@ -89,7 +89,7 @@ class Sheet:
         for rule in RULES:
 
             def speaks(places: np.ndarray, rule: Any = rule) -> bool:
-                some = self._picked(lambda numbers: Column(numbers[places]))
+                some = self._picked(lambda numbers: ArrayValue(numbers[places]))
                 return any(True for _ in rule(some, self.given))
 
             try:
@@ -102,15 +102,15 @@ class Sheet:
         """Return whether a condition holds for any of the jobs."""
 
         def holds(places: np.ndarray) -> bool:
-            return bool(condition(self._picked(lambda numbers: Column(numbers[places]))))
+            return bool(condition(self._picked(lambda numbers: ArrayValue(numbers[places]))))
 
         return bool(places_where(holds, len(self)).any())
 
     def keys(self) -> list[str]:
         """Return the keys of the jobs: of all from one text, in which the numbers change."""
-        columns: list[Column] = []
+        columns: list[ArrayValue] = []
 
-        def held(value: Column) -> str:
+        def held(value: ArrayValue) -> str:
             columns.append(value)
             return f"@{len(columns) - 1}"
 
@@ -133,4 +133,4 @@ class Sheet:
             rows = zip(*(self.values(part) for part in stands_for(key)), strict=True)
             return [single(size for size in sizes if size > 0) for sizes in rows]
         value = value_of(self.case, key)
-        return value.numbers.tolist() if isinstance(value, Column) else [value] * len(self)
+        return value.numbers.tolist() if isinstance(value, ArrayValue) else [value] * len(self)

@@ -18,7 +18,7 @@ from compressor.cases.yaml_reader import Node
 if TYPE_CHECKING:
     import numpy as np
 
-    from compressor.cases.sheet import Sheet
+    from compressor.cases.sheet import CaseBatch
 
 Told = Callable[[str, int, int], object]  # of a study: its name, cases read, cases in all
 
@@ -84,7 +84,7 @@ class Study:
 class Cases(Sequence[Case]):
     """The cases of blocks one after the other, each built when it is asked for.
 
-    Jobs that differ in numbers alone are one `Sheet`, which is made and checked at once.
+    Jobs that differ in numbers alone are one `CaseBatch`, which is made and checked at once.
     """
 
     def __init__(self, name: str, parts: Sequence[Block]):
@@ -110,13 +110,13 @@ class Cases(Sequence[Case]):
         return made
 
     @cached_property
-    def sheets(self) -> "list[Sheet]":
+    def sheets(self) -> "list[CaseBatch]":
         """All cases. Raises CaseError where fixed values of a block do not fit."""
-        from compressor.cases.sheet import Sheet
+        from compressor.cases.sheet import CaseBatch
 
         found, before = [], 0
         for part in self.parts:
-            found += [Sheet.of(self.name, jobs, before) for jobs in part.alike()]
+            found += [CaseBatch.of(self.name, jobs, before) for jobs in part.alike()]
             before += len(part.kept)
         return found
 
@@ -153,7 +153,7 @@ class Cases(Sequence[Case]):
         """Return the value of a dotted key in each case, as `value_of` gives it."""
         return self._each(lambda sheet: sheet.values(key))
 
-    def _each(self, of: "Callable[[Sheet], Sequence[Any]]", told: Told = unheard) -> list[Any]:
+    def _each(self, of: "Callable[[CaseBatch], Sequence[Any]]", told: Told = unheard) -> list[Any]:
         """Return what a function gives for the jobs of each sheet, of all cases in their order."""
         found: list[Any] = [None] * len(self)
         done = 0
@@ -196,7 +196,7 @@ class Cases(Sequence[Case]):
         return [number for number, held in enumerate(holds) if held]
 
 
-class Jobs(Protocol):
+class StudyJobs(Protocol):
     """What a study tells of its jobs, whether read from a case file or from a store."""
 
     @property
@@ -207,7 +207,7 @@ class Jobs(Protocol):
     def jobs(self) -> int: ...
 
 
-def points(study: Jobs) -> Iterator[dict[str, Any]]:
+def points(study: StudyJobs) -> Iterator[dict[str, Any]]:
     """Yield the swept values that each job has, by dotted key, in the order of the jobs.
 
     What is swept in other blocks only is left out.

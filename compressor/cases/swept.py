@@ -43,7 +43,7 @@ Spread = Callable[[float], float]  # of a coordinate in [0, 1)
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweptKey:
     """One swept key. A list has `nodes`; a sampled key's values come from a design by `spread`."""
 
     key: str
@@ -73,7 +73,7 @@ def is_swept(key: str, node: Node) -> bool:
     return key != "contact.materials" or any(isinstance(n.value, list) for n in node.value)
 
 
-def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> Sweep | None:
+def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> SweptKey | None:
     """Return how a key is swept, or None, what is wrong having joined `problems`."""
 
     def refuse(message: str, at: Node = node) -> None:
@@ -83,7 +83,7 @@ def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> Sweep | None:
         if not node.value:
             refuse("is an empty list")
             return None
-        return Sweep(key, node, "list", len(node.value))
+        return SweptKey(key, node, "list", len(node.value))
     log = node.value.get("log")
     words = [word for word in node.value if word != "log"]
     if len(words) != 1 or words[0] not in FORMS:
@@ -123,7 +123,7 @@ def _is_finite(value: object) -> bool:
 def _sweep_range(
     key: str, node: Node, word: str, numbers: list[Fraction], log: bool,
     refuse: Callable[..., None],
-) -> Sweep | None:  # fmt: skip
+) -> SweptKey | None:  # fmt: skip
     """Return the sweep between two numbers, if both are good values of the key."""
     first, last, *more = numbers
     count, message = 0, ""
@@ -152,9 +152,9 @@ def _sweep_range(
         spread = _spread(float(first), float(last), log)
         row = row_of(key)
         if row and row.kind == "integer":
-            return Sweep(key, node, word, 0, spread=lambda share: round(spread(share)))
-        return Sweep(key, node, word, 0, spread=spread)
-    return Sweep(key, node, word, count, make=between(word, first, last, count))
+            return SweptKey(key, node, word, 0, spread=lambda share: round(spread(share)))
+        return SweptKey(key, node, word, 0, spread=spread)
+    return SweptKey(key, node, word, count, make=between(word, first, last, count))
 
 
 def between(word: str, first: Fraction, last: Fraction, count: int) -> Make:

@@ -13,7 +13,7 @@ from compressor.physics.loads import (
     segments,
     static_load,
 )
-from compressor.physics.march import Status, Work, march, march_twins, new_walker, new_work
+from compressor.physics.march import Status, WorkArrays, march, march_twins, new_walker, new_work
 from compressor.physics.mechanism_rows import STALLED, wear_all
 from compressor.physics.observe import (
     COLUMNS,
@@ -30,7 +30,7 @@ from compressor.physics.record import (
     new_record,
     state_names,
 )
-from compressor.physics.runge_kutta import FLOWS, Pair
+from compressor.physics.runge_kutta import FLOWS, RungeKuttaPair
 from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
 from compressor.physics.systems import (
     beyond_model,

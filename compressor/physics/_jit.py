@@ -173,7 +173,7 @@ def dispatch_on_record(least: int, special: Function, usual: Function) -> Functi
     return chosen
 
 
-def plain(function: Function) -> Function:
+def uncompiled(function: Function) -> Function:
     """Return the Python function itself: for a single call, which does not wait for machine code.
 
     What it calls is compiled all the same.

@@ -159,7 +159,7 @@ def carried_by(joint, y, p):
     return 0.0, 0.0
 
 
-class Contact(NamedTuple):
+class ContactState(NamedTuple):
     """One joint's contact: SI, forces on the rod."""
 
     fx: float
@@ -174,7 +174,7 @@ class Contact(NamedTuple):
     unclamped: float  # normal force before the clamp at zero
 
 
-NO_CONTACT = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_CONTACT = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inline_numba
@@ -183,15 +183,15 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
 
     eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); spins of
     journal and rod (rad/s, counter-clockwise); bearing: the joint's journal radius (m), clearance
-    (m) and stiffness (N/m^p); carried: as by `carried_by`. Returns a `Contact`; one contact point
-    serves both bodies, so that angular momentum balances. Concentric circles exert no force.
+    (m) and stiffness (N/m^p); carried: as by `carried_by`. Returns a `ContactState`; one contact
+    point serves both bodies, so that angular momentum balances. Concentric circles exert no force.
     """
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, stiffness = bearing
     distance = square_root(fma(ex, ex, ey * ey))
     penetration = distance - clearance
     if distance == 0.0:
-        return Contact(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0)
+        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0)
     per_distance = 1.0 / distance
     nx = ex * per_distance
     ny = ey * per_distance
@@ -209,7 +209,9 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
     fx = fma(normal, nx, friction * ny)
     fy = fma(normal, ny, -(friction * nx))
     moment = -bore * friction
-    return Contact(fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped)
+    return ContactState(
+        fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped
+    )
 
 
 @inline_llvm

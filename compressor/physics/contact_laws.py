@@ -27,7 +27,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import fma, inline_llvm, inline_numba, jit, plain, square_root
+from compressor.physics._jit import fma, inline_llvm, inline_numba, jit, square_root, uncompiled
 
 FLATTEST = 1.25  # of ln(4 S c / F) - 1: from there on Johnson's force goes on along its tangent
 JOHNSON_DEEPEST = 0.5  # of the clearance: up to which the law is meant, before that
@@ -320,7 +320,7 @@ class Power:
 
     def damping(self, depth: float) -> float:
         """Return the damping coefficient (N s/m) at a penetration (m)."""
-        return self.full_damping * plain(rise)(depth * self.per_full_damping)
+        return self.full_damping * uncompiled(rise)(depth * self.per_full_damping)
 
     def energy(self, depth: float) -> float:
         """Return the energy (J) that is stored at a penetration (m)."""

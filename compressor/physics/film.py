@@ -34,7 +34,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import jit, plain
+from compressor.physics._jit import jit, uncompiled
 from compressor.physics.contact_laws import rise
 
 CENTRED = 0.1
@@ -107,8 +107,8 @@ def film_constants(ratio, share, number):
         quotient = [number(name, one, ratio) / each[name](one, ratio) for one in eps]
         fit = np.polynomial.Chebyshev.fit(eps, quotient, count - 1)
         found += fit.convert(kind=np.polynomial.Polynomial).coef.tolist()
-    wall = plain(bounded_eccentricity)(1.0, share)
-    return (*found, plain(squeeze_number)(wall, ratio, np.array(found)))
+    wall = uncompiled(bounded_eccentricity)(1.0, share)
+    return (*found, uncompiled(squeeze_number)(wall, ratio, np.array(found)))
 
 
 @jit

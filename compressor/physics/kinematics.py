@@ -18,7 +18,7 @@ S3, S5, S7, S9 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880
 C4, C6, C8 = 1 / 24, -1 / 720, 1 / 40320
 
 
-class Motion(NamedTuple):
+class IdealMotion(NamedTuple):
     """The ideal motion at one time: rad, m and s; x counts from the crank centre."""
 
     cos_theta: float
@@ -34,14 +34,14 @@ class Motion(NamedTuple):
 
 @jit
 def ideal(t, p):
-    """Return the ideal `Motion` at time t (s): Eq. 1 exactly, with its derivatives."""
+    """Return the ideal `IdealMotion` at time t (s): Eq. 1 exactly, with its derivatives."""
     theta = p.omega * t
     return ideal_at(math.cos(theta), math.sin(theta), p)
 
 
 @inline_numba
 def ideal_at(cos_theta, sin_theta, p):
-    """Return the ideal `Motion` at a crank angle given by its cosine and sine."""
+    """Return the ideal `IdealMotion` at a crank angle given by its cosine and sine."""
     ratio = p.crank_ratio
     sin_phi = ratio * sin_theta
     cos_phi = square_root((1.0 - sin_phi) * (1.0 + sin_phi))
@@ -53,7 +53,7 @@ def ideal_at(cos_theta, sin_theta, p):
     x = p.crank_radius * cos_theta + reach
     v = -crank * sin_theta - p.rod_length * sin_phi * rate
     a = -crank * p.omega * cos_theta - reach * rate * rate - p.rod_length * sin_phi * spin_up
-    return Motion(cos_theta, sin_theta, sin_phi, cos_phi, rate, spin_up, x, v, a)
+    return IdealMotion(cos_theta, sin_theta, sin_phi, cos_phi, rate, spin_up, x, v, a)
 
 
 @inline_numba
@@ -79,7 +79,7 @@ def crank_direction(t, p):
 
 @inline_numba
 def ideal_after(base, span, p):
-    """Return the ideal `Motion` a time (s) after the crank angle whose (cosine, sine) is the base.
+    """Return the `IdealMotion` a time (s) after the crank angle whose (cosine, sine) is the base.
 
     A step turns the crank by little, so that these need no sine and cosine of their own.
     """

@@ -67,7 +67,7 @@ from compressor.physics.lane_steps import (
     new_lanes,
 )  # fmt: skip
 from compressor.physics.lane_tally import control, judge, judge_closer, move_on, tally_lanes
-from compressor.physics.march import DONE, RUNNING, WALKER, Work, march, new_work
+from compressor.physics.march import DONE, RUNNING, WALKER, WorkArrays, march, new_work
 from compressor.physics.observe import ACCELERATION, CRANK_POWER
 from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import FLOWS, STAGES, weights_at
@@ -96,7 +96,7 @@ class Runs(NamedTuple):
     phases: np.ndarray
     times: np.ndarray
     states: np.ndarray  # (samples, n)
-    works: Work  # each array with a first axis more, (m,)
+    works: WorkArrays  # each array with a first axis more, (m,)
 
 
 @inline_numba
@@ -246,7 +246,7 @@ def sample_lane(W, j, runs, job, work):
 def work_of(runs, job):
     """Return what `march` works in for a run."""
     w = runs.works
-    return Work(
+    return WorkArrays(
         w.k[job], w.new[job], w.column[job], w.jacobian[job], w.dense[job], w.weights[job],
         w.y[job], w.rows[job], w.apart[job], w.row[job],
     )  # fmt: skip
@@ -378,5 +378,5 @@ def gather_runs(runs: Sequence[Run]) -> Runs:
         np.concatenate([run.edges for run in runs]), np.concatenate([run.phases for run in runs]),
         np.concatenate([run.times for run in runs]),
         np.full((counts[:, 1].sum(), n), math.nan),
-        Work(*(np.zeros((m, *array.shape)) for array in new_work(n))),
+        WorkArrays(*(np.zeros((m, *array.shape)) for array in new_work(n))),
     )  # fmt: skip

@@ -19,7 +19,7 @@ from compressor.physics.march import NODES
 from compressor.physics.motion import deviating, evaluate
 from compressor.physics.observe import energies, joint_forces, observed_columns, powers
 from compressor.physics.record import RECORD, Load
-from compressor.physics.runge_kutta import STAGES, A, C, E, Pair
+from compressor.physics.runge_kutta import STAGES, A, C, E, RungeKuttaPair
 
 LANES = 16
 MOST = 8  # numbers of a motion
@@ -84,7 +84,7 @@ def new_lanes():
     return raw[skip : skip + TOTAL * LANES]
 
 
-PAIR, IMPACT = int(Pair.TSIT5), int(Law.IMPACT)
+PAIR, IMPACT = int(RungeKuttaPair.TSIT5), int(Law.IMPACT)
 NO_CORNERS = (0.0, 0.0, 0.0)  # of the load: a lane ends at each
 STEP_WEIGHTS, FRACTIONS, ERROR_WEIGHTS = A[PAIR], C[PAIR], E[PAIR]
 NODE_WEIGHTS = ALL_NODE_WEIGHTS[PAIR]

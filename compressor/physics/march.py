@@ -42,7 +42,7 @@ from compressor.physics.runge_kutta import (
     STAGES,
     A,
     P,
-    Pair,
+    RungeKuttaPair,
     combine,
     error_norm,
     extend,
@@ -63,8 +63,8 @@ from compressor.physics.step_control import (
 from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,
-    gauge,
-    glance,
+    observe_contact,
+    observe_with_energy,
     write_eccentricities,
 )
 from compressor.physics.tally import (
@@ -79,7 +79,9 @@ NODES, WEIGHTS = lobatto(5)  # at which a step is observed
 COARSE_WEIGHTS = np.zeros(NODES.size)  # at its ends and in its middle alone
 COARSE_WEIGHTS[::2] = lobatto(3)[1]
 # of the stages of each explicit pair, at these nodes: (pair, node, stage)
-NODE_WEIGHTS = np.array([[P[pair] @ s ** np.arange(1, 5) for s in NODES] for pair in Pair])
+NODE_WEIGHTS = np.array(
+    [[P[pair] @ s ** np.arange(1, 5) for s in NODES] for pair in RungeKuttaPair]
+)
 NODE_WEIGHTS[:, -1] = A[:, -1]
 
 
@@ -133,7 +135,7 @@ WALKER = np.dtype(
 )
 
 
-class Work(NamedTuple):
+class WorkArrays(NamedTuple):
     """Arrays that a march works in; between calls the first row of `k` and `row` carry over."""
 
     k: np.ndarray  # (7, n + 4): stages of the explicit pair, or increments of the stiff partner
@@ -162,7 +164,7 @@ def new_walker(mode):
 def new_work(n):
     """Return the arrays for a motion of n numbers (positions and rates)."""
     size = n + FLOWS
-    return Work(
+    return WorkArrays(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
         np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
         np.zeros(2), np.zeros(COLUMNS),
@@ -202,7 +204,7 @@ rosenbrock_extend = rosenbrock.extend
 
 
 @inline_llvm
-def attempt(w, base, h, z, work, atol, size, phase, p):
+def try_step(w, base, h, z, work, atol, size, phase, p):
     """Take a step of length h by the walker's present method; returns its error norm."""
     if w.stiff:
         u = work.k[1:]
@@ -254,7 +256,7 @@ def may_touch(rows, p):
 
 
 @inline_llvm
-def look_at_step(w, base, h, z, work, phase, p, tally):
+def observe_step(w, base, h, z, work, phase, p, tally):
     """Observe the step's interpolant at its nodes; returns every which one.
 
     An explicit step is looked at in its middle and at its ends, where its last stage has gauged
@@ -265,13 +267,13 @@ def look_at_step(w, base, h, z, work, phase, p, tally):
     n = work.y.size
     if w.stiff:
         rosenbrock_extend(z, work.new, work.k[1:], work.dense)
-        gauge(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
+        observe_with_energy(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
     w.laid = w.stiff
     if w.observed:  # the last step's end is this step's begin
         for j in range(ACCELERATION, COLUMNS):
             work.rows[0, j] = work.row[j]
     else:
-        glance(ideal(w.t, p), z[:n], phase, p, work.rows[0])
+        observe_contact(ideal(w.t, p), z[:n], phase, p, work.rows[0])
     every = 1 if w.stiff else MIDDLE
     for i in INWARD:
         if w.stiff:
@@ -280,7 +282,7 @@ def look_at_step(w, base, h, z, work, phase, p, tally):
             combine(NODE_WEIGHTS[w.pair, i], h, z, work.k, work.y)
         else:
             break
-        glance(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
+        observe_contact(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
         if i == MIDDLE and not w.stiff:
             if may_change(work.rows, p):
                 every = 1
@@ -354,7 +356,7 @@ def measure_apart(w, h, every, work, phase, p):
 
 
 @inline_llvm
-def take_in(w, h, every, work, phase, p, tally):
+def accumulate_metrics(w, h, every, work, phase, p, tally):
     """Tally an accepted step that has been looked at, and audit its energy."""
     last = NODES.size - 1
     for j in range(ACCELERATION, COLUMNS):
@@ -370,7 +372,7 @@ def take_in(w, h, every, work, phase, p, tally):
 
 
 @inline_llvm
-def land(w, h, work, phase, p, tally):
+def finish_at_event(w, h, work, phase, p, tally):
     """Note that a step of length h has ended on an onset; whether joints carry new speeds."""
     w.landing = 0.0
     w.landed = 1
@@ -379,7 +381,7 @@ def land(w, h, work, phase, p, tally):
 
 
 @jit
-def finite(new):
+def is_finite(new):
     """Return whether every number of a state is finite."""
     total = 0.0
     for i in range(new.size):
@@ -388,7 +390,7 @@ def finite(new):
 
 
 @inline_llvm
-def advance(w, z, work, reached, fresh, at_edge, segments):
+def accept_step(w, z, work, reached, fresh, at_edge, segments):
     """Move the walker to the end of the step that was taken, and into the next segment.
 
     fresh: whether its last stage is not the next step's first.
@@ -411,7 +413,7 @@ def stop_beyond(w, z, tally, p):
     """Stop a walker whose motion has left what the model describes."""
     if tally.deepest > w.deepest:
         w.status = PENETRATION_IMPLAUSIBLE
-    elif not finite(z):
+    elif not is_finite(z):
         w.status = NON_FINITE
     elif beyond_model(z, p):
         w.status = BEYOND_MODEL
@@ -426,7 +428,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
     phases: the load's segments; times, states: output grid (m,) and (m, n); tally: gathers
     metrics. z, w, work, states and tally are written.
     """
-    work = Work(
+    work = WorkArrays(
         without_refcount(work.k), without_refcount(work.new), without_refcount(work.column),
         without_refcount(work.jacobian), without_refcount(work.dense),
         without_refcount(work.weights), without_refcount(work.y), without_refcount(work.rows),
@@ -451,28 +453,28 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         if landing:
             h = w.landing
         base = crank_direction(w.t, p)
-        error = attempt(w, base, h, z, work, atol, size, phase, p)
+        error = try_step(w, base, h, z, work, atol, size, phase, p)
         if not landing:
             if not error <= 1.0:
                 refuse(w, h, error)
                 if w.h < LEAST_STEP * (w.t + 1.0 / p.omega):
-                    w.status = STEP_UNDERFLOW if finite(work.k[0]) else NON_FINITE
+                    w.status = STEP_UNDERFLOW if is_finite(work.k[0]) else NON_FINITE
                 continue
             longer = next_step_length(w, h, error)
             w.h = max(w.h, longer) if h < w.h else longer
-        every = look_at_step(w, base, h, z, work, phase, p, tally)
-        met = landing and land(w, h, work, phase, p, tally)
+        every = observe_step(w, base, h, z, work, phase, p, tally)
+        met = landing and finish_at_event(w, h, work, phase, p, tally)
         if not landing and onset_ahead(w, h, every, work, phase, p):
             continue
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h
-        take_in(w, h, every, work, phase, p, tally)
+        accumulate_metrics(w, h, every, work, phase, p, tally)
         wear_step(w, base, h, z, work, phase, p, tally)
         sample_grid(w, reached, h, z, work, times, states)
         w.taken = h
         was_stiff = w.stiff
         choose_method(w, h, z, work, size)
-        advance(w, z, work, reached, was_stiff or met, at_edge, phases.size)
+        accept_step(w, z, work, reached, was_stiff or met, at_edge, phases.size)
         if met:  # what is seen at t is not what the step saw at its end
             w.observed = 0
         stop_beyond(w, z, tally, p)
@@ -495,12 +497,12 @@ def separation(t, y, other, p, rows):
 
 
 @inline_llvm
-def follow(w, fellow, twin, work, atol, size, phase, p):
+def step_twin(w, fellow, twin, work, atol, size, phase, p):
     """Take the step that a walker took, from fellow.t on, in the twin's motion."""
     if fellow.fresh:
         derivative_with_flows(fellow.t, twin, phase, p, work.k[0])
     base = crank_direction(fellow.t, p)
-    attempt(fellow, base, w.taken, twin, work, atol, size, phase, p)
+    try_step(fellow, base, w.taken, twin, work, atol, size, phase, p)
     for i in range(twin.size):
         twin[i] = work.new[i]
         work.k[0, i] = work.k[STAGES - 1, i]
@@ -508,7 +510,7 @@ def follow(w, fellow, twin, work, atol, size, phase, p):
 
 
 @inline_llvm
-def meet(w, z, twin, work, phase, p):
+def match_contact_speeds(w, z, twin, work, phase, p):
     """Have the twin's contacts carry the speeds at which they meet where the first motion's do."""
     n = work.y.size
     for joint in range(2):
@@ -539,9 +541,9 @@ def march_twins(
         # a plain 1 would be a type of its own, for which numba compiles all of march again
         march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))
         if w.steps > steps:
-            follow(w, fellow, twin, twin_work, atol, size, phase, p)
+            step_twin(w, fellow, twin, twin_work, atol, size, phase, p)
             if has_chosen_laws(p) and w.landed:
-                meet(w, z, twin, twin_work, phase, p)
+                match_contact_speeds(w, z, twin, twin_work, phase, p)
             if not separation(w.t, z[:n], twin[:n], p, rows) <= far:
                 fellow.status = DONE
                 return

@@ -1,6 +1,6 @@
 """The general slider-crank: joints and guide with or without clearance, the rod elastic or rigid.
 
-One system for all combinations. The bodies' velocities (`Row`) are linear in the rates of the
+One system for all combinations. The bodies' velocities (`BodyRow`) are linear in the rates of the
 coordinates (`record.Coordinate`), with a matrix of eleven columns; what a case does not name is a
 column less. The equations of motion are the bodies' own, projected on the columns that are left
 (Jourdain's principle), so that the forces of ideal joints drop out; these follow afterwards.
@@ -18,7 +18,7 @@ the model of Simeon's slider-crank (IVP test set, "crank"; linear stiffness). Th
 displaced rod is spread evenly.
 
 Axes: u along the rod, (cos phi, -sin phi), and v across it, (sin phi, cos phi); the rod's spin is
-counter-clockwise, -phi'. Rows and columns of a mechanism's bodies: `mechanism.Row`.
+counter-clockwise, -phi'. Rows and columns of a mechanism's bodies: `mechanism.BodyRow`.
 
 The crosshead's guide: friction of an ideal one, contact of the four corners in one with play. The
 crosshead is a block about its pin, `guide_length` to either side along x and `guide_height` along
@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import fma, jit, square_root
-from compressor.physics.contact import NO_CONTACT, Contact, carried_by, joint_contact
+from compressor.physics.contact import NO_CONTACT, ContactState, carried_by, joint_contact
 from compressor.physics.contact_laws import power, rise
 from compressor.physics.film import film
 from compressor.physics.loads import piston_force
@@ -271,7 +271,7 @@ def corners(height, tilt, rates, p):
     return Guided(fx, fy, moment, stored, damped, rubbed, deepest)
 
 
-class Row(IntEnum):
+class BodyRow(IntEnum):
     """Velocities of the bodies, by which their inertia and forces are written."""
 
     CRANK = 0  # rad/s
@@ -284,7 +284,7 @@ class Row(IntEnum):
     CROSSHEAD_SPIN = 10
 
 
-ROWS, COORDINATES = len(Row) + MODES - 1, len(Coordinate)
+ROWS, COORDINATES = len(BodyRow) + MODES - 1, len(Coordinate)
 FIRST_MODE = int(Coordinate.BEND_1)
 STRETCH = int(Coordinate.STRETCH)
 
@@ -318,8 +318,8 @@ NO_FILM = Film(0.0, 0.0)
 class Joints(NamedTuple):
     """Contacts, guide and load, and the bores' spins: all forces that need no acceleration."""
 
-    big: Contact  # with the film's force and moment, where a joint has one
-    small: Contact
+    big: ContactState  # with the film's force and moment, where a joint has one
+    small: ContactState
     big_film: Film
     small_film: Film
     guide: Guided
@@ -408,11 +408,11 @@ def fill_bias(pose, rates, p, bias):
 
 @jit
 def oiled_contact(joint, contact, eccentricity, spins, p):
-    """Return a joint's `Contact` with its film's force and moment on the rod, and the `Film`."""
+    """Return a joint's `ContactState` with its film's force and moment, and the `Film`."""
     if p.viscosity == 0.0:
         return contact, NO_FILM
     fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
-    found = Contact(
+    found = ContactState(
         contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
         contact.penetration, contact.rate, contact.slip, contact.elastic, contact.unclamped,
     )  # fmt: skip
@@ -431,7 +431,7 @@ def bore_axes(slope, modes, pose, p):
 
 @jit
 def touching(joint, eccentricity, axes, spins, carried, p):
-    """Return a joint's `Contact`, with a round bore or a worn one."""
+    """Return a joint's `ContactState`, with a round bore or a worn one."""
     if p.sectors:
         return worn_contact(joint, eccentricity, axes, spins, carried, p)
     bearing = p.pin_radius[joint], p.clearance[joint], p.stiffness[joint]

@@ -10,7 +10,7 @@ import numpy as np
 
 from compressor.physics._jit import jit, square_root
 from compressor.physics.contact import friction_coefficient
-from compressor.physics.kinematics import Motion
+from compressor.physics.kinematics import IdealMotion
 from compressor.physics.linear import factorize_positive, substitute_positive
 from compressor.physics.mechanism import (
     ROWS,
@@ -49,7 +49,7 @@ class Reactions(NamedTuple):
 class Solved(NamedTuple):
     """A mechanism at one crank angle and state, with its accelerations; SI."""
 
-    motion: Motion  # ideal, of a steady crank
+    motion: IdealMotion  # ideal, of a steady crank
     pose: Pose
     joints: Joints
     reactions: Reactions

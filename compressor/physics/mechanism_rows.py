@@ -228,14 +228,14 @@ def derivative_and_gauge(motion, z, phase, p, out, row):
 
 
 @jit
-def glance(motion, y, phase, p, row):
-    """`observe.glance` of the mechanism."""
+def observe_contact(motion, y, phase, p, row):
+    """`observe.observe_contact` of the mechanism."""
     write_glanced(solve(motion, y, phase, p), p, row)
 
 
 @jit
-def gauge(motion, y, phase, p, row):
-    """`observe.gauge` of the mechanism."""
+def observe_with_energy(motion, y, phase, p, row):
+    """`observe.observe_with_energy` of the mechanism."""
     write_row(solve(motion, y, phase, p), p, row)
 
 

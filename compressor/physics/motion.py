@@ -17,13 +17,13 @@ from compressor.physics._jit import fma, inline_llvm, inline_numba, jit
 from compressor.physics.contact import (
     LUGRE,
     NO_CONTACT,
-    Contact,
+    ContactState,
     bristle_rate,
     carried_by,
     joint_contact,
 )
 from compressor.physics.contact_laws import has_chosen_laws
-from compressor.physics.kinematics import Motion, ideal, small_angle
+from compressor.physics.kinematics import IdealMotion, ideal, small_angle
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END as AT_BIG_END
 from compressor.physics.record import SMALL_END as AT_SMALL_END
@@ -195,11 +195,11 @@ def ideal_centre_acceleration(motion, p):
 class Instant(NamedTuple):
     """Everything the forces and accelerations at one time and state depend on, evaluated once."""
 
-    motion: Motion
+    motion: IdealMotion
     turn: Turn
     load: float
-    big: Contact
-    small: Contact
+    big: ContactState
+    small: ContactState
     a: float  # crosshead's acceleration
     spin_up: float  # second derivative of phi
     centre_x: float  # rod centre's acceleration; 0 unless it is an unknown of the scene
@@ -210,7 +210,7 @@ class Instant(NamedTuple):
 def evaluate(motion, y, phase, p):
     """Return the `Instant` of a state around the ideal motion, in the load's phase.
 
-    motion: `Motion` at the time; y: zeros (4) in the ideal scene.
+    motion: `IdealMotion` at the time; y: zeros (4) in the ideal scene.
     """
     n = p.freedoms
     turn = rod_turn(motion, y[n - 1], y[2 * n - 1], p)
@@ -288,7 +288,7 @@ def derivative(t, y, phase, p, out):
 
 @jit
 def contact_at(joint, t, y, phase, p):
-    """Return a joint's `Contact` at a time and state."""
+    """Return a joint's `ContactState` at a time and state."""
     now = evaluate(ideal(t, p), y, phase, p)
     return now.big if joint == 0 else now.small
 

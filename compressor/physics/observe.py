@@ -35,7 +35,7 @@ class Column(IntEnum):
     ROD_ANGLE = 2
     PISTON_FORCE = 3
     ECCENTRICITY = 4  # four: (joint, axis)
-    ACCELERATION = 8  # from here on: what `gauge` writes
+    ACCELERATION = 8  # from here on: what `observe_with_energy` writes
     FORCE = 9  # four: (joint, axis)
     FORCE_SIZE = 13  # two
     DEVIATION = 15  # of the acceleration from the ideal motion
@@ -272,14 +272,14 @@ def observe(t, y, phase, p, row):
 
 
 @inline_llvm
-def glance(motion, y, phase, p, row):
+def observe_contact(motion, y, phase, p, row):
     """The columns from ACCELERATION to GUIDE_MOMENT: what a step is tallied by within its ends."""
     now = evaluate(motion, y, phase, p)
     write_glanced(now, y, joint_forces(now, y, p), p, row)
 
 
 @inline_llvm
-def gauge(motion, y, phase, p, row):
+def observe_with_energy(motion, y, phase, p, row):
     """The columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     now = evaluate(motion, y, phase, p)
     write_gauged(now, y, joint_forces(now, y, p), p, row)
@@ -310,7 +310,7 @@ def write_flowing_derivative(motion, z, phase, p, out):
 
 @inline_llvm
 def derivative_and_gauge(motion, z, phase, p, out, row):
-    """`derivative_with_flows` and `gauge` from one evaluation."""
+    """`derivative_with_flows` and `observe_with_energy` from one evaluation."""
     n = z.size - 4
     y = z[:n]
     now = evaluate(motion, y, phase, p)

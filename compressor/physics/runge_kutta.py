@@ -19,7 +19,7 @@ FLOWS = 4
 LANES = 4  # sums are taken four unknowns at a time, which a processor does at once
 
 
-class Pair(IntEnum):
+class RungeKuttaPair(IntEnum):
     """The explicit pairs: rows of the tables below."""
 
     DOPRI5 = 0

@@ -11,9 +11,9 @@ from compressor.physics.motion import derivative as scene_derivative
 from compressor.physics.motion import start as scene_start
 from compressor.physics.observe import derivative_and_gauge as scene_derivative_and_gauge
 from compressor.physics.observe import derivative_with_flows as scene_derivative_with_flows
-from compressor.physics.observe import gauge as scene_gauge
-from compressor.physics.observe import glance as scene_glance
 from compressor.physics.observe import observe_all as scene_observe_all
+from compressor.physics.observe import observe_contact as scene_glance
+from compressor.physics.observe import observe_with_energy as scene_gauge
 from compressor.physics.observe import write_eccentricities as scene_eccentricities
 from compressor.physics.observe import write_flowing_derivative as scene_flowing_derivative
 from compressor.physics.record import MECHANISM
@@ -36,8 +36,8 @@ write_flowing_derivative = dispatch_on_record(
 derivative_and_gauge = dispatch_on_record(
     MECHANISM, mechanism_rows.derivative_and_gauge, scene_derivative_and_gauge
 )
-glance = dispatch_on_record(MECHANISM, mechanism_rows.glance, scene_glance)
-gauge = dispatch_on_record(MECHANISM, mechanism_rows.gauge, scene_gauge)
+observe_contact = dispatch_on_record(MECHANISM, mechanism_rows.observe_contact, scene_glance)
+observe_with_energy = dispatch_on_record(MECHANISM, mechanism_rows.observe_with_energy, scene_gauge)
 observe_all = dispatch_on_record(MECHANISM, mechanism_rows.observe_all, scene_observe_all)
 contact_at = dispatch_on_record(MECHANISM, mechanism_rows.contact_at, scene_contact_at)
 write_eccentricities = dispatch_on_record(

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from compressor.physics._jit import jit, square_root
-from compressor.physics.contact import Contact, friction_coefficient
+from compressor.physics.contact import ContactState, friction_coefficient
 from compressor.physics.contact_laws import in_contact, normal_force
 from compressor.physics.record import MOST_SECTORS
 
@@ -163,7 +163,7 @@ def at_the_wall(joint, contact, eccentricity, axes, rod_spin, p):
     overlap = np.empty(p.sectors)
     most = overlaps(ex, ey, joint, p, overlap)
     x, y = nearest_wall(overlap, most, p)
-    return Contact(
+    return ContactState(
         contact.fx, contact.fy, contact.moment, contact.normal, contact.friction, most,
         x * vx + y * vy, contact.slip, contact.elastic, contact.unclamped,
     )  # fmt: skip
@@ -171,7 +171,7 @@ def at_the_wall(joint, contact, eccentricity, axes, rod_spin, p):
 
 @jit
 def worn_contact(joint, eccentricity, axes, spins, carried, p):
-    """Return `Contact` between a joint's journal and its worn bore.
+    """Return `ContactState` between a joint's journal and its worn bore.
 
     eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); axes: cosine
     and sine of the bore's angle, counter-clockwise; spins of journal and rod (rad/s); carried: as
@@ -196,7 +196,7 @@ def worn_contact(joint, eccentricity, axes, spins, carried, p):
     fx, fy = normal * gx + friction * ny, normal * gy - friction * nx
     moment = normal * (ex * gy - ey * gx) - bore * friction
     c, s = axes
-    return Contact(
+    return ContactState(
         c * fx - s * fy, s * fx + c * fy, moment, normal, friction, penetration, rate, slip,
         elastic, unclamped,
     )  # fmt: skip

@@ -202,7 +202,7 @@ FROM_ZERO = 5.0  # rank of what appears: as of a value 150 times as large
 
 
 @dataclass(frozen=True)
-class Finding:
+class MetricChange:
     """What a metric does over jobs; `low` and `high` are numbers with bars and unit, or one is "".
 
     `at_low`, `at_high`: of which jobs; `change`: the ratio in words.
@@ -218,7 +218,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Line:
+class StudyLine:
     """What was run, under which name, and how it ended."""
 
     name: str
@@ -228,21 +228,21 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Answer:
+class FirstScreen:
     """The first screen; `pictures` are SVG of the mechanisms with their captions."""
 
-    lines: Sequence[Line]
-    findings: Sequence[tuple[str, Sequence[Finding]]]
+    lines: Sequence[StudyLine]
+    findings: Sequence[tuple[str, Sequence[MetricChange]]]
     claims: Sequence[Claim]
     pictures: Sequence[tuple[str, str]]
 
 
-def answer_section(answer: Answer) -> Section:
+def answer_section(answer: FirstScreen) -> Section:
     """Return the section that the page begins with."""
     return Section("answer", "The answer", "answer.html", answer)
 
 
-def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[Finding]:
+def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[MetricChange]:
     """Return what changes most over jobs, each named and with its metrics."""
     named = [(name, job) for name, job in jobs if str(job["status"].item()) == "ok"]
     known = list(dict.fromkeys(m for _, job in named for m in measures(job)))
@@ -251,7 +251,7 @@ def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[Finding]:
     return rank_findings(rows, names)
 
 
-def study_findings(data: xr.Dataset) -> list[Finding]:
+def study_findings(data: xr.Dataset) -> list[MetricChange]:
     """Return what changes most over the jobs of a study, as `open_study` gives it."""
     rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in measures(data)]
     return rank_findings(rows, Points(data))
@@ -307,9 +307,9 @@ def _columns(measure: Measure, jobs: Sequence[xr.Dataset]) -> tuple[np.ndarray, 
 
 def rank_findings(
     rows: Iterable[tuple[Measure, np.ndarray, np.ndarray]], names: Sequence[str]
-) -> list[Finding]:
+) -> list[MetricChange]:
     """Return the findings of measures over jobs, the greatest change first, one a metric."""
-    best: dict[str, Finding] = {}
+    best: dict[str, MetricChange] = {}
     for measure, values, bars in rows:
         if METRICS[measure.variable].counted or measure.variable in FROM_IDEAL:
             continue
@@ -321,7 +321,7 @@ def rank_findings(
 
 def finding(
     measure: Measure, values: np.ndarray, bars: np.ndarray, names: Sequence[str]
-) -> Finding | None:
+) -> MetricChange | None:
     """Return what a measure does over jobs, where that is beyond its error bars.
 
     Jobs whose value is not known within its bar, such as a chaotic motion's peak, do not count.
@@ -344,18 +344,18 @@ def finding(
 
     title = measure.title[0].upper() + measure.title[1:]
     if len(values) == 1:
-        return Finding(title, "", "", told(high), "", "", 0.0)
+        return MetricChange(title, "", "", told(high), "", "", 0.0)
     if values[high] - values[low] <= np.nansum([bars[high], bars[low]]):
         return None
     ratio = values[high] / values[low] if values[low] > 0.0 else math.inf
     rank = min(math.log(ratio), FROM_ZERO) if values[low] > 0.0 else FROM_ZERO
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
-    return Finding(title, told(low), names[low], told(high), names[high], change, rank)
+    return MetricChange(title, told(low), names[low], told(high), names[high], change, rank)
 
 
 def round_robin(
-    each: Sequence[tuple[str, Sequence[Finding]]],
-) -> Iterator[tuple[str, Sequence[Finding]]]:
+    each: Sequence[tuple[str, Sequence[MetricChange]]],
+) -> Iterator[tuple[str, Sequence[MetricChange]]]:
     """At most so many findings in all, the first of each first."""
     room = MOST_FINDINGS
     counts = [0] * len(each)

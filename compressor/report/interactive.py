@@ -18,7 +18,7 @@ import xarray as xr
 
 from compressor.analysis import SPOKEN, NoSeriesError, last_revolution
 from compressor.metrics import JOINTS
-from compressor.report.figures.extract import Note, Panel, Scale, Sheet, Trace
+from compressor.report.figures.extract import FigureData, Panel, PanelText, Scale, Trace
 from compressor.store import DamagedJob, Stored, publish
 
 LIBRARY = "plotly.min.js"
@@ -37,14 +37,14 @@ def publish_library(folder: Path) -> None:
         publish(path, library.read_bytes())
 
 
-def script(name: str, sheet: Sheet) -> str:
+def script(name: str, sheet: FigureData) -> str:
     """Return the script of a figure."""
     data = json.dumps(content(sheet), separators=(",", ":"), allow_nan=False)
     data = data.replace("<", "\\u003c")
     return f"compsimFigure({json.dumps(name)},{data});\n"
 
 
-def content(sheet: Sheet) -> dict[str, Any]:
+def content(sheet: FigureData) -> dict[str, Any]:
     """Return what a figure shows, as plain data. Panels with the same `link` are zoomed together.
 
     `unified`: all curves go from left to right, so that the values at one x are told together.
@@ -81,7 +81,7 @@ def content(sheet: Sheet) -> dict[str, Any]:
     }
 
 
-def axis_title(sheet: Sheet, panel: Panel) -> str:
+def axis_title(sheet: FigureData, panel: Panel) -> str:
     """Return the title of a panel's x axis, or of one below it in the same column."""
     below = [one for one in sheet.panels if one.column == panel.column and one.row >= panel.row]
     return next((one.x.title for one in below if one.x.title), "")
@@ -114,7 +114,7 @@ def axis(scale: Scale, others: Mapping[float, str] | None = None) -> dict[str, A
     return found | {name: value for name, value in more.items() if value}
 
 
-def note(one: Note) -> dict[str, Any]:
+def note(one: PanelText) -> dict[str, Any]:
     """Return a text, or a straight line, as plain data."""
     place = {way: value for way in "xy" if not np.isnan(value := getattr(one, way))}
     return {"text": one.text, **place, "color": one.color, "dash": one.dash, "inside": one.inside}
@@ -193,7 +193,7 @@ def numbers(values: np.ndarray) -> Any:
     return base64.b64encode(values.astype(FLOAT).tobytes()).decode()
 
 
-def describe_figure(sheet: Sheet) -> str:
+def describe_figure(sheet: FigureData) -> str:
     """Return what is seen in a figure, in words: its panels, their axes and curves."""
     told = []
     for panel in sheet.panels:
@@ -233,7 +233,7 @@ def series_name(key: str) -> str:
     return f"job-{key}"
 
 
-def job_sheet(run: xr.Dataset) -> Sheet:
+def job_sheet(run: xr.Dataset) -> FigureData:
     """Return a job's acceleration and the size of its contact forces, over the last revolution."""
     angle, turn = last_revolution(run)
     moved = Trace("line", "acceleration", angle, turn["acceleration"].values, color="#000000")
@@ -247,7 +247,7 @@ def job_sheet(run: xr.Dataset) -> Sheet:
               Scale(title, *limits(traces)), (row, row + 1), (0, 1), traces, ())
         for row, (title, traces) in enumerate(((ACCELERATION, (moved,)), (FORCE, forces)))
     )  # fmt: skip
-    return Sheet(panels, (1.0, 1.0), (1.0,), (8.0, 5.0))
+    return FigureData(panels, (1.0, 1.0), (1.0,), (8.0, 5.0))
 
 
 def limits(traces: Iterable[Trace]) -> tuple[float, float]:

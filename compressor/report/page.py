@@ -39,7 +39,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """A row's cells; `mark`: the job failed, is missing, or is chaotic; `key`: of the job."""
 
     cells: Sequence[Cell]
@@ -48,11 +48,11 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """A table; `head` has a title for each column."""
 
     head: Sequence[str]
-    rows: Sequence[Row]
+    rows: Sequence[TableRow]
 
 
 def number(value: float) -> str:
@@ -91,16 +91,16 @@ def value_cell(value: Any) -> Cell:
     return Cell(str(value))
 
 
-def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> Row:
+def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> TableRow:
     """Return a job's row, marked where the job failed, is missing, or is chaotic."""
     if status == "failed":
-        return Row(cells, "failed", key)
+        return TableRow(cells, "failed", key)
     if status == "missing":
-        return Row(cells, "missing", key)
-    return Row(cells, "chaotic" if regime == Regime.CHAOTIC else "", key)
+        return TableRow(cells, "missing", key)
+    return TableRow(cells, "chaotic" if regime == Regime.CHAOTIC else "", key)
 
 
-def ending(status: object, reason: object, regime: object = "") -> str:
+def status_text(status: object, reason: object, regime: object = "") -> str:
     """Return how a job ended, in words, and how its motion goes, if it is known."""
     said = reason or regime
     return f"{status}: {said}" if said else str(status)
@@ -223,7 +223,7 @@ def restate_page(page: str, before: Running, now: Running) -> str:
 Draw = Callable[[str, str, str, Drawing], Plate]  # of name, heading, caption and drawing
 
 
-class Note(NamedTuple):
+class StudyNote(NamedTuple):
     """A line in the section of a study, and a link below it: the id of a section, and its words."""
 
     text: str
@@ -241,7 +241,7 @@ class Chapter(NamedTuple):
 class Additions(NamedTuple):
     """Notes by the name of the study that they are on, and chapters."""
 
-    notes: Mapping[str, Note]
+    notes: Mapping[str, StudyNote]
     chapters: Sequence[Chapter]
 
 

@@ -41,15 +41,15 @@ from compressor.report.figures.diagnosis import (
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures
 from compressor.report.page import (
     Cell,
+    PageTable,
     Plate,
-    Row,
     Section,
-    Table,
+    TableRow,
     column_title,
-    ending,
     job_row,
     measured_cell,
     number_cell,
+    status_text,
     value_cell,
 )
 from compressor.report.study_section import SHORT, file_name
@@ -249,7 +249,7 @@ class SecondSet:
 
 
 @dataclass(frozen=True)
-class Pair:
+class FigurePair:
     """A figure of a second set, and its counterpart in the first where that is drawn."""
 
     first: Plate | None
@@ -264,7 +264,7 @@ class SecondSetContent:
     table: str
     differences: Sequence[str]
     notes: Sequence[str]
-    pairs: Sequence[Pair]
+    pairs: Sequence[FigurePair]
     claims: Sequence[object]
 
     @property
@@ -397,7 +397,8 @@ def second_section(
     counterparts = {plate.name: plate for plate in first}
     names = {second_name(found.study, item): item for item in SET}
     pairs = [
-        Pair(counterparts.get(f"figure-{names[plate.name].number:02d}"), plate) for plate in plates
+        FigurePair(counterparts.get(f"figure-{names[plate.name].number:02d}"), plate)
+        for plate in plates
     ]
     lacking = [item for name, item in names.items() if name not in {p.name for p in plates}]
     notes = [NO_IDEAL.format(number_figures(lacking))] if lacking else []
@@ -426,7 +427,7 @@ class PaperCasesContent:
     """What a page says of the paper's cases: what to know beside their numbers, and a table."""
 
     caveats: list[str]
-    table: Table
+    table: PageTable
 
 
 def paper_sections(
@@ -445,7 +446,7 @@ def paper_sections(
     ]
 
 
-def cases_table(paper: PaperRuns) -> Table:
+def cases_table(paper: PaperRuns) -> PageTable:
     """Return a row for each of the paper's cases, stored or not."""
     known = [measures(run) for run in paper.stored.values()]
     shown = [m for m in MEASURES if any(m in some for some in known)]
@@ -455,17 +456,20 @@ def cases_table(paper: PaperRuns) -> Table:
         run = paper.stored.get(name)
         if run is None:
             cells = [Cell(label_in_words(name)), Cell("not stored"), *[Cell("")] * (len(head) - 2)]
-            rows.append(Row(cells, "missing"))
+            rows.append(TableRow(cells, "missing"))
             continue
         status, key = str(run["status"].item()), run.attrs["key"]
         regime = run.attrs.get("regime", "")
-        start = [Cell(label_in_words(name)), Cell(ending(status, run["reason"].item(), regime))]
+        start = [
+            Cell(label_in_words(name)),
+            Cell(status_text(status, run["reason"].item(), regime)),
+        ]
         metrics = [measured_cell(m, *value_of(m, run)) for m in shown]
         residual = number_cell(float(run.get("energy_residual", math.nan)))
         tolerance = value_cell(run.attrs.get("rtol", ""))
         trust = [residual, tolerance, Cell(key[:SHORT], "code")]
         rows.append(job_row([*start, *metrics, *trust], status, regime, key))
-    return Table(head, rows)
+    return PageTable(head, rows)
 
 
 def value_of(measure: Measure, run: xr.Dataset) -> tuple[float, float]:
@@ -481,10 +485,10 @@ def label_in_words(name: str) -> str:
     return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
 
 
-def printed_table() -> Table:
+def printed_table() -> PageTable:
     """Return the paper's numbers of the spring load beside those that follow from its equations."""
     rows = [
-        Row([
+        TableRow([
             Cell(f"{c.quantity} ({c.unit})"),
             number_cell(math.nan if c.printed is None else c.printed),
             number_cell(c.follows),
@@ -492,7 +496,7 @@ def printed_table() -> Table:
         ])
         for c in comparisons()
     ]  # fmt: skip
-    return Table(["quantity", "printed", "follows", "from"], rows)
+    return PageTable(["quantity", "printed", "follows", "from"], rows)
 
 
 def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
@@ -527,7 +531,7 @@ class DiagnosisContent:
     """What a page says of the faults side by side."""
 
     order: int
-    table: Table
+    table: PageTable
     plates: list[Plate]
 
 
@@ -561,16 +565,18 @@ def diagnosis_sections(found: Shakings, plates: list[Plate]) -> Iterator[Section
         yield Section("diagnosis", "Diagnosis", "diagnosis.html", content)
 
 
-def force_table(found: Shakings) -> Table:
+def force_table(found: Shakings) -> PageTable:
     """Return the rms of X above `ORDER` and its two shares, N, by fault and clearance."""
     head = ["clearance at", "mm", "rms (N)", "near changes of direction (N)", "elsewhere (N)"]
     healthy = found["design"]
-    rows = [Row([Cell("none"), Cell("0", "number"), *forces(healthy)])]
+    rows = [TableRow([Cell("none"), Cell("0", "number"), *forces(healthy)])]
     for fault in FAULTS:
         for clearance in CLEARANCES:
             one = found[label(fault, clearance)]
-            rows.append(Row([Cell(SPOKEN[fault]), Cell(f"{clearance:g}", "number"), *forces(one)]))
-    return Table(head, rows)
+            rows.append(
+                TableRow([Cell(SPOKEN[fault]), Cell(f"{clearance:g}", "number"), *forces(one)])
+            )
+    return PageTable(head, rows)
 
 
 def forces(one: Shaking) -> list[Cell]:

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 from compressor.analysis import caption, case_of, claims
 from compressor.report.answer import (
-    Answer,
-    Finding,
-    Line,
+    FirstScreen,
+    MetricChange,
+    StudyLine,
     answer_section,
     assumptions_section,
     findings,
@@ -39,10 +39,10 @@ from compressor.report.interactive import (
 from compressor.report.page import (
     Add,
     Additions,
-    Note,
     Plate,
     Running,
     Section,
+    StudyNote,
     document,
     restate_page,
 )
@@ -190,7 +190,7 @@ def compose(
     return Made(plates, [study.name for study in studies], series, page)
 
 
-def notes_on(study: str, added: Sequence[Additions]) -> list[Note]:
+def notes_on(study: str, added: Sequence[Additions]) -> list[StudyNote]:
     """Return what was added to the section of a study."""
     return [one.notes[study] for one in added if study in one.notes]
 
@@ -201,13 +201,13 @@ class DrawnStudy(NamedTuple):
     figures: Section
     table: Section
     plates: list[Plate]
-    findings: list[Finding]
-    line: Line
+    findings: list[MetricChange]
+    line: StudyLine
     jobs: dict[str, dict[str, Any]]
 
 
 def drawn_study(
-    stored: Stored, study: StoredStudy, other: SecondSet | None, notes: Sequence[Note]
+    stored: Stored, study: StoredStudy, other: SecondSet | None, notes: Sequence[StudyNote]
 ) -> DrawnStudy:
     """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
 
@@ -226,21 +226,23 @@ def drawn_study(
         counts = job_counts(data)
         return DrawnStudy(
             figures, table, plates, study_findings(data),
-            Line(f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed)),
+            StudyLine(f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed)),
             job_facts(stored.folder, data, keys),
         )  # fmt: skip
 
 
 def summarise(
     stored: Stored, own: Sequence[StoredStudy], paper: PaperRuns, drawn: Sequence[DrawnStudy]
-) -> Answer:
+) -> FirstScreen:
     """Return the page's first screen."""
     lines = [one.line for one in drawn]
-    each: list[tuple[str, Sequence[Finding]]] = [(one.line.name, one.findings) for one in drawn]
+    each: list[tuple[str, Sequence[MetricChange]]] = [
+        (one.line.name, one.findings) for one in drawn
+    ]
     if paper.stored:
         failed = [n for n, run in paper.stored.items() if str(run["status"].item()) != "ok"]
         said = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")
-        lines.append(Line("The paper's cases", "cases", said, bool(failed)))
+        lines.append(StudyLine("The paper's cases", "cases", said, bool(failed)))
         worn = (
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )
@@ -255,7 +257,7 @@ def summarise(
         for name, case in shown
         if case
     ]
-    return Answer(lines, [*round_robin(each)], found, pictures)
+    return FirstScreen(lines, [*round_robin(each)], found, pictures)
 
 
 def remove_stale(report: Path, made: Made) -> None:

@@ -14,14 +14,14 @@ from compressor.reasons import remedy
 from compressor.report.figures.sweep_data import measures
 from compressor.report.page import (
     Cell,
-    Note,
+    PageTable,
     Plate,
     Section,
-    Table,
+    StudyNote,
     column_title,
-    ending,
     job_row,
     measured_cell,
+    status_text,
     value_cell,
 )
 from compressor.store import Folder, Stored, StoredStudy, study_caveats
@@ -66,7 +66,7 @@ class StudyContent:
     plates: Sequence[Plate]
     jobs: str
     second_set: str = ""
-    notes: Sequence[Note] = ()
+    notes: Sequence[StudyNote] = ()
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class JobsContent:
 
     study: str
     jobs: int
-    table: Table
+    table: PageTable
     regimes: Sequence[str]
 
 
@@ -85,7 +85,7 @@ def study_sections(
     data: xr.Dataset,
     plates: Sequence[Plate],
     second_set: str = "",
-    notes: Sequence[Note] = (),
+    notes: Sequence[StudyNote] = (),
 ) -> tuple[Section, Section]:
     """Return the sections of a study as `open_study` gives it: figures and failures, and table.
 
@@ -147,7 +147,7 @@ def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[st
         point = {name: value_cell(values[n]).text for name, values in swept.items()}
         found[key] = {
             "values": point,
-            "status": ending(status[n], reason[n]),
+            "status": status_text(status[n], reason[n]),
             "command": f"compsim show {key[:SHORT]} -i {shlex.quote(str(results))}",
         }
     return found
@@ -161,13 +161,13 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
     for place in failed[:MOST_DETAILS]:
         job = stored.status(str(data["key"].values.flat[place]))
         point = [f"{name} {value_cell(values[place]).text}" for name, values in swept.items()]
-        told.append(f"{', '.join(point)}: {ending(job.reason, job.detail) if job else 'gone'}")
+        told.append(f"{', '.join(point)}: {status_text(job.reason, job.detail) if job else 'gone'}")
     if len(failed) > MOST_DETAILS:
         told.append(f"and {len(failed) - MOST_DETAILS} more")
     return told
 
 
-def jobs_table(data: xr.Dataset) -> Table:
+def jobs_table(data: xr.Dataset) -> PageTable:
     """Return a row for every job of a study, as far as a page can hold them."""
     swept, shown = swept_values(data), measures(data)
     metrics = [(m, ravel_jobs(m.of(data)), ravel_jobs(m.bar(data))) for m in shown]
@@ -176,11 +176,11 @@ def jobs_table(data: xr.Dataset) -> Table:
     rows = []
     for place, (status, reason, regime, key) in zip(range(MOST_ROWS), ends, strict=False):
         cells = [value_cell(values[place]) for values in swept.values()]
-        cells.append(Cell(ending(status, reason, regime)))
+        cells.append(Cell(status_text(status, reason, regime)))
         cells += [measured_cell(m, float(of[place]), float(bar[place])) for m, of, bar in metrics]
         cells.append(Cell(str(key)[:SHORT], "code"))
         rows.append(job_row(cells, str(status), str(regime), str(key)))
-    return Table([*swept, "status", *map(column_title, shown), "job"], rows)
+    return PageTable([*swept, "status", *map(column_title, shown), "job"], rows)
 
 
 def ravel_jobs(values: xr.DataArray) -> np.ndarray:

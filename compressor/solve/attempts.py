@@ -103,7 +103,7 @@ def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
     return np.concatenate(grids)
 
 
-def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndarray]:
+def prepare_run(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndarray]:
     """Return what a request begins with: an empty trajectory, the load's edges and phases, the
     motion.
     """
@@ -121,7 +121,7 @@ def ready(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndar
 
 def integrate(request: Request) -> Trajectory:
     """Integrate a scene with clearance over its output grid; a run that fails is returned too."""
-    result, edges, phases, z = ready(request)
+    result, edges, phases, z = prepare_run(request)
     began = time.perf_counter()
     try:
         # a trial step may leave the finite numbers; the steps taken are checked
@@ -190,7 +190,7 @@ Ahead = Mapping[float, Solution]  # attempts of a case that were made before, by
 NOTHING_AHEAD: Ahead = {}
 
 
-def attempt(
+def run_at_tolerance(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
     state: np.ndarray | None = None,
 ) -> Solution:  # fmt: skip
@@ -243,7 +243,7 @@ def times_of(case: Case, sampled: bool) -> Times:
 def request(
     case: Case, rtol: float, p: np.record, times: Times, state: np.ndarray | None = None
 ) -> Request:
-    """Return what `attempt` asks to be integrated, without a limit in wall time."""
+    """Return what `run_at_tolerance` asks to be integrated, without a limit in wall time."""
     how = case.solve
     if state is None:
         y = initial_state(case, p)
@@ -271,7 +271,7 @@ def solution_of_trajectory(
 
 
 def companion_rtol(p: np.record, rtol: float) -> float | None:
-    """Return the tolerance of a run's `companion`, if that is by the run's own method and
+    """Return the tolerance of a run's `comparison_run`, if that is by the run's own method and
     tighter.
     """
     fits = rtol >= 0.99 * TIGHTER * TIGHTEST and not overruns_friction(p, rtol)
@@ -290,7 +290,7 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
     return rubs and rtol * length_and_speed(p)[1] > BLUNT * p["stiction_velocity"]
 
 
-def companion(
+def comparison_run(
     case: Case, solution: Solution, timeout: float, ahead: Ahead = NOTHING_AHEAD
 ) -> Solution:
     """Return the run that a run's errors are estimated by, where no looser one is there: a tighter
@@ -301,21 +301,23 @@ def companion(
     """
     tighter = companion_rtol(solution.p, solution.rtol)
     if tighter is not None:
-        return ahead.get(tighter) or attempt(case, tighter, timeout, False)
+        return ahead.get(tighter) or run_at_tolerance(case, tighter, timeout, False)
     if overruns_friction(solution.p, solution.rtol):
         stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return attempt(stiff, solution.rtol / STIFF_TIGHTER, timeout, False)
-    return attempt(case, 10.0 * solution.rtol, timeout, False)
+        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, False)
+    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, False)
 
 
-def witness(case: Case, solution: Solution, other: Solution, timeout: float) -> Solution | None:
+def looser_comparison_run(
+    case: Case, solution: Solution, other: Solution, timeout: float
+) -> Solution | None:
     """Return a looser run, by which errors are estimated as well where the motion enlarges them.
 
-    other: its `companion`. None where there is no need, or the run does not reach its end.
+    other: its `comparison_run`. None where there is no need, or the run does not reach its end.
     """
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
-    found = attempt(case, LOOSER * solution.rtol, timeout, False)
+    found = run_at_tolerance(case, LOOSER * solution.rtol, timeout, False)
     return None if found.reason else found
 
 
@@ -325,14 +327,14 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
     The longest by any of them; inf without one that reached its end.
     """
     residual = energy_residual(solution.trajectory.tally)
-    known = [(by_run(solution, one), one.loads) for one in others if not one.reason]
+    known = [(compare_with_run(solution, one), one.loads) for one in others if not one.reason]
     by: list[tuple[Companion | None, np.ndarray]] = [*known] or [(None, solution.loads[:0])]
     solution.bars = longest([bars(solution.metrics, one, residual) for one, _ in by])
     solution.series_errors = longest([series_errors(one) for one, _ in by])
     solution.reversal_bars = longest([reversal_bars(solution.loads, *one) for one in by])
 
 
-def by_run(solution: Solution, other: Solution) -> Companion:
+def compare_with_run(solution: Solution, other: Solution) -> Companion:
     """Return what another run that reached its end tells of a run."""
     apart = distances(solution.samples, other.samples)
     return Companion(other.metrics, other.rtol / solution.rtol, apart)

@@ -47,7 +47,7 @@ def predictability_horizon(
     before, as by `timeout` (s) or the case's max_steps, the time up to there: no more is known.
     The case's own method and tolerance do not count: the horizon belongs to the motion.
     """
-    return part(case, case.duration, rtol, close, timeout).horizon
+    return follow_case_twins(case, case.duration, rtol, close, timeout).horizon
 
 
 class Parting(NamedTuple):
@@ -67,7 +67,9 @@ class Parting(NamedTuple):
         return math.inf if self.whole else self.time
 
 
-def part(case: Case, span: float, rtol: float, close: float, timeout: float) -> Parting:
+def follow_case_twins(
+    case: Case, span: float, rtol: float, close: float, timeout: float
+) -> Parting:
     """Follow twins over a span (s), `close` at its begin, within a wall time (s).
 
     As `predictability_horizon`, which tells more.

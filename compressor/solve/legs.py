@@ -16,10 +16,10 @@ import numpy as np
 
 from compressor.cases import TIGHTEST, Case
 from compressor.metrics import AXES, JOINTS
-from compressor.outcome import Table
+from compressor.outcome import DatasetParts
 from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe_all
 from compressor.reasons import Reason
-from compressor.solve.attempts import Solution, attempt, integrate, request, times_of
+from compressor.solve.attempts import Solution, integrate, request, run_at_tolerance, times_of
 from compressor.solve.error_bars import RUNGS, Metrics, allowed_residual, energy_residual
 from compressor.solve.regime import least_promise, steady, with_settle_rev
 from compressor.solve.request import Cuts, Turns, merge_turns, passed_time, revolutions
@@ -70,7 +70,7 @@ class Stretch:
     timeout: float
 
 
-def follow(
+def follow_revolutions(
     case: Case,
     state: np.ndarray | None,
     span: Stretch,
@@ -84,9 +84,9 @@ def follow(
     deadline = time.monotonic() + span.timeout
     of, rtol = leg_case(case, span.revolutions), case.rtol
     for rung in range(RUNGS + 1):
-        course = Course(of, span.section, enough)
+        course = PoincareCuts(of, span.section, enough)
         left = max(deadline - time.monotonic(), 0.0)
-        run = attempt(of, rtol, left, False, course.cuts, state)
+        run = run_at_tolerance(of, rtol, left, False, course.cuts, state)
         found = course.leg(run)
         residual = energy_residual(run.trajectory.tally)
         most = allowed_residual(case.rtol, len(found.turns))
@@ -100,7 +100,7 @@ def follow(
     return found
 
 
-def settle(case: Case, state: np.ndarray | None, span: Stretch) -> tuple[Leg, float]:
+def settle_motion(case: Case, state: np.ndarray | None, span: Stretch) -> tuple[Leg, float]:
     """Follow a case until the metrics of revolutions agree, as with `settle_rev: auto`.
 
     With the revolution from which on they do; nan where they do not within the span.
@@ -112,12 +112,12 @@ def settle(case: Case, state: np.ndarray | None, span: Stretch) -> tuple[Leg, fl
         each.append(metrics(p, turns[-1]))
         return steady(each, within) is not None
 
-    found = follow(case, state, span, enough)
+    found = follow_revolutions(case, state, span, enough)
     agreed = steady([metrics(p, turn) for turn in found.turns], within)
     return found, float(agreed[0]) if agreed else math.nan
 
 
-def with_samples(case: Case, state: np.ndarray, span: Stretch) -> tuple[Table, str, str]:
+def with_samples(case: Case, state: np.ndarray, span: Stretch) -> tuple[DatasetParts, str, str]:
     """Return a leg as a run with time series on the case's output grid, measured from its second
     turn on.
 
@@ -125,7 +125,7 @@ def with_samples(case: Case, state: np.ndarray, span: Stretch) -> tuple[Table, s
     """
     of = leg_case(case, span.revolutions)
     of = replace(of, solve=replace(of.solve, settle_rev=1.0))
-    run = attempt(of, case.rtol, span.timeout, True, None, state)
+    run = run_at_tolerance(of, case.rtol, span.timeout, True, None, state)
     return with_series(of, run)[1], run.reason, run.detail
 
 
@@ -138,7 +138,7 @@ def leg_case(case: Case, count: int) -> Case:
     return replace(of, solve=how, output=replace(of.output, keep="series", signals=False))
 
 
-class Course:
+class PoincareCuts:
     """What a run passes: cuts at the section and at the end of each revolution.
 
     With a section of 0 the two are one.
@@ -209,7 +209,7 @@ class Rubbed(NamedTuple):
     detail: str = ""
 
 
-def rub(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed:
+def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed:
     """Follow a case over its span on worn bores, and measure what rubs after it has settled.
 
     worn: (joint, sector), m; state: the motion to begin with, at top dead centre, or None for the

@@ -15,9 +15,9 @@ import numpy as np
 from compressor.physics import (
     FLOWS,
     Mode,
-    Pair,
+    RungeKuttaPair,
     Status,
-    Work,
+    WorkArrays,
     derivative_with_flows,
     march,
     new_walker,
@@ -42,27 +42,27 @@ from compressor.solve.request import (
 from compressor.solve.si_record import contact_sizes, natural_sizes
 
 COMPILED = {
-    "auto": (Mode.AUTO, Pair.TSIT5),
-    "DOPRI5": (Mode.EXPLICIT, Pair.DOPRI5),
-    "TSIT5": (Mode.EXPLICIT, Pair.TSIT5),
-    "RODAS": (Mode.STIFF, Pair.DOPRI5),
+    "auto": (Mode.AUTO, RungeKuttaPair.TSIT5),
+    "DOPRI5": (Mode.EXPLICIT, RungeKuttaPair.DOPRI5),
+    "TSIT5": (Mode.EXPLICIT, RungeKuttaPair.TSIT5),
+    "RODAS": (Mode.STIFF, RungeKuttaPair.DOPRI5),
 }
 LANE_METHODS = ("auto", "TSIT5")
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 
 
-class Standing(NamedTuple):
+class MarchState(NamedTuple):
     """How a march stands: all that `march` writes but the output samples."""
 
     walker: np.record
     z: np.ndarray  # motion and flows, (n + 4,)
-    work: Work
+    work: WorkArrays
     tally: np.record
 
-    def copy(self) -> "Standing":
+    def copy(self) -> "MarchState":
         """Return a copy that a march may go on from."""
-        work = Work(*(array.copy() for array in self.work))
-        return Standing(self.walker.copy(), self.z.copy(), work, self.tally.copy())
+        work = WorkArrays(*(array.copy() for array in self.work))
+        return MarchState(self.walker.copy(), self.z.copy(), work, self.tally.copy())
 
     @property
     def attempts(self) -> int:
@@ -71,7 +71,7 @@ class Standing(NamedTuple):
         return int(w.steps + w.rejected + w.onsets + (w.landing > 0.0))
 
 
-class Snapshot(NamedTuple):
+class Checkpoint(NamedTuple):
     """What is kept of a standing to go on from it: of its work, what a call of `march` reads.
 
     Records are kept as bytes: numpy takes five microseconds to copy one, a fiftieth for these.
@@ -85,7 +85,7 @@ class Snapshot(NamedTuple):
     kind: np.dtype  # of the tally
 
     @classmethod
-    def of(cls, now: Standing) -> "Snapshot":
+    def of(cls, now: MarchState) -> "Checkpoint":
         """Return a snapshot, in about a microsecond."""
         work = now.work
         return cls(
@@ -93,11 +93,11 @@ class Snapshot(NamedTuple):
             now.tally.tobytes(), now.tally.dtype,
         )  # fmt: skip
 
-    def standing(self) -> Standing:
+    def standing(self) -> MarchState:
         """Return a march as it stood then."""
         work = new_work(self.z.size - FLOWS)
         work.k[0], work.row[:] = self.rates, self.row
-        return Standing(
+        return MarchState(
             unpack_record(self.walker, new_walker(0).dtype),
             self.z.copy(),
             work,
@@ -124,7 +124,7 @@ class March:
     phases: np.ndarray
     states: np.ndarray
 
-    def advance(self, now: Standing, attempts: int, segments: int | None = None) -> None:
+    def advance(self, now: MarchState, attempts: int, segments: int | None = None) -> None:
         """Go on by at most so many attempts of a step, through the first so many segments."""
         request, size = self.request, self.size
         edges, phases = self.edges, self.phases
@@ -147,7 +147,7 @@ def ready_walker(request: Request, size: np.ndarray) -> np.record:
     return walker
 
 
-def retrace(before: Standing, after: Standing, march: March) -> History:
+def retrace(before: MarchState, after: MarchState, march: March) -> History:
     """Return the history of a march that stood like `before` and stopped like `after`.
 
     `before` is written.
@@ -184,7 +184,7 @@ def attempted_length(now: np.record, then: np.record, end: float) -> float:
 
 
 def scaled_error(
-    now: Standing, then: Standing, step: float, rtol: float, size: np.ndarray
+    now: MarchState, then: MarchState, step: float, rtol: float, size: np.ndarray
 ) -> np.ndarray:
     """Return the estimated error of each number of the motion over its tolerance, (n,)."""
     n = now.z.size - FLOWS
@@ -201,7 +201,7 @@ def dominant(scaled: np.ndarray, new: np.ndarray) -> int:
 
 def describe_attempt(now: np.record, then: np.record) -> str:
     """Return the method of an attempt, and what became of it."""
-    method = "RODAS" if now.stiff else Pair(int(now.pair)).name
+    method = "RODAS" if now.stiff else RungeKuttaPair(int(now.pair)).name
     if then.steps > now.steps:
         return f"{method} to an onset" if now.landing > 0.0 else f"{method} taken"
     return f"{method} refused" if then.rejected > now.rejected else f"{method} cut at an onset"
@@ -218,12 +218,12 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     edges, phases, walker["settle"] = with_edge(edges, phases, request.settle)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
     march = March(request, size, edges, phases, result.states)
-    now = Standing(walker, z, new_work(size.size), result.tally)
-    earlier = before = Snapshot.of(now)
+    now = MarchState(walker, z, new_work(size.size), result.tally)
+    earlier = before = Checkpoint.of(now)
     seen = 0  # attempts at the last snapshot
     while walker.status == Status.RUNNING:
         if result.steps + result.rejected >= seen + LAST:
-            earlier, before = before, Snapshot.of(now)
+            earlier, before = before, Checkpoint.of(now)
             seen = result.steps + result.rejected
         attempts = min(CHUNK, request.max_steps - walker.steps - walker.rejected)
         march.advance(now, attempts, ends[0] if ends else phases.size)

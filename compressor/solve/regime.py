@@ -19,9 +19,9 @@ import numpy as np
 from compressor.cases import ACCURACY, TIGHTEST, Case
 from compressor.metrics import METRICS
 from compressor.reasons import Reason
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.error_bars import Metrics, beyond
-from compressor.solve.horizon import Parting, part
+from compressor.solve.horizon import Parting, follow_case_twins
 from compressor.solve.request import Cuts, Trajectory, Turns, revolutions
 from compressor.solve.run_metrics import metrics
 from compressor.solve.series import a_turn, distances
@@ -42,7 +42,7 @@ MOMENT = 1e-6  # rev
 SAME = 1e-9  # relative distance of revolutions that rounding makes
 
 
-class Search:
+class HorizonSearch:
     """A search for the horizon of a case beside its runs, and the budget of both.
 
     The budget counts evaluations of the equations, so that results do not depend on how busy the
@@ -134,7 +134,7 @@ class Search:
 
         def follow(span: float, rtol: float) -> Parting:
             case = self.within_budget(self.case, (most - self.of_twins) / TWO)
-            found = part(case, span, rtol, CLOSE, self.left)
+            found = follow_case_twins(case, span, rtol, CLOSE, self.left)
             self.of_twins += TWO * found.attempts * self.per_step
             return found
 
@@ -157,7 +157,7 @@ class Search:
 def load_twins(case: Case) -> float:
     """Load what twins need, or compile it once on a machine; the time (s) that took counts not."""
     began = time.monotonic()
-    part(case, MOMENT * case.turn, RTOL, CLOSE, math.inf)
+    follow_case_twins(case, MOMENT * case.turn, RTOL, CLOSE, math.inf)
     return time.monotonic() - began
 
 
@@ -213,7 +213,7 @@ class Settling:
     detail: str = ""
 
 
-def with_span(case: Case, search: Search) -> Settling:
+def with_span(case: Case, search: HorizonSearch) -> Settling:
     """Give numbers to `settle_rev: auto` and `duration_rev: auto`, within the case's wall time."""
     if case.solve.settle_rev != "auto":
         return Settling(with_settle_rev(case, float(case.solve.settle_rev), 1))
@@ -228,7 +228,7 @@ def with_span(case: Case, search: Search) -> Settling:
     scout = with_settle_rev(case, 0.0, 1, float(most))
     scout = replace(scout, solve=replace(scout.solve, error_bars=False, accuracy="standard"))
     cuts = Cuts(revolutions(0.0, scout.duration, case.turn), enough)
-    attempt(scout, case.rtol, search.left, False, cuts)
+    run_at_tolerance(scout, case.rtol, search.left, False, cuts)
     each = [metrics(p, turn) for turn in cuts.turns]
     found = steady(each, within)
     if found is None:

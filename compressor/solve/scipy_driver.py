@@ -164,7 +164,7 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
         for i, phase in enumerate(phases):
             right_hand_side.phase = int(phase)
             wanted = np.flatnonzero(owner == i)
-            segment = Segment(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
+            segment = LoadStretch(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
             z = segment.run(z)
             if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally, z):
                 result.stop_time = math.nan
@@ -183,7 +183,7 @@ def scipy_method(name: str) -> Any:
     return getattr(scipy_integrate, name)
 
 
-class Segment:
+class LoadStretch:
     """One stretch between load corners, stepped by a fresh SciPy solver."""
 
     def __init__(self, request, right_hand_side, result, begin, end, wanted):

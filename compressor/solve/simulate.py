@@ -8,7 +8,7 @@ import numpy as np
 
 from compressor.cases import MODEL, Case, back_action, require_case
 from compressor.metrics import SERIES
-from compressor.outcome import Outcome, Table, row, without_run
+from compressor.outcome import DatasetParts, Outcome, row, without_run
 from compressor.physics import FLOWS, is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
@@ -159,7 +159,7 @@ def simulate(case: Case) -> "xr.Dataset":
     return as_dataset(observe(require_case(case))[1])
 
 
-def as_dataset(table: Table) -> "xr.Dataset":
+def as_dataset(table: DatasetParts) -> "xr.Dataset":
     """Return the Dataset of a table: the last one's like with other values, where shapes are the
     same.
 
@@ -188,7 +188,7 @@ def as_dataset(table: Table) -> "xr.Dataset":
     return made
 
 
-def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, Table]:
+def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, DatasetParts]:
     """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
     if case.problems:
         found = refused_outcome(case)
@@ -196,7 +196,7 @@ def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, Table]:
     return with_series(case, solve(case, ahead))
 
 
-def with_series(case: Case, solution: Solution) -> tuple[Outcome, Table]:
+def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
     """Return the `Outcome` of a solution and what its Dataset is made of."""
     kept = case.output.keep == "series"
     found = outcome(case, solution)

@@ -21,15 +21,15 @@ from compressor.solve.attempts import (
     Ahead,
     Solution,
     Times,
-    attempt,
-    companion,
     companion_rtol,
+    comparison_run,
     estimate_errors,
-    ready,
+    looser_comparison_run,
+    prepare_run,
     request,
+    run_at_tolerance,
     solution_of_trajectory,
     times_of,
-    witness,
 )
 from compressor.solve.error_bars import (
     ORDER,
@@ -43,7 +43,14 @@ from compressor.solve.error_bars import (
 )
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.march_driver import LANE_METHODS, ready_walker
-from compressor.solve.regime import DOUBTFUL, Search, doubtful, repeats, with_settle_rev, with_span
+from compressor.solve.regime import (
+    DOUBTFUL,
+    HorizonSearch,
+    doubtful,
+    repeats,
+    with_settle_rev,
+    with_span,
+)
 from compressor.solve.request import Cuts, Trajectory, revolutions, with_edge
 from compressor.solve.run_metrics import chaotic_bars, statistics
 from compressor.solve.si_record import natural_sizes, record, scene
@@ -53,8 +60,8 @@ LEAST_TIME = 10.0  # s of wall time that a case must have: the clock is not look
 MOST_SAMPLES = 100_000  # of a run in a lane
 
 
-class Asked(NamedTuple):
-    """An attempt that is to be made for a case: its number, and what `attempt` would ask for."""
+class LaneRequest(NamedTuple):
+    """A run that lanes are to make: the number of its case, and the request for it."""
 
     case: int
     rtol: float
@@ -67,9 +74,9 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
     """Return the first attempts of each case, as far as lanes can make them: of scenes for which
     they are compiled.
     """
-    asked: dict[int, list[Asked]] = {number: [] for number in scenes}
+    asked: dict[int, list[LaneRequest]] = {number: [] for number in scenes}
     for number, case in enumerate(cases):
-        if suits(case) and (of := int(scene(case))) in asked:
+        if may_run_in_lanes(case) and (of := int(scene(case))) in asked:
             asked[of] += attempts_of(number, case)
     found: list[dict[float, Solution]] = [{} for _ in cases]
     for attempts in asked.values():
@@ -85,7 +92,7 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
     return list(found)
 
 
-def suits(case: Case) -> bool:
+def may_run_in_lanes(case: Case) -> bool:
     """Return whether a case may be simulated in lanes, by what it says of its solution."""
     how = case.solve
     ready = case.is_plain and not case.problems and how.method in LANE_METHODS
@@ -93,7 +100,7 @@ def suits(case: Case) -> bool:
     return ready and how.timeout_s >= LEAST_TIME and how.max_steps >= MOST_ATTEMPTS
 
 
-def attempts_of(number: int, case: Case) -> list[Asked]:
+def attempts_of(number: int, case: Case) -> list[LaneRequest]:
     """Return what a case's first attempt needs, and its companion's."""
     case = with_settle_rev(case, float(case.solve.settle_rev), 1)
     p, sampled = record(case), case.output.keep == "series"
@@ -106,7 +113,7 @@ def attempts_of(number: int, case: Case) -> list[Asked]:
     return [one for one in found if one.times.all.size <= MOST_SAMPLES]
 
 
-def with_tolerance(one: Asked, rtol: float) -> Asked:
+def with_tolerance(one: LaneRequest, rtol: float) -> LaneRequest:
     """Return the same attempt at another tolerance."""
     walker = one.run.walker.copy()
     walker["rtol"] = rtol
@@ -114,18 +121,18 @@ def with_tolerance(one: Asked, rtol: float) -> Asked:
     return one._replace(rtol=rtol, run=run, trajectory=trajectory)
 
 
-def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Times) -> Asked:
+def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Times) -> LaneRequest:
     """Return an attempt made ready."""
     wanted = request(case, rtol, p, times)
-    trajectory, edges, phases, z = ready(wanted)
+    trajectory, edges, phases, z = prepare_run(wanted)
     size = natural_sizes(p)
     walker = ready_walker(wanted, size)
     edges, phases, walker["settle"] = with_edge(edges, phases, wanted.settle)
     run = Run(walker, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
-    return Asked(number, rtol, times, run, trajectory)
+    return LaneRequest(number, rtol, times, run, trajectory)
 
 
-def lane_solution(one: Asked, run: Run, each: float) -> Solution:
+def lane_solution(one: LaneRequest, run: Run, each: float) -> Solution:
     """Return an attempt whose run has reached its end; each: wall time (s) of an evaluation."""
     walker, trajectory = run.walker, one.trajectory
     trajectory.states, trajectory.tally = run.states, run.tally
@@ -144,7 +151,7 @@ AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 LEAST, MOST = 10.0, 1000.0  # times tighter that the next run may be
 
 
-def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
+def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> Solution:
     """Return the first run that balances and keeps its promise, or the last whole one as a failed
     job.
 
@@ -161,7 +168,7 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
     )
     unsound = 0  # runs that did not balance
     while True:
-        now = ahead.get(rtol) or attempt(
+        now = ahead.get(rtol) or run_at_tolerance(
             search.within_budget(case), rtol, search.left, case.output.keep == "series"
         )
         if now.reason:
@@ -177,24 +184,26 @@ def climb(case: Case, search: Search, ahead: Ahead) -> Solution:
         if not case.wants_bars:
             return now
         if before is None:
-            other = companion(case, now, search.left, ahead)
+            other = comparison_run(case, now, search.left, ahead)
             search.count(other.trajectory)
         else:
             other = before
         estimate_errors(now, other)
-        excess, third = over_promise(case, now), None
+        excess, third = excess_over_promise(case, now), None
         if excess <= 1.0:
             excess, third = recheck(case, now, other, before is None, search)
         if excess <= 1.0:
-            now.promise = "kept" if promises(case) else "none"
+            now.promise = "kept" if has_promise(case) else "none"
             return now
         if looks_chaotic(now) and search.look(whole=before is not None):
             return now
         if other.reason or min(rtol, other.rtol) < 1.01 * TIGHTEST:
-            return short_of(case, now, other.detail or "no run is tighter")
+            return fail_accuracy(case, now, other.detail or "no run is tighter")
         worse = third or other
         before = tightest(case, now, other, worse)
-        rtol = max(short(before.rtol / further(excess, worse.rtol / now.rtol)), TIGHTEST)
+        rtol = max(
+            round_rtol(before.rtol / tighten_factor(excess, worse.rtol / now.rtol)), TIGHTEST
+        )
 
 
 def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
@@ -204,7 +213,7 @@ def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
 
 
 def recheck(
-    case: Case, now: Solution, other: Solution, first: bool, search: Search
+    case: Case, now: Solution, other: Solution, first: bool, search: HorizonSearch
 ) -> tuple[float, Solution | None]:
     """Compare a run that seems to keep its promise with a third one, too; two may agree by chance.
 
@@ -213,26 +222,26 @@ def recheck(
     run where it is by that.
     """
     if first:
-        third = witness(case, now, other, search.left)
+        third = looser_comparison_run(case, now, other, search.left)
     else:
-        third = companion(case, now, search.left)
+        third = comparison_run(case, now, search.left)
         if third.reason or third.rtol == other.rtol:
             third = None
-    excess = over_promise(case, now)
+    excess = excess_over_promise(case, now)
     if third is None:
         return excess, None
     search.count(third.trajectory)
     estimate_errors(now, other, third)
-    more = over_promise(case, now)
+    more = excess_over_promise(case, now)
     return more, third if more > excess else None
 
 
-def promises(case: Case) -> bool:
+def has_promise(case: Case) -> bool:
     """Return whether a case's accuracy promises an error, and not only sets a tolerance."""
     return case.wants_bars and case.solve.rtol is None
 
 
-def over_promise(case: Case, solution: Solution) -> float:
+def excess_over_promise(case: Case, solution: Solution) -> float:
     """Return the greatest estimated error over what accuracy promises; 0 where it promises
     nothing.
     """
@@ -241,7 +250,7 @@ def over_promise(case: Case, solution: Solution) -> float:
             beyond(solution.metrics[name], solution.bars[name]) / target
             for name, target in case.targets
         )
-    return solution.series_errors["acceleration"] / case.promise if promises(case) else 0.0
+    return solution.series_errors["acceleration"] / case.promise if has_promise(case) else 0.0
 
 
 def looks_chaotic(solution: Solution) -> bool:
@@ -249,7 +258,7 @@ def looks_chaotic(solution: Solution) -> bool:
     return solution.series_errors["acceleration"] >= DOUBTFUL
 
 
-def further(excess: float, ratio: float) -> float:
+def tighten_factor(excess: float, ratio: float) -> float:
     """Return how many times tighter than both of a pair the next run is to be.
 
     excess: of the pair's estimate over what is promised; ratio: of their tolerances.
@@ -258,7 +267,7 @@ def further(excess: float, ratio: float) -> float:
     return min(max(ratio_of(AIM / error), LEAST), MOST)
 
 
-def short(rtol: float) -> float:
+def round_rtol(rtol: float) -> float:
     """Return a tolerance that is told in two digits."""
     return float(f"{rtol:.1e}")
 
@@ -270,14 +279,14 @@ def energy_balances(case: Case, solution: Solution) -> bool:
     )
 
 
-def cut_short(case: Case, best: Solution | None, now: Solution, search: Search) -> Solution:
+def cut_short(case: Case, best: Solution | None, now: Solution, search: HorizonSearch) -> Solution:
     """Return what is left of a case whose present run did not reach its end."""
     if best is None or now.reason not in OUT_OF_BUDGET:
         return now
     detail = f"the next run: {search.limit_of(now.trajectory) or now.detail}"
     if not energy_balances(case, best):
         return fail_energy_audit(case, best, detail, now.reason)
-    return short_of(case, best, detail, now.reason)
+    return fail_accuracy(case, best, detail, now.reason)
 
 
 def fail_energy_audit(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
@@ -292,7 +301,7 @@ def fail_energy_audit(case: Case, best: Solution, detail: str, reason: str = "")
     return best
 
 
-def short_of(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
+def fail_accuracy(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
     """Return a run with its errors as a failed job, since they are larger than promised."""
     timed_out = reason == Reason.BUDGET_SECONDS
     best.reason = reason if timed_out else Reason.ACCURACY_NOT_REACHED
@@ -318,18 +327,18 @@ def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
 
     ahead: of its attempts those that `side_by_side` has made.
     """
-    search = Search(case)
+    search = HorizonSearch(case)
     for made in ahead.values():
         search.began -= made.trajectory.evaluations * EVALUATION
     settling = with_span(case, search)
     case = search.case = settling.case
-    solution = climb(case, search, ahead)
+    solution = refine_until_accurate(case, search, ahead)
     solution.settled = settling.settled
     if solution.reason not in ("", Reason.ACCURACY_NOT_REACHED):
         return solution
     find_horizon(case, solution, search)
     if solution.horizon < case.duration:
-        return chaotic(case, solution, search)
+        return chaotic_solution(case, solution, search)
     if case.wants_bars:
         name_regime(case, solution, search)
     if settling.detail and not solution.reason:
@@ -337,18 +346,18 @@ def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
     return solution
 
 
-def find_horizon(case: Case, solution: Solution, search: Search) -> None:
+def find_horizon(case: Case, solution: Solution, search: HorizonSearch) -> None:
     """The horizon of a motion, where it is asked for, or where errors are as large as numbers."""
     if case.solve.horizon is True:
         search.horizon = predictability_horizon(case, search.left)
-    elif case.wants_bars and in_doubt(case, solution):
+    elif case.wants_bars and is_in_doubt(case, solution):
         search.look(whole=True)
         if solution.reason and search.stopped:
             solution.detail += f"; {UNTOLD}"
     solution.horizon = search.horizon
 
 
-def in_doubt(case: Case, solution: Solution) -> bool:
+def is_in_doubt(case: Case, solution: Solution) -> bool:
     """Return whether a motion may be chaotic, by its errors.
 
     Not where the promise of a word is kept: two motions, a tolerance apart, stayed together.
@@ -362,9 +371,9 @@ def in_doubt(case: Case, solution: Solution) -> bool:
     )
 
 
-def name_regime(case: Case, solution: Solution, search: Search) -> None:
+def name_regime(case: Case, solution: Solution, search: HorizonSearch) -> None:
     """Say whether a motion that is not chaotic can be foretold, and whether it repeats itself."""
-    if in_doubt(case, solution):
+    if is_in_doubt(case, solution):
         whole = search.horizon == math.inf
         solution.regime = Regime.PREDICTABLE if whole else Regime.UNDECIDED
         return
@@ -376,7 +385,7 @@ def name_regime(case: Case, solution: Solution, search: Search) -> None:
             solution.settled = since
 
 
-def chaotic(case: Case, solution: Solution, search: Search) -> Solution:
+def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> Solution:
     """Return a motion that cannot be foretold: one more run, for statistics over its revolutions.
 
     No error of a single course is claimed; averages have their statistical one.
@@ -384,7 +393,7 @@ def chaotic(case: Case, solution: Solution, search: Search) -> Solution:
     horizon, ends = search.horizon, revolutions(case.settle, case.duration, case.turn)
     loosest = min(CHAOTIC_RTOL, case.rtol)
     for rtol in sorted({loosest, min(loosest, solution.rtol)}, reverse=True):
-        now = attempt(case, rtol, search.left, case.output.keep == "series", Cuts(ends))
+        now = run_at_tolerance(case, rtol, search.left, case.output.keep == "series", Cuts(ends))
         now.horizon, now.settled, now.regime = horizon, solution.settled, Regime.CHAOTIC
         if now.reason or energy_balances(case, now):
             break
@@ -397,7 +406,7 @@ def chaotic(case: Case, solution: Solution, search: Search) -> Solution:
         if now.turns:
             now.statistics = statistics(now.p, now.turns)
             now.bars = chaotic_bars(now.statistics, now.metrics)
-        if over_promise(case, now) > 1.0 and case.targets:
+        if excess_over_promise(case, now) > 1.0 and case.targets:
             what = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
-            return short_of(case, now, what)
+            return fail_accuracy(case, now, what)
     return now

@@ -19,7 +19,7 @@ import numpy as np
 
 from compressor.cases import Output
 from compressor.metrics import NUMBERS
-from compressor.outcome import SeriesFile, Table
+from compressor.outcome import DatasetParts, SeriesFile
 from compressor.store import hdf5
 from compressor.store.files import (
     HEX20,
@@ -46,14 +46,14 @@ def series_path(place: Path, key: str, checksum: str) -> Path:
     return place / "jobs" / f"{key}-{checksum}.h5"
 
 
-def write_series(place: Path, dataset: "Table | xr.Dataset", output: Output) -> SeriesFile:
+def write_series(place: Path, dataset: "DatasetParts | xr.Dataset", output: Output) -> SeriesFile:
     """Write the file of a job's Dataset, or of what it is made of; a `Writer` gives it its name."""
     file, data = series_file(dataset, output)
     store_series(place, dataset.attrs["key"], file, data)
     return file
 
 
-def series_file(dataset: "Table | xr.Dataset", output: Output) -> tuple[SeriesFile, bytes]:
+def series_file(dataset: "DatasetParts | xr.Dataset", output: Output) -> tuple[SeriesFile, bytes]:
     """Return the file that a job's Dataset makes, and its bytes."""
     data, times = series_image(dataset, output), dataset.variables["time"].values
     return SeriesFile(times.size, float(times[-1]), output.precision, digest(data)), data
@@ -64,7 +64,7 @@ def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
     write_pending(series_path(place, key, file.digest), data)
 
 
-def series_image(dataset: "Table | xr.Dataset", output: Output) -> bytes:
+def series_image(dataset: "DatasetParts | xr.Dataset", output: Output) -> bytes:
     """Return a job's Dataset as the bytes of its file."""
     series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
     rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
@@ -88,7 +88,9 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
 
 
 def image_of(
-    dataset: "Table | xr.Dataset", rounded: Collection[str] = (), deflated: Collection[str] = ()
+    dataset: "DatasetParts | xr.Dataset",
+    rounded: Collection[str] = (),
+    deflated: Collection[str] = (),
 ) -> bytes:
     """Return a Dataset as the bytes of a file; `rounded` variables in single precision."""
     variables = {

@@ -45,8 +45,8 @@ from compressor.store.rows import Cut, Rows
 from compressor.store.series_file import read_dataset
 from compressor.store.studies import (
     Again,
-    Change,
     StoredStudy,
+    StudyChange,
     change_of,
     find_job,
     owners,
@@ -330,7 +330,7 @@ FORMER = "clipped_share"  # name of `clipped_fraction` in files of series
 
 
 @dataclass(frozen=True)
-class Standing:
+class StudyProgress:
     """How the jobs of one study stand.
 
     `reasons`: failed ones by reason; `promises`, `regimes`: those that are ok by what their
@@ -369,7 +369,7 @@ class JobReport:
     caveats: list[str]  # of one that is ok: what to know beside its numbers, a sentence each
 
 
-def standings(folder: Folder) -> list[Standing]:
+def standings(folder: Folder) -> list[StudyProgress]:
     """Return how each study of a folder stands. Raises WrongName where there is none.
 
     Former studies come last, those that have finished jobs which the present one lacks.
@@ -394,7 +394,7 @@ def standings(folder: Folder) -> list[Standing]:
         ok, failed = int(good.sum()), int((~good).sum())
         missing = study.jobs - ok - failed
         found.append(
-            Standing(
+            StudyProgress(
                 study.name, study.case_file, study.jobs, ok, failed, missing,
                 counts("reason", stored[~good]), counts("promise", done), counts("regime", done),
                 study_caveats(rows, study), study.again, study.former_of, study.written,
@@ -441,7 +441,7 @@ def _hides_clipping(numbers: dict[str, Any], attributes: dict[str, Any]) -> bool
     return math.isnan(numbers["clipped_fraction"]) and '"sensor"' in attributes.get("case", "")
 
 
-def changes(folder: Folder, studies: "Sequence[Study]") -> list[Change]:
+def changes(folder: Folder, studies: "Sequence[Study]") -> list[StudyChange]:
     """Return what a run of studies would take out of the stored ones of their names. Raises
     StoreError.
     """

@@ -151,7 +151,7 @@ def owners(
     return found
 
 
-class Change(NamedTuple):
+class StudyChange(NamedTuple):
     """How a study takes jobs out of the stored study of its name.
 
     `before`, `now`: their jobs; `shared`: those in both; `finished`: stored jobs that are in the
@@ -168,7 +168,7 @@ class Change(NamedTuple):
     older_model: str
 
 
-def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) -> Change | None:
+def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) -> StudyChange | None:
     """Return what writing a study would take out of the stored one; None where nothing.
 
     stored: gives the keys of all stored jobs, where it is asked.
@@ -180,7 +180,7 @@ def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) ->
     finished = len(gone & stored())
     former = _former_name(folder, old) if finished else ""
     model = str(old.versions.get("model", ""))
-    return Change(
+    return StudyChange(
         study.name, old.jobs, study.jobs, len({*old.keys}) - len(gone), finished, former,
         "" if model == MODEL_VERSION else model,
     )  # fmt: skip

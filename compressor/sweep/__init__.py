@@ -4,6 +4,6 @@ from compressor.sweep.cluster import Cluster
 from compressor.sweep.execution import cores
 from compressor.sweep.plan import Forecast, forecast
 from compressor.sweep.sweep import Options, Progress, Summary, run_here, sweep
-from compressor.sweep.wanted import Now
+from compressor.sweep.wanted import SweepProgress
 from compressor.sweep.warm_up import Needs
-from compressor.sweep.worker import Done, Lost
+from compressor.sweep.worker import JobLost, JobResult

@@ -19,10 +19,10 @@ from compressor.cases import Case
 from compressor.outcome import Outcome
 from compressor.store import StoreError, publish, store_series
 from compressor.sweep.run_job import Carried, run_job
-from compressor.sweep.sweep import GRACE, Jobs
+from compressor.sweep.sweep import GRACE, LazyCases
 from compressor.sweep.versions import ClusterError, differences, unfitness, versions
 from compressor.sweep.warm_up import Needs, load
-from compressor.sweep.worker import Done, Lost, Workers
+from compressor.sweep.worker import JobLost, JobResult, Workers
 
 
 def run_near(place: Path, token: Path, text: str, case: Case) -> Outcome | Carried | StoreError:
@@ -121,14 +121,14 @@ class Cluster:
         cases: Sequence[Case],
         remark: Callable[[str], None],
         pulse: Callable[[], object],
-    ) -> Generator[Done | Lost, None, None]:
+    ) -> Generator[JobResult | JobLost, None, None]:
         """Run cases; `compressor.sweep.sweep.Backend` tells the rest."""
         from compressor.sweep.cluster_batches import Remote  # loads dask: only where one is used
 
         with visible(place) as (token, text):
             rules = Workers(prepare=partial(load, Needs.of(cases)), grace=GRACE)
             work = partial(run_near, place, token, text)
-            remote = Remote(self.client, work, rules, Jobs(cases))
+            remote = Remote(self.client, work, rules, LazyCases(cases))
             remote.remark = remark
             remote.decode = lambda result: receive_result(place, pickle.loads(result))
             yield from remote.ends(pulse)

@@ -31,7 +31,7 @@ from compressor.sweep.execution import (
     memory_share,
 )
 from compressor.sweep.versions import ClusterError, Unfit, differences, unfitness, versions
-from compressor.sweep.worker import Lost, Workers
+from compressor.sweep.worker import JobLost, Workers
 
 ONE = threading.Lock()  # joblib has one pool a process: threads take turns, each with all of it
 KEPT: dict[bytes, Local] = {}  # the pool that is kept for the next batch, by what it does
@@ -202,7 +202,7 @@ class Remote(Batches):
         elif not self.stopped:
             yield from self.lost_batch(batch, found)
 
-    def lost_batch(self, batch: list[Job], error: BaseException) -> Iterator[Lost]:
+    def lost_batch(self, batch: list[Job], error: BaseException) -> Iterator[JobLost]:
         """Yield a batch has lost its workers: it is tried alone, then each of its jobs."""
         from distributed import KilledWorker
 
@@ -211,11 +211,11 @@ class Remote(Batches):
             raise ClusterError(f"worker {unfit}") from error
         if self.alone and len(batch) == 1:
             how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
-            yield Lost(batch[0].id, Reason.WORKER_DIED, f"{how}, {AGAIN}")
+            yield JobLost(batch[0].id, Reason.WORKER_DIED, f"{how}, {AGAIN}")
         else:
             self.suspects.extend([[job] for job in batch] if self.alone else [batch])
 
-    def fail(self, error: BaseException) -> Iterable[Lost]:
+    def fail(self, error: BaseException) -> Iterable[JobLost]:
         raise error if self.client.status == "running" else describe_lost_scheduler(self.client)
 
     def discard(self) -> None:

@@ -41,16 +41,16 @@ from compressor.sweep.worker import (
     ENDING,
     NOTE,
     WHY,
-    Done,
-    Lost,
+    JobLost,
+    JobResult,
     Workers,
     describe_error,
     do_batch,
-    settle,
+    init_worker,
 )
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
-End = Done | Lost
+End = JobResult | JobLost
 
 TICK = 0.1  # s between two looks at the clocks of the jobs
 MOST_BATCH = 200  # jobs
@@ -78,7 +78,7 @@ class Batches:
     parallel: Callable[[], Parallel]  # joblib's, for one round: called in the thread
     call: Callable[[list[Job]], Any]  # a batch as joblib takes it
     watch: Callable[[float, bool], None]  # called often: the time, whether something has arrived
-    fail: Callable[[BaseException], Iterable[Lost]]  # a round ended by an error
+    fail: Callable[[BaseException], Iterable[JobLost]]  # a round ended by an error
     discard: Callable[[], None]  # ends what a job that is tried alone must not share with others
     stop: Callable[[], None]  # ends all workers; what had arrived stays
 
@@ -188,7 +188,7 @@ class Batches:
             try:
                 return Job(name, pickle.dumps(payload, pickle.HIGHEST_PROTOCOL), timeout)
             except Exception as error:
-                lost = Lost(None, Reason.INTERNAL_ERROR, *describe_error(error))
+                lost = JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
                 self.arrived.put(([Job(name, b"", timeout)], [lost]))
         return None
 
@@ -196,7 +196,7 @@ class Batches:
         """Yield how the jobs of a batch ended; a rest that was given back waits again."""
         self.waiting.extendleft(reversed(batch[len(found) :]))
         for job, end in zip(batch, found, strict=False):
-            if isinstance(end, Lost):
+            if isinstance(end, JobLost):
                 again = end.reason == Reason.OUT_OF_MEMORY and AGAIN not in end.detail
                 yield from self.lose(job, end, again)
                 continue
@@ -205,10 +205,10 @@ class Batches:
             try:
                 end = replace(end, id=job.id, result=self.decode(end.result))
             except Exception as error:
-                end = Lost(job.id, Reason.INTERNAL_ERROR, *describe_error(error))
+                end = JobLost(job.id, Reason.INTERNAL_ERROR, *describe_error(error))
             yield end
 
-    def lose(self, job: Job, end: Lost, again: bool) -> Iterator[Lost]:
+    def lose(self, job: Job, end: JobLost, again: bool) -> Iterator[JobLost]:
         """Yield a job is lost, or tried again, once and alone."""
         if again and not job.retried:
             self.suspects.append([job._replace(retried=True)])
@@ -330,7 +330,7 @@ class Local(Batches):
             self.pool = Parallel(
                 max(self.width, 2), Loky(self.hand_over), "generator_unordered", batch_size=1,
                 pre_dispatch=2 * self.width, max_nbytes=None, temp_folder=tempfile.gettempdir(),
-                initializer=settle, initargs=self.initargs,
+                initializer=init_worker, initargs=self.initargs,
             ).__enter__()  # fmt: skip
             self.executor = get_reusable_executor(1 if self.alone else self.width, reuse=True)
         return self.pool
@@ -385,7 +385,7 @@ class Local(Batches):
             with contextlib.suppress(OSError), open(os.devnull, "wb") as nobody:
                 os.dup2(nobody.fileno(), results._writer.fileno())
 
-    def fail(self, error: BaseException) -> Iterator[Lost]:
+    def fail(self, error: BaseException) -> Iterator[JobLost]:
         """Yield the pool has broken: see to its jobs. The one that ran in a dead process may be
         why.
         """
@@ -411,17 +411,17 @@ class Local(Batches):
             self.fruitless, self.most = self.fruitless + 1, max(1, largest // 2)
             if self.fruitless > FRUITLESS:
                 why = self.notes[-WHY:].rstrip(b"\0").decode(errors="replace")
-                how = why or ending(next((codes[pid] for pid in died), None))
+                how = why or batch_ending(next((codes[pid] for pid in died), None))
                 raise WorkersFailed(f"jobs could not even begin: {how}")
         self.discard()
 
-    def blame(self, job: Job, late: bool, code: int | None) -> Iterator[Lost]:
+    def blame(self, job: Job, late: bool, code: int | None) -> Iterator[JobLost]:
         """Yield a job was at work in a process that died, or was killed since it took too long."""
-        reason, text = Reason.WORKER_DIED, f"its worker ended by {ending(code)}"
+        reason, text = Reason.WORKER_DIED, f"its worker ended by {batch_ending(code)}"
         if late:
             reason = Reason.BUDGET_SECONDS
             text = f"more than {job.timeout:g} s of wall time; its worker was killed"
-        yield from self.lose(job, Lost(None, reason, text), not late)
+        yield from self.lose(job, JobLost(None, reason, text), not late)
 
     def discard(self) -> None:
         """End the pool, if there is one."""
@@ -500,7 +500,7 @@ def kill(pids: Iterable[int]) -> None:
             os.kill(pid, signal.SIGKILL)
 
 
-def ending(code: int | None) -> str:
+def batch_ending(code: int | None) -> str:
     """Return how a process ended, from its exit code (less the signal's number)."""
     if code is None or code >= 0:
         return "an unknown cause" if code is None else f"exit code {code}"

@@ -17,7 +17,7 @@ import numpy as np
 
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, read_store, series_file
-from compressor.sweep.wanted import Wanted, revolutions, stored_ends
+from compressor.sweep.wanted import RequestedJobs, revolutions, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
 
 ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
@@ -37,7 +37,7 @@ class Next:
 
 
 @dataclass(frozen=True)
-class Part:
+class StudyShare:
     """One study's share; a job of several studies counts for the first of them.
 
     `least`, `most`: the range of `seconds`; they are the same where all missing jobs were timed,
@@ -66,7 +66,7 @@ class Forecast:
     jobs: int
     done: int
     missing: int
-    studies: tuple[Part, ...]
+    studies: tuple[StudyShare, ...]
     first: tuple[Next, ...]
     workers: int = 1
     seconds: float = 0.0
@@ -112,7 +112,7 @@ class Ahead:
             bytes=sum(part.bytes for part in parts),
         )
 
-    def expected(self, part: Part, costs: "Sequence[Cost]") -> Part:
+    def expected(self, part: StudyShare, costs: "Sequence[Cost]") -> StudyShare:
         """Return a study's part with what its missing jobs will take, by some of them."""
         keys = self.missing[part.study]
         looked_at = [self.cases[key] for key in keys if key in self.cases]
@@ -135,11 +135,11 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
     """
     store = read_store(folder)
     keys = {study.name: dict.fromkeys(study.keys[n] for n in study.selected) for study in studies}
-    done = {*stored_ends(store, Wanted(studies, store.keys()))}
+    done = {*stored_ends(store, RequestedJobs(studies, store.keys()))}
     missing: dict[str, list[str]] = {}
     looked_at: set[str] = set()
     ahead: list[Next] = []
-    parts: list[Part] = []
+    parts: list[StudyShare] = []
     told: set[str] = set()
     for study in studies:
         mine = [key for key in keys[study.name] if key not in told]
@@ -148,10 +148,10 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
         missing[study.name] = new
         few = len(new) <= MOST_CASES
         looked_at.update(new if few else random.Random(0).sample(new, MOST_CASES))
-        parts.append(Part(study.name, len(mine), len(mine) - len(new), len(new)))
+        parts.append(StudyShare(study.name, len(mine), len(mine) - len(new), len(new)))
         ahead += next_of(study, {*new}, first - len(ahead))
     counts = Forecast(len(told), len(done), len(told) - len(done), tuple(parts), tuple(ahead))
-    return Ahead(counts, missing, dict(Wanted(studies, looked_at)))
+    return Ahead(counts, missing, dict(RequestedJobs(studies, looked_at)))
 
 
 def next_of(study: Study, keys: set[str], most: int) -> Iterator[Next]:

@@ -18,9 +18,16 @@ from compressor.outcome import Outcome, without_run
 from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.execution import Input, require_posix, rest, run_batches
 from compressor.sweep.run_job import run_ahead, run_job
-from compressor.sweep.wanted import End, Missing, Now, Wanted, Work, stored_ends
+from compressor.sweep.wanted import (
+    JobEnd,
+    PendingCases,
+    RequestedJobs,
+    SweepProgress,
+    SweepWork,
+    stored_ends,
+)
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.worker import Done, Lost, Workers
+from compressor.sweep.worker import JobLost, JobResult, Workers
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
@@ -41,7 +48,7 @@ class Backend(Protocol):
         cases: Sequence[Case],
         remark: Callable[[str], None],
         pulse: Callable[[], object],
-    ) -> Generator[Done | Lost, None, None]: ...
+    ) -> Generator[JobResult | JobLost, None, None]: ...
 
 
 @dataclass(frozen=True)
@@ -61,11 +68,11 @@ class Options:
     part: tuple[int, int] | None = None
     wait: bool = False
     backend: Backend | None = None
-    pulse: Callable[[Now], object] = lambda now: None
+    pulse: Callable[[SweepProgress], object] = lambda now: None
 
 
 @dataclass(frozen=True)
-class Failure:
+class JobFailure:
     """A failed job as one study sees it."""
 
     study: str
@@ -76,7 +83,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Count:
+class JobCount:
     """How many of a study's selected jobs ended well."""
 
     study: str
@@ -95,8 +102,8 @@ class Summary:
     total: int
     done_before: int
     run_now: int
-    counts: tuple[Count, ...]
-    failed: tuple[Failure, ...]
+    counts: tuple[JobCount, ...]
+    failed: tuple[JobFailure, ...]
     seconds: float
     stale: dict[str, int]
     gaining: int
@@ -129,7 +136,7 @@ def sweep(
     jobs = sum(len(study.selected) for study in studies)
     if jobs > MANY:
         progress(0, jobs, f"preparing {jobs} jobs")
-    cases = Wanted(studies)
+    cases = RequestedJobs(studies)
     with Writer(folder, name, options.wait, options.command) as writer:
         if writer.unowned:
             files = (
@@ -147,7 +154,7 @@ def sweep(
                 position = int(writer.found.rows.find([key])[0])
                 cases[key] = writer.found.status_at(position).kept_by(cases[key])
             stale, gaining = {}, set()
-        missing = Missing(cases, [key for key in cases if key not in ends])
+        missing = PendingCases(cases, [key for key in cases if key not in ends])
         for study in studies:
             write_study(folder, study, options.command, writer.found.keys)
         if missing:
@@ -166,15 +173,15 @@ def run_missing(
     writer: Writer,
     missing: Sequence[Case],
     backend: Backend,
-    ends: dict[str, End],
-    watchers: tuple[Progress, Callable[[Now], object]],
+    ends: dict[str, JobEnd],
+    watchers: tuple[Progress, Callable[[SweepProgress], object]],
 ) -> None:
     """Run and store cases; `ends` gains how each ended.
 
     watchers: progress, told of what is on disk, and the pulse.
     """
     progress, pulse = watchers
-    done, total, work = len(ends), len(ends) + len(missing), Work(missing)
+    done, total, work = len(ends), len(ends) + len(missing), SweepWork(missing)
     failed = sum(end.status != "ok" for end in ends.values())
 
     def tell(acknowledged: Sequence[str]) -> None:
@@ -187,16 +194,16 @@ def run_missing(
     def beat() -> None:
         tell(writer.flush_if_due())
         left = work.left()
-        pulse(Now(done, failed, total, *(left or ())))
+        pulse(SweepProgress(done, failed, total, *(left or ())))
 
-    def keep(end: Done | Lost) -> None:
+    def keep(end: JobResult | JobLost) -> None:
         outcome = outcome_of(end)
-        ends[outcome.key] = End(outcome.status, outcome.reason, outcome.detail)
+        ends[outcome.key] = JobEnd(outcome.status, outcome.reason, outcome.detail)
         work.add(end)
         tell(writer.add(outcome))
 
     progress(done, total, "")
-    pulse(Now(done, failed, total))
+    pulse(SweepProgress(done, failed, total))
     running = backend(writer.place, missing, lambda remark: progress(done, total, remark), beat)
     try:
         for end in running:
@@ -217,9 +224,9 @@ def local(workers: int) -> Backend:
         cases: Sequence[Case],
         remark: Callable[[str], None],
         pulse: Callable[[], object],
-    ) -> Generator[Done | Lost, None, None]:
+    ) -> Generator[JobResult | JobLost, None, None]:
         needs, work = Needs.of(cases).with_lanes(cases), partial(run_job, place)
-        return run_here(work, Jobs(cases), needs, workers, remark, pulse)
+        return run_here(work, LazyCases(cases), needs, workers, remark, pulse)
 
     return run
 
@@ -231,7 +238,7 @@ def run_here(
     workers: int,
     remark: Callable[[str], None],
     pulse: Callable[[], object] = lambda: None,
-) -> Generator[Done | Lost, None, None]:
+) -> Generator[JobResult | JobLost, None, None]:
     """Return `run_batches` in processes that load the equations, compiled before if there is a job.
 
     Where the needs name scenes for lanes, jobs are cases, and `work` takes what `run_ahead` gives.
@@ -245,7 +252,7 @@ def run_here(
     )
 
 
-class Jobs(Sequence[Any]):
+class LazyCases(Sequence[Any]):
     """Cases as workers take them, each made when it is taken."""
 
     def __init__(self, cases: Sequence[Case]):
@@ -260,25 +267,25 @@ class Jobs(Sequence[Any]):
 
 
 def endings(
-    studies: Sequence[Study], ends: dict[str, End]
-) -> tuple[tuple[Count, ...], tuple[Failure, ...]]:
+    studies: Sequence[Study], ends: dict[str, JobEnd]
+) -> tuple[tuple[JobCount, ...], tuple[JobFailure, ...]]:
     """Return how the selected jobs of each study ended, and every one that failed."""
     counts, failures = [], []
     for study in studies:
         selected = {*study.selected}
         failed = [
-            Failure(study.name, point, key, ends[key].reason, ends[key].detail)
+            JobFailure(study.name, point, key, ends[key].reason, ends[key].detail)
             for number, point in enumerate(points(study))
             if number in selected and ends[key := study.keys[number]].status != "ok"
         ]
-        counts.append(Count(study.name, len(selected), len(failed)))
+        counts.append(JobCount(study.name, len(selected), len(failed)))
         failures += failed
     return tuple(counts), tuple(failures)
 
 
-def outcome_of(end: Done | Lost) -> Outcome:
+def outcome_of(end: JobResult | JobLost) -> Outcome:
     """Return the outcome of a job, also of one that raised an exception or lost its worker."""
-    if isinstance(end, Done):
+    if isinstance(end, JobResult):
         if isinstance(end.result, StoreError):
             raise end.result
         return end.result

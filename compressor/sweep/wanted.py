@@ -15,10 +15,10 @@ import numpy as np
 
 from compressor.cases import Case, Study
 from compressor.store import Stored
-from compressor.sweep.worker import Done, Lost
+from compressor.sweep.worker import JobLost, JobResult
 
 
-class End(NamedTuple):
+class JobEnd(NamedTuple):
     """How a job ended."""
 
     status: str
@@ -26,10 +26,10 @@ class End(NamedTuple):
     detail: str
 
 
-WELL = End("ok", "", "")
+WELL = JobEnd("ok", "", "")
 
 
-class Wanted(Mapping[str, Case]):
+class RequestedJobs(Mapping[str, Case]):
     """Each selected job once, by key; its case is built when it is asked for.
 
     Where studies share a job, its case serves them all. A case can be changed in what is no part of
@@ -77,10 +77,10 @@ class Wanted(Mapping[str, Case]):
             yield self[keys[0]], keys
 
 
-class Missing(Sequence[Case]):
+class PendingCases(Sequence[Case]):
     """The cases of some wanted jobs, each built when it is asked for: many take much memory."""
 
-    def __init__(self, wanted: Wanted, keys: Sequence[str]):
+    def __init__(self, wanted: RequestedJobs, keys: Sequence[str]):
         self.wanted, self.keys = wanted, keys
 
     def __len__(self) -> int:
@@ -89,10 +89,10 @@ class Missing(Sequence[Case]):
     @overload
     def __getitem__(self, index: int) -> Case: ...
     @overload
-    def __getitem__(self, index: slice) -> "Missing": ...
-    def __getitem__(self, index: int | slice) -> "Case | Missing":
+    def __getitem__(self, index: slice) -> "PendingCases": ...
+    def __getitem__(self, index: int | slice) -> "Case | PendingCases":
         if isinstance(index, slice):
-            return Missing(self.wanted, self.keys[index])
+            return PendingCases(self.wanted, self.keys[index])
         return self.wanted[self.keys[index]]
 
 
@@ -115,13 +115,13 @@ def serving_both(first: Case, second: Case) -> Case:
     return replace(first, output=output, solve=solve)
 
 
-def stored_ends(store: Stored, wanted: Wanted) -> dict[str, End]:
+def stored_ends(store: Stored, wanted: RequestedJobs) -> dict[str, JobEnd]:
     """Return how the jobs ended that need no new run: stored ones that serve, with intact files.
 
     A case whose job is to be run again goes on keeping the time series that its job has, as exact
     as they are.
     """
-    found: dict[str, End] = {}
+    found: dict[str, JobEnd] = {}
     rows = store.rows
     for case, keys in [*wanted.alike()]:
         places = rows.find(keys)
@@ -135,7 +135,7 @@ def stored_ends(store: Stored, wanted: Wanted) -> dict[str, End]:
                 found[key] = WELL
                 if rows.columns["status"][position] != b"ok":
                     end = store.status_at(position)
-                    found[key] = End(end.status, end.reason, end.detail)
+                    found[key] = JobEnd(end.status, end.reason, end.detail)
             else:
                 wanted[key] = store.status_at(position).kept_by(wanted[key])
     return found
@@ -146,7 +146,7 @@ SOONEST = 1.0  # s of work before there is one
 KNOWN = 0.5  # of the revolutions ahead must be of kinds that are measured
 
 
-class Now(NamedTuple):
+class SweepProgress(NamedTuple):
     """How a sweep stands.
 
     done, failed, total: jobs, those stored before among them; failed ones are done, too. left: s
@@ -161,14 +161,14 @@ class Now(NamedTuple):
     at_least: bool = False
 
 
-class Left(NamedTuple):
+class RemainingWork(NamedTuple):
     """Seconds of work that are left, and whether unmeasured kinds come on top of them."""
 
     seconds: float
     at_least: bool
 
 
-class Work:
+class SweepWork:
     """The work of a sweep: revolutions ahead, and what those behind have taken, by kind."""
 
     def __init__(self, cases: Iterable[Case], clock: Callable[[], float] = time.monotonic):
@@ -180,11 +180,11 @@ class Work:
         for case in cases:
             self.ahead[kind(case)] = self.ahead.get(kind(case), 0.0) + revolutions(case)
 
-    def add(self, end: Done | Lost) -> None:
+    def add(self, end: JobResult | JobLost) -> None:
         """A job has ended; one that was lost tells nothing of the others."""
         of, turns = kind(end.id), revolutions(end.id)
         self.ahead[of] = max(0.0, self.ahead[of] - turns)
-        if isinstance(end, Lost):
+        if isinstance(end, JobLost):
             return
         self.last = self.clock()
         if not self.ends:
@@ -194,7 +194,7 @@ class Work:
         known, took = self.behind.get(of, (0.0, 0.0))
         self.behind[of] = known + turns, took + end.seconds
 
-    def left(self) -> Left | None:
+    def left(self) -> RemainingWork | None:
         """Return what is left to do; None as long as too little is known to say."""
         elapsed = self.last - self.began
         if self.ends < FEWEST or elapsed < SOONEST or not self.seconds:
@@ -209,7 +209,7 @@ class Work:
         )
         at_once = self.seconds / elapsed
         since = self.clock() - self.last
-        return Left(max(0.0, seconds / at_once - since), unknown > 0)
+        return RemainingWork(max(0.0, seconds / at_once - since), unknown > 0)
 
 
 def kind(case: Case) -> Hashable:

@@ -30,7 +30,7 @@ WHY = 400  # bytes behind the notes: what kept a worker from beginning
 
 
 @dataclass(frozen=True)
-class Done:
+class JobResult:
     """A job that ended, its result, and the seconds that it took."""
 
     id: Any
@@ -39,7 +39,7 @@ class Done:
 
 
 @dataclass(frozen=True)
-class Lost:
+class JobLost:
     """A job that has no result.
 
     `reason`: WORKER_DIED, OUT_OF_MEMORY, BUDGET_SECONDS, or INTERNAL_ERROR, with a traceback,
@@ -70,10 +70,10 @@ class Workers:
     target_seconds: float = 0.2
 
 
-HERE: dict[str, Any] = {}  # what `settle` leaves for `do_batch`
+HERE: dict[str, Any] = {}  # what `init_worker` leaves for `do_batch`
 
 
-def settle(work: Callable[[Any], Any], rules: Workers, notes: str, parent: int) -> None:
+def init_worker(work: Callable[[Any], Any], rules: Workers, notes: str, parent: int) -> None:
     """Make a new process a worker: its end, signals, streams, memory; what it is told once."""
     if sys.platform == "linux":  # die when the parent does, even amid compiled code
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -121,9 +121,9 @@ def limit(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
 
 
-def do_batch(place: int, payloads: Sequence[bytes]) -> tuple[int, list[Done | Lost]]:
+def do_batch(place: int, payloads: Sequence[bytes]) -> tuple[int, list[JobResult | JobLost]]:
     """Do the jobs of a batch: its place, and how jobs ended, all but a rest that is given back."""
-    found: list[Done | Lost] = []
+    found: list[JobResult | JobLost] = []
     began = start = time.monotonic()
     NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), 0, start)
     jobs, each = look_ahead(payloads), (time.monotonic() - start) / len(payloads)
@@ -155,16 +155,16 @@ def only(payload: bytes) -> tuple[Any]:
     return (pickle.loads(payload),)
 
 
-def perform(job: Callable[[], tuple[Any, ...]], start: float) -> Done | Lost:
+def perform(job: Callable[[], tuple[Any, ...]], start: float) -> JobResult | JobLost:
     """Do one job; its result is pickled."""
     try:
         result = pickle.dumps(HERE["work"](*job()), pickle.HIGHEST_PROTOCOL)
-        return Done(None, result, time.monotonic() - start)
+        return JobResult(None, result, time.monotonic() - start)
     except MemoryError:
         most = f"needs more than the {HERE['rules'].memory / 1e9:.3g} GB that a worker may add"
-        return Lost(None, Reason.OUT_OF_MEMORY, most)
+        return JobLost(None, Reason.OUT_OF_MEMORY, most)
     except BaseException as error:  # work may even call sys.exit
-        return Lost(None, Reason.INTERNAL_ERROR, *describe_error(error))
+        return JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
 
 
 def describe_error(error: BaseException) -> tuple[str, str]:

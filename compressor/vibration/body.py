@@ -22,7 +22,7 @@ from compressor.cases import Body
 DEGREE = 3
 
 
-class Motion(NamedTuple):
+class OscillatorMotion(NamedTuple):
     """Displacement, velocity and acceleration at the samples of the force, each (n,)."""
 
     displacement: np.ndarray
@@ -32,7 +32,7 @@ class Motion(NamedTuple):
 
 def oscillate(
     force: np.ndarray, step: float, frequency: float, damping_ratio: float, steady: bool = False
-) -> Motion:
+) -> OscillatorMotion:
     """Return the motion q'' + 2 zeta w q' + w^2 q = f of an oscillator.
 
     force: f, per unit of modal mass, at n >= 4 equal steps, (n,); step: s; frequency: w / 2 pi, Hz;
@@ -62,7 +62,7 @@ def oscillate(
     displacement = z.imag / root.imag
     velocity = z.real + root.real * displacement
     acceleration = force + 2.0 * root.real * velocity - omega**2 * displacement
-    return Motion(displacement, velocity, acceleration)
+    return OscillatorMotion(displacement, velocity, acceleration)
 
 
 def pieces(force: np.ndarray, step: float, periodic: bool) -> np.ndarray:
@@ -106,11 +106,11 @@ class Forces:
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """The mass centre along x and y, and rocking (rad), each a `Motion`; nothing where held."""
+    """An `OscillatorMotion` of the mass centre along x and y, and of rocking (rad); None: held."""
 
-    x: Motion
-    y: Motion
-    rocking: Motion
+    x: OscillatorMotion
+    y: OscillatorMotion
+    rocking: OscillatorMotion
 
     def acceleration(self, axis: str, point: tuple[float, float]) -> np.ndarray:
         """Return the acceleration (m/s2, (n,)) along an axis of a point, in m from the mass centre.
@@ -138,7 +138,7 @@ def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
         "rocking": (moment / body.inertia_kg_m2, body.frequency_rocking_Hz),
     }
     free = [*body.freedoms.partition("_")[0]] + ["rocking"] * body.freedoms.endswith("rocking")
-    still = Motion(*(np.zeros(len(shaking)),) * 3)
+    still = OscillatorMotion(*(np.zeros(len(shaking)),) * 3)
     motions = {
         name: oscillate(force, forces.step, frequency, body.damping_ratio, steady)
         if name in free

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.analysis import captions
-from compressor.analysis.orbit import Course
+from compressor.analysis.orbit import JournalMotion
 from compressor.analysis.runs import CLEARANCES, FAULTS, label
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
@@ -148,7 +148,7 @@ def test_changes_about_top_dead_centre_belong_together(turns, told):
 
 def courses(*turns, rings=(600.0, 500.0, 400.0)):
     """Three runs of a journal, of which no more is known than where its force turns."""
-    return [Course("big_end", 0.0, 1e-5, 1.0, one, ring)
+    return [JournalMotion("big_end", 0.0, 1e-5, 1.0, one, ring)
             for one, ring in zip(turns, rings, strict=True)]  # fmt: skip
 
 

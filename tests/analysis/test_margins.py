@@ -8,8 +8,8 @@ import xarray as xr
 
 from compressor.analysis.claims import claims
 from compressor.analysis.margins import (
+    BarredNumber,
     Margin,
-    Measure,
     above,
     at_least,
     at_most,
@@ -21,16 +21,16 @@ from compressor.analysis.margins import (
 
 
 def test_margins_by_hand():
-    assert at_least(Measure(3.3, 0.3), 3.0) == pytest.approx((0.1, 0.1))
-    assert at_least(Measure(2.4, 0.3), 3.0) == pytest.approx((-0.2, 0.1))
-    assert at_most(Measure(0.02, 0.01), 0.05) == pytest.approx((0.6, 0.2))
-    assert above(Measure(2.0), 2.0).value < 0.0 == at_least(Measure(2.0), 2.0).value
+    assert at_least(BarredNumber(3.3, 0.3), 3.0) == pytest.approx((0.1, 0.1))
+    assert at_least(BarredNumber(2.4, 0.3), 3.0) == pytest.approx((-0.2, 0.1))
+    assert at_most(BarredNumber(0.02, 0.01), 0.05) == pytest.approx((0.6, 0.2))
+    assert above(BarredNumber(2.0), 2.0).value < 0.0 == at_least(BarredNumber(2.0), 2.0).value
 
 
 def test_a_ratio_s_relative_errors_add():
-    ratio = Measure(6.0, 0.06).over(Measure(2.0, 0.04))
+    ratio = BarredNumber(6.0, 0.06).over(BarredNumber(2.0, 0.04))
     assert ratio == pytest.approx((3.0, 3.0 * 0.03))
-    assert Measure(1.0).over(Measure(0.0)).value == math.inf
+    assert BarredNumber(1.0).over(BarredNumber(0.0)).value == math.inf
 
 
 def test_the_least_margin_reaches_as_low_as_any_may_be():

@@ -18,7 +18,7 @@ from random_cases import strangers
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.error_bars import WHOLE, Companion, bars, closeness
 from compressor.solve.series import distances
 
@@ -38,7 +38,7 @@ def one_case(values):
 
     def run(rtol):
         if rtol not in runs:
-            runs[rtol] = attempt(case, rtol, 600.0, False)
+            runs[rtol] = run_at_tolerance(case, rtol, 600.0, False)
         return runs[rtol]
 
     truth, rows = run(TRUTH), []

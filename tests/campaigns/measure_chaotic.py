@@ -24,7 +24,7 @@ from random_cases import strangers
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
 from compressor.outcome import Regime
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.request import Cuts, revolutions
 from compressor.solve.run_metrics import metrics
@@ -162,7 +162,7 @@ def told(values, method):
     how = {**RANDOM, "method": method, "rtol": OTHER_RTOL, "error_bars": False}
     other = Case.from_values({**values, "solve": how})
     cuts = Cuts(revolutions(of.settle, of.duration, of.turn))
-    run = attempt(other, OTHER_RTOL, how["timeout_s"], False, cuts)
+    run = run_at_tolerance(other, OTHER_RTOL, how["timeout_s"], False, cuts)
     if run.reason:
         return {**row, "other": run.reason}
     squares = np.array([metrics(run.p, turn)["rms_acceleration"] ** 2 for turn in cuts.turns])

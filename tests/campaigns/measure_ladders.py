@@ -20,7 +20,7 @@ from compressor.cases.case import Case
 from compressor.cases.groups import Contact
 from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
 from compressor.report.figures.style import render
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.error_bars import allowed_residual
 from compressor.solve.simulate import simulate, with_series
 from compressor.studies.tradeoff.work_precision import (
@@ -46,7 +46,7 @@ def short(value):
 
 def alone(case):
     """The Dataset of one run at the case's own tolerance, whatever the energy audit says of it."""
-    found = attempt(case, case.rtol, case.solve.timeout_s, sampled=True)
+    found = run_at_tolerance(case, case.rtol, case.solve.timeout_s, sampled=True)
     assert not found.reason, found.detail
     table = with_series(case, found)[1]
     return xr.Dataset(table.variables, attrs=table.attrs)

@@ -15,7 +15,7 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
-from compressor.studies.wear.stages import Worn, dataset, first, following, life
+from compressor.studies.wear.stages import Worn, first, following, life, stages_dataset
 
 ONE = {"joint": "big_end", "clearance_mm": 0.2}
 LIMIT = 1.5  # clearances, at which it ends
@@ -30,7 +30,7 @@ def followed(values, **wear):
     stages = [first(of)]
     while not of.over(stages[-1]):
         stages.append(following(of, stages[-1]))
-    reached = life(of, dataset(of, stages))
+    reached = life(of, stages_dataset(of, stages))
     return reached.hours, at_limit(of, stages), stages[-1]["reason"]
 
 

@@ -19,7 +19,7 @@ from page_tables import kept
 from compressor.cases.load import load_studies
 from compressor.studies.diagnosis.approximate import Distance, Interval
 from compressor.studies.diagnosis.features import FEATURES
-from compressor.studies.diagnosis.identify import Answer, Candidate
+from compressor.studies.diagnosis.identify import Candidate, Identification
 
 
 def test_machines_are_spread_and_come_again():
@@ -73,7 +73,7 @@ class Told:
             )
         ]
         nowhere = Distance(1.0, 1.0)
-        return Answer(tuple(found), self.calls % 2 == 0, 0.5, nowhere, nowhere, "", {})
+        return Identification(tuple(found), self.calls % 2 == 0, 0.5, nowhere, nowhere, "", {})
 
 
 def test_answers_are_counted():

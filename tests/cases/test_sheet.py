@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case, parts_of
 from compressor.cases.checks import value_of, values_given
-from compressor.cases.columns import Column, Mixed, alike, places_where
+from compressor.cases.columns import ArrayValue, Mixed, alike, places_where
 from compressor.cases.conflicts import reads
 from compressor.cases.load import MAX_CONFLICTS, CaseFileError, itself, load_studies
 from compressor.cases.parameter import CaseError
@@ -250,7 +250,7 @@ OPERATORS = [operator.add, operator.sub, operator.mul, operator.lt, operator.le,
 @pytest.mark.parametrize("operation", OPERATORS)
 @given(many=MANY, other=NUMBERS)
 def test_columns_calculate_as_numbers_do(operation, many, other):
-    column = Column(np.array(many))
+    column = ArrayValue(np.array(many))
     assert operation(column, other).numbers.tolist() == [operation(a, other) for a in many]
     assert operation(other, column).numbers.tolist() == [operation(other, a) for a in many]
     assert operation(column, column).numbers.tolist() == [operation(a, a) for a in many]
@@ -258,7 +258,7 @@ def test_columns_calculate_as_numbers_do(operation, many, other):
 
 @given(many=st.lists(st.floats(1e-3, 1e3), min_size=1, max_size=8), other=st.floats(0.5, 2))
 def test_columns_divide_and_take_powers_as_numbers_do(many, other):
-    column = Column(np.array(many))
+    column = ArrayValue(np.array(many))
     assert (column / other).numbers.tolist() == [a / other for a in many]
     assert (other / column).numbers.tolist() == [other / a for a in many]
     assert (column**other).numbers.tolist() == [a**other for a in many]
@@ -268,7 +268,7 @@ def test_columns_divide_and_take_powers_as_numbers_do(many, other):
 
 
 def test_a_condition_that_holds_for_some_alone_is_mixed():
-    column = Column(np.array([1.0, 2.0, 3.0]))
+    column = ArrayValue(np.array([1.0, 2.0, 3.0]))
     assert column > 0
     assert not column > 3
     with pytest.raises(Mixed) as caught:
@@ -278,7 +278,7 @@ def test_a_condition_that_holds_for_some_alone_is_mixed():
 
 
 def test_what_is_no_number_is_not_compared_by_size():
-    column = Column(np.array([1.0, 2.0]))
+    column = ArrayValue(np.array([1.0, 2.0]))
     assert not column == "auto"  # noqa: SIM201
     assert column != "auto"
     for wrong in (lambda: {column}, lambda: float(column), lambda: column + "1"):
@@ -291,7 +291,7 @@ def test_places_are_cut_where_conditions_are_mixed():
 
     def test(places):
         asked.append(len(places))
-        x = Column(numbers[places])
+        x = ArrayValue(numbers[places])
         return bool(x > 2 and x < 7)
 
     assert places_where(test, 10).nonzero()[0].tolist() == [3, 4, 5, 6]

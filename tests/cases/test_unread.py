@@ -13,7 +13,7 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.table import table
 from compressor.solve import simulate
 from compressor.store.series_file import series_image
-from compressor.studies.wear.stages import Worn, dataset, first, following, life
+from compressor.studies.wear.stages import Worn, first, following, life, stages_dataset
 
 SHORT = {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 5,
          "error_bars": False, "horizon": False}  # fmt: skip
@@ -207,7 +207,7 @@ def stored(text: str) -> dict[str, str]:
     if case.wear:
         worn = Worn(case)
         begun = first(worn)
-        stages = dataset(worn, [begun, following(worn, begun)])
+        stages = stages_dataset(worn, [begun, following(worn, begun)])
         found |= {name: repr(item.values.tolist()) for name, item in stages.variables.items()}
         found["life"] = repr((life(worn, stages), worn.limit))
     return found

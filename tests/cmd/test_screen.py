@@ -9,7 +9,7 @@ import pytest
 from compsim import screen as module
 from compsim.screen import Screen
 
-from compressor.sweep.wanted import Now
+from compressor.sweep.wanted import SweepProgress
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_failed_jobs_and_the_time_left_stand_in_the_line(terminal, capsys):
     terminal()
     screen = Screen(quiet=False)
     screen(40, 100, "")
-    screen.stands(Now(40, 3, 100, 75.0, True))
+    screen.stands(SweepProgress(40, 3, 100, 75.0, True))
     screen.line.progress.refresh()
     screen.end()
     err = capsys.readouterr().err
@@ -72,7 +72,7 @@ def test_a_narrow_terminal_gets_one_line_as_well(columns, terminal, capsys):
     terminal(columns)
     screen = Screen(quiet=False)
     screen(123456, 1000000, "")
-    screen.stands(Now(123456, 3456, 1000000, 7500.0))
+    screen.stands(SweepProgress(123456, 3456, 1000000, 7500.0))
     screen.line.progress.refresh()
     screen.end()
     drawn = re.split(r"\r|\x1b\[\d?[AK]|\n", re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().err))
@@ -175,6 +175,6 @@ def test_quiet_is_quiet(clock, capsys):
     for done in range(100):
         clock[0] += 1
         screen(done, 100, "a remark")
-        screen.stands(Now(done, 0, 100))
+        screen.stands(SweepProgress(done, 0, 100))
     screen.end()
     assert capsys.readouterr().err == ""

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 from compsim import cli, watch
-from compsim.watch import Watch, Writer
+from compsim.watch import PageWatch, PageWriter
 
 from compressor.report.page import document
-from compressor.sweep.wanted import Now
+from compressor.sweep.wanted import SweepProgress
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
-NOW = Now(12, 3, 400, 125.0)
+NOW = SweepProgress(12, 3, 400, 125.0)
 STANDS = {"done": 1, "failed": 0, "total": 2, "at": "12:00:00"}
 PATIENCE = 60.0  # s
 # stands in for the process: notes what it is told; what it answers are its arguments, in turn
@@ -57,7 +57,7 @@ def watched(tmp_path, monkeypatch):
             )  # fmt: skip
 
         monkeypatch.setattr(watch, "start_process", started)
-        return Watch("results", "report", "compsim run a.yaml --watch")
+        return PageWatch("results", "report", "compsim run a.yaml --watch")
 
     def noted():
         return notes.read_text().splitlines() if notes.exists() else []
@@ -181,7 +181,7 @@ def test_a_run_that_is_killed_leaves_the_ordinary_page(watched):
 @pytest.fixture
 def writer(tmp_path):
     handler = signal.getsignal(signal.SIGINT)
-    yield Writer({"results": "results", "report": str(tmp_path), "command": "compsim run"})
+    yield PageWriter({"results": "results", "report": str(tmp_path), "command": "compsim run"})
     signal.signal(signal.SIGINT, handler)
 
 
@@ -243,13 +243,13 @@ def test_a_run_is_watched_from_its_first_page_to_its_last(case_file, capsys, mon
             until(lambda: self.hear() or self.idle)
             pages.append((now, Path("report/index.html").read_text()))
 
-    real = Watch.stands
+    real = PageWatch.stands
     monkeypatch.setattr(watch, "SECONDS", 0.0)
-    monkeypatch.setattr(Watch, "stands", stands)
+    monkeypatch.setattr(PageWatch, "stands", stands)
     assert cli.main(["run", case_file, "-j", "1", "--watch"]) == 0
     assert capsys.readouterr().err.endswith("page: report/index.html\n")
     ((now, page),) = pages
-    assert now == Now(0, 0, 2)
+    assert now == SweepProgress(0, 0, 2)
     assert '<meta http-equiv="refresh" content="' in page
     words = "<strong>Still running:</strong> 0 of 2 jobs done, 0 failed, at "
     assert words in " ".join(page.split())

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED
-from compressor.physics.contact import Contact, nearness
+from compressor.physics.contact import ContactState, nearness
 from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
@@ -20,8 +20,8 @@ from compressor.physics.observe import (
     COLUMNS,
     Column,
     derivative_with_flows,
-    glance,
     observe_all,
+    observe_contact,
 )
 from compressor.physics.onset import (
     EDGE,
@@ -38,7 +38,7 @@ from compressor.physics.onset import (
     touching_between,
 )
 from compressor.physics.record import FREEDOMS, SMALL_END
-from compressor.physics.runge_kutta import FLOWS, STAGES, Pair, interpolate, take_step
+from compressor.physics.runge_kutta import FLOWS, STAGES, RungeKuttaPair, interpolate, take_step
 from compressor.physics.tally import new_tally
 from compressor.solve.march_driver import COMPILED as METHODS
 from compressor.solve.march_driver import CONTACT_STEP
@@ -152,7 +152,7 @@ def test_the_share_of_a_step_without_contact_ends_where_contact_does(coefficient
     walker.laid, work.dense[:] = 1, small_end_only(coefficients)
     for s, row in zip(NODES, work.rows, strict=True):
         interpolate(s, work.dense, work.y)
-        glance(ideal(s * H, p), work.y, 0, p, row)
+        observe_contact(ideal(s * H, p), work.y, 0, p, row)
     measure_apart(walker, H, 1, work, 0, p)
     assert work.apart == pytest.approx([0.0, apart], abs=2 * PLACED)
 
@@ -211,7 +211,7 @@ def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     normal, elastic, unclamped = normal_force(
         penetration, rate, 1.0, p.stiffness[1], p.clearance[1], p
     )
-    contact = Contact(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
+    contact = ContactState(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
     assert (nearness(contact, p.stiffness[1], p.clearance[1], p) > 0) == (normal > 0)
 
 
@@ -222,7 +222,7 @@ def test_a_clamped_force_counts_as_a_length(exponent):
     p.exponent = exponent
     pull = p.stiffness[1] * p.full_damping**exponent
     for share in (1.0, 0.01):
-        contact = Contact(0.0, 0.0, 0.0, 0.0, 0.0, 1e-6, -1.0, 0.0, 0.0, -share * pull)
+        contact = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 1e-6, -1.0, 0.0, 0.0, -share * pull)
         assert nearness(contact, p.stiffness[1], p.clearance[1], p) == pytest.approx(
             -share * p.full_damping
         )
@@ -268,7 +268,7 @@ def flown(t, y, time, phase, p):
     for i in range(count):
         new = np.zeros(z.size)
         derivative_with_flows(t + i * h, z, phase, p, k[0])
-        take_step(Pair.DOPRI5, crank_direction(t + i * h, p), h, z, k, phase, p, new, row)
+        take_step(RungeKuttaPair.DOPRI5, crank_direction(t + i * h, p), h, z, k, phase, p, new, row)
         z = new
     return z[: y.size]
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from compressor.cases.case import Case
 from compressor.physics.contact_laws import HYSTERESIS, Law
 from compressor.physics.record import CARRIED
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 
 EACH = [(law, e, out) for law, many in GIVEN.items() for e, out in zip(ASKED, many, strict=True)]
 pytestmark = pytest.mark.compiled
@@ -83,7 +83,7 @@ def test_each_joint_and_each_impact_has_its_own_speed():
     values = {"joint": "both", "clearance_mm": 0.3, "contact": {"law": "flores",
               "restitution": 0.6}, "load": "none", "solve": {"duration_rev": 2}}  # fmt: skip
     case = Case.from_values(values)
-    run = attempt(case, 1e-7, 60.0, True)
+    run = run_at_tolerance(case, 1e-7, 60.0, True)
     assert run.reason == ""
     carried = run.trajectory.states[:, 8:10]
     floor = case.contact.least_approach_mm_per_s / 1000

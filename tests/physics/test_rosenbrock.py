@@ -9,7 +9,7 @@ from compressor.cases.case import Case
 from compressor.physics import rosenbrock
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, interpolate
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 
@@ -81,7 +81,7 @@ def test_auto_turns_to_the_stiff_partner(values):
     runs = {method: simulate(one) for method, one in cases.items()}
     assert {str(run["status"].values) for run in runs.values()} == {"ok"}
     evaluations = {  # before the audit repeats a run at a tighter tolerance
-        method: attempt(one, one.rtol, math.inf, sampled=True).trajectory.evaluations
+        method: run_at_tolerance(one, one.rtol, math.inf, sampled=True).trajectory.evaluations
         for method, one in cases.items()
     }
     assert evaluations["auto"] < 0.4 * evaluations["DOPRI5"]

@@ -14,7 +14,7 @@ from compressor.physics.runge_kutta import (
     C,
     E,
     P,
-    Pair,
+    RungeKuttaPair,
     combine,
     error_norm,
     extend,
@@ -43,7 +43,7 @@ def flow(pair, steps, k=None):
     return z
 
 
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 def test_order_conditions(pair):
     """All eight up to order 4 and the quadrature conditions of order 5; the estimate's to 4."""
     a, b, c = A[pair], A[pair, -1], C[pair]
@@ -59,7 +59,7 @@ def test_order_conditions(pair):
     assert (b - E[pair]) @ c**4 != pytest.approx(1 / 5, abs=1e-4)  # the estimate is of order 4
 
 
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 @pytest.mark.parametrize("n", [4, 8])
 def test_the_error_is_a_root_mean_square_over_the_tolerance(pair, n):
     """Of every number of the motion, none of the flows."""
@@ -71,13 +71,13 @@ def test_the_error_is_a_root_mean_square_over_the_tolerance(pair, n):
     assert error_norm(pair, h, z, new, k, rtol, atol) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 def test_dense_output_ends_at_the_step(pair):
     assert P[pair].sum(axis=1) == pytest.approx(A[pair, -1], abs=1e-13)
 
 
 @pytest.mark.parametrize("s", [0.0, 0.1, 0.5, 0.93, 1.0])
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 def test_stages_combine_to_the_interpolant(pair, s):
     k = np.sin(np.arange(7.0 * 12)).reshape(STAGES, 12)
     z, dense, y, combined = np.arange(12.0), np.zeros((5, 8)), np.zeros(8), np.zeros(8)
@@ -89,7 +89,7 @@ def test_stages_combine_to_the_interpolant(pair, s):
     assert combined == pytest.approx(y, rel=1e-12)
 
 
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 def test_the_weights_of_the_nodes_are_stored(pair):
     weights = np.zeros(STAGES)
     for node, stored in zip(NODES, NODE_WEIGHTS[pair], strict=True):
@@ -97,7 +97,7 @@ def test_the_weights_of_the_nodes_are_stored(pair):
         assert stored == pytest.approx(weights, abs=1e-13)
 
 
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 def test_order_of_convergence(pair):
     exact = flow(pair, 512)
     errors = [np.abs(flow(pair, n) - exact)[:8].max() for n in (6, 12, 24)]
@@ -105,7 +105,7 @@ def test_order_of_convergence(pair):
     assert orders == pytest.approx(5, abs=0.2)
 
 
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 def test_order_of_dense_output(pair):
     errors = []
     for h in (4e-3, 2e-3, 1e-3):

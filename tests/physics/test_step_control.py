@@ -9,7 +9,7 @@ from compressor.cases.case import Case
 from compressor.physics import rosenbrock
 from compressor.physics.march import new_walker, new_work
 from compressor.physics.observe import derivative_with_flows
-from compressor.physics.runge_kutta import FLOWS, STAGES, A, Pair
+from compressor.physics.runge_kutta import FLOWS, STAGES, A, RungeKuttaPair
 from compressor.physics.step_control import (
     CALM_STEPS,
     EVERY,
@@ -127,7 +127,7 @@ def linear_step(pair, eigenvalue):
     return work, z
 
 
-@pytest.mark.parametrize("pair", Pair)
+@pytest.mark.parametrize("pair", RungeKuttaPair)
 @pytest.mark.parametrize("eigenvalue", [-3e3, 40.0])
 def test_an_explicit_step_tells_the_eigenvalue(pair, eigenvalue):
     work, z = linear_step(pair, eigenvalue)
@@ -136,8 +136,8 @@ def test_an_explicit_step_tells_the_eigenvalue(pair, eigenvalue):
 
 
 def test_a_step_that_stands_still_tells_no_eigenvalue():
-    work, z = linear_step(Pair.TSIT5, 0.0)
-    assert stiff_rate(walker(pair=Pair.TSIT5), H, z, work, SIZE) == 0.0
+    work, z = linear_step(RungeKuttaPair.TSIT5, 0.0)
+    assert stiff_rate(walker(pair=RungeKuttaPair.TSIT5), H, z, work, SIZE) == 0.0
 
 
 def stiff_work(eigenvalues):
@@ -172,13 +172,13 @@ def explicit_steps(w, reach, limit=1000):
 
 def test_stability_that_holds_the_steps_calls_the_stiff_partner():
     looks = math.ceil(STIFF_STEPS / EVERY)
-    assert explicit_steps(walker(pair=Pair.TSIT5), 1.05 * SUSPECT) == looks * EVERY
-    assert explicit_steps(walker(pair=Pair.TSIT5), 0.95 * SUSPECT) == 1000
+    assert explicit_steps(walker(pair=RungeKuttaPair.TSIT5), 1.05 * SUSPECT) == looks * EVERY
+    assert explicit_steps(walker(pair=RungeKuttaPair.TSIT5), 0.95 * SUSPECT) == 1000
     assert explicit_steps(walker(Mode.EXPLICIT), 1.05 * SUSPECT) == 1000
 
 
 def test_a_look_without_suspicion_takes_one_back():
-    w = walker(pair=Pair.TSIT5)
+    w = walker(pair=RungeKuttaPair.TSIT5)
     for reach, held in ((1.0, 4), (1.0, 8), (0.1, 4), (0.1, 0), (0.1, 0)):
         work, z = linear_step(w.pair, -reach * STABILITY_LIMIT / H)
         w.steps = EVERY

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from compressor.report.answer import (
-    Finding,
+    MetricChange,
     Points,
     finding,
     rank_findings,
@@ -120,7 +120,7 @@ def test_a_short_bar_has_the_unit_of_its_number():
 
 
 def test_three_findings_are_shared_among_studies():
-    one = Finding("", "", "", "", "", "", 0.0)
+    one = MetricChange("", "", "", "", "", "", 0.0)
     assert [(n, len(f)) for n, f in round_robin([("a", [one] * 3), ("b", [one])])] == [
         ("a", 2), ("b", 1),
     ]  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from compressor.report.figures.extract import Sheet, as_csv, extract, with_jobs
+from compressor.report.figures.extract import FigureData, as_csv, extract, with_jobs
 from compressor.report.interactive import (
     MOST_POINTS,
     content,
@@ -186,7 +186,7 @@ def test_what_is_seen_is_said_in_words(figure):
     assert describe_figure(extract(figure)).startswith(
         "4 panels. whole: sine, cosine; enlarged: sine"
     )
-    assert describe_figure(Sheet((), (1.0,), (1.0,), (1.0, 1.0))) == ""
+    assert describe_figure(FigureData((), (1.0,), (1.0,), (1.0, 1.0))) == ""
 
 
 def test_the_library_lies_beside_the_page(tmp_path):

@@ -16,28 +16,28 @@ from matplotlib.figure import Figure
 
 from compressor.analysis.claims import Claim
 from compressor.report import page
-from compressor.report.answer import Answer, Assumptions, Finding, Line, Provenance
+from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
 from compressor.report.page import (
     Cell,
-    Note,
+    PageTable,
     Plate,
-    Row,
     Running,
     Section,
-    Table,
+    StudyNote,
+    TableRow,
     document,
     templates,
 )
 from compressor.report.paper_sections import (
     DiagnosisContent,
+    FigurePair,
     MissingFigures,
-    Pair,
     PaperCasesContent,
     SecondSetContent,
 )
 from compressor.report.study_section import JobsContent, StudyContent
 from compressor.store.studies import StoredStudy
-from compressor.studies.claims.page import Part
+from compressor.studies.claims.page import MachinesFile
 from compressor.studies.tradeoff.page import ModelsContent
 
 ROOT = Path(__file__).parents[2]
@@ -82,8 +82,8 @@ def plate(evil):
 
 def table(evil):
     marks = ("", "failed", "missing")
-    rows = [Row([Cell(evil(), kind, 1.0) for kind in KINDS], mark, evil()) for mark in marks]
-    return Table([evil(), evil()], rows)
+    rows = [TableRow([Cell(evil(), kind, 1.0) for kind in KINDS], mark, evil()) for mark in marks]
+    return PageTable([evil(), evil()], rows)
 
 
 def contents(evil):
@@ -91,9 +91,9 @@ def contents(evil):
     claims = [Claim(n, evil(), evil(), held, [(evil(), evil())], evil())
               for n, held in enumerate((True, False, None))]  # fmt: skip
     first = replace(plate(lambda: "stands in the first set"), heading=evil())
-    found = Finding(*(evil() for _ in range(6)), 1.0)
-    answer = Answer(
-        [Line(evil(), evil(), evil(), bad) for bad in (True, False)],
+    found = MetricChange(*(evil() for _ in range(6)), 1.0)
+    answer = FirstScreen(
+        [StudyLine(evil(), evil(), evil(), bad) for bad in (True, False)],
         [(evil(), [found]), (evil(), [found])],
         claims,
         [(evil(), evil())],
@@ -107,16 +107,16 @@ def contents(evil):
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
         "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
-        f"{STUDIES}.claims:machines.html": [Part(evil(), [evil()], plate(evil))],
+        f"{STUDIES}.claims:machines.html": [MachinesFile(evil(), [evil()], plate(evil))],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         f"{STUDIES}.tradeoff:models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
         "second_set.html": SecondSetContent(
-            evil(), evil(), [evil()], [evil()], [Pair(first, plate(evil))], claims
+            evil(), evil(), [evil()], [evil()], [FigurePair(first, plate(evil))], claims
         ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
-                                   evil(), evil(), [Note(evil(), evil(), evil())]),
+                                   evil(), evil(), [StudyNote(evil(), evil(), evil())]),
     }  # fmt: skip
 
 
@@ -171,8 +171,8 @@ def test_an_attribute_ends_where_its_text_ends():
 def test_rows_are_marked_and_cells_have_their_class():
     long = "x" * 37
     cells = [Cell("1 ± 2", "number", 1.25), Cell(long[1:]), Cell(long), Cell(long, "code")]
-    rows = [Row(cells, "failed", "k1"), Row([Cell("", "word"), Cell("k", "code")])]
-    text = document([Section("a", "A", "printed.html", Table(["head"], rows))], {})
+    rows = [TableRow(cells, "failed", "k1"), TableRow([Cell("", "word"), Cell("k", "code")])]
+    text = document([Section("a", "A", "printed.html", PageTable(["head"], rows))], {})
     assert re.findall("<tr.*?</tr>", text, re.DOTALL)[1:] == [
         '<tr class="failed" data-job="k1"><td class="number" data-value="1.25">1 ± 2</td>'
         f"<td>{long[1:]}</td>"

@@ -23,7 +23,7 @@ from compressor.solve.request import Request
 from compressor.solve.scipy_driver import needs_landings
 from compressor.solve.si_record import natural_sizes, offsets, record
 from compressor.solve.simulate import simulate
-from compressor.studies.tradeoff.explain import terms, unknowns
+from compressor.studies.tradeoff.explain import terms, unknown_names
 
 pytestmark = pytest.mark.compiled
 
@@ -222,7 +222,10 @@ def test_explain_names_laws_and_bristles():
     pin = {"law": "johnson", "length_mm": 20, "modulus_GPa": 110}
     active, _ = terms(Case.resolve({**values, "contact": pin}))
     assert active["contact"] == "johnson, E* = 110 GPa, 20 mm long, undamped"
-    assert unknowns(case)[-2:] == ("bristles at the big end, m", "bristles at the small end, m")
+    assert unknown_names(case)[-2:] == (
+        "bristles at the big end, m",
+        "bristles at the small end, m",
+    )
     one = Case.resolve({**values, "joint": "big_end"})
-    assert unknowns(one)[2:] == ("bristles at the big end, m",)
-    assert len(unknowns(Case.resolve({"joint": "both", "clearance_mm": 0.2}))) == 4
+    assert unknown_names(one)[2:] == ("bristles at the big end, m",)
+    assert len(unknown_names(Case.resolve({"joint": "both", "clearance_mm": 0.2}))) == 4

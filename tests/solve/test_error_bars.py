@@ -188,8 +188,8 @@ def test_the_run_that_errors_are_estimated_by(rtol, other):
     """A tighter one; by the stiff method where explicit steps may mislead; looser at the end."""
     given = {"duration_rev": 0.25, "settle_rev": 0, "rtol": rtol}
     case = Case.from_values({**BOTH, "solve": given})
-    found = attempts.attempt(case, rtol, 60.0, False)
-    assert attempts.companion(case, found, 60.0).rtol == pytest.approx(other)
+    found = attempts.run_at_tolerance(case, rtol, 60.0, False)
+    assert attempts.comparison_run(case, found, 60.0).rtol == pytest.approx(other)
 
 
 LOOSE = {
@@ -212,8 +212,8 @@ def test_where_explicit_steps_overrun_friction_the_stiff_partner_estimates_the_e
     )
     found, truth = solve(case), solve(sure)
     assert attempts.overruns_friction(found.p, rtol)
-    again = attempts.attempt(case, rtol, 60.0, False)
-    attempts.estimate_errors(again, attempts.attempt(case, other, 60.0, False))
+    again = attempts.run_at_tolerance(case, rtol, 60.0, False)
+    attempts.estimate_errors(again, attempts.run_at_tolerance(case, other, 60.0, False))
     name = "rms_acceleration_deviation"
     error = abs(found.metrics[name] - truth.metrics[name])
     assert error > 10 * again.bars[name]
@@ -241,7 +241,7 @@ def test_a_metric_added_to_the_table_has_error_bars(monkeypatch):
     how = {"duration_rev": 0.5, "settle_rev": 0, "rtol": 1e-5}
     case = Case.from_values({**BOTH, "solve": how})
     found = solve(case)
-    tighter = attempts.companion(case, found, 60.0)
+    tighter = attempts.comparison_run(case, found, 60.0)
     apart = abs(found.metrics["loss"] - tighter.metrics["loss"])
     assert 0 < Bar().own * apart <= found.bars["loss"] < 0.5 * found.metrics["loss"]
 
@@ -265,7 +265,7 @@ def test_a_failed_run_has_no_bars():
 @pytest.mark.parametrize("load", ["spring", "gas", "none"])
 def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
     found = measure(Case.from_values({"load": load, "solve": SHORT}))
-    truth = attempts.attempt(
+    truth = attempts.run_at_tolerance(
         Case.from_values({"load": load, "solve": SHORT}), 1e-12, 60.0, True
     ).metrics
     for name in METRICS:

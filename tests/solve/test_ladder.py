@@ -15,7 +15,7 @@ from compressor.solve import attempts, solution
 from compressor.solve.error_bars import ENLARGED, ORDER, closeness, is_amplified, unmet
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.solution import AIM, LEAST, MOST, further, solve
+from compressor.solve.solution import AIM, LEAST, MOST, solve, tighten_factor
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -107,7 +107,7 @@ def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
     found = solve(case)
     expected = [rtol, rtol / attempts.TIGHTER, rtol * attempts.LOOSER]
     assert asked == pytest.approx(expected)
-    again, *others = (attempts.attempt(case, one, 60.0, False) for one in expected)
+    again, *others = (attempts.run_at_tolerance(case, one, 60.0, False) for one in expected)
     assert is_amplified(rtol, distances(again.samples, others[0].samples))
     by_each = []
     for other in others:
@@ -122,7 +122,7 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
 
     def lucky(case, solution, timeout, ahead=attempts.NOTHING_AHEAD):
         if solution.rtol < ACCURACY["draft"].rtol:
-            return attempts.companion(case, solution, timeout)
+            return attempts.comparison_run(case, solution, timeout)
         other = replace(solution, rtol=solution.rtol / attempts.TIGHTER)
         much = 1.2 * ENLARGED * solution.rtol**ORDER
         other.samples = solution.samples.copy()
@@ -130,14 +130,14 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
         return other
 
     alone = of(ILL, accuracy="draft", max_steps=20_000)
-    monkeypatch.setattr(solution, "companion", lucky)
+    monkeypatch.setattr(solution, "comparison_run", lucky)
     found = solve(alone)
     first = ACCURACY["draft"].rtol
     assert asked[:2] == pytest.approx([first, first * attempts.LOOSER])
     assert len(asked) > 2
     assert min(asked) < 0.11 * first
     assert found.promise == "kept"
-    monkeypatch.setattr(solution, "witness", lambda *_: None)
+    monkeypatch.setattr(solution, "looser_comparison_run", lambda *_: None)
     assert solve(alone).rtol == first  # which is not enough
 
 
@@ -160,7 +160,7 @@ def test_later_runs_that_agree_by_chance_keep_no_promise(
     found = solve(case)
     assert found.promise == "kept" or found.regime == "chaotic"
     if found.promise == "kept":
-        exact = attempts.attempt(case, TIGHTEST, 60.0, False)
+        exact = attempts.run_at_tolerance(case, TIGHTEST, 60.0, False)
         assert distances(exact.samples, found.samples)["acceleration"] <= case.promise
 
 
@@ -172,7 +172,7 @@ def test_a_third_run_that_tells_more_is_what_the_next_run_is_compared_with(monke
         excess, _ = original(case, now, other, first, search)
         made.append(asked[-1])
         if len(made) == 1:
-            third = attempts.companion(case, now, search.left)
+            third = attempts.comparison_run(case, now, search.left)
             del asked[-1]
             return 2.0, third
         return excess, None
@@ -188,7 +188,7 @@ def test_a_third_run_that_tells_more_is_what_the_next_run_is_compared_with(monke
 
 def test_of_some_runs_the_tightest_that_balances_is_compared_with(monkeypatch):
     case = of(ILL, rtol=1e-5)
-    one = attempts.attempt(case, 1e-5, 60.0, False)
+    one = attempts.run_at_tolerance(case, 1e-5, 60.0, False)
     other, third, last = (replace(one, rtol=rtol) for rtol in (4e-6, 1e-6, TIGHTEST))
     assert solution.tightest(case, one, other, third, last) is third
     monkeypatch.setattr(solution, "energy_balances", lambda _, run: run is not third)
@@ -198,14 +198,22 @@ def test_of_some_runs_the_tightest_that_balances_is_compared_with(monkeypatch):
 
 def test_a_witness_that_fails_is_not_heard(monkeypatch):
     case = of(ILL, rtol=1e-5)
-    two = attempts.attempt(case, 1e-5, 60.0, False), attempts.attempt(case, 4e-6, 60.0, False)
-    assert attempts.witness(case, *two, 60.0) is not None
-    original = attempts.attempt
-    monkeypatch.setattr(
-        attempts, "attempt", lambda *asked: replace(original(*asked), reason="step_underflow")
+    two = (
+        attempts.run_at_tolerance(case, 1e-5, 60.0, False),
+        attempts.run_at_tolerance(case, 4e-6, 60.0, False),
     )
-    assert attempts.witness(case, *two, 60.0) is None
-    assert attempts.witness(case, two[0], replace(two[1], reason="non_finite"), 60.0) is None
+    assert attempts.looser_comparison_run(case, *two, 60.0) is not None
+    original = attempts.run_at_tolerance
+    monkeypatch.setattr(
+        attempts,
+        "run_at_tolerance",
+        lambda *asked: replace(original(*asked), reason="step_underflow"),
+    )
+    assert attempts.looser_comparison_run(case, *two, 60.0) is None
+    assert (
+        attempts.looser_comparison_run(case, two[0], replace(two[1], reason="non_finite"), 60.0)
+        is None
+    )
 
 
 @pytest.mark.parametrize("word", ACCURACY)
@@ -253,14 +261,14 @@ def test_the_ideal_machine_keeps_every_word(load):
 def test_the_next_run_is_as_tight_as_its_error_needs():
     """Where errors fall as assumed, its estimate is AIM of what is allowed."""
     for excess, ratio in ((3.0, 0.5), (30.0, 0.5), (5.0, 40.0)):
-        q = further(excess, ratio)
+        q = tighten_factor(excess, ratio)
         assert LEAST <= q <= MOST
         error = excess / closeness(ratio)  # of the looser of the two, over what is allowed
         tightest = error * max(ratio, 1 / ratio) ** -ORDER
         if LEAST < q < MOST:
             assert closeness(q) * tightest == pytest.approx(AIM)
-    assert further(1.01, 0.5) == LEAST
-    assert further(1e9, 0.5) == MOST
+    assert tighten_factor(1.01, 0.5) == LEAST
+    assert tighten_factor(1e9, 0.5) == MOST
 
 
 # Accuracy by number

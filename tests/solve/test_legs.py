@@ -9,8 +9,15 @@ from conftest import CHAOTIC
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.physics import Column
-from compressor.solve.attempts import attempt
-from compressor.solve.legs import Stretch, eccentricities, follow, leg_case, settle, with_samples
+from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.legs import (
+    Stretch,
+    eccentricities,
+    follow_revolutions,
+    leg_case,
+    settle_motion,
+    with_samples,
+)
 from compressor.solve.series import rows_of
 from compressor.solve.si_record import record
 
@@ -24,9 +31,9 @@ def span(revolutions, section=0.0):
 
 @pytest.mark.parametrize("section", [0.0, 1.0])
 def test_a_leg_from_a_state_is_a_run_from_it(section):
-    first = follow(BIG_END, None, span(2, section))
-    again = follow(BIG_END, first.state, span(1, section))
-    run = attempt(leg_case(BIG_END, 1), BIG_END.rtol, 60.0, False, None, first.state)
+    first = follow_revolutions(BIG_END, None, span(2, section))
+    again = follow_revolutions(BIG_END, first.state, span(1, section))
+    run = run_at_tolerance(leg_case(BIG_END, 1), BIG_END.rtol, 60.0, False, None, first.state)
     np.testing.assert_array_equal(run.trajectory.states[0], first.state)
     apart = np.abs(again.state - run.trajectory.states[-1]) / np.abs(again.state)
     assert apart.max() < (1e-12 if section == 0.0 else 1e-3)
@@ -34,9 +41,9 @@ def test_a_leg_from_a_state_is_a_run_from_it(section):
 
 def test_legs_join_without_a_seam():
     """A leg of three revolutions is one of two and one, but for its steps' own errors."""
-    whole = follow(BIG_END, None, span(3, 2.0))
-    first = follow(BIG_END, None, span(2, 2.0))
-    second = follow(BIG_END, first.state, span(1, 2.0))
+    whole = follow_revolutions(BIG_END, None, span(3, 2.0))
+    first = follow_revolutions(BIG_END, None, span(2, 2.0))
+    second = follow_revolutions(BIG_END, first.state, span(1, 2.0))
     np.testing.assert_allclose(second.points[0], whole.points[2], rtol=1e-3, atol=1e-8)
     np.testing.assert_array_equal(first.points, whole.points[:2])
     for name, row in METRICS.items():
@@ -46,9 +53,9 @@ def test_legs_join_without_a_seam():
 
 def test_points_are_the_eccentricities_at_the_section():
     section = math.radians(90)
-    found = follow(BIG_END, None, span(2, section))
+    found = follow_revolutions(BIG_END, None, span(2, section))
     of = leg_case(BIG_END, 2)
-    run = attempt(of, BIG_END.rtol, 60.0, True)
+    run = run_at_tolerance(of, BIG_END.rtol, 60.0, True)
     rows = rows_of(run.p, run.trajectory)
     at = [300, 1500]  # samples at 90 and 450 degrees
     place = rows[at, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2, 2)
@@ -66,7 +73,7 @@ def test_rates_are_those_of_the_start():
     """
     offset = {"big_end_x": 0.05, "big_end_y": -0.02, "small_end_x": 0.03, "small_end_y": 0.01}
     case = Case.from_values({"joint": "both", "clearance_mm": 0.2, "initial_offset_mm": offset})
-    state = attempt(leg_case(case, 1), case.rtol, 60.0, False).trajectory.states[0]
+    state = run_at_tolerance(leg_case(case, 1), case.rtol, 60.0, False).trajectory.states[0]
     found = eccentricities(record(case), 0.0, state)
     np.testing.assert_allclose(found[:, :2], [[5e-5, -2e-5], [3e-5, 1e-5]], rtol=1e-9)
     across = 0.3 * (3e-5 / 0.6) * case.omega * 0.12 / 0.6
@@ -75,24 +82,26 @@ def test_rates_are_those_of_the_start():
 
 
 def test_a_leg_ends_once_enough_is_known():
-    found = follow(BIG_END, None, span(9, 1.0), lambda turns, points: len(points) == 2)
+    found = follow_revolutions(BIG_END, None, span(9, 1.0), lambda turns, points: len(points) == 2)
     assert (len(found.turns), len(found.points), found.reason) == (2, 2, "")
     assert found.turns[-1]["seconds"] == pytest.approx(BIG_END.turn, rel=1e-9)
 
 
 def test_settling_is_told_with_the_revolution_from_which_on():
-    found, since = settle(BIG_END, None, span(20))
+    found, since = settle_motion(BIG_END, None, span(20))
     assert since == 1 < len(found.turns) < 6
-    later, at_once = settle(BIG_END, found.state, span(20))
+    later, at_once = settle_motion(BIG_END, found.state, span(20))
     assert at_once == 0
     assert len(later.turns) == 3
     chaotic = Case.from_values({**CHAOTIC, **DRAFT})
-    lost, never = settle(chaotic, None, span(6))
+    lost, never = settle_motion(chaotic, None, span(6))
     assert (len(lost.turns), math.isnan(never)) == (6, True)
 
 
 def test_a_leg_with_series_is_measured_from_its_second_revolution_on():
-    table, reason, _ = with_samples(BIG_END, follow(BIG_END, None, span(1)).state, span(2))
+    table, reason, _ = with_samples(
+        BIG_END, follow_revolutions(BIG_END, None, span(1)).state, span(2)
+    )
     assert not reason
     assert table.attrs["settle"] == pytest.approx(BIG_END.turn)
     assert table.variables["time"].values.size == 2401
@@ -101,7 +110,7 @@ def test_a_leg_with_series_is_measured_from_its_second_revolution_on():
 def test_a_leg_that_fails_has_the_revolutions_before():
     values = {"joint": "big_end", "clearance_mm": 0.2}
     short = Case.from_values({**values, "solve": {"max_steps": 1200, "accuracy": "draft"}})
-    found = follow(short, None, span(50, 1.0))
+    found = follow_revolutions(short, None, span(50, 1.0))
     assert found.reason == "budget_steps"
     assert 0 < len(found.turns) == len(found.points) < 50
     assert np.isfinite(found.state).all()

@@ -24,7 +24,7 @@ from compressor.solve.regime import (
     SHORT,
     SURE,
     WORK,
-    Search,
+    HorizonSearch,
     repeats,
 )
 from compressor.solve.request import Trajectory
@@ -80,7 +80,7 @@ def test_accuracy_by_number_is_kept_by_averages_of_chaos_alone():
 
 @pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
 def test_the_paper_s_cases_are_periodic_and_not_searched(joint, monkeypatch):
-    monkeypatch.setattr(Search, "look", None)
+    monkeypatch.setattr(HorizonSearch, "look", None)
     values = {"joint": joint} | ({} if joint == "none" else {"clearance_mm": 0.2})
     found = measure(case(values, duration_rev=8))
     assert (found.attributes["promise"], found.attributes["regime"]) == ("kept", "periodic")
@@ -116,7 +116,7 @@ def run_of(evaluations, **ended):
 
 def searched(of, *runs):
     """A search beside runs of so many evaluations."""
-    search = Search(of)
+    search = HorizonSearch(of)
     for evaluations in runs:
         search.count(run_of(evaluations))
     return search
@@ -134,7 +134,7 @@ def followed(monkeypatch, *found, needs=1000):
         end = next(ends) if attempts == needs else Parting(0.0, False, False)
         return end._replace(attempts=attempts)
 
-    monkeypatch.setattr(regime, "part", part)
+    monkeypatch.setattr(regime, "follow_case_twins", part)
     return asked
 
 
@@ -177,7 +177,7 @@ def test_the_search_takes_no_more_than_its_share(monkeypatch, needs):
     """Of what the runs have taken, in evaluations: the clock does not count."""
     of = case()
     asked = followed(monkeypatch, Parting(0.0, False, True), needs=needs)
-    search = Search(of)
+    search = HorizonSearch(of)
     for _ in range(4):  # a run, and a look
         search.count(run_of(60_000))
         search.look(whole=True)
@@ -190,7 +190,7 @@ def test_the_search_takes_no_more_than_its_share(monkeypatch, needs):
 def test_runs_and_twins_have_twenty_times_the_first_run_s_work(monkeypatch):
     """Or two seconds' worth, if that is more; a first run has the case's limit alone."""
     of = case()
-    assert Search(of).within_budget(of) is of
+    assert HorizonSearch(of).within_budget(of) is of
     assert searched(of, 6000).work_left == LEAST_WORK - 6000
     asked = followed(monkeypatch, Parting(0.0, False, True), needs=10**7)
     search = searched(of, 6_000_000, 42_000_000)
@@ -246,7 +246,7 @@ def test_a_search_ends_with_the_job_s_time(monkeypatch):
 
 
 def test_what_cannot_be_told_in_the_time_is_undecided(monkeypatch):
-    monkeypatch.setattr(Search, "look", lambda self, whole: False)
+    monkeypatch.setattr(HorizonSearch, "look", lambda self, whole: False)
     found = measure(case(CHAOTIC, rtol=1e-6))
     assert (found.status, found.attributes["regime"]) == ("ok", Regime.UNDECIDED)
     found = measure(case(CHAOTIC, accuracy="reference"))

@@ -12,7 +12,7 @@ from compressor.cases.materials import contact_stiffness
 from compressor.metrics import JOINTS
 from compressor.physics.contact_laws import Power
 from compressor.physics.step_control import STABILITY_LIMIT
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.cautions import (
     across,
     contact_scales,
@@ -95,7 +95,7 @@ def runs():
         for rtol in (1e-4, 1e-7):
             solve = {"rtol": rtol, "duration_rev": 2, "settle_rev": 0}
             case = Case.resolve({**values, "solve": solve})
-            found.append((case, attempt(case, case.rtol, 600, False).trajectory))
+            found.append((case, run_at_tolerance(case, case.rtol, 600, False).trajectory))
     return found
 
 

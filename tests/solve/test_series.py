@@ -6,7 +6,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import SERIES, SERIES_ERRORS
 from compressor.physics import COLUMNS, Column
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.series import (
     A_TURN,
     FEWEST,
@@ -60,7 +60,7 @@ def test_the_times_do_not_depend_on_what_is_stored():
 def test_samples_are_those_of_a_run_at_these_times():
     """The run keeps its own, as if nothing else had been asked for."""
     of = case(duration_rev=0.25, settle_rev=0.1)
-    run = attempt(of, 1e-5, 60.0, True)
+    run = run_at_tolerance(of, 1e-5, 60.0, True)
     whole, states = run.trajectory.times, run.trajectory.states.copy()
     rows = rows_of(run.p, run.trajectory)
     taken = take_samples(run.p, run.trajectory, whole[5:9], whole[::30])
@@ -88,7 +88,7 @@ def test_distances_are_relative_and_by_joint():
 
 def test_a_block_is_what_is_stored():
     of = case(duration_rev=0.25, settle_rev=0)
-    stored, run = simulate(of), attempt(of, of.rtol, 60.0, True)
+    stored, run = simulate(of), run_at_tolerance(of, of.rtol, 60.0, True)
     rows = rows_of(run.p, run.trajectory)
     for name in SERIES:
         np.testing.assert_array_equal(stored[name].values, block(name, rows))

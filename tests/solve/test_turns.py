@@ -5,7 +5,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.solve.attempts import attempt
+from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.request import Cuts, merge_turns, revolutions
 from compressor.solve.run_metrics import metrics
 
@@ -18,7 +18,7 @@ def case(joint, method, **solve):
 
 
 def run(of, cuts=None):
-    return attempt(of, 1e-8, 60.0, False, cuts)
+    return run_at_tolerance(of, 1e-8, 60.0, False, cuts)
 
 
 def ends(of):

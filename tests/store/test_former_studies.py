@@ -12,7 +12,7 @@ from compressor.store import studies as stored_studies
 from compressor.store.files import StoreWarning
 from compressor.store.reader import open_study, read_store
 from compressor.store.status import changes, report_job, standings, verify
-from compressor.store.studies import Change, read_studies, write_study
+from compressor.store.studies import StudyChange, read_studies, write_study
 from compressor.store.writer import Writer
 
 FEW = {"clearance_mm": [0.1, 0.2]}
@@ -47,7 +47,7 @@ def test_a_study_that_shrinks_stays_as_a_former_one(wear):
     more = wear(**MORE)
     run(more)
     few = wear(**FEW)
-    assert changes("results", [few]) == [Change("wear", 3, 2, 2, 1, "wear~1", "")]
+    assert changes("results", [few]) == [StudyChange("wear", 3, 2, 2, 1, "wear~1", "")]
     assert names() == ["wear"]  # asked, not changed
     run(few)
     assert names() == ["wear", "wear~1"]
@@ -71,7 +71,7 @@ def test_a_study_that_grows_or_repeats_leaves_no_former_one(wear):
 def test_what_never_ran_is_not_kept(wear):
     run(wear(**MORE), 2)
     few = wear(**FEW)
-    assert changes("results", [few]) == [Change("wear", 3, 2, 2, 0, "", "")]
+    assert changes("results", [few]) == [StudyChange("wear", 3, 2, 2, 0, "", "")]
     run(few)
     assert names() == ["wear"]
 
@@ -168,4 +168,4 @@ def test_jobs_of_an_older_model_are_told_as_such(wear, monkeypatch):
     monkeypatch.setattr("compressor.cases.case.MODEL_VERSION", "3")
     monkeypatch.setattr(stored_studies, "MODEL_VERSION", "3")
     again = wear(**MORE)
-    assert changes("results", [again]) == [Change("wear", 3, 3, 0, 3, "wear~1", "2")]
+    assert changes("results", [again]) == [StudyChange("wear", 3, 3, 0, 3, "wear~1", "2")]

@@ -22,18 +22,18 @@ from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from compressor.sweep import execution
 from compressor.sweep.execution import WorkersFailed, rest, run_batches
-from compressor.sweep.worker import MOST_TEXT, Done, Lost, Workers
+from compressor.sweep.worker import MOST_TEXT, JobLost, JobResult, Workers
 
 RULES = {"memory": LEAST, "grace": 0.3}
 HERE = str(Path(__file__).parent)
 
 
 def results(ends):
-    return {end.id: end.result for end in ends if isinstance(end, Done)}
+    return {end.id: end.result for end in ends if isinstance(end, JobResult)}
 
 
 def lost(ends):
-    return {end.id: end for end in ends if isinstance(end, Lost)}
+    return {end.id: end for end in ends if isinstance(end, JobLost)}
 
 
 def is_running(pid):
@@ -165,9 +165,9 @@ def test_a_death_in_a_look_ahead_costs_its_cause_alone():
     ends = list(
         run_batches(lambda job, known: known[1], named(range(60)), Workers(1, ahead=deadly))
     )
-    lost = [end for end in ends if isinstance(end, Lost)]
+    lost = [end for end in ends if isinstance(end, JobLost)]
     assert [(end.id, end.reason) for end in lost] == [(17, "worker_died")]
-    done = {end.id: end.result for end in ends if not isinstance(end, Lost)}
+    done = {end.id: end.result for end in ends if not isinstance(end, JobLost)}
     assert done == {n: n * n for n in range(60) if n != 17}
 
 

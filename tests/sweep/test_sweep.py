@@ -18,8 +18,8 @@ from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.status import verify
 from compressor.sweep import warm_up
-from compressor.sweep.sweep import Failure, Options, sweep
-from compressor.sweep.wanted import Wanted
+from compressor.sweep.sweep import JobFailure, Options, sweep
+from compressor.sweep.wanted import RequestedJobs
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 
@@ -58,7 +58,7 @@ def test_a_failed_job_leaves_the_others_be(workers, studies, tmp_path):
     assert [(count.study, count.jobs, count.failed) for count in summary.counts] == [
         ("budget", 4, 2)
     ]
-    assert summary.failed[0] == Failure(
+    assert summary.failed[0] == JobFailure(
         "budget",
         {"solve.max_steps": 5, "load": "none"},
         made[0].cases[0].key,
@@ -107,7 +107,7 @@ def test_where_studies_share_a_job_the_greater_demand_counts(studies):
     made = studies(
         few={"output": {"keep": "metrics"}}, all={}, less={"output": {"keep": "metrics"}}
     )
-    (case,) = Wanted(made).values()
+    (case,) = RequestedJobs(made).values()
     assert case.output.keep == "series"
 
 
@@ -151,7 +151,7 @@ def test_shards_are_one_study_together(studies, tmp_path, in_process):
         sweep(made, tmp_path / "out", 1, options=Options(part=(number, 3))) for number in (1, 2, 3)
     ]
     assert all(part.done_before == 0 for part in parts)
-    assert sum(part.run_now for part in parts) == len(Wanted(made)) == 9
+    assert sum(part.run_now for part in parts) == len(RequestedJobs(made)) == 9
     assert sweep(made, tmp_path / "out", 1).run_now == 0
     whole = {key for study in made for key in study.keys}
     assert store.finished_keys(tmp_path / "out") == whole

@@ -6,8 +6,8 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.reasons import Reason
-from compressor.sweep.wanted import FEWEST, Now, Work
-from compressor.sweep.worker import Done, Lost
+from compressor.sweep.wanted import FEWEST, SweepProgress, SweepWork
+from compressor.sweep.worker import JobLost, JobResult
 
 START_UP = 40.0  # s: the equations are compiled, workers start
 SECONDS = {"none": 0.01, "big_end": 0.5, "both": 1.0}  # a revolution
@@ -25,7 +25,7 @@ def seconds_of(one):
 def guesses(cases, workers=2):
     """(time, what is left in truth, the guess) at the end of each job of a sweep by a clock."""
     now = [0.0]
-    work = Work(cases, lambda: now[0])
+    work = SweepWork(cases, lambda: now[0])
     assert work.left() is None
     free, ends = [START_UP] * workers, []
     for one in cases:
@@ -35,7 +35,7 @@ def guesses(cases, workers=2):
     finish = max(free)
     for at, _, one in sorted(ends):
         now[0] = at
-        work.add(Done(one, None, seconds_of(one)))
+        work.add(JobResult(one, None, seconds_of(one)))
         yield at, finish - at, work.left()
 
 
@@ -86,20 +86,22 @@ def test_a_kind_that_is_not_measured_makes_a_guess_a_lower_bound():
     "solve", [{"accuracy": "reference"}, {"error_bars": False}, {"rtol": 1e-9}]
 )
 def test_kinds_differ_in_what_costs(solve):
-    work = Work(
+    work = SweepWork(
         [case() for _ in range(9)] + [case(**solve) for _ in range(9)], iter(range(99)).__next__
     )
     for _ in range(4):
-        work.add(Done(case(), None, 1.0))
+        work.add(JobResult(case(), None, 1.0))
     assert work.left() is None or work.left().at_least
 
 
 def test_lost_jobs_tell_nothing_and_are_no_longer_ahead():
     now = [0.0]
-    work = Work([case() for _ in range(14)], lambda: now[0])
+    work = SweepWork([case() for _ in range(14)], lambda: now[0])
     for number in range(12):
         now[0] += 1.0
-        end = Done(case(), None, 1.0) if number % 2 else Lost(case(), Reason.WORKER_DIED, "")
+        end = (
+            JobResult(case(), None, 1.0) if number % 2 else JobLost(case(), Reason.WORKER_DIED, "")
+        )
         work.add(end)
     # 6 s of work in the 11 s since the first measured job began: two are left, 1 s each
     assert work.left().seconds == pytest.approx(2 * 11 / 6)
@@ -122,10 +124,10 @@ def test_a_sweep_tells_how_it_stands(tmp_path, in_process):
     (study,) = load_studies(tmp_path / "wear.yaml", only="clearance_mm < 0.25")
     told = []
     sweep([study], tmp_path / "out", 1, options=Options(pulse=told.append))
-    assert told[0] == Now(0, 0, 4)
+    assert told[0] == SweepProgress(0, 0, 4)
     assert {(now.total, now.left) for now in told} == {(4, None)}
     assert [now.done for now in told] == sorted(now.done for now in told)
     (study,) = load_studies(tmp_path / "wear.yaml")
     told.clear()
     sweep([study], tmp_path / "out", 1, options=Options(pulse=told.append))
-    assert told[0] == Now(4, 2, 6)
+    assert told[0] == SweepProgress(4, 2, 6)

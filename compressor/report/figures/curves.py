@@ -16,7 +16,7 @@ from matplotlib.ticker import MultipleLocator
 from numpy.lib.stride_tricks import sliding_window_view
 
 from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled_part
-from compressor.report.figures.style import BY_CLEARANCE, BY_LOAD, IDEAL, Line
+from compressor.report.figures.style import BY_CLEARANCE, BY_LOAD, IDEAL, LineStyle
 
 Runs = Mapping[str, xr.Dataset]
 
@@ -56,7 +56,7 @@ class Curve:
 
     name: str
     run: xr.Dataset
-    line: Line
+    line: LineStyle
 
     def handle(self) -> Line2D:
         """Return the curve's entry in a legend."""

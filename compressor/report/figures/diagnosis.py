@@ -36,7 +36,7 @@ from compressor.report.figures.style import (
     GOLD,
     IDEAL,
     RED,
-    Line,
+    LineStyle,
     in_style,
     legend_above,
     sheet,
@@ -46,9 +46,9 @@ Shakings = Mapping[str, Shaking]  # by label of the paper's cases
 
 ALONE = FAULTS[:2]  # clearance at one joint
 BY_FAULT = {
-    "big_end": (Line(BLUE, "-", 1.2, 2.3), "o"),
-    "small_end": (Line(RED, (0, (6, 1.2)), 1.2, 2.2), "D"),
-    "both": (Line(GOLD, (0, (6, 1, 1.2, 1)), 1.8, 2.1), "s"),
+    "big_end": (LineStyle(BLUE, "-", 1.2, 2.3), "o"),
+    "small_end": (LineStyle(RED, (0, (6, 1.2)), 1.2, 2.2), "D"),
+    "both": (LineStyle(GOLD, (0, (6, 1, 1.2, 1)), 1.8, 2.1), "s"),
 }
 BIN = 5.0  # degrees over which the rms is taken
 NEAR = "#f2ead9"

@@ -55,7 +55,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Note:
+class PanelText:
     """A text in a panel, or a straight line across it (`text` "") at x or at y, else nan."""
 
     text: str = ""
@@ -92,12 +92,12 @@ class Panel:
     row: tuple[int, int]
     column: tuple[int, int]
     traces: tuple[Trace, ...]
-    notes: tuple[Note, ...]
+    notes: tuple[PanelText, ...]
     is_square: bool = False  # the units of both axes are as long
 
 
 @dataclass(frozen=True)
-class Sheet:
+class FigureData:
     """A figure; heights and widths: of the grid's rows and columns, relative to the first."""
 
     panels: tuple[Panel, ...]
@@ -106,7 +106,7 @@ class Sheet:
     size: tuple[float, float]  # inches
 
 
-def as_csv(sheet: Sheet) -> str:
+def as_csv(sheet: FigureData) -> str:
     """Return all numbers of a figure. Curves over the same x share a column of it, and stand once.
 
     A column is headed "panel: curve: title of the axis", with " below" and " above" for the ends
@@ -429,7 +429,7 @@ READERS: tuple[tuple[type, Reader], ...] = (
 )
 
 
-def extract(figure: Figure) -> Sheet:
+def extract(figure: Figure) -> FigureData:
     """Return the numbers that a figure shows."""
     named = legend_names(figure)
     scales = {bar.ax: bar for bar in colorbars(figure)}
@@ -442,7 +442,7 @@ def extract(figure: Figure) -> Sheet:
     found = tuple(panel(axes, named, titles) for axes in panels)
     heights, widths = ((1.0,), (1.0,)) if grid is None else ratios(grid)
     width, height = figure.get_size_inches()
-    return Sheet(found, heights, widths, (float(width), float(height)))
+    return FigureData(found, heights, widths, (float(width), float(height)))
 
 
 def ratios(grid: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -470,7 +470,7 @@ def panel(axes: Axes, named: Names, shared: list[str]) -> Panel:
     traces = tuple(trace for trace in every_trace(axes, named))
     title = axes.get_title("left") or axes.get_title() or axes.get_title("right")
     return Panel(
-        plain(title),
+        strip_mathtext(title),
         scale(axes.xaxis, axes.get_xlabel() or shared[0], axes.get_xlim(), axes.get_xscale()),
         scale(axes.yaxis, axes.get_ylabel() or shared[1], axes.get_ylim(), axes.get_yscale()),
         (row.start, row.stop),
@@ -488,7 +488,9 @@ def scale(axis: Any, title: str, limits: tuple[float, float], kind: str) -> Scal
         places = axis.get_majorticklocs()
         texts = axis.get_major_formatter().format_ticks(places)
         words = {
-            float(place): plain(text) for place, text in zip(places, texts, strict=False) if text
+            float(place): strip_mathtext(text)
+            for place, text in zip(places, texts, strict=False)
+            if text
         }
         if all(is_number(text) for text in words.values()):
             words = {}
@@ -500,10 +502,10 @@ def scale(axis: Any, title: str, limits: tuple[float, float], kind: str) -> Scal
         step = float(second - first)
     shown = axis.get_tick_params(which="major")
     bare = not shown.get("labelleft" if axis.axis_name == "y" else "labelbottom", True)
-    return Scale(plain(title), low, high, kind == "log", words, step, bare)
+    return Scale(strip_mathtext(title), low, high, kind == "log", words, step, bare)
 
 
-def plain(title: str) -> str:
+def strip_mathtext(title: str) -> str:
     """Return a title in one line, without the marks of mathematical letters."""
     return " ".join(title.replace("$", "").split())
 
@@ -516,7 +518,7 @@ def is_number(text: str) -> bool:
     return True
 
 
-def notes(axes: Axes) -> Iterator[Note]:
+def notes(axes: Axes) -> Iterator[PanelText]:
     """Yield the texts in a panel, and straight lines across it."""
     for text in axes.texts:
         words = " ".join(text.get_text().split())
@@ -524,21 +526,21 @@ def notes(axes: Axes) -> Iterator[Note]:
             x, y = map(float, text.get_position())
             if isinstance(text, Annotation) and text.xycoords == "data":
                 x, y = map(float, text.xy)
-                yield Note(words, x, y, to_hex(text.get_color()))
+                yield PanelText(words, x, y, to_hex(text.get_color()))
             elif isinstance(text, Annotation) and isinstance(text.xycoords, Transform):
                 place = text.xycoords.transform(text.xy)
                 x, y = map(float, axes.transAxes.inverted().transform(place))
-                yield Note(words, x, y, to_hex(text.get_color()), inside=True)
+                yield PanelText(words, x, y, to_hex(text.get_color()), inside=True)
             else:
                 inside = not in_data(axes, text)
-                yield Note(words, x, y, to_hex(text.get_color()), inside=inside)
+                yield PanelText(words, x, y, to_hex(text.get_color()), inside=inside)
     for line in axes.lines:
         own = line.get_transform().contains_branch_seperately(axes.transData)
         if own == (True, False):
-            yield Note("", first(line.get_xdata()), color=to_hex(line.get_color()),
+            yield PanelText("", first(line.get_xdata()), color=to_hex(line.get_color()),
                        dash=pattern(line))  # fmt: skip
         elif own == (False, True):
-            yield Note("", y=first(line.get_ydata()), color=to_hex(line.get_color()),
+            yield PanelText("", y=first(line.get_ydata()), color=to_hex(line.get_color()),
                        dash=pattern(line))  # fmt: skip
 
 

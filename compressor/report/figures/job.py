@@ -37,7 +37,7 @@ from compressor.report.figures.style import (
     GOLD,
     GREY,
     RED,
-    Line,
+    LineStyle,
     in_style,
     legend_above,
     sheet,
@@ -46,7 +46,7 @@ from compressor.report.figures.style import (
 # flight, impact, following: lightness 30, 54, 90
 MODE_COLORS = dict(zip(MODES, (BLUE, RED, "#dde3ee"), strict=True))
 UNSEEN = "#ffffff"
-PATH = Line(BLUE, "-", 0.9, 2.3)
+PATH = LineStyle(BLUE, "-", 0.9, 2.3)
 BY_JOINT = dict(zip(JOINTS, ((BLUE, "o"), (RED, "D")), strict=True))
 CORNERS = {0: ("top dead centre", "o"), 90: ("90°", "^"), 180: ("bottom dead centre", "s"),
            270: ("270°", "v")}  # fmt: skip
@@ -181,9 +181,9 @@ def draw_impacts(run: xr.Dataset) -> Figure:
 
 Forces = dict[str, np.ndarray]
 
-THIS = Line(BLUE, "-", 1.1, 2.3)
-TWIN = Line(GOLD, "-", 2.2, 2.1)  # broader and lighter, below
-MARK = Line(RED, (0, (4, 1.5)), 1.0, 2.2)
+THIS = LineStyle(BLUE, "-", 1.1, 2.3)
+TWIN = LineStyle(GOLD, "-", 2.2, 2.1)  # broader and lighter, below
+MARK = LineStyle(RED, (0, (4, 1.5)), 1.0, 2.2)
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MOST_ORDERS = 200  # that are drawn
 MOST_ENVELOPE = 60  # of an envelope
@@ -273,7 +273,7 @@ def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
     return figure
 
 
-def plot_lines(panel: Axes, lines: tuple[np.ndarray, np.ndarray], line: Line) -> None:
+def plot_lines(panel: Axes, lines: tuple[np.ndarray, np.ndarray], line: LineStyle) -> None:
     """Orders and amplitudes, (k,) each, on a log scale from order 1 on, with `ORDER` marked."""
     shown = (lines[0] >= 1) & (lines[0] <= MOST_ORDERS)
     orders, amplitudes = (values[shown] for values in lines)

@@ -5,9 +5,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from compressor.report.figures.ladders import line_handles, loglog
-from compressor.report.figures.style import CYCLE, GREY, Line, in_style, sheet
+from compressor.report.figures.style import CYCLE, GREY, LineStyle, in_style, sheet
 
-PROMISED = Line(GREY, "--", 1.2, 1.0)
+PROMISED = LineStyle(GREY, "--", 1.2, 1.0)
 SHOWN = {
     "markersize": 2.2,
     "linestyle": "none",

@@ -6,11 +6,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from compressor.report.figures.style import BLACK, CYCLE, GREY, Line, in_style, legend_above, sheet
+from compressor.report.figures.style import (
+    BLACK,
+    CYCLE,
+    GREY,
+    LineStyle,
+    in_style,
+    legend_above,
+    sheet,
+)
 
 MARKERS = ("o", "s", "D")
-GUIDE = Line(GREY, (0, (1, 1.2)), 1.3, 1.5)
-KNOWN = Line(BLACK, (0, (4, 1.5)), 0.9, 1.4)
+GUIDE = LineStyle(GREY, (0, (1, 1.2)), 1.3, 1.5)
+KNOWN = LineStyle(BLACK, (0, (4, 1.5)), 0.9, 1.4)
 RUNGS = {
     "error_acceleration": "error of acceleration (L2)",
     "error_peak_acceleration": "error of its peak",
@@ -90,6 +98,6 @@ def scene_handles(data: xr.Dataset) -> list[Line2D]:
     ]  # fmt: skip
 
 
-def line_handles(meanings: dict[str, Line]) -> list[Line2D]:
+def line_handles(meanings: dict[str, LineStyle]) -> list[Line2D]:
     """Return what guiding lines mean."""
     return [Line2D([], [], label=text, **line.properties()) for text, line in meanings.items()]

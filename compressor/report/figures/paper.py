@@ -40,7 +40,7 @@ from compressor.report.figures.style import (
     GOLD,
     GREY,
     RED,
-    Line,
+    LineStyle,
     in_style,
     legend_above,
     sheet,
@@ -214,9 +214,9 @@ def regress(panel: Axes, run: xr.Dataset, joint: str) -> None:
 
 
 PHASES = ("expansion", "suction", "compression", "discharge")
-CLOSED = Line(BLUE, "-", 1.8, 2.3)
-PRINTED = Line(GOLD, "-", 1.6, 2.2)
-BASE = Line("#707070", (0, (1, 1.2)), 1.2, 2.1)
+CLOSED = LineStyle(BLUE, "-", 1.8, 2.3)
+PRINTED = LineStyle(GOLD, "-", 1.6, 2.2)
+BASE = LineStyle("#707070", (0, (1, 1.2)), 1.2, 2.1)
 
 
 @in_style
@@ -346,7 +346,7 @@ def write_at(
     panel.annotate(text, point, shift, textcoords="offset points", ha=side, fontsize=9)
 
 
-def legend_below(panel: Axes, entries: Sequence[tuple[Line, str]]) -> None:
+def legend_below(panel: Axes, entries: Sequence[tuple[LineStyle, str]]) -> None:
     """A panel's legend in the margin below it."""
     handles = [Line2D([], [], label=name, **line.properties()) for line, name in entries]
     panel.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)

@@ -54,7 +54,7 @@ def one_by_one(
     """Return all figures in this process."""
     made = {}
     for name, figure in figures.items():
-        tell(headings[name])
+        report_figure(headings[name])
         made[name] = both(figure)
     return made
 
@@ -80,7 +80,7 @@ def by_two(
         while waiting:
             with contextlib.suppress(IndexError):
                 name = waiting.pop()
-                tell(headings[name])
+                report_figure(headings[name])
                 made[name] = both(figures[name])
         for name in figures.keys() - made.keys():
             with contextlib.suppress(KeyError, OSError, RuntimeError):  # it has died
@@ -94,11 +94,11 @@ def by_two(
 
 def draw_inherited(name: str, heading: str) -> tuple[bytes, ...]:
     """Return the pictures of a figure, in the copied process."""
-    tell(heading)
+    report_figure(heading)
     return both(_inherited[name])
 
 
-def tell(heading: str) -> None:
+def report_figure(heading: str) -> None:
     """Say what is being drawn, in one write: two processes share the stream."""
     with contextlib.suppress(OSError):
         sys.stderr.write(f"drawing {heading}\n")

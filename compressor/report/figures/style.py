@@ -48,7 +48,7 @@ STYLE: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
-class Line:
+class LineStyle:
     """How one curve is drawn; a higher `zorder` lies on top."""
 
     color: str
@@ -64,23 +64,23 @@ class Line:
 # from dark to light: lightness (CIE L*) 0, 30, 54, 77
 BLACK, BLUE, RED, GOLD = "#000000", "#1f4488", "#d0583b", "#ecb44a"
 GREY = "#b5b5b5"
-IDEAL = Line(BLACK, (0, (1, 1.2)), 1.3, 2.4)
+IDEAL = LineStyle(BLACK, (0, (1, 1.2)), 1.3, 2.4)
 BY_CLEARANCE = {
-    0.1: Line(BLUE, (0, (4.5, 1.2)), 0.9, 2.3),
-    0.2: Line(RED, (0, (6, 1, 1.2, 1)), 1.0, 2.2),
-    0.3: Line(GOLD, "-", 1.6, 2.1),
+    0.1: LineStyle(BLUE, (0, (4.5, 1.2)), 0.9, 2.3),
+    0.2: LineStyle(RED, (0, (6, 1, 1.2, 1)), 1.0, 2.2),
+    0.3: LineStyle(GOLD, "-", 1.6, 2.1),
 }
 BY_LOAD = {
-    "typical": Line(GOLD, "-", 2.6, 2.1),
-    "design": Line(BLUE, (0, (4.5, 1.6)), 1.3, 2.2),
+    "typical": LineStyle(GOLD, "-", 2.6, 2.1),
+    "design": LineStyle(BLUE, (0, (4.5, 1.6)), 1.3, 2.2),
 }
 # for a handful of curves of any meaning
 CYCLE = (
-    Line(BLUE, "-", 1.4),
-    Line(RED, (0, (6, 1.5)), 1.4),
-    Line(GOLD, (0, (6, 1.2, 1.2, 1.2)), 1.8),
-    Line(BLACK, (0, (1, 1.2)), 1.5),
-    Line("#8c8c8c", (0, (3, 1.2)), 1.6),
+    LineStyle(BLUE, "-", 1.4),
+    LineStyle(RED, (0, (6, 1.5)), 1.4),
+    LineStyle(GOLD, (0, (6, 1.2, 1.2, 1.2)), 1.8),
+    LineStyle(BLACK, (0, (1, 1.2)), 1.5),
+    LineStyle("#8c8c8c", (0, (3, 1.2)), 1.6),
 )
 
 P = ParamSpec("P")

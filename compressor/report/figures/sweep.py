@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from compressor.report.figures import sweep_captions as captions
-from compressor.report.figures.sweep_data import Measure, Sweep, measures, sweep_of
+from compressor.report.figures.sweep_data import Measure, PlottedSweep, measures, sweep_of
 from compressor.report.figures.sweep_maps import (
     Ranking,
     draw_maps,
@@ -65,7 +65,7 @@ def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
 
 
 def several(
-    sweep: Sweep, shown: Sequence[Measure], marks: tuple[str, str]
+    sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
     """Yield a grid of two or more axes: a ranking, all metrics, and of three or more axes some
     closer.
@@ -99,7 +99,7 @@ def several(
 
 
 def draw_sampled(
-    sweep: Sweep, shown: Sequence[Measure], marks: tuple[str, str]
+    sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
     """Yield a list of jobs: a ranking, each metric against its strongest key, and some against
     all.
@@ -124,7 +124,9 @@ def draw_sampled(
     yield SweepFigure("scatter", title, caption, draw_scatter(sweep, columns, group))
 
 
-def draw_ranked(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> Iterator[SweepFigure]:
+def draw_ranked(
+    sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]
+) -> Iterator[SweepFigure]:
     """Yield the ranking of the axes, if enough is known for one."""
     if found and len(sweep.axes) > 1:
         caption = captions.ranking(sweep, found, shown)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from compressor.report.figures.sweep_data import Axis, Measure, Sweep, shown_value
+from compressor.report.figures.sweep_data import Measure, PlottedAxis, PlottedSweep, shown_value
 from compressor.report.figures.sweep_maps import MOST_CELLS, Ranking, describe_ranking
 from compressor.report.figures.sweep_panels import (
     MOST_COLUMNS,
@@ -46,20 +46,22 @@ def join_sentences(*parts: str) -> str:
     return " ".join(part for part in parts if part)
 
 
-def split_measures(sweep: Sweep, known: Sequence[Measure]) -> tuple[list[Measure], list[Measure]]:
+def split_measures(
+    sweep: PlottedSweep, known: Sequence[Measure]
+) -> tuple[list[Measure], list[Measure]]:
     """Return the measures that differ between jobs, and those that do not."""
     varied = [bool(np.ptp(v[np.isfinite(v)])) for v in (sweep.values(m) for m in known)]
     both = [*zip(known, varied, strict=True)]
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
 
 
-def marks_told(sweep: Sweep) -> str:
+def marks_told(sweep: PlottedSweep) -> str:
     """Return what marks mean, where there are any."""
     status, chaotic = sweep.status, sweep.chaotic
     return MARKS if chaotic.any() or np.isin(status, ("failed", "missing")).any() else ""
 
 
-def same_told(sweep: Sweep, same: Sequence[Measure]) -> str:
+def same_told(sweep: PlottedSweep, same: Sequence[Measure]) -> str:
     """Return the measures that are the same at every job, with their values."""
     if not same:
         return ""
@@ -70,7 +72,7 @@ def same_told(sweep: Sweep, same: Sequence[Measure]) -> str:
     return f"The same at every job, and not drawn: {'; '.join(parts)}."
 
 
-def curves(sweep: Sweep) -> str:
+def curves(sweep: PlottedSweep) -> str:
     """Return a sweep along one axis."""
     return join_sentences(
         f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
@@ -79,7 +81,7 @@ def curves(sweep: Sweep) -> str:
     )
 
 
-def maps(sweep: Sweep) -> str:
+def maps(sweep: PlottedSweep) -> str:
     """Return a sweep along two axes."""
     return join_sentences(
         "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
@@ -87,13 +89,13 @@ def maps(sweep: Sweep) -> str:
     )
 
 
-def thinned_told(axis: Axis, most: int) -> str:
+def thinned_told(axis: PlottedAxis, most: int) -> str:
     """Return how many of an axis' values are shown, if not all are."""
     count = axis.values.size
     return "" if count <= most else f"Of {count} values of {axis.phrase} {most} are shown."
 
 
-def points_told(sweep: Sweep, role: Roles) -> str:
+def points_told(sweep: PlottedSweep, role: Roles) -> str:
     """Return what a point is: a job, with what its marks mean, or a mean over which axes."""
     others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
     if not others:
@@ -106,7 +108,7 @@ def points_told(sweep: Sweep, role: Roles) -> str:
     return join_sentences(f"Each point is the mean over {' and '.join(others)}.", left)
 
 
-def overview(sweep: Sweep, role: Roles) -> str:
+def overview(sweep: PlottedSweep, role: Roles) -> str:
     """Return every metric over two of the axes."""
     color = sweep.axes[role.color]
     return join_sentences(
@@ -120,7 +122,7 @@ def overview(sweep: Sweep, role: Roles) -> str:
     )
 
 
-def multiples(sweep: Sweep, role: Roles) -> str:
+def multiples(sweep: PlottedSweep, role: Roles) -> str:
     """Return the panels for the values of an axis, or of two."""
     places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
     limits = zip(role, (MOST_PLACES, MOST_LINES, MOST_COLUMNS, MOST_ROWS), strict=True)
@@ -132,13 +134,13 @@ def multiples(sweep: Sweep, role: Roles) -> str:
     )
 
 
-def points(sweep: Sweep, is_ranked: bool) -> str:
+def points(sweep: PlottedSweep, is_ranked: bool) -> str:
     """Return each metric of a list of jobs over a key."""
     which = "the key that matters most for it" if is_ranked else "a key"
     return join_sentences(f"Every metric over {which}, a point a job.", *describe_trends(sweep))
 
 
-def scatter(sweep: Sweep, columns: Sequence[int], keys: int) -> str:
+def scatter(sweep: PlottedSweep, columns: Sequence[int], keys: int) -> str:
     """Return some metrics of a list of jobs over several keys."""
     some = f"the {len(columns)} strongest of {keys} keys" if keys > len(columns) else "each key"
     return join_sentences(
@@ -146,7 +148,7 @@ def scatter(sweep: Sweep, columns: Sequence[int], keys: int) -> str:
     )
 
 
-def describe_trends(sweep: Sweep) -> Iterator[str]:
+def describe_trends(sweep: PlottedSweep) -> Iterator[str]:
     """Yield what is said of trends and of colours, and how many points are drawn."""
     yield TREND
     phrase, _, _ = grouping(sweep)
@@ -159,7 +161,7 @@ def describe_trends(sweep: Sweep) -> Iterator[str]:
         )
 
 
-def ranking(sweep: Sweep, found: Ranking, shown: Sequence[Measure]) -> str:
+def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> str:
     """Return which axis matters for which of the metrics that are shown."""
     left = [measure.title for measure in shown if measure not in found]
     kind = next(iter(found.values())).kind

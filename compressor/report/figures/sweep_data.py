@@ -113,7 +113,7 @@ OUTSIDE = "outside"  # status of a point of the grid that the study leaves out
 
 
 @dataclass(frozen=True)
-class Axis:
+class PlottedAxis:
     """A swept key. values: those of the grid in order or, of a list of jobs, that of each job."""
 
     name: str
@@ -160,7 +160,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class PlottedSweep:
     """The jobs of a study over its axes.
 
     place: the number of each point's job in the order of the study's `status`, -1 where the study
@@ -168,7 +168,7 @@ class Sweep:
     """
 
     data: xr.Dataset
-    axes: tuple[Axis, ...]
+    axes: tuple[PlottedAxis, ...]
     place: np.ndarray
     is_grid: bool
 
@@ -219,7 +219,7 @@ class Sweep:
         return self.of(self.data["key"]) if "key" in self.data else None
 
 
-def sweep_of(data: xr.Dataset) -> Sweep:
+def sweep_of(data: xr.Dataset) -> PlottedSweep:
     """Return the sweep of a study, as `open_study` gives it; a list of jobs is a grid where it
     fills one.
 
@@ -229,7 +229,9 @@ def sweep_of(data: xr.Dataset) -> Sweep:
     names = swept_axes(data)
     if status.dims == ("job",):
         axes = [axis_of(data, name, data[name].values) for name in names]
-        return grid_jobs(data, axes) or Sweep(data, tuple(axes), np.arange(status.size), False)
+        return grid_jobs(data, axes) or PlottedSweep(
+            data, tuple(axes), np.arange(status.size), False
+        )
     place = np.arange(status.size).reshape(status.shape)
     found = []
     for name in names:
@@ -237,10 +239,12 @@ def sweep_of(data: xr.Dataset) -> Sweep:
         order = np.arange(values.size) if values.dtype.kind not in "fiu" else np.argsort(values)
         place = np.take(place, order, axis=status.dims.index(name))
         found.append(axis_of(data, name, values[order]))
-    return Sweep(data, tuple(found), place.reshape([axis.values.size for axis in found]), True)
+    return PlottedSweep(
+        data, tuple(found), place.reshape([axis.values.size for axis in found]), True
+    )
 
 
-def coarse(sweep: Sweep, axis: int, most: int) -> Sweep:
+def coarse(sweep: PlottedSweep, axis: int, most: int) -> PlottedSweep:
     """Return a grid with at most so many values of an axis, evenly chosen, the ends among them."""
     size = sweep.axes[axis].values.size
     if size <= most:
@@ -250,10 +254,10 @@ def coarse(sweep: Sweep, axis: int, most: int) -> Sweep:
         replace(one, values=one.values[chosen]) if n == axis else one
         for n, one in enumerate(sweep.axes)
     ]
-    return Sweep(sweep.data, tuple(axes), np.take(sweep.place, chosen, axis), True)
+    return PlottedSweep(sweep.data, tuple(axes), np.take(sweep.place, chosen, axis), True)
 
 
-def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:
+def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> PlottedAxis:
     """Return an axis of a study with its phrase and unit."""
     attrs = data[name].attrs
     unit, key = str(attrs.get("units", "")), str(attrs.get("case_key", name))
@@ -263,24 +267,24 @@ def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> Axis:
     phrase = str(attrs.get("long_name", key))
     if phrase in (key, name) or len(phrase) > LONG or values.dtype.kind not in "fiu":
         phrase = own.replace("_", " ")
-    return Axis(name, phrase, unit, values)
+    return PlottedAxis(name, phrase, unit, values)
 
 
-def grid_jobs(data: xr.Dataset, columns: Sequence[Axis]) -> Sweep | None:
+def grid_jobs(data: xr.Dataset, columns: Sequence[PlottedAxis]) -> PlottedSweep | None:
     """Return a list of jobs as a grid; None where it leaves out too much of it, as samples do."""
     if any(has_gaps(axis) for axis in columns) or not columns:
         return None
-    axes: list[Axis] = []
+    axes: list[PlottedAxis] = []
     codes: list[np.ndarray] = []
     for axis in columns:
         values, code = levels(axis)
         for n, other in enumerate(codes):
             if advance_together(code, other, axis.is_words or axes[n].is_words):
                 named = f"{axes[n].phrase}, with {axis.phrase}"
-                axes[n] = Axis(axes[n].name, named, axes[n].unit, axes[n].values)
+                axes[n] = PlottedAxis(axes[n].name, named, axes[n].unit, axes[n].values)
                 break
         else:
-            axes.append(Axis(axis.name, axis.phrase, axis.unit, values))
+            axes.append(PlottedAxis(axis.name, axis.phrase, axis.unit, values))
             codes.append(code)
     shape = tuple(axis.values.size for axis in axes)
     jobs = data["status"].size
@@ -290,15 +294,15 @@ def grid_jobs(data: xr.Dataset, columns: Sequence[Axis]) -> Sweep | None:
     place[tuple(codes)] = np.arange(jobs)
     if (place >= 0).sum() != jobs:
         return None  # one point has two jobs
-    return Sweep(data, tuple(axes), place, True)
+    return PlottedSweep(data, tuple(axes), place, True)
 
 
-def has_gaps(axis: Axis) -> bool:
+def has_gaps(axis: PlottedAxis) -> bool:
     """Return whether some jobs have no value of a key."""
     return bool((axis.values == "").any() if axis.is_words else np.isnan(axis.places).any())
 
 
-def levels(axis: Axis) -> tuple[np.ndarray, np.ndarray]:
+def levels(axis: PlottedAxis) -> tuple[np.ndarray, np.ndarray]:
     """Return the different values of a column, numbers in order, and which of them each job has."""
     if not axis.is_words:
         return np.unique(axis.values, return_inverse=True)

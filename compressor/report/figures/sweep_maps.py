@@ -16,7 +16,14 @@ from compressor.analysis import Effects, grid_effects, sampled_effects
 from compressor.metrics import METRICS
 from compressor.report.figures.extract import with_jobs
 from compressor.report.figures.style import BLUE, GOLD, GREY, in_style, legend_above, sheet
-from compressor.report.figures.sweep_data import MARKS, NAMES, Axis, Measure, Sweep, spans_decades
+from compressor.report.figures.sweep_data import (
+    MARKS,
+    NAMES,
+    Measure,
+    PlottedAxis,
+    PlottedSweep,
+    spans_decades,
+)
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
     MOST_KEYS,
@@ -35,7 +42,7 @@ FEWEST_RISEN = 0.2  # of the cells, above the least value
 NOTHING: dict[str, Any] = {"facecolor": "#f2f2f2", "edgecolor": GREY, "hatch": "////"}
 
 
-def across(sweep: Sweep) -> tuple[int, int]:
+def across(sweep: PlottedSweep) -> tuple[int, int]:
     """Return which of two axes lies in x and which in y: words in y, else the one with fewer
     values.
     """
@@ -47,13 +54,13 @@ def across(sweep: Sweep) -> tuple[int, int]:
 class Cells(NamedTuple):
     """The jobs of a map: its axes in x and y, the places of the cells' middles, and their keys."""
 
-    axes: tuple[Axis, Axis]
+    axes: tuple[PlottedAxis, PlottedAxis]
     centres: tuple[np.ndarray, np.ndarray]
     keys: np.ndarray | None
 
 
 @in_style
-def draw_maps(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
+def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
     """Return every measure over both axes of a grid, a cell a job, at most MOST_CELLS along an
     axis.
     """
@@ -113,7 +120,7 @@ def plot_map(
         bar.add_lines(lines)
 
 
-def has_lines(table: np.ndarray, axes: tuple[Axis, Axis]) -> bool:
+def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
     """Return whether lines of equal value tell something: over numbers, and not around a few
     cells.
     """
@@ -131,7 +138,7 @@ def mark_cells(panel: Axes, cells: Cells, status: np.ndarray, chaotic: np.ndarra
         mark_points(panel, x[columns], y[rows], keys, mark, name)
 
 
-def scale_way(panel: Axes, way: str, axis: Axis) -> None:
+def scale_way(panel: Axes, way: str, axis: PlottedAxis) -> None:
     """Words as ticks, or a log scale, of the x or the y axis of a map."""
     own = panel.xaxis if way == "x" else panel.yaxis
     if axis.is_words:
@@ -140,7 +147,7 @@ def scale_way(panel: Axes, way: str, axis: Axis) -> None:
         (panel.set_xscale if way == "x" else panel.set_yscale)("log")
 
 
-def edges_of(centres: np.ndarray, axis: Axis) -> np.ndarray:
+def edges_of(centres: np.ndarray, axis: PlottedAxis) -> np.ndarray:
     """Return the edges between cells: halfway, on a log scale by ratio; outer cells are
     symmetric.
     """
@@ -159,7 +166,7 @@ FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its mean
 Ranking = dict[Measure, Effects]
 
 
-def ranking(sweep: Sweep, measures: Sequence[Measure]) -> Ranking:
+def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
     """Return the effects of a sweep's axes on each measure of which enough is known; all of one
     kind.
     """
@@ -180,7 +187,7 @@ def order_of(effects: Effects) -> list[int]:
     return np.argsort(-np.nan_to_num(effects.strength), kind="stable").tolist()
 
 
-def leading(sweep: Sweep, measures: Sequence[Measure], most: int) -> list[Measure]:
+def leading(sweep: PlottedSweep, measures: Sequence[Measure], most: int) -> list[Measure]:
     """Return the measures that change most over a sweep, as the greatest over the least value.
 
     One a metric; none that is a count, or is 0 without clearance by its meaning.
@@ -207,7 +214,7 @@ def overall(found: Ranking) -> list[int]:
 
 
 @in_style
-def draw_ranking(sweep: Sweep, found: Ranking) -> Figure:
+def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Figure:
     """Return a panel an axis, the strongest first, with a row a measure; bars with 95 %
     intervals.
     """
@@ -259,7 +266,7 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
     return float(values[axis]) * factor, float(low), float(high)
 
 
-def describe_ranking(sweep: Sweep, found: Ranking) -> str:
+def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
     """Return the strongest axis of each measure, a sentence an axis; or axes that are not told
     apart.
     """

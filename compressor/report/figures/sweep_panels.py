@@ -15,13 +15,13 @@ from matplotlib.patches import Patch
 
 from compressor.analysis import trend
 from compressor.report.figures.extract import with_jobs
-from compressor.report.figures.style import BLUE, CYCLE, Line, in_style, legend_above, sheet
+from compressor.report.figures.style import BLUE, CYCLE, LineStyle, in_style, legend_above, sheet
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
-    Axis,
     Measure,
-    Sweep,
+    PlottedAxis,
+    PlottedSweep,
     coarse,
     name_value,
     spans_decades,
@@ -99,7 +99,7 @@ def marks_shown(status: np.ndarray, chaotic: np.ndarray) -> list[Line2D]:
     return found + ([Line2D([], [], label=CHAOTIC, **RING)] if chaotic.any() else [])
 
 
-def scale_x(panel: Axes, axis: Axis) -> None:
+def scale_x(panel: Axes, axis: PlottedAxis) -> None:
     """Words as ticks, and a log scale where numbers span decades."""
     if axis.is_words:
         panel.set_xticks(range(len(axis.words)), in_lines(axis.words))
@@ -137,7 +137,7 @@ def scale_y(panel: Axes, values: np.ndarray) -> float:
     return float(high - low + 2.0 * room)
 
 
-def lines_for(axis: Axis, chosen: Iterable[int]) -> list[Line]:
+def lines_for(axis: PlottedAxis, chosen: Iterable[int]) -> list[LineStyle]:
     """Return a line for each of an axis' values, from dark to light where they are numbers.
 
     chosen: the numbers of the values. Colours are those of viridis, which the colour-blind tell
@@ -147,7 +147,7 @@ def lines_for(axis: Axis, chosen: Iterable[int]) -> list[Line]:
     if len(numbers) <= len(CYCLE) and (axis.is_words or len(numbers) == 1):
         return list(CYCLE[: len(numbers)])
     shares = np.linspace(0.0, 0.88, len(numbers))
-    return [Line(to_hex(colormaps["viridis"](share)), "-", 1.5) for share in shares]
+    return [LineStyle(to_hex(colormaps["viridis"](share)), "-", 1.5) for share in shares]
 
 
 def thin_places(size: int, most: int) -> np.ndarray:
@@ -157,14 +157,14 @@ def thin_places(size: int, most: int) -> np.ndarray:
     )
 
 
-PLAIN_LINE = Line(BLUE, "-", 1.4).properties() | {"marker": "o", "markersize": 3.8}
+PLAIN_LINE = LineStyle(BLUE, "-", 1.4).properties() | {"marker": "o", "markersize": 3.8}
 
 
 MOST_JOBS = 1000
 
 
 @in_style
-def draw_curves(sweep: Sweep, measures: Sequence[Measure]) -> Figure:
+def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
     """Return every measure over the one axis of a grid, a point a job; over words without a line.
 
     Of more than MOST_JOBS jobs as many are drawn.
@@ -204,7 +204,7 @@ class Roles(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class MeasuredPoints:
     """A measure at points: of a sweep or, of a line, over x and what is averaged, (x, others)."""
 
     values: np.ndarray
@@ -219,7 +219,7 @@ class Part:
         return self.values.shape[1] == 1
 
 
-def roles_of(sweep: Sweep, order: Sequence[int], detailed: bool) -> Roles:
+def roles_of(sweep: PlottedSweep, order: Sequence[int], detailed: bool) -> Roles:
     """Return which axis does what. order: the axes' numbers, the strongest first.
 
     In x lies the one of the two strongest axes of numbers that has more values, in colours the
@@ -231,13 +231,13 @@ def roles_of(sweep: Sweep, order: Sequence[int], detailed: bool) -> Roles:
     return Roles(x, color, *(others[:2] if detailed else []))
 
 
-def chosen_of(axis: Axis, most: int) -> np.ndarray:
+def chosen_of(axis: PlottedAxis, most: int) -> np.ndarray:
     """Return the numbers of an axis' values that are shown."""
     return thin_places(axis.values.size, most)
 
 
 @in_style
-def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
+def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Figure:
     """Return every measure over two axes, as lines; means over the others, if there are any.
 
     What is not known within its error bar is no part of a mean.
@@ -256,18 +256,18 @@ def draw_overview(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Fig
     return figure
 
 
-def is_averaged(sweep: Sweep, role: Roles) -> bool:
+def is_averaged(sweep: PlottedSweep, role: Roles) -> bool:
     """Return whether lines are means over some axes."""
     return any(n not in role for n in range(len(sweep.axes)))
 
 
-def marks_of(sweep: Sweep, role: Roles) -> list[Line2D]:
+def marks_of(sweep: PlottedSweep, role: Roles) -> list[Line2D]:
     """Return the legend's entries of marks: means have none."""
     return [] if is_averaged(sweep, role) else marks_shown(sweep.status, sweep.chaotic)
 
 
 @in_style
-def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Figure:
+def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Figure:
     """Return a panel for each value of one axis and, in rows, of another, or for each measure."""
     sweep = coarse(sweep, role.x, MOST_PLACES)
     columns = chosen_of(sweep.axes[role.column], MOST_COLUMNS)
@@ -295,15 +295,15 @@ def draw_multiples(sweep: Sweep, role: Roles, measures: Sequence[Measure]) -> Fi
     return figure
 
 
-def whole_part(sweep: Sweep, measure: Measure, role: Roles) -> Part:
+def whole_part(sweep: PlottedSweep, measure: Measure, role: Roles) -> MeasuredPoints:
     """Return a measure over a sweep; where lines are means, what is known of it within its error
     bar.
     """
     values = sweep.known(measure) if is_averaged(sweep, role) else sweep.values(measure)
-    return Part(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
+    return MeasuredPoints(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
 
 
-def line_part(whole: Part, role: Roles, at: dict[int, int]) -> Part:
+def line_part(whole: MeasuredPoints, role: Roles, at: dict[int, int]) -> MeasuredPoints:
     """Return what a line shows: the points over x at a value of some axes, numbers by number."""
 
     def part(values: np.ndarray) -> np.ndarray:
@@ -311,14 +311,18 @@ def line_part(whole: Part, role: Roles, at: dict[int, int]) -> Part:
         left = [n for n in range(values.ndim) if n not in at]
         return np.moveaxis(values[index], left.index(role.x), 0).reshape(values.shape[role.x], -1)
 
-    return Part(
+    return MeasuredPoints(
         part(whole.values), part(whole.bars), part(whole.status), part(whole.chaotic),
         None if whole.keys is None else part(whole.keys),
     )  # fmt: skip
 
 
 def plot_parts(
-    panel: Axes, sweep: Sweep, role: Roles, parts: Sequence[Part], whole: Part
+    panel: Axes,
+    sweep: PlottedSweep,
+    role: Roles,
+    parts: Sequence[MeasuredPoints],
+    whole: MeasuredPoints,
 ) -> dict[str, Line2D]:
     """Return a panel's lines and marks; gives the legend's entries by name."""
     axis, color = sweep.axes[role.x], sweep.axes[role.color]
@@ -346,7 +350,7 @@ def plot_parts(
 
 
 def plot_part(
-    panel: Axes, x: np.ndarray, part: Part, name: str, style: dict[str, Any], span: float
+    panel: Axes, x: np.ndarray, part: MeasuredPoints, name: str, style: dict[str, Any], span: float
 ) -> None:  # fmt: skip
     """A line through jobs with their bars, or through means."""
     if part.is_jobs:
@@ -371,7 +375,7 @@ PLACES = 60  # of a trend
 
 
 @in_style
-def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
+def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
     """Return every measure over the axis that matters most for it; axes: their numbers, one a
     measure.
     """
@@ -385,7 +389,7 @@ def draw_points(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) 
 
 
 @in_style
-def draw_scatter(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
+def draw_scatter(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
     """Return the measures in rows over axes in columns."""
     figure, grid = sheet(
         len(measures), len(axes), 2.3 * len(measures) + 0.9, sharex="col", sharey="row"
@@ -401,7 +405,7 @@ def draw_scatter(sweep: Sweep, axes: Sequence[int], measures: Sequence[Measure])
     return figure
 
 
-def grouping(sweep: Sweep) -> tuple[str, list[Any], np.ndarray]:
+def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
     """Return the words that have a colour: their axis' phrase, the words, and each job's number.
 
     The first axis of words with no more of them than there are lines to tell apart.
@@ -412,7 +416,7 @@ def grouping(sweep: Sweep) -> tuple[str, list[Any], np.ndarray]:
     return "", [""], np.zeros(sweep.place.shape, int)
 
 
-def plot_points(panel: Axes, sweep: Sweep, axis: int, measure: Measure) -> None:
+def plot_points(panel: Axes, sweep: PlottedSweep, axis: int, measure: Measure) -> None:
     """The jobs over one axis, and for each group the trend and its interval."""
     one = sweep.axes[axis]
     x, y, keys = one.places, sweep.values(measure), sweep.keys
@@ -456,12 +460,12 @@ def plot_trend(panel: Axes, x: np.ndarray, y: np.ndarray, color: str, name: str)
     panel.plot(at, middle, color=color, linewidth=1.8, label=f"trend{name}", zorder=3)
 
 
-def entries(sweep: Sweep) -> list[Any]:
+def entries(sweep: PlottedSweep) -> list[Any]:
     """Return the legend of a scatter diagram."""
     return [*_entries(sweep), *marks_shown(sweep.status, sweep.chaotic)]
 
 
-def _entries(sweep: Sweep) -> Iterator[Any]:
+def _entries(sweep: PlottedSweep) -> Iterator[Any]:
     phrase, words, _ = grouping(sweep)
     for n, word in enumerate(words):
         color = CYCLE[n].color if phrase else BLUE

@@ -90,7 +90,7 @@ def claims(
             screen.end()
     finally:
         screen.end()
-    tell(found, as_json)
+    report_machines(found, as_json)
     beside = "" if output == "claims" else f" --claims {shlex.quote(output)}"
     say_unless(quiet, f"next: compsim report{beside}")
     failed = any((one["status"] == "failed").any() for one in found)
@@ -103,7 +103,7 @@ def say_unless(quiet: bool, text: str) -> None:
         say(text)
 
 
-def tell(found: "list[xr.Dataset]", as_json: bool) -> None:
+def report_machines(found: "list[xr.Dataset]", as_json: bool) -> None:
     """Files of judged machines on stdout, with what they say."""
     told = {one.encoding["source"]: [*sentences(one)] for one in found}
     if as_json:

@@ -36,7 +36,7 @@ NO_FIGURE = ("", "", None)
 
 
 @dataclass(frozen=True)
-class Part:
+class MachinesFile:
     """One file of judged machines: what is said of it, and its figure."""
 
     name: str
@@ -105,7 +105,7 @@ def add(results: Folder, studies: Sequence[StoredStudy], draw: Draw, place: Fold
     parts, found = [], machine_files(place) if place else {}
     for name, sentences, heading, caption, drawing in machine_drawings(found):
         plate = draw(file_name("machines", name), heading, caption, drawing) if drawing else None
-        parts.append(Part(name, sentences, plate))
+        parts.append(MachinesFile(name, sentences, plate))
     if not parts:
         return Additions({}, [])
     title = "In which machines the paper's claims hold"

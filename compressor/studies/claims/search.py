@@ -40,7 +40,7 @@ NAMES = {1: "", LONGER: "-longer", LONGEST: "-longest"}
 HALVINGS = 4  # of each change, on the way back to the default
 
 
-class Span(NamedTuple):
+class AssumptionRange(NamedTuple):
     """An assumption: its key, the function that spreads it over its range, and its default."""
 
     key: str
@@ -68,7 +68,7 @@ class Span(NamedTuple):
         return float(brentq(lambda share: self.spread(share) - value, 0.0, 1.0))
 
 
-class Search:
+class MachineSearch:
     """The machines of a search, which grow; each is judged once and stored.
 
     longer: how many times as long as the study's their runs are. In longer runs a claim counts as
@@ -82,7 +82,7 @@ class Search:
         self.workers, self.progress = workers, progress
         defaults = Case.from_values({}).values()
         self.spans = [
-            Span(axis.key, axis.spread, float(value_in(defaults, axis.key)))
+            AssumptionRange(axis.key, axis.spread, float(value_in(defaults, axis.key)))
             for axis in study.axes
             if axis.spread is not None and isinstance(value_in(defaults, axis.key), int | float)
         ]
@@ -216,7 +216,7 @@ def least_change(
     """
     from scipy.optimize import differential_evolution
 
-    search = Search(study, folder, workers, progress)
+    search = MachineSearch(study, folder, workers, progress)
 
     def costs(shares: np.ndarray) -> np.ndarray:
         many = np.atleast_2d(shares.T).tolist()
@@ -229,14 +229,14 @@ def least_change(
         rng=np.random.default_rng(SEED),
     )  # fmt: skip
     near = descend(search, min(search.asked, key=search.cost), STEP)
-    longer = Search(study, folder, workers, progress, LONGER)
+    longer = MachineSearch(study, folder, workers, progress, LONGER)
     best = descend(longer, near, STEP / 2.0)
     if holds := longer.cost(best) < 1.0:
         taken_back(longer, best)
     best = min(longer.points, key=longer.cost)
     looked, last = len(search.points) + len(longer.points), longer
     if not holds and min(longer.points[best].margin) >= 0.0:
-        last = Search(study, folder, workers, progress, LONGEST)
+        last = MachineSearch(study, folder, workers, progress, LONGEST)
         last.ask([best])
         looked += 1
     found = last.judged().isel(machine=[[*last.points].index(best)])
@@ -247,7 +247,7 @@ def least_change(
     return found
 
 
-def beginning(search: Search) -> np.ndarray:
+def beginning(search: MachineSearch) -> np.ndarray:
     """Return the first generation: the defaults, the study's best machines, and draws where these
     are few.
 
@@ -268,7 +268,7 @@ def beginning(search: Search) -> np.ndarray:
     return np.array([search.home.tolist(), *best, *drawn])
 
 
-def descend(search: Search, best: tuple[float, ...], step: float) -> tuple[float, ...]:
+def descend(search: MachineSearch, best: tuple[float, ...], step: float) -> tuple[float, ...]:
     """Return the best machine of a compass search that begins at one; until claims hold, or steps
     end.
 
@@ -289,7 +289,7 @@ def descend(search: Search, best: tuple[float, ...], step: float) -> tuple[float
     return best
 
 
-def taken_back(search: Search, best: tuple[float, ...]) -> None:
+def taken_back(search: MachineSearch, best: tuple[float, ...]) -> None:
     """Take back each change of a machine at which all claims hold, as far as they go on to.
 
     The smallest change first; a whole one if that goes, else by bisection.

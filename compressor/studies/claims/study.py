@@ -24,7 +24,7 @@ from compressor.store import (
     swept_column,
     write_dataset,
 )
-from compressor.sweep import Done, Lost, Needs, Progress, run_here
+from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
 
 CLAIMS = tuple(range(1, 9))
 SHARES = ("apart", "hit", "energy_angle", "active")  # by which claim 7 is measured
@@ -151,9 +151,9 @@ def judge_machines(
 ) -> xr.Dataset:
     """Judge the machines of a study that FOLDER/NAME.nc does not hold yet; gives all of them.
 
-    As `dataset` makes it. Whatever ends the run early, what was finished is stored, but for the
-    last seconds. Raises ClaimsError, WorkersFailed, and StoreError also where the file holds
-    finished machines that the study does not have, which would be lost.
+    As `machines_dataset` makes it. Whatever ends the run early, what was finished is stored, but
+    for the last seconds. Raises ClaimsError, WorkersFailed, and StoreError also where the file
+    holds finished machines that the study does not have, which would be lost.
     """
     cases, path = machines(study), Path(folder) / f"{study.name}.nc"
     keys = [machine_key(case) for case in cases]
@@ -172,13 +172,13 @@ def judge_machines(
             done += 1
             progress(done, total, "")
             if time.monotonic() - written > FLUSH:
-                write_dataset(path, dataset(study, keys, known))
+                write_dataset(path, machines_dataset(study, keys, known))
                 written = time.monotonic()
     finally:
         running.close()
         if missing:
-            write_dataset(path, dataset(study, keys, known))
-    found = dataset(study, keys, known)
+            write_dataset(path, machines_dataset(study, keys, known))
+    found = machines_dataset(study, keys, known)
     found.encoding["source"] = str(path)
     return found
 
@@ -189,12 +189,14 @@ def machine_key(case: Case) -> str:
     return hashlib.sha256(f"{case.key} {rules}".encode()).hexdigest()[:20]
 
 
-def judge_end(end: Done | Lost) -> Judged:
+def judge_end(end: JobResult | JobLost) -> Judged:
     """Return what a job says of its machine, also one that took its worker with it."""
-    return end.result if isinstance(end, Done) else Judged(failed=f"{end.reason}: {end.detail}")
+    return (
+        end.result if isinstance(end, JobResult) else Judged(failed=f"{end.reason}: {end.detail}")
+    )
 
 
-def dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr.Dataset:
+def machines_dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr.Dataset:
     """Return the machines of a study by their assumptions: `margin`, `held` and more over (claim,
     ...).
 
@@ -262,7 +264,7 @@ def read_kept_machines(path: Path) -> dict[str, Judged]:
 
 
 def read_machines(path: Path) -> xr.Dataset:
-    """Return the machines of a file, as `dataset` made them. Raises StoreError where it is none."""
+    """Return the machines of a file of `machines_dataset`. Raises StoreError where it is none."""
     found = read_dataset(path, REMEDY)
     if "share_margin" not in found or "key" not in found:
         raise StoreError(path, "is no file of judged machines", REMEDY)

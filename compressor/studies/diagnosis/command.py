@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
 
-    from compressor.studies.diagnosis.identify import Answer, Identifier
+    from compressor.studies.diagnosis.identify import Identification, Identifier
 
 
 def levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
@@ -147,7 +147,7 @@ def identify(
     finally:
         screen.end()
     if as_json:
-        print_text(json.dumps(plain(record, fitted, answer), indent=1))
+        print_text(json.dumps(jsonable_record(record, fitted, answer), indent=1))
         return DONE
     pulses = found.tacho
     rpm_told = 60.0 * (len(pulses) - 1) / (pulses[-1] - pulses[0])
@@ -158,7 +158,7 @@ def identify(
     return DONE
 
 
-def verdict(answer: "Answer") -> Iterator[str]:
+def verdict(answer: "Identification") -> Iterator[str]:
     """Yield that nothing fits, and what may be done; nothing where something does."""
     if answer.fits:
         return
@@ -171,7 +171,7 @@ def verdict(answer: "Answer") -> Iterator[str]:
     yield "the ranking below is what is least far, and is not to be trusted"
 
 
-def ranking(answer: "Answer") -> Iterator[str]:
+def ranking(answer: "Identification") -> Iterator[str]:
     """Yield the table of joints."""
     yield f"{'rank':<5} {'joint':<10} {'probability':>11}  clearance, mm: median [90 % interval]"
     for rank, one in enumerate(answer.candidates, 1):
@@ -186,7 +186,7 @@ def ends(clearances: dict[str, Any]) -> str:
     )
 
 
-def grounds(fitted: "Identifier", answer: "Answer", folder: str) -> Iterator[str]:
+def grounds(fitted: "Identifier", answer: "Identification", folder: str) -> Iterator[str]:
     """Yield what an answer rests on, and its cautions."""
     library = fitted.library
     yield (f"rests on {len(library.keys)} of {plural(library.jobs)} of study {library.study} in "
@@ -219,7 +219,7 @@ def span(values: "np.ndarray") -> str:
     return ", ".join(sorted({str(value) for value in values.tolist()}))
 
 
-def plain(record: str, fitted: "Identifier", answer: "Answer") -> dict[str, Any]:
+def jsonable_record(record: str, fitted: "Identifier", answer: "Identification") -> dict[str, Any]:
     """Return an answer as JSON says it."""
     library = fitted.library
     return {

@@ -36,7 +36,7 @@ class RecordError(CompsimError):
 
 
 @dataclass(frozen=True)
-class Feature:
+class SignalFeature:
     """A feature's name, unit and phrase."""
 
     name: str
@@ -44,32 +44,36 @@ class Feature:
     phrase: str
 
 
-def _table() -> dict[str, Feature]:
+def _table() -> dict[str, SignalFeature]:
     rows = [
-        Feature("level", "", "log10 of the rms in m/s2"),
-        Feature("speed", "", "log10 of the speed in rev/s"),
-        Feature("crest_factor", "1", "greatest magnitude over rms"),
-        Feature("kurtosis", "1", "fourth central moment over the square of the second"),
-        Feature("gini", "1", "Gini index of magnitudes"),
-        Feature(
+        SignalFeature("level", "", "log10 of the rms in m/s2"),
+        SignalFeature("speed", "", "log10 of the speed in rev/s"),
+        SignalFeature("crest_factor", "1", "greatest magnitude over rms"),
+        SignalFeature("kurtosis", "1", "fourth central moment over the square of the second"),
+        SignalFeature("gini", "1", "Gini index of magnitudes"),
+        SignalFeature(
             "energy_angle", "1", f"share of angle with 90 % of the energy above order {SWING:g}"
         ),
-        Feature("above_swing", "", f"log10 of the share of the energy above order {SWING:g}"),
-        Feature(
+        SignalFeature("above_swing", "", f"log10 of the share of the energy above order {SWING:g}"),
+        SignalFeature(
             "synchronous", "1", f"of the energy above order {SWING:g}, that every turn repeats"
         ),
     ]
     for low, high in zip(BANDS, (*BANDS[1:], math.inf), strict=True):
         reach = f"{low:g} to {high:g} Hz" if high < math.inf else f"above {low:g} Hz"
-        rows.append(Feature(f"band_{low:g}", "", f"log10 of the share of the energy, {reach}"))
+        rows.append(
+            SignalFeature(f"band_{low:g}", "", f"log10 of the share of the energy, {reach}")
+        )
     for k in range(SECTORS):
         begin, end = 360 * k // SECTORS, 360 * (k + 1) // SECTORS
-        rows.append(Feature(
+        rows.append(SignalFeature(
             f"sector_{begin}", "",
             f"log10 of the share of the energy above order {SWING:g}, {begin} to {end} degrees",
         ))  # fmt: skip
     for beat in BEATS:
-        rows.append(Feature(f"envelope_{beat}", "1", f"order {beat} of the envelope over its mean"))
+        rows.append(
+            SignalFeature(f"envelope_{beat}", "1", f"order {beat} of the envelope over its mean")
+        )
     return {row.name: row for row in rows}
 
 

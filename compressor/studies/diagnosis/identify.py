@@ -62,7 +62,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Identification:
     """What explains a record.
 
     candidates: the most probable first; fits: whether anything does; p_value: share of the study's
@@ -136,7 +136,7 @@ class Identifier:
             Strangeness.fit((filled - middle) / scale), right, covered, equal,
         )  # fmt: skip
 
-    def identify(self, row: np.ndarray) -> Answer:
+    def identify(self, row: np.ndarray) -> Identification:
         """Return what explains a record with these features, (FEATURES,)."""
         filled = np.where(np.isnan(row), self.middle, row)
         plain = (filled - self.middle) / self.scale
@@ -155,7 +155,7 @@ class Identifier:
         off = self.strangeness.off(plain)
         odd = {list(FEATURES)[k]: float(off[k]) for k in np.argsort(-np.abs(off))[:ODD]}
         nearest = str(self.library.keys[self.strangeness.nearest(plain)])
-        return Answer(tuple(found), chance >= LIMIT, chance, near, apart, nearest, odd)
+        return Identification(tuple(found), chance >= LIMIT, chance, near, apart, nearest, odd)
 
 
 def _ends(joint: str, equal: bool) -> list[int]:
@@ -184,7 +184,7 @@ def find_record(name: str, folder: Folder, steady: SteadySpeed | None) -> tuple[
 
 def explain_record(
     record: Record, folder: Folder, study: str, key: str, progress: Progress
-) -> tuple[Identifier, Answer]:
+) -> tuple[Identifier, Identification]:
     """Return what a stored study tells of a record, and the identifier that does; key: a job left
     out.
 

@@ -18,7 +18,7 @@ PERIOD_1 = "period 1"
 MOST_SPANS = 4  # of values that are listed; of more the first and the last
 
 
-class Seen(NamedTuple):
+class SeenValue(NamedTuple):
     """A value on the way, the regime found there, and its largest exponent (1/rev) with error."""
 
     value: float
@@ -32,7 +32,7 @@ class Seen(NamedTuple):
         return self.exponent - self.error > 0.0
 
 
-def way(chain: xr.Dataset) -> list[Seen]:
+def way(chain: xr.Dataset) -> list[SeenValue]:
     """Return what one direction saw, in the order it went; values that failed are left out."""
     over, found = chain.attrs["over"], []
     for i in np.argsort(chain[over].values, kind="stable"):
@@ -40,7 +40,7 @@ def way(chain: xr.Dataset) -> list[Seen]:
         regime = regime_of(one)
         if regime:
             exponent, error = (float(one[f"lyapunov_exponent{end}"]) for end in ("", "_error"))
-            found.append(Seen(float(one[over]), regime, exponent, error))
+            found.append(SeenValue(float(one[over]), regime, exponent, error))
     return found[::-1] if str(chain["direction"].values) == "down" else found
 
 
@@ -73,7 +73,7 @@ def bifurcation(pair: xr.Dataset) -> str:
     return " ".join([*sentences, *directions(pair), *failures(pair)])
 
 
-def course(seen: Sequence[Seen], unit: str) -> str:
+def course(seen: Sequence[SeenValue], unit: str) -> str:
     """Return where period 1 is lost and comes back, and how often each regime was found."""
     regimes = [one.regime for one in seen]
     if not seen:
@@ -99,7 +99,7 @@ def course(seen: Sequence[Seen], unit: str) -> str:
     )
 
 
-def parting(seen: Sequence[Seen], unit: str) -> str:
+def parting(seen: Sequence[SeenValue], unit: str) -> str:
     """Return where the largest exponent is first above 0 by more than its error, or how near it
     came.
     """
@@ -204,7 +204,7 @@ def spans(values: np.ndarray, marked: np.ndarray) -> str:
     )
 
 
-def rate(one: Seen) -> str:
+def rate(one: SeenValue) -> str:
     """Return an exponent with its error, where that is known."""
     if not (np.isfinite(one.error) and one.error > 0.0):
         return f"{one.exponent:.3g} a revolution"

@@ -66,7 +66,7 @@ class Chain:
         return Path(folder) / FOLDER / self.study / f"{self.key}.nc"
 
 
-class Task(NamedTuple):
+class ChainTask(NamedTuple):
     """A chain to be run in a folder of results; `rerun`: from its first failed value on."""
 
     folder: str
@@ -74,14 +74,14 @@ class Task(NamedTuple):
     rerun: bool = False
 
 
-class Ended(NamedTuple):
+class ChainEnd(NamedTuple):
     """How a chain ended: how many values it has, and the failed ones with reason and detail."""
 
     values: int
     failed: tuple[tuple[float, str, str], ...]
 
 
-def run_chain(task: Task) -> Ended | StoreError:
+def run_chain(task: ChainTask) -> ChainEnd | StoreError:
     """Run what a chain's file does not hold yet, in a worker.
 
     A StoreError is returned: it ends the run, while an exception is a failure of the chain.
@@ -95,10 +95,10 @@ def run_chain(task: Task) -> Ended | StoreError:
         for case in chain.cases[len(rows) :]:
             rows.append(run_value(case, last_state(rows), chain.asked))
             if time.monotonic() - written > FLUSH:
-                write_dataset(path, dataset(chain, rows))
+                write_dataset(path, chain_dataset(chain, rows))
                 written, stored = time.monotonic(), len(rows)
         if stored < len(rows) or task.rerun:
-            write_dataset(path, dataset(chain, rows))
+            write_dataset(path, chain_dataset(chain, rows))
     except StoreError as error:
         return error
     return chain_end(chain, rows)
@@ -109,11 +109,11 @@ def first_failed(rows: Sequence[Row]) -> int:
     return next((n for n, row in enumerate(rows) if row["status"] != "ok"), len(rows))
 
 
-def chain_end(chain: Chain, rows: Sequence[Row]) -> Ended:
+def chain_end(chain: Chain, rows: Sequence[Row]) -> ChainEnd:
     """Return how far a chain has come."""
     paired = zip(chain.values, rows, strict=False)
     bad = [(v, row["reason"], row["detail"]) for v, row in paired if row["status"] != "ok"]
-    return Ended(len(rows), tuple(bad))
+    return ChainEnd(len(rows), tuple(bad))
 
 
 def last_state(rows: Sequence[Row]) -> np.ndarray | None:
@@ -122,7 +122,7 @@ def last_state(rows: Sequence[Row]) -> np.ndarray | None:
     return None if state is None or np.isnan(state).any() else state
 
 
-def dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
+def chain_dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
     """Return the rows of a chain, with the dimension `value` in the order of running."""
     found: dict[str, tuple] = {}
     for name, phrase in TEXTS.items():

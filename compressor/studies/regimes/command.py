@@ -23,7 +23,7 @@ from compressor.program import printable
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-    from compressor.studies.regimes.run import RegimesSummary, Standing
+    from compressor.studies.regimes.run import ChainProgress, RegimesSummary
 
 MOST_FAILURES = 20  # listed one by one
 
@@ -40,7 +40,7 @@ def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, 
         say(f"what is finished is stored in {folder}; the same command goes on from there")
         raise
     screen.end()
-    tell(summary, folder, quiet)
+    report_chains(summary, folder, quiet)
     return SOME_FAILED if summary.failed else DONE
 
 
@@ -54,14 +54,14 @@ def check_options(alone: bool, scheduler: str | None, rerun: tuple[str, ...], wa
         raise click.UsageError("--watch shows jobs, and regimes have none: compsim plot draws them")
 
 
-def ahead(studies: "list[Study]", folder: str) -> "list[Standing]":
+def ahead(studies: "list[Study]", folder: str) -> "list[ChainProgress]":
     """Return how many values of each study's chains are stored."""
     from compressor.studies.regimes.run import standing
 
     return standing(studies, folder)
 
 
-def ahead_lines(standings: "list[Standing]") -> Iterator[str]:
+def ahead_lines(standings: "list[ChainProgress]") -> Iterator[str]:
     """Yield how many values the chains of each study have, and how many of them are stored."""
     for one in standings:
         missing = one.chains * one.values - one.done
@@ -81,7 +81,7 @@ def regimes_of(folder: str, study: str) -> str:
     return ", ".join(told) + (f"; periods: {', '.join(of)}" if of else "")
 
 
-def tell(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
+def report_chains(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
     """Say what there is now, and what failed."""
     for count in summary.counts:
         where = os.path.join(folder, "regimes", count.study)

@@ -23,13 +23,13 @@ from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Regime
 from compressor.program import PROGRAM
-from compressor.solve import follow, record
+from compressor.solve import follow_revolutions, record
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 from compressor.studies.regimes.chains import FOLDER, REMEDY, Chain, read_kept_rows
 from compressor.studies.regimes.values import (
     Clock,
-    Motion,
     Row,
+    SettledMotion,
     apart,
     measure_motion,
     places,
@@ -52,7 +52,7 @@ VERDICTS = {
 }
 
 
-class Seen(NamedTuple):
+class MotionSignature(NamedTuple):
     """What tells motions apart: regime, period (rev, nan: none), Poincaré places, rms, its error.
 
     places: (k, joint, 2), in clearances; rms of acceleration and its standard error, m/s2.
@@ -65,7 +65,7 @@ class Seen(NamedTuple):
     rms_error: float
 
 
-def differ(one: Seen, other: Seen, within: float) -> bool:
+def differ(one: MotionSignature, other: MotionSignature, within: float) -> bool:
     """Return whether two motions of a machine are different ones.
 
     Two that repeat themselves: by sets of Poincaré places that are farther apart than three times
@@ -83,28 +83,28 @@ def differ(one: Seen, other: Seen, within: float) -> bool:
     return regimes == {Regime.PERIODIC, Regime.CHAOTIC}
 
 
-def seen_in_row(row: Row, case: Case) -> Seen:
+def seen_in_row(row: Row, case: Case) -> MotionSignature:
     """Return what a stored value says of its motion."""
     count = 0 if row["status"] != "ok" else int(row["revolutions"])
     period = float(row["period"])
     points = row["section"][: count if math.isnan(period) else int(period)]
     found = places(points, record(case)["clearance"])
     error = float(row["rms_acceleration_standard_error"])
-    return Seen(row["regime"], period, found, float(row["rms_acceleration"]), error)
+    return MotionSignature(row["regime"], period, found, float(row["rms_acceleration"]), error)
 
 
-def seen_in_motion(motion: Motion, case: Case) -> Seen:
+def seen_in_motion(motion: SettledMotion, case: Case) -> MotionSignature:
     """Return the same of a motion that was followed now."""
     found = places(motion.points, record(case)["clearance"])
     if motion.reason:
-        return Seen("", math.nan, found, math.nan, math.nan)
+        return MotionSignature("", math.nan, found, math.nan, math.nan)
     rms = float(motion.leg.numbers(motion.count)["rms_acceleration"])
     error = motion.leg.rms_error(motion.count)
-    return Seen(motion.regime, motion.period, found, rms, error)
+    return MotionSignature(motion.regime, motion.period, found, rms, error)
 
 
 @dataclass(frozen=True)
-class Pair:
+class ChainPair:
     """The two chains of one machine, up and down."""
 
     up: Chain
@@ -127,7 +127,7 @@ class Doubt(NamedTuple):
     case: Case
     up: np.ndarray
     down: np.ndarray
-    pair: Pair
+    pair: ChainPair
 
 
 class Verdict(NamedTuple):
@@ -143,7 +143,7 @@ class Verdict(NamedTuple):
 AGREED = Verdict(0, 0, 0, 0, 0)
 
 
-def doubts(pair: Pair, folder: Folder) -> list[Doubt]:
+def doubts(pair: ChainPair, folder: Folder) -> list[Doubt]:
     """Return the values at which the stored chains of a pair differ."""
     up = read_kept_rows(pair.up, pair.up.path(folder))
     down = read_kept_rows(pair.down, pair.down.path(folder))
@@ -167,7 +167,7 @@ def confirm(doubt: Doubt) -> Verdict:
     of_ends = [later(case, state, doubt.pair.up) for state in (doubt.up, doubt.down)]
     of_starts = [later(start, None, doubt.pair.up) for start in other_starts(case)]
     within = tolerance(case)
-    different: list[Seen] = []
+    different: list[MotionSignature] = []
     for one in (*of_ends, *of_starts):
         if one.regime and all(differ(one, other, within) for other in different):
             different.append(one)
@@ -179,14 +179,14 @@ def confirm(doubt: Doubt) -> Verdict:
     return Verdict(1, int(len(different) > 1), len(different), up, down)
 
 
-def later(case: Case, state: np.ndarray | None, chain: Chain) -> Seen:
+def later(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSignature:
     """Return the motion after many more revolutions from a state on, or from the case's own
     start.
     """
     clock = Clock(case.solve.timeout_s)
-    leg = follow(case, state, stretch(chain.asked, FURTHER, clock))
+    leg = follow_revolutions(case, state, stretch(chain.asked, FURTHER, clock))
     if leg.reason:
-        return Seen("", math.nan, leg.points[:0, :, :2], math.nan, math.nan)
+        return MotionSignature("", math.nan, leg.points[:0, :, :2], math.nan, math.nan)
     return seen_in_motion(measure_motion(case, leg.state, chain.asked, clock), case)
 
 
@@ -207,7 +207,7 @@ def other_starts(case: Case) -> list[Case]:
     return found
 
 
-def read_verdicts(pair: Pair, folder: Folder) -> dict[int, Verdict]:
+def read_verdicts(pair: ChainPair, folder: Folder) -> dict[int, Verdict]:
     """Return the stored verdicts by the number of the value, going up; none where there is no
     file.
     """
@@ -222,7 +222,7 @@ def read_verdicts(pair: Pair, folder: Folder) -> dict[int, Verdict]:
     return {n: Verdict(*row) for n, (looked, row) in enumerate(rows) if looked}
 
 
-def write_verdicts(pair: Pair, folder: Folder, known: Mapping[int, Verdict]) -> None:
+def write_verdicts(pair: ChainPair, folder: Folder, known: Mapping[int, Verdict]) -> None:
     """Store verdicts by the number of the value, going up; the others are not known yet."""
     rows = [known.get(n, AGREED) for n in range(len(pair.up.cases))]
     dims = ("value",)
@@ -242,10 +242,10 @@ def verdict_attrs() -> dict[str, dict[str, str]]:
     return {name: {"units": "1", "long_name": phrase} for name, phrase in VERDICTS.items()}
 
 
-class Book:
+class VerdictBook:
     """The verdicts of a pair of chains as they arrive; written every few seconds."""
 
-    def __init__(self, pair: Pair, folder: Folder, flush: float):
+    def __init__(self, pair: ChainPair, folder: Folder, flush: float):
         self.pair, self.folder, self.flush = pair, folder, flush
         self.known = read_verdicts(pair, folder)
         stored = (len(read_kept_rows(chain, chain.path(folder))) for chain in (pair.up, pair.down))

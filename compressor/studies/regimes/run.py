@@ -23,13 +23,13 @@ from compressor.studies.regimes.chains import (
     FLUSH,
     FOLDER,
     Chain,
-    Ended,
-    Task,
+    ChainEnd,
+    ChainTask,
     read_chain,
     run_chain,
 )
-from compressor.studies.regimes.confirm import Book, Pair, Verdict, confirm
-from compressor.sweep import Done, Lost, Needs, Progress, run_here
+from compressor.studies.regimes.confirm import ChainPair, Verdict, VerdictBook, confirm
+from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
 
 LEGS = 4  # runs of a value, each with the case's own wall time at most, and some more
 LOOK = 1.0  # s between two looks at how far chains have come
@@ -37,7 +37,7 @@ FILE = "study.json"
 
 
 @dataclass(frozen=True)
-class Machine:
+class FollowedMachine:
     """The chains of one case of a study, by direction; `point`: its swept values."""
 
     study: str
@@ -45,12 +45,12 @@ class Machine:
     chains: tuple[Chain, ...]
 
     @property
-    def pair(self) -> Pair | None:
+    def pair(self) -> ChainPair | None:
         """Up and down, where both are followed."""
-        return Pair(*self.chains) if len(self.chains) == 2 else None
+        return ChainPair(*self.chains) if len(self.chains) == 2 else None
 
 
-class Failure(NamedTuple):
+class ValueFailure(NamedTuple):
     """A failed value, or a chain that has no more of them."""
 
     study: str
@@ -61,7 +61,7 @@ class Failure(NamedTuple):
     detail: str
 
 
-class Count(NamedTuple):
+class ChainCount(NamedTuple):
     """What a study has now: chains and values in each; values that are done, and failed.
 
     differ, confirmed: values at which up and down differ, and second attractors among these.
@@ -82,8 +82,8 @@ class RegimesSummary:
 
     total: int
     done_before: int
-    counts: tuple[Count, ...]
-    failed: tuple[Failure, ...]
+    counts: tuple[ChainCount, ...]
+    failed: tuple[ValueFailure, ...]
     seconds: float
 
 
@@ -104,19 +104,19 @@ def run_regimes(
     chains = [chain for machine in machines for chain in machine.chains]
     total = sum(len(chain.cases) for chain in chains)
     before = sum(done(chain, folder) for chain in chains)
-    tasks = [Task(str(folder), chain, rerun) for chain in chains]
-    ends = run_chains(tasks, workers, Watch(chains, folder, total, progress))
+    tasks = [ChainTask(str(folder), chain, rerun) for chain in chains]
+    ends = run_chains(tasks, workers, ChainWatch(chains, folder, total, progress))
     books = look_again(machines, ends, folder, workers, progress)
     counts, failures = describe_progress(studies, machines, ends, books)
     return RegimesSummary(total, before, counts, failures, time.monotonic() - began)
 
 
-def machines_of(study: Study) -> list[Machine]:
+def machines_of(study: Study) -> list[FollowedMachine]:
     """Return the selected machines of a study with their chains."""
     found, selected = [], {*study.selected}
     for number, point in enumerate(points(study)):
         if number in selected:
-            found.append(Machine(study.name, point, chains_of(study, number)))
+            found.append(FollowedMachine(study.name, point, chains_of(study, number)))
     return found
 
 
@@ -140,7 +140,7 @@ def write_manifest(folder: Path, study: Study) -> None:
         "axes": [{"key": axis.key, "values": axis.values} for axis in study.axes],
         "is_grid": study.is_grid,
         "chains": [[chain.key for chain in chains] for chains in every],
-        "pairs": [Pair(*chains).key for chains in every if len(chains) == 2],
+        "pairs": [ChainPair(*chains).key for chains in every if len(chains) == 2],
         "model_version": MODEL,
         "program": PROGRAM,
     }
@@ -154,7 +154,7 @@ def done(chain: Chain, folder: Path) -> int:
     return read_chain(path).sizes.get("value", 0) if path.exists() else 0
 
 
-class Watch:
+class ChainWatch:
     """Tells how many values are stored, from the chains' files."""
 
     def __init__(self, chains: Sequence[Chain], folder: Path, total: int, progress: Progress):
@@ -185,12 +185,14 @@ class Watch:
         self.remark("")
 
 
-def run_chains(tasks: Sequence[Task], workers: int, watch: Watch) -> dict[str, Ended | Lost]:
+def run_chains(
+    tasks: Sequence[ChainTask], workers: int, watch: ChainWatch
+) -> dict[str, ChainEnd | JobLost]:
     """Return how each chain ended, by its key."""
     missing = [task for task in tasks if task.rerun or not complete(task)]
     cases = [case for task in missing for case in task.chain.cases[:1]]
     jobs = [(task.chain.key, task, seconds(task.chain)) for task in missing]
-    found: dict[str, Ended | Lost] = {}
+    found: dict[str, ChainEnd | JobLost] = {}
     running = run_here(run_chain, jobs, Needs.of(cases), workers, watch.remark, watch.pulse)
     with contextlib.closing(running):
         for end in running:
@@ -199,13 +201,13 @@ def run_chains(tasks: Sequence[Task], workers: int, watch: Watch) -> dict[str, E
         watch.look()
     for task in tasks:
         if task.chain.key not in found:
-            stored = run_chain(Task(task.folder, task.chain))  # nothing is missing
-            assert isinstance(stored, Ended)
+            stored = run_chain(ChainTask(task.folder, task.chain))  # nothing is missing
+            assert isinstance(stored, ChainEnd)
             found[task.chain.key] = stored
     return found
 
 
-def complete(task: Task) -> bool:
+def complete(task: ChainTask) -> bool:
     """Return whether all values of a chain are stored."""
     return done(task.chain, Path(task.folder)) == len(task.chain.cases)
 
@@ -215,27 +217,27 @@ def seconds(chain: Chain) -> float:
     return LEGS * sum(case.solve.timeout_s for case in chain.cases)
 
 
-def result(end: Done | Lost) -> Any:
+def result(end: JobResult | JobLost) -> Any:
     """Return what a job gave, or how it was lost; raises the StoreError that one gave."""
-    if isinstance(end, Done) and isinstance(end.result, StoreError):
+    if isinstance(end, JobResult) and isinstance(end.result, StoreError):
         raise end.result
-    return end.result if isinstance(end, Done) else end
+    return end.result if isinstance(end, JobResult) else end
 
 
 def look_again(
-    machines: Sequence[Machine],
-    ends: dict[str, Ended | Lost],
+    machines: Sequence[FollowedMachine],
+    ends: dict[str, ChainEnd | JobLost],
     folder: Path,
     workers: int,
     progress: Progress,
-) -> dict[str, Book]:
+) -> dict[str, VerdictBook]:
     """Return the verdicts of all pairs of chains, by the pair's key; what is missing is run."""
     pairs = [
         machine.pair
         for machine in machines
-        if machine.pair and all(isinstance(ends[c.key], Ended) for c in machine.chains)
+        if machine.pair and all(isinstance(ends[c.key], ChainEnd) for c in machine.chains)
     ]
-    books = {pair.key: Book(pair, folder, FLUSH) for pair in pairs}
+    books = {pair.key: VerdictBook(pair, folder, FLUSH) for pair in pairs}
     doubted = [doubt for book in books.values() for doubt in book.missing]
     if not doubted:
         return books
@@ -265,41 +267,45 @@ def look_again(
 
 def describe_progress(
     studies: Sequence[Study],
-    machines: Sequence[Machine],
-    ends: dict[str, Ended | Lost],
-    books: dict[str, Book],
-) -> tuple[tuple[Count, ...], tuple[Failure, ...]]:
+    machines: Sequence[FollowedMachine],
+    ends: dict[str, ChainEnd | JobLost],
+    books: dict[str, VerdictBook],
+) -> tuple[tuple[ChainCount, ...], tuple[ValueFailure, ...]]:
     """Return what each study has now, and every failed value."""
     counts, failures = [], []
     for study in studies:
         own = [machine for machine in machines if machine.study == study.name]
         chains = [chain for machine in own for chain in machine.chains]
         bad = [failure for machine in own for failure in failed_values(machine, ends)]
-        finished = [end for c in chains if isinstance(end := ends[c.key], Ended)]
+        finished = [end for c in chains if isinstance(end := ends[c.key], ChainEnd)]
         kept = [books[pair.key].count() for m in own if (pair := m.pair) and pair.key in books]
         differ, confirmed = (sum(column) for column in zip(*kept, strict=True)) if kept else (0, 0)
         values = study.regimes.n if study.regimes else 0
         complete = sum(end.values for end in finished)
-        counts.append(Count(study.name, len(chains), values, complete, len(bad), differ, confirmed))
+        counts.append(
+            ChainCount(study.name, len(chains), values, complete, len(bad), differ, confirmed)
+        )
         failures += bad
     return tuple(counts), tuple(failures)
 
 
-def failed_values(machine: Machine, ends: dict[str, Ended | Lost]) -> Iterator[Failure]:
+def failed_values(
+    machine: FollowedMachine, ends: dict[str, ChainEnd | JobLost]
+) -> Iterator[ValueFailure]:
     """Yield the failed values of a machine; of a chain that was lost, its first value without a
     run.
     """
     for chain in machine.chains:
         end = ends[chain.key]
         where = machine.study, machine.point, chain.direction
-        if isinstance(end, Lost):
-            yield Failure(*where, chain.values[0], str(end.reason), end.detail)
+        if isinstance(end, JobLost):
+            yield ValueFailure(*where, chain.values[0], str(end.reason), end.detail)
             continue
         for value, reason, detail in end.failed:
-            yield Failure(*where, value, reason, detail)
+            yield ValueFailure(*where, value, reason, detail)
 
 
-class Standing(NamedTuple):
+class ChainProgress(NamedTuple):
     """How far a study is: its chains, the values of each, and how many are stored of all."""
 
     study: str
@@ -308,12 +314,12 @@ class Standing(NamedTuple):
     done: int
 
 
-def standing(studies: Sequence[Study], folder: Folder) -> list[Standing]:
+def standing(studies: Sequence[Study], folder: Folder) -> list[ChainProgress]:
     """Return how far the chains of studies are in a folder; runs nothing. Raises StoreError."""
     place: Callable[[Chain], int] = partial(done, folder=Path(folder))
     found = []
     for study in studies:
         chains = [chain for machine in machines_of(study) for chain in machine.chains]
         values = study.regimes.n if study.regimes else 0
-        found.append(Standing(study.name, len(chains), values, sum(map(place, chains))))
+        found.append(ChainProgress(study.name, len(chains), values, sum(map(place, chains))))
     return found

@@ -13,7 +13,15 @@ from compressor.cases import Case, Regimes
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Regime
 from compressor.physics import state_names
-from compressor.solve import Leg, Stretch, follow, largest_exponent, record, settle, with_samples
+from compressor.solve import (
+    Leg,
+    Stretch,
+    follow_revolutions,
+    largest_exponent,
+    record,
+    settle_motion,
+    with_samples,
+)
 
 COUNTED = 16  # rev of a motion that repeats itself
 
@@ -124,7 +132,7 @@ METRICS = (
 
 
 @dataclass
-class Motion:
+class SettledMotion:
     """What a motion settles to.
 
     `regime`: of `Regime`; `period` (rev): nan where it does not repeat itself; `points`: of the
@@ -185,7 +193,7 @@ def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
     row, clock = empty(asked, case), Clock(case.solve.timeout_s)
     if state is not None:
         row["end_state"] = state
-    settled, since = settle(case, state, stretch(asked, asked.settle_rev, clock))
+    settled, since = settle_motion(case, state, stretch(asked, asked.settle_rev, clock))
     if settled.reason:
         return failed_row(row, settled.reason, settled.detail)
     row["settled_rev"] = np.asarray(since)
@@ -221,7 +229,7 @@ def stretch(asked: Regimes, revolutions: int, clock: Clock) -> Stretch:
     return Stretch(revolutions, math.radians(asked.section_deg), clock.left)
 
 
-def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> Motion:
+def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> SettledMotion:
     """Return the motion from a settled state on, followed until its Poincaré points repeat or
     suffice.
     """
@@ -230,13 +238,13 @@ def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) 
     def period(points: np.ndarray) -> int | None:
         return period_of(places(points, clearance), within)
 
-    leg = follow(
+    leg = follow_revolutions(
         case, state, stretch(asked, asked.measure_rev, clock),
         lambda turns, points: period(points) is not None,
     )  # fmt: skip
     found = None if leg.reason else period(leg.points)
     if leg.reason:
-        return Motion("", math.nan, leg.points[:0], leg, 0)
+        return SettledMotion("", math.nan, leg.points[:0], leg, 0)
     exponents = math.nan, math.nan
     if asked.exponent:
         exponents = exponent(case, leg.state, found is not None, asked.measure_rev, clock.left)
@@ -245,12 +253,14 @@ def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) 
         count = found * ((2 * found + MORE) // found)
         points = leg.points[-found:]
         word = Regime.UNDECIDED if parts else Regime.PERIODIC
-        return Motion(word, float(found), points, leg, count, exponents)
+        return SettledMotion(word, float(found), points, leg, count, exponents)
     word = Regime.CHAOTIC if parts else Regime.UNDECIDED
-    return Motion(word, math.nan, leg.points, leg, len(leg.turns), exponents)
+    return SettledMotion(word, math.nan, leg.points, leg, len(leg.turns), exponents)
 
 
-def contacts(case: Case, motion: Motion, asked: Regimes, clock: Clock, row: Row) -> tuple[str, str]:
+def contacts(
+    case: Case, motion: SettledMotion, asked: Regimes, clock: Clock, row: Row
+) -> tuple[str, str]:
     """Write contact modes and impacts of the revolutions that follow into a row.
 
     Of one period, or of up to `SAMPLED` revolutions; one more goes before, so that contacts have

@@ -24,7 +24,7 @@ from compsim.screen import (
 from compsim.show import sayable
 
 if TYPE_CHECKING:
-    from compressor.studies.search.find import Answer
+    from compressor.studies.search.find import SearchResult
     from compressor.studies.search.question import Question
 
 KINDS = ("first", "greatest", "least")
@@ -86,7 +86,7 @@ def find(
     finally:
         screen.end()
     if as_json:
-        print_text(json.dumps(plain(question, answer), indent=1))
+        print_text(json.dumps(jsonable_answer(question, answer), indent=1))
     else:
         for line in lines(question, answer, output):
             print_text(line)
@@ -104,7 +104,7 @@ def asked_for(config: str, asked: dict[str, Any]) -> "Question":
     return Question.written(config, asked["over"], asked[given[0]], given[0], **more)
 
 
-def lines(question: "Question", answer: "Answer", folder: str) -> Iterator[str]:
+def lines(question: "Question", answer: "SearchResult", folder: str) -> Iterator[str]:
     """Yield an answer as it is printed."""
     told = comparison_lines if answer.best is None else extremum_lines
     yield from told(question, answer)
@@ -120,7 +120,7 @@ def lines(question: "Question", answer: "Answer", folder: str) -> Iterator[str]:
            f"{answer.study} of {folder}")  # fmt: skip
 
 
-def comparison_lines(question: "Question", answer: "Answer") -> Iterator[str]:
+def comparison_lines(question: "Question", answer: "SearchResult") -> Iterator[str]:
     """Yield where a comparison first becomes true."""
     goal = question.goal
     text = f"{goal.name} {goal.sign} {goal.limit:g} {goal.unit}".rstrip()
@@ -142,12 +142,12 @@ def comparison_lines(question: "Question", answer: "Answer") -> Iterator[str]:
             yield f"  {plural(len(answer.blind), 'point')} between {doubt(answer)}:"
 
 
-def doubt(answer: "Answer") -> str:
+def doubt(answer: "SearchResult") -> str:
     """Return what points do whose error bars reach the limit."""
     return "does not decide" if len(answer.blind) == 1 else "do not decide"
 
 
-def extremum_lines(question: "Question", answer: "Answer") -> Iterator[str]:
+def extremum_lines(question: "Question", answer: "SearchResult") -> Iterator[str]:
     """Yield where a metric is greatest or least."""
     best = answer.best
     assert best is not None
@@ -194,7 +194,7 @@ def spacing(question: "Question") -> str:
     return f"{question.scan} points {(question.high - question.low) / steps:.4g} apart"
 
 
-def plain(question: "Question", answer: "Answer") -> dict[str, Any]:
+def jsonable_answer(question: "Question", answer: "SearchResult") -> dict[str, Any]:
     """Return a question and its answer as JSON says them."""
     asked = dataclasses.asdict(question)
     return sayable(asked | {"unit": question.goal.unit} | dataclasses.asdict(answer))

@@ -16,7 +16,7 @@ from itertools import pairwise
 from scipy.optimize import minimize_scalar
 
 from compressor.store import Folder, StoreError, read_store, read_studies
-from compressor.studies.search.question import Question, Reading
+from compressor.studies.search.question import JobReading, Question
 from compressor.sweep import Options, Progress, sweep
 
 MOST_POINTS = 200  # that one search may ask for beyond its scan
@@ -28,17 +28,17 @@ class Point:
 
     share: float
     argument: float
-    told: Reading
+    told: JobReading
     key: str = ""  # of the job
     failed: bool = False
 
 
 Evaluate = Callable[[Sequence[float]], list[Point]]  # shares -> their points, in any order
-Holds = Callable[[Reading], bool | None]
+Holds = Callable[[JobReading], bool | None]
 
 
 @dataclass(frozen=True)
-class Answer:
+class SearchResult:
     """What a search found.
 
     kind: `found`; `undecided`: found, but points inside the interval cannot be decided; `at_low`:
@@ -69,7 +69,7 @@ class Answer:
 
 def first(
     evaluate: Evaluate, holds: Holds, shares: Sequence[float], tolerance: float, at_once: int = 1
-) -> Answer:
+) -> SearchResult:
     """Return the interval in which a comparison first becomes true, going up from share 0.
 
     Its ends are decided points, less than `tolerance` (a share) apart, or less than that from the
@@ -84,7 +84,7 @@ def first(
     return answer
 
 
-def interval(points: Sequence[Point], holds: Holds) -> Answer:
+def interval(points: Sequence[Point], holds: Holds) -> SearchResult:
     """Return what some points, in their order, say of where a comparison first becomes true."""
     low: Point | None = None
     blind: list[Point] = []
@@ -92,17 +92,17 @@ def interval(points: Sequence[Point], holds: Holds) -> Answer:
         verdict = holds(point.told)
         if verdict:
             kind = "undecided" if blind else "found" if low else "at_low"
-            return Answer(kind, low, point, blind=tuple(blind), points=tuple(points))
+            return SearchResult(kind, low, point, blind=tuple(blind), points=tuple(points))
         if verdict is None:
             blind.append(point)
         else:
             low, blind = point, []
     silent = tuple(point for point in points if holds(point.told) is None)
-    return Answer("unclear" if silent else "nowhere", None, None, blind=silent,
+    return SearchResult("unclear" if silent else "nowhere", None, None, blind=silent,
                   points=tuple(points))  # fmt: skip
 
 
-def sections(answer: Answer, tolerance: float, at_once: int) -> list[float]:
+def sections(answer: SearchResult, tolerance: float, at_once: int) -> list[float]:
     """Return the shares that narrow an interval: of it, or of what is left and right of blind
     points.
     """
@@ -124,7 +124,7 @@ def sections(answer: Answer, tolerance: float, at_once: int) -> list[float]:
 
 def extremum(
     evaluate: Evaluate, greatest: bool, shares: Sequence[float], tolerance: float
-) -> Answer:
+) -> SearchResult:
     """Return where a metric is greatest or least: near the best of the points at `shares`.
 
     Between the two neighbours of that, minimize_scalar(method="bounded") goes on until its argument
@@ -133,7 +133,7 @@ def extremum(
     points = sorted(evaluate(shares), key=lambda point: point.share)
     usable = [point for point in points if not point.told.reason]
     if not usable:
-        return Answer("unclear", None, None, blind=tuple(points), points=tuple(points))
+        return SearchResult("unclear", None, None, blind=tuple(points), points=tuple(points))
     factor = -1.0 if greatest else 1.0
     known = {point.share: point for point in points}
     worst = max(factor * point.told.value for point in usable)
@@ -152,7 +152,7 @@ def extremum(
     return around(known.values(), factor)
 
 
-def around(known: Iterable[Point], factor: float) -> Answer:
+def around(known: Iterable[Point], factor: float) -> SearchResult:
     """Return the best of some points, those that may be as good, and the surely worse ones around
     them.
 
@@ -171,7 +171,7 @@ def around(known: Iterable[Point], factor: float) -> Answer:
     left = -math.inf if low is None else low.share
     right = math.inf if high is None else high.share
     blind = tuple(p for p in points if p.told.reason and left < p.share < right)
-    return Answer("undecided" if blind else "found", low, high, best, tuple(within), blind,
+    return SearchResult("undecided" if blind else "found", low, high, best, tuple(within), blind,
                   tuple(points))  # fmt: skip
 
 
@@ -185,14 +185,14 @@ def find(
     folder: Folder,
     workers: int = 2,
     progress: Progress = lambda done, total, remark: None,
-) -> Answer:
+) -> SearchResult:
     """Answer a question by jobs in a folder's store; those that it holds are not run again.
 
     The study is called after the file and the key. It keeps the points of earlier questions that
     are of the same case. Raises QuestionError, CaseFileError, StoreError and WorkersFailed.
     """
     question.checked()
-    jobs = Jobs(question, folder, workers, progress)
+    jobs = SearchJobs(question, folder, workers, progress)
     goal, shares, tolerance = question.goal, question.shares, question.tolerance
     if goal.sign in ("greatest", "least"):
         answer = extremum(jobs, goal.sign == "greatest", shares, tolerance)
@@ -201,7 +201,7 @@ def find(
     return replace(answer, run_now=jobs.run_now, study=jobs.name)
 
 
-class Jobs:
+class SearchJobs:
     """Evaluates a question's goal by jobs of one study that grows."""
 
     def __init__(self, question: Question, folder: Folder, workers: int, progress: Progress):
@@ -245,7 +245,7 @@ class Jobs:
                 raise StoreError(self.folder, f"job {key} is gone", "ask again")
             end = store.status_at(position)
             if end.status != "ok":
-                told = Reading(reason=f"the job failed, {end.reason}: {end.detail}")
+                told = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
             else:
                 told = question.goal.read(end.numbers, str(store.rows.words["regime"][position]))
             found.append(Point(share, value, told, key, end.status != "ok"))

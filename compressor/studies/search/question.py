@@ -34,7 +34,7 @@ class QuestionError(CompsimError, ValueError):
 
 
 @dataclass(frozen=True)
-class Reading:
+class JobReading:
     """What a job says: value and bar in the metric's SI unit; `reason`: why it says nothing.
 
     averaged: value is a mean over revolutions, and bar half of its 95 % interval, since the motion
@@ -70,7 +70,7 @@ class Goal:
         """The SI unit, "" for a share or a count."""
         return "" if NUMBERS[self.metric][1] == "1" else NUMBERS[self.metric][1]
 
-    def holds(self, told: Reading) -> bool | None:
+    def holds(self, told: JobReading) -> bool | None:
         """Return whether the comparison holds; None where the error bar does not let that be
         told.
         """
@@ -78,7 +78,7 @@ class Goal:
         ends = {bool(compare(told.value + side, self.limit)) for side in (-told.bar, told.bar)}
         return ends.pop() if not told.reason and len(ends) == 1 else None
 
-    def read(self, numbers: np.void, regime: str) -> Reading:
+    def read(self, numbers: np.void, regime: str) -> JobReading:
         """Return what the numbers (dtype ROW) of a job that is ok say, moving in a regime.
 
         A single peak of a chaotic motion has no meaning: the mean over revolutions of each one's
@@ -96,14 +96,14 @@ class Goal:
             value = self._at(numbers, self.metric)
             bar = self._at(numbers, f"{self.metric}_error")
         if math.isnan(value):
-            return Reading(reason=f"the job has no {self.metric}")
+            return JobReading(reason=f"the job has no {self.metric}")
         if math.isinf(bar):
             few = " and has too few revolutions" if regime == "chaotic" else ""
             reason = f"its error is not known, as the motion is {regime or 'of unknown kind'}{few}"
-            return Reading(value, reason=reason, averaged=averaged)
+            return JobReading(value, reason=reason, averaged=averaged)
         if math.isnan(bar):
-            return Reading(value, 0.0, averaged=averaged, barred=False)
-        return Reading(value, bar, averaged=averaged)
+            return JobReading(value, 0.0, averaged=averaged, barred=False)
+        return JobReading(value, bar, averaged=averaged)
 
     def _at(self, numbers: np.void, name: str) -> float:
         dims = (METRICS | ROD_LOAD)[self.metric].dims

@@ -31,9 +31,9 @@ from compressor.metrics import METRICS
 from compressor.solve import (
     COMPILED,
     Solution,
-    attempt,
     energy_residual,
     predictability_horizon,
+    run_at_tolerance,
     solve,
 )
 
@@ -74,7 +74,7 @@ Compare = Callable[[Solution, Solution], Excess]
 
 
 @dataclass
-class Finding:
+class StressFinding:
     """What is found of one scene.
 
     `verdict`: ok, failed, silent_wrong or unjudged; `reason`: why a run failed, or no judge could
@@ -97,12 +97,12 @@ class Finding:
     beyond: Excess = NOTHING
 
 
-def judge(case: Case) -> Finding:
+def judge(case: Case) -> StressFinding:
     """Run a case with error bars, and judge what it says."""
     began = time.perf_counter()
     found = solve(case)
     seconds, residual = time.perf_counter() - began, energy_residual(found.trajectory.tally)
-    result = Finding(found, seconds, residual, reason=str(found.reason), detail=found.detail)
+    result = StressFinding(found, seconds, residual, reason=str(found.reason), detail=found.detail)
     if found.reason:
         result.verdict = "failed"
         return result
@@ -114,7 +114,7 @@ def judge(case: Case) -> Finding:
     return result
 
 
-def by_numbers(case: Case, result: Finding) -> None:
+def by_numbers(case: Case, result: StressFinding) -> None:
     """Judge the numbers up to the horizon, or of as much of it as a judge can do."""
     for parts in sorted({min(share, result.horizon) for share in LENGTHS}, reverse=True):
         claim = shorten_case(case, parts)
@@ -131,7 +131,7 @@ def by_numbers(case: Case, result: Finding) -> None:
     result.reason = "judges_fail"
 
 
-def by_statistics(case: Case, result: Finding) -> None:
+def by_statistics(case: Case, result: StressFinding) -> None:
     """Judge the whole of a run that goes beyond its horizon.
 
     There any other tolerance makes another motion: a tenth will do, and even the stiff partner may
@@ -145,7 +145,7 @@ def by_statistics(case: Case, result: Finding) -> None:
 
 
 def agreed_verdict(
-    claim: Case, found: Solution, measured: Compare, result: Finding
+    claim: Case, found: Solution, measured: Compare, result: StressFinding
 ) -> tuple[str, Excess, Solution | None]:
     """Return what the judges of a run say together, by how much, and the run of the one that
     counts.
@@ -187,14 +187,14 @@ def tolerance(rtol: float, share: float = TIGHTER) -> float:
     return max(share * rtol, TIGHTEST)
 
 
-def run_judge(case: Case, method: str, rtol: float, result: Finding) -> Solution | None:
+def run_judge(case: Case, method: str, rtol: float, result: StressFinding) -> Solution | None:
     """Return a judge's run of a case, if it reaches its end."""
     seconds = SECONDS if method in COMPILED else SCIPY_SECONDS
     how = replace(
         case.solve, method=method, rtol=rtol, accuracy="standard",
         max_steps=MORE_STEPS * case.solve.max_steps,
     )  # fmt: skip
-    other = attempt(replace(case, solve=how), rtol, seconds, True)
+    other = run_at_tolerance(replace(case, solve=how), rtol, seconds, True)
     result.by.append(f"({method})" if other.reason else method)
     return None if other.reason else other
 

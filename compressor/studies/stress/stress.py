@@ -22,7 +22,7 @@ from compressor.reasons import Reason
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 from compressor.studies.stress import extremes
 from compressor.studies.stress.extremes import Budget
-from compressor.sweep import Done, Lost, Needs, Progress, run_here
+from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
 
 FILE = "stress.nc"
 FULL = Budget()
@@ -148,26 +148,26 @@ def campaign(
             rows[end.id] = scene_row(end)
             progress(sum(number < count for number in rows), total, "")
             if time.monotonic() - written > FLUSH:
-                write_dataset(path, dataset(rows.values(), seed, budget))
+                write_dataset(path, campaign_dataset(rows.values(), seed, budget))
                 written = time.monotonic()
     finally:
         running.close()
         if rows:
-            write_dataset(path, dataset(rows.values(), seed, budget))
-    found = dataset([rows[number] for number in range(count)], seed, budget)
+            write_dataset(path, campaign_dataset(rows.values(), seed, budget))
+    found = campaign_dataset([rows[number] for number in range(count)], seed, budget)
     found.encoding["source"] = str(path)  # as xarray names a file that it has read
     return found
 
 
-def scene_row(end: Done | Lost) -> Row:
+def scene_row(end: JobResult | JobLost) -> Row:
     """Return the row of a scene, also of one that took its worker with it."""
-    if isinstance(end, Done):
+    if isinstance(end, JobResult):
         return dict(end.result)
     row = {"scene": end.id, "verdict": "failed", "reason": str(end.reason), "detail": end.detail}
     return row | {"seconds": TIMEOUT if end.reason == Reason.BUDGET_SECONDS else math.nan}
 
 
-def dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset:
+def campaign_dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset:
     """Return the rows as a Dataset with the dimension scene, in order; numbers that there are
     not are nan.
     """

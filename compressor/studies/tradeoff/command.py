@@ -149,7 +149,7 @@ def cases_of_files(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dic
     cases = {}
     for study in load_studies(*configs, overrides=overrides, follow=False):
         for point, case in zip(points(study), study.cases, strict=True):
-            name = " ".join([study.name, *(plain(value) for value in point.values())])
+            name = " ".join([study.name, *(format_swept(value) for value in point.values())])
             if not faulty(case):
                 raise click.UsageError(
                     f"{study.path}: {name} has no joint with clearance, so nothing is integrated: "
@@ -159,7 +159,7 @@ def cases_of_files(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dic
     return cases
 
 
-def plain(value: object) -> str:
+def format_swept(value: object) -> str:
     """Return a swept value in few characters."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 

@@ -31,7 +31,7 @@ from compressor.solve import (
     simulate,
     stiffness_of,
 )
-from compressor.studies.tradeoff.features import FEATURES, Effect, Feature, comparable, compare
+from compressor.studies.tradeoff.features import FEATURES, Effect, ModelFeature, comparable, compare
 from compressor.studies.tradeoff.model_choices import shown_words
 from compressor.studies.tradeoff.work_precision import SLOW, Progress, complete, faulty
 
@@ -113,7 +113,7 @@ def explain(
         jobs=len(study.cases),
         point=next(points(study)),
         scene=SCENES[tuple(faulty(case))],
-        unknowns=unknowns(case),
+        unknowns=unknown_names(case),
         active=active,
         absent=absent,
         scales=joints,
@@ -136,7 +136,7 @@ def explain(
     )
 
 
-def unknowns(case: Case) -> tuple[str, ...]:
+def unknown_names(case: Case) -> tuple[str, ...]:
     """Return the names of what is integrated: freedoms, bristles where friction has them, the
     crank's own.
     """
@@ -237,7 +237,7 @@ def contact_words(case: Case) -> str:
     return f"{contact.law}, {material}, {shape}, {damped}"
 
 
-def paid_value(case: Case, feature: Feature) -> str:
+def paid_value(case: Case, feature: ModelFeature) -> str:
     """Return the value by which a case pays for a feature."""
     group, dot, name = feature.key.partition(".")
     if feature.key == "friction" and case.friction:

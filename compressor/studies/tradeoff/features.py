@@ -47,7 +47,7 @@ UNDAMPED = ("impact", "hertz")  # laws that no restitution damps
 
 
 @dataclass(frozen=True)
-class Feature:
+class ModelFeature:
     """One feature of the model: the key that sets it, and cases with and without it.
 
     `add` gives None where a case has no use for the feature, or cannot have it; `off` and `on`
@@ -81,9 +81,9 @@ def with_clearance(case: Case, joint: str) -> Case | None:
     return replace(case, joint="both", clearance_mm=widths)
 
 
-def clearance_feature(joint: str) -> Feature:
+def clearance_feature(joint: str) -> ModelFeature:
     """Return a second joint's clearance, which doubles the freedoms."""
-    return Feature(
+    return ModelFeature(
         f"clearance of the {joint.replace('_', ' ')}",
         f"clearance_mm.{joint}",
         lambda case: len(faulty(case)) == 2,
@@ -100,9 +100,9 @@ def with_values(case: Case, group: str, **values: Any) -> Case:
     return replace(case, **{group: replace(getattr(case, group), **values)})
 
 
-def contact_feature(law: str) -> Feature:
+def contact_feature(law: str) -> ModelFeature:
     """Return another contact law than ADAMS's."""
-    return Feature(
+    return ModelFeature(
         f"contact law {law}",
         "contact.law",
         lambda case: case.contact.law == law and bool(faulty(case)),
@@ -144,9 +144,9 @@ def bearing_length(case: Case) -> float:
     return 2.0 * min(case.machine.pin_radius(joint) for joint in JOINTS)
 
 
-def friction_feature(law: str) -> Feature:
+def friction_feature(law: str) -> ModelFeature:
     """Return another friction law than ADAMS's."""
-    return Feature(
+    return ModelFeature(
         f"friction law {law}",
         "friction.law",
         lambda case: bool(case.friction and case.friction.law == law),
@@ -210,9 +210,9 @@ def with_group(case: Case, key: str, group: Any) -> Case:
 
 def group_feature(
     name: str, key: str, off: str, add: Callable[[Case], Case | None], is_choice: bool = False
-) -> Feature:
+) -> ModelFeature:
     """Return a group of the mechanism that a case may name."""
-    return Feature(
+    return ModelFeature(
         name,
         key,
         lambda case: getattr(case, key) is not None,
@@ -238,7 +238,7 @@ def rubbing(case: Case) -> Case | None:
 
 
 FEATURES = (
-    Feature(
+    ModelFeature(
         "friction",
         "friction",
         lambda case: bool(case.friction and (case.friction.static or case.friction.dynamic)),
@@ -248,7 +248,7 @@ FEATURES = (
         "friction",
         "friction: false",
     ),
-    Feature(
+    ModelFeature(
         "spring damping",
         "spring.damping_N_s_per_mm",
         lambda case: case.load == "spring" and case.spring.damping_N_s_per_mm > 0,
@@ -260,7 +260,7 @@ FEATURES = (
         "spring damping",
         "spring.damping_N_s_per_mm: 0",
     ),
-    Feature(
+    ModelFeature(
         "gravity",
         "machine.gravity_m_per_s2",
         lambda case: case.machine.gravity_m_per_s2 > 0,
@@ -270,7 +270,7 @@ FEATURES = (
         f"gravity {GRAVITY:g} m/s²",
         "machine.gravity_m_per_s2: 0",
     ),
-    Feature(
+    ModelFeature(
         "back pressure",
         "gas.back_pressure_MPa",
         lambda case: case.load == "gas" and case.gas.back_pressure_MPa > 0,
@@ -280,7 +280,7 @@ FEATURES = (
         "back pressure",
         "gas.back_pressure_MPa: 0",
     ),
-    Feature(
+    ModelFeature(
         "load",
         "load",
         lambda case: case.load != "none",
@@ -293,7 +293,7 @@ FEATURES = (
     *map(clearance_feature, JOINTS),
     *(contact_feature(law) for law in CONTACT_LAWS if law != "impact"),
     *(friction_feature(law) for law in FRICTION_LAWS if law != "adams"),
-    Feature(
+    ModelFeature(
         "play of the guide",
         "guide.clearance_mm",
         lambda case: bool(case.guide and case.guide.clearance_mm > 0),
@@ -304,7 +304,7 @@ FEATURES = (
         "guide.clearance_mm: 0",
         is_choice=True,
     ),
-    Feature(
+    ModelFeature(
         "friction of ideal joints",
         "friction.ideal_joints",
         lambda case: bool(case.friction and case.friction.ideal_joints),

@@ -15,7 +15,7 @@ from compressor.report import (
     BLUE,
     GOLD,
     RED,
-    Line,
+    LineStyle,
     in_style,
     legend_above,
     sheet,
@@ -25,17 +25,17 @@ COLUMNS = 3
 ROOM = 4.0  # times left of the fastest point, for the words
 MID, LIGHT = "#7d7d7d", "#ababab"
 # compiled methods are solid and coloured, SciPy's grey and dashed
-LOOKS: dict[str, tuple[Line, str, str]] = {
-    "auto": (Line(BLUE, "-", 1.7, 3.2), "o", "auto (TSIT5)"),
-    "DOPRI5": (Line(RED, "-", 1.3, 3.1), "s", "DOPRI5"),
-    "RODAS": (Line(GOLD, "-", 1.6, 3.0), "D", "RODAS"),
-    "DOP853": (Line(BLACK, (0, (1, 1.2)), 1.2, 2.5), "^", "SciPy DOP853"),
-    "RK45": (Line(MID, (0, (4, 1.5)), 1.1, 2.4), "v", "SciPy RK45"),
-    "LSODA": (Line(BLACK, (0, (6, 1.5)), 1.0, 2.3), "<", "SciPy LSODA"),
-    "Radau": (Line(LIGHT, (0, (6, 1.2, 1.2, 1.2)), 1.3, 2.2), ">", "SciPy Radau"),
-    "BDF": (Line(MID, (0, (1, 1.2)), 1.2, 2.1), "p", "SciPy BDF"),
+LOOKS: dict[str, tuple[LineStyle, str, str]] = {
+    "auto": (LineStyle(BLUE, "-", 1.7, 3.2), "o", "auto (TSIT5)"),
+    "DOPRI5": (LineStyle(RED, "-", 1.3, 3.1), "s", "DOPRI5"),
+    "RODAS": (LineStyle(GOLD, "-", 1.6, 3.0), "D", "RODAS"),
+    "DOP853": (LineStyle(BLACK, (0, (1, 1.2)), 1.2, 2.5), "^", "SciPy DOP853"),
+    "RK45": (LineStyle(MID, (0, (4, 1.5)), 1.1, 2.4), "v", "SciPy RK45"),
+    "LSODA": (LineStyle(BLACK, (0, (6, 1.5)), 1.0, 2.3), "<", "SciPy LSODA"),
+    "Radau": (LineStyle(LIGHT, (0, (6, 1.2, 1.2, 1.2)), 1.3, 2.2), ">", "SciPy Radau"),
+    "BDF": (LineStyle(MID, (0, (1, 1.2)), 1.2, 2.1), "p", "SciPy BDF"),
 }
-OTHER = (Line(MID, "-", 1.0, 2.0), ".", "")
+OTHER = (LineStyle(MID, "-", 1.0, 2.0), ".", "")
 PAPER: dict[str, Any] = {"marker": "*", "color": BLACK, "markersize": 12, "linestyle": "none",
                          "markeredgecolor": "white", "zorder": 6}  # fmt: skip
 TIER: dict[str, Any] = {"marker": "o", "markersize": 9.5, "markerfacecolor": "none",

@@ -29,7 +29,7 @@ from compressor.solve import simulate
 from compressor.studies.tradeoff.features import (
     FEATURES,
     SERIES_ERRORS,
-    Feature,
+    ModelFeature,
     read_from_grid,
     series_errors,
     with_values,
@@ -78,7 +78,7 @@ def model_variants(case: Case) -> list[Choice]:
     return [*found, *chosen]
 
 
-def toggle_features(case: Case, rows: Iterable[Feature]) -> Iterator[Choice]:
+def toggle_features(case: Case, rows: Iterable[ModelFeature]) -> Iterator[Choice]:
     """Yield a case without each feature that it has, and with each that it has not."""
     for feature in rows:
         if feature.paid(case):

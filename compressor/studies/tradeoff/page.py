@@ -23,10 +23,10 @@ from compressor.report import (
     Chapter,
     Draw,
     Measure,
-    Note,
-    Row,
+    PageTable,
     Section,
-    Table,
+    StudyNote,
+    TableRow,
     column_title,
     file_name,
     measures,
@@ -225,7 +225,7 @@ class ModelsContent:
     place: str
     headline: str
     unknown: str
-    table: Table
+    table: PageTable
 
 
 def read_models(folder: Folder, study: StoredStudy) -> xr.Dataset | None:
@@ -258,7 +258,7 @@ def add(results: Folder, studies: Sequence[StoredStudy], draw: Draw, place: Fold
         if data is not None:
             anchor = file_name("models", study.name)
             line = headline(model_table(data))
-            notes[study.name] = Note(line, anchor, "Table of the choices")
+            notes[study.name] = StudyNote(line, anchor, "Table of the choices")
             chapters.append(Chapter(models_section(anchor, study, data)))
     return Additions(notes, chapters)
 
@@ -276,14 +276,14 @@ def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section
     return Section(anchor, title, "compressor.studies.tradeoff:models.html", content)
 
 
-def page_table(table: ModelTable) -> Table:
+def page_table(table: ModelTable) -> PageTable:
     """Return the cells of a table: the case itself, each choice, and the span."""
     numbers = zip(table.measures, table.values, table.bars, strict=True)
     values = [number_cell(by_bar(value, bar, m.is_relative)) for m, value, bar in numbers]
     itself = [Cell("the case itself"), *values, Cell("")]
     span = [Cell("all of them"), *map(number_cell, table.span_texts), Cell("")]
-    rows = [Row(itself), *(Row([*row_cells(row)]) for row in table.rows), Row(span)]
-    return Table(["choice of the model", *map(column_title, table.measures), "assumed"], rows)
+    rows = [TableRow(itself), *(TableRow([*row_cells(row)]) for row in table.rows), TableRow(span)]
+    return PageTable(["choice of the model", *map(column_title, table.measures), "assumed"], rows)
 
 
 def row_cells(row: ModelRow) -> Iterator[Cell]:

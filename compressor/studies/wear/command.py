@@ -10,7 +10,7 @@ import click
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    Reading,
+    ReadingProgress,
     Screen,
     all_stored,
     as_json,
@@ -30,7 +30,7 @@ from compressor.program import printable
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-    from compressor.studies.wear.run import Machine, WearSummary
+    from compressor.studies.wear.run import WearSummary, WornMachine
 
 MOST_DRAWN = 12  # machines that get a figure
 HEAD = f"{'worn out after, h':>17}  {'with f times to 1/f of the wear':>31}  at the end"
@@ -66,7 +66,7 @@ def wear(
     from compressor.studies.wear.run import run_wear
     from compressor.sweep import cores
 
-    with Reading(quiet) as told:
+    with ReadingProgress(quiet) as told:
         studies = load_studies(*configs, overrides=overrides, follow=False, told=told)
     check(studies)
     screen = Screen(quiet, "machines", alike=False)
@@ -78,13 +78,13 @@ def wear(
         raise
     screen.end()
     if as_json:
-        print_text(json.dumps([plain(one, output) for one in summary.machines], indent=1))
+        print_text(json.dumps([jsonable_wear(one, output) for one in summary.machines], indent=1))
     else:
         for line in table(summary.machines):
             print_text(line)
     drawn = [*draw(summary, output)]
     if not quiet:
-        tell(summary, output, drawn)
+        report_wear(summary, output, drawn)
     for one in summary.failed:
         fail(one)
     return SOME_FAILED if summary.failed else DONE
@@ -115,16 +115,16 @@ def check(studies: "list[Study]") -> None:
                 )
 
 
-def table(machines: "tuple[Machine, ...]") -> Iterator[str]:
+def table(machines: "tuple[WornMachine, ...]") -> Iterator[str]:
     """Yield a line for each machine, below a head."""
     names = [" ".join([one.study, *(f"{k}={v}" for k, v in one.point.items())]) for one in machines]
     width = max(map(len, names))
     yield f"{'machine':<{width}}  {HEAD}"
     for name, one in zip(names, machines, strict=True):
-        yield f"{name:<{width}}  {ending(one)}"
+        yield f"{name:<{width}}  {wear_ending(one)}"
 
 
-def ending(one: "Machine") -> str:
+def wear_ending(one: "WornMachine") -> str:
     """Return how a machine ended, in a line."""
     found, how = one.life, one.case.wear
     if not found or not how:
@@ -145,7 +145,7 @@ def hours(value: float, sign: str = "") -> str:
     return f"{sign}{value:.0f}" if value >= 1000 else f"{sign}{value:.4g}"
 
 
-def plain(one: "Machine", folder: str) -> dict[str, Any]:
+def jsonable_wear(one: "WornMachine", folder: str) -> dict[str, Any]:
     """Return a machine as JSON says it."""
     from compressor.studies.wear.stages import wear_file
 
@@ -159,7 +159,7 @@ def plain(one: "Machine", folder: str) -> dict[str, Any]:
     return found
 
 
-def tell(summary: "WearSummary", folder: str, drawn: list[str]) -> None:
+def report_wear(summary: "WearSummary", folder: str, drawn: list[str]) -> None:
     """Say what was done, and where figures are."""
     total = len(summary.machines)
     done = f"{plural(total - summary.done_before, 'machine')} in {duration(summary.seconds)}"
@@ -185,7 +185,7 @@ def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
         yield os.fspath(path)
 
 
-def fail(one: "Machine") -> None:
+def fail(one: "WornMachine") -> None:
     """Say why a machine ended early, and what to do."""
     from compressor.reasons import remedy
 

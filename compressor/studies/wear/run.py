@@ -12,20 +12,20 @@ from compressor.studies.wear.stages import (
     Life,
     Stage,
     Worn,
-    dataset,
     first,
     following,
     life,
     read_kept_stages,
+    stages_dataset,
     write,
 )
-from compressor.sweep import Done, Lost, Needs, Progress, run_here
+from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
 
 AT_MOST = 100_000  # motions, the wall time of which a machine may take
 
 
 @dataclass(frozen=True)
-class Machine:
+class WornMachine:
     """How a machine of a study has worn; `point`: its swept values, `reason`: why it ended early.
 
     `stages`: profiles that are stored; `life`: None where there is none.
@@ -44,17 +44,17 @@ class Machine:
 class WearSummary:
     """What a run did: machines, how many of them were complete before, and seconds."""
 
-    machines: tuple[Machine, ...]
+    machines: tuple[WornMachine, ...]
     done_before: int
     seconds: float
 
     @property
-    def failed(self) -> list[Machine]:
+    def failed(self) -> list[WornMachine]:
         """Those that ended early."""
         return [machine for machine in self.machines if machine.reason]
 
 
-class Task(NamedTuple):
+class WearTask(NamedTuple):
     """A machine to be followed in a folder of results; `rerun`: from its failed stage on."""
 
     folder: str
@@ -62,7 +62,7 @@ class Task(NamedTuple):
     rerun: bool = False
 
 
-class Ended(NamedTuple):
+class WearEnd(NamedTuple):
     """How a machine's wear ended: stages, its life, and why it ended early."""
 
     stages: int
@@ -87,10 +87,10 @@ def run_wear(
         for study in studies
         for point, case in zip(points(study), study.cases, strict=True)
     ]
-    tasks = {(worn := Worn(case)).key: Task(str(folder), worn, rerun) for _, _, case in listed}
+    tasks = {(worn := Worn(case)).key: WearTask(str(folder), worn, rerun) for _, _, case in listed}
     before = [key for key, task in tasks.items() if complete(task)]
     missing = [task for key, task in tasks.items() if key not in before]
-    ends: dict[str, Ended | Lost] = {}
+    ends: dict[str, WearEnd | JobLost] = {}
 
     def remark(text: str) -> None:
         progress(len(before) + len(ends), len(tasks), text)
@@ -101,29 +101,29 @@ def run_wear(
     running = run_here(follow_wear, jobs, needs, workers, remark)
     with contextlib.closing(running):
         for end in running:
-            if isinstance(end, Done) and isinstance(end.result, StoreError):
+            if isinstance(end, JobResult) and isinstance(end.result, StoreError):
                 raise end.result
-            ends[end.id] = end.result if isinstance(end, Done) else end
+            ends[end.id] = end.result if isinstance(end, JobResult) else end
             remark("")
     ends |= {key: wear_end(tasks[key].worn, stored_stages(tasks[key])) for key in before}
     found = tuple(machine(*one, ends[Worn(one[2]).key]) for one in listed)
     return WearSummary(found, len(before), time.monotonic() - began)
 
 
-def stored_stages(task: Task) -> list[Stage]:
+def stored_stages(task: WearTask) -> list[Stage]:
     """Return the stages of a machine that are kept of an earlier run. Raises StoreError."""
     stages = read_kept_stages(task.worn, task.worn.path(task.folder))
     good = [stage for stage in stages if not stage["reason"]]
     return good if task.rerun else stages
 
 
-def complete(task: Task) -> bool:
+def complete(task: WearTask) -> bool:
     """Return whether all stages of a machine are stored. Raises StoreError."""
     stages = stored_stages(task)
     return bool(stages) and task.worn.over(stages[-1])
 
 
-def follow_wear(task: Task) -> Ended | StoreError:
+def follow_wear(task: WearTask) -> WearEnd | StoreError:
     """Follow what is missing of a machine, in a worker.
 
     A StoreError is returned: it ends the run, while an exception is a failure of the machine.
@@ -142,14 +142,16 @@ def follow_wear(task: Task) -> Ended | StoreError:
     return wear_end(worn, stages)
 
 
-def wear_end(worn: Worn, stages: list[Stage]) -> Ended:
+def wear_end(worn: Worn, stages: list[Stage]) -> WearEnd:
     """Return how a machine's wear has ended."""
     last = stages[-1]
-    return Ended(len(stages), life(worn, dataset(worn, stages)), last["reason"], last["detail"])
+    return WearEnd(
+        len(stages), life(worn, stages_dataset(worn, stages)), last["reason"], last["detail"]
+    )
 
 
-def machine(study: str, point: dict[str, Any], case: Case, end: Ended | Lost) -> Machine:
+def machine(study: str, point: dict[str, Any], case: Case, end: WearEnd | JobLost) -> WornMachine:
     """Return a machine of a study, and how it ended."""
-    if isinstance(end, Lost):
-        return Machine(study, point, case, 0, None, str(end.reason), end.detail)
-    return Machine(study, point, case, *end)
+    if isinstance(end, JobLost):
+        return WornMachine(study, point, case, 0, None, str(end.reason), end.detail)
+    return WornMachine(study, point, case, *end)

@@ -14,7 +14,7 @@ import xarray as xr
 from compressor.cases import MODEL, Case, Wear, model_of, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
-from compressor.solve import Rubbed, rub
+from compressor.solve import Rubbed, wear_bores
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 
 FOLDER = "wear"
@@ -100,7 +100,7 @@ class Worn:
 def first(of: Worn) -> Stage:
     """Return the stage of unworn bores."""
     unworn = np.zeros((len(JOINTS), of.how.sectors))
-    return new_stage(0.0, unworn, rub(of.case, unworn, None))
+    return new_stage(0.0, unworn, wear_bores(of.case, unworn, None))
 
 
 def new_stage(hours: float, worn: np.ndarray, motion: Rubbed) -> Stage:
@@ -122,16 +122,16 @@ def following(of: Worn, stage: Stage) -> Stage:
     fastest = float(rate.max())
     step = to_si(of.how.step_mm, "mm")
     span = min(step / fastest, left) if fastest > 0.0 else left  # revolutions
-    midway = rub(of.case, stage["worn_depth"] + 0.5 * span * rate, stage["end_state"])
+    midway = wear_bores(of.case, stage["worn_depth"] + 0.5 * span * rate, stage["end_state"])
     if midway.reason:
         return stage | {"reason": midway.reason, "detail": midway.detail}
     hours = stage["hours"] + span * midway.turn / 3600.0
     hours = of.most_hours if span == left else hours
     worn = stage["worn_depth"] + span * of.depth_per_work[:, np.newaxis] * midway.work
-    return new_stage(hours, worn, rub(of.case, worn, midway.state))
+    return new_stage(hours, worn, wear_bores(of.case, worn, midway.state))
 
 
-def dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
+def stages_dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
     """Return the stages of a machine, with the dimension `stage`."""
     found: dict[str, tuple] = {}
     for name, phrase in (("reason", "why it ended early"), ("detail", "what is known of that")):
@@ -177,7 +177,7 @@ def read_kept_stages(of: Worn, path: Path) -> list[Stage]:
 
 def write(of: Worn, folder: Folder, stages: list[Stage]) -> None:
     """Store the stages of a machine. Raises StoreError."""
-    write_dataset(of.path(folder), dataset(of, stages))
+    write_dataset(of.path(folder), stages_dataset(of, stages))
 
 
 def wear_file(folder: Folder, case: Case) -> Path:

@@ -19,7 +19,7 @@ from compressor.cases.load import load_studies
 from compressor.store import writer
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
-from compressor.sweep.wanted import Wanted, stored_ends
+from compressor.sweep.wanted import RequestedJobs, stored_ends
 
 WHAT = "two to four runs on one store at once"
 MASSES = [4 + n / 100 for n in range(24)]  # rod masses, kg; a study has a stretch of them
@@ -107,7 +107,7 @@ def served(folder, command):
     studies = load_studies(folder / command[0])
     if part:
         studies = [study.shard(int(part[0]), int(part[1])) for study in studies]
-    cases = Wanted(studies)
+    cases = RequestedJobs(studies)
     return set(stored_ends(read_store(folder / "out"), cases)), set(cases)
 
 

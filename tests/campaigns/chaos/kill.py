@@ -20,7 +20,7 @@ from chaos.tally import Tally
 from compressor.cases.load import load_studies
 from compressor.store import writer
 from compressor.store.reader import read_store
-from compressor.sweep.wanted import Wanted, stored_ends
+from compressor.sweep.wanted import RequestedJobs, stored_ends
 
 WHAT = "SIGKILL of the parent, a worker or both at a random moment, then resumed"
 VICTIMS = ("parent", "worker", "both")
@@ -67,7 +67,7 @@ class Scene:
         masses = [3 + n / 500 for n in range(kind.real_jobs if real else kind.jobs)]
         path = case_file(self.template, "killed", masses, kind.keep)
         self.studies = load_studies(path)
-        self.cases = Wanted(self.studies)
+        self.cases = RequestedJobs(self.studies)
         if kind.upgraded:
             case_file(self.template, "before", masses[::2])
             self.complete(self.template, "before.yaml")
@@ -101,7 +101,7 @@ class Scene:
 
     def served(self, folder):
         """The results that a run would not compute again: key -> row."""
-        keys = stored_ends(read_store(folder / "out"), Wanted(self.studies))
+        keys = stored_ends(read_store(folder / "out"), RequestedJobs(self.studies))
         found = rows(folder / "out")
         return {key: found[key] for key in keys}
 

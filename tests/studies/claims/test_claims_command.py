@@ -8,7 +8,7 @@ from compsim import cli
 
 from compressor.studies.claims import search as searching
 from compressor.studies.claims import study as judging
-from compressor.studies.claims.study import Judged, dataset
+from compressor.studies.claims.study import Judged, machines_dataset
 from compressor.studies.claims.study import machines as machines_of
 
 MAP = "machine: {rod_mass_kg: [3, 4.7], reciprocating_mass_kg: [10, 14]}\n"
@@ -33,7 +33,7 @@ def here(tmp_path, monkeypatch):
                 for n in range(study.jobs)}  # fmt: skip
         if study.name == "map":
             rows["0"] = Judged(failed="both 0.1: not_settled")
-        found = dataset(study, [*map(str, range(study.jobs))], rows)
+        found = machines_dataset(study, [*map(str, range(study.jobs))], rows)
         found.encoding["source"] = f"{folder}/{study.name}.nc"
         return found
 

@@ -12,14 +12,14 @@ from compressor.studies.claims.study import (
     ClaimsError,
     Judged,
     cases_judged,
-    dataset,
     judge_end,
     judge_machines,
     machines,
+    machines_dataset,
     read_machines,
     rows_of,
 )
-from compressor.sweep.worker import Done, Lost
+from compressor.sweep.worker import JobLost, JobResult
 
 QUICK = "solve: {accuracy: draft, duration_rev: 2, output_step_deg: 1}\n"
 GRID = QUICK + "machine: {rod_mass_kg: [3, 4.7], reciprocating_mass_kg: [10, 14, 20]}\n"
@@ -44,7 +44,7 @@ def verdict(number, chaotic=0):
 def test_a_grid_has_its_axes_as_dimensions(plan):
     study = plan(GRID)
     rows = {str(n): verdict(n - 2.0) for n in range(5)} | {"5": Judged(failed="both 0.1: no")}
-    found = dataset(study, [*map(str, range(6))], rows)
+    found = machines_dataset(study, [*map(str, range(6))], rows)
     assert found["margin"].dims == ("rod_mass_kg", "reciprocating_mass_kg", "claim")
     at = found.sel(rod_mass_kg=4.7, reciprocating_mass_kg=10, claim=3)
     assert at["margin"].item() == pytest.approx(1.2)
@@ -57,7 +57,7 @@ def test_a_grid_has_its_axes_as_dimensions(plan):
 
 def test_other_studies_have_one_dimension(plan):
     study = plan(QUICK + "blocks: [{friction: false}, {machine: {rod_mass_kg: [3, 4]}}]\n")
-    found = dataset(study, ["a", "b", "c"], {"b": verdict(1.0)})
+    found = machines_dataset(study, ["a", "b", "c"], {"b": verdict(1.0)})
     assert found["margin"].dims == ("machine", "claim")
     assert found["friction"].values.tolist() == ["false", "true", "true"]
     assert found["status"].values.tolist() == ["", "ok", ""]
@@ -68,15 +68,15 @@ def test_what_is_stored_reads_back(plan, tmp_path, text):
     study = plan(text)
     keys = [f"k{n}" for n in range(study.jobs)]
     rows = {"k0": verdict(0.5, 3), "k2": Judged(failed="big_end 0.1: not_settled")}
-    write_dataset(tmp_path / "some.nc", dataset(study, keys, rows))
+    write_dataset(tmp_path / "some.nc", machines_dataset(study, keys, rows))
     again = read_machines(tmp_path / "some.nc")
     assert repr(rows_of(again)) == repr(rows)
     assert {*again.coords} >= {axis.key.rpartition(".")[2] for axis in study.axes}
 
 
 def test_a_machine_that_took_its_worker_with_it_has_a_reason():
-    assert judge_end(Done(0, verdict(1.0), 0.1)) == verdict(1.0)
-    assert judge_end(Lost(0, "worker_died", "exit code 9")).failed == "worker_died: exit code 9"
+    assert judge_end(JobResult(0, verdict(1.0), 0.1)) == verdict(1.0)
+    assert judge_end(JobLost(0, "worker_died", "exit code 9")).failed == "worker_died: exit code 9"
 
 
 @pytest.mark.parametrize(
@@ -106,13 +106,13 @@ def test_a_study_goes_on_where_it_ended(plan, tmp_path, monkeypatch):
     kept = rows_of(whole)
     last = str(whole["key"].values[1])
     part = {key: row for key, row in kept.items() if key != last}
-    write_dataset(path, dataset(study, whole["key"].values.tolist(), part))
+    write_dataset(path, machines_dataset(study, whole["key"].values.tolist(), part))
 
     tasks = []
 
     def run(work, jobs, *rest):
         tasks.append([number for number, *_ in jobs])
-        yield from (Done(number, work(case), 0.1) for number, case, _ in jobs)
+        yield from (JobResult(number, work(case), 0.1) for number, case, _ in jobs)
 
     monkeypatch.setattr(machine_study, "run_here", run)
     again = judge_machines(study, tmp_path / "out", 2)
@@ -125,6 +125,8 @@ def test_a_study_goes_on_where_it_ended(plan, tmp_path, monkeypatch):
 
 def test_other_files_are_not_overwritten(plan, tmp_path):
     study = plan(QUICK)
-    write_dataset(tmp_path / "some.nc", dataset(study, ["a"], {}).drop_vars("share_margin"))
+    write_dataset(
+        tmp_path / "some.nc", machines_dataset(study, ["a"], {}).drop_vars("share_margin")
+    )
     with pytest.raises(StoreError, match="is no file of judged machines"):
         judge_machines(study, tmp_path, 2)

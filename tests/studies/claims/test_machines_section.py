@@ -14,7 +14,7 @@ from compressor.studies.claims.page import (
     machine_drawings,
     machine_files,
 )
-from compressor.studies.claims.study import Judged, cases_judged, dataset
+from compressor.studies.claims.study import Judged, cases_judged, machines_dataset
 
 
 def verdict(case):
@@ -29,7 +29,7 @@ def judged(tmp_path, path, overrides=()):
     """A file of a study whose verdicts are made up."""
     (study,) = load_studies(path, overrides=overrides, variants=cases_judged)
     rows = {str(n): verdict(case) for n, case in enumerate(study.cases)}
-    found = dataset(study, [*rows], rows)
+    found = machines_dataset(study, [*rows], rows)
     write_dataset(tmp_path / f"{study.name}.nc", found)
     return found
 

@@ -8,8 +8,14 @@ from compressor.store import StoreError
 from compressor.store.series_file import read_dataset, write_dataset
 from compressor.studies.claims import search as searching
 from compressor.studies.claims.findings import change
-from compressor.studies.claims.search import POPULATION, Span, cost, least_change
-from compressor.studies.claims.study import ClaimsError, Judged, cases_judged, dataset, machine_key
+from compressor.studies.claims.search import POPULATION, AssumptionRange, cost, least_change
+from compressor.studies.claims.study import (
+    ClaimsError,
+    Judged,
+    cases_judged,
+    machine_key,
+    machines_dataset,
+)
 
 TEXT = """\
 machine: {rod_mass_kg: {saltelli: [1, 9]}, reciprocating_mass_kg: {saltelli: [2, 30]}}
@@ -34,7 +40,7 @@ def judge(monkeypatch, tmp_path):
                 )
                 for key, case in zip(keys, study.cases, strict=True)
             }
-            found = dataset(study, keys, rows)
+            found = machines_dataset(study, keys, rows)
             found.encoding["source"] = str(tmp_path / f"{study.name}.nc")
             write_dataset(tmp_path / f"{study.name}.nc", found)
             return found
@@ -128,7 +134,7 @@ def test_a_search_begins_at_the_study_s_best_machine(judge, tmp_path):
         key: Judged((1.0,) * 7 + (least(case),), (0.0,) * 8, (0.0,) * 4, (0.0,) * 4)
         for key, case in zip(keys, study.cases, strict=True)
     }
-    write_dataset(tmp_path / "some.nc", dataset(study, keys, rows))
+    write_dataset(tmp_path / "some.nc", machines_dataset(study, keys, rows))
     nearest = max(row.margin[7] for row in rows.values())
     judge(least, TEXT.replace("n: 2", "n: 64"), generations=0)
     first = read_dataset(tmp_path / "some-search.nc").isel(machine=slice(POPULATION))
@@ -197,6 +203,6 @@ def test_what_a_machine_costs():
 
 
 def test_the_default_s_place_in_a_range():
-    assert Span("k", lambda s: 20.0 * 100.0**s, 200.0).home == pytest.approx(0.5)
-    assert Span("k", lambda s: 1.0 + s, 5.0).home == 1.0
-    assert np.isclose(Span("k", lambda s: 1.0 + s, 1.25).home, 0.25)
+    assert AssumptionRange("k", lambda s: 20.0 * 100.0**s, 200.0).home == pytest.approx(0.5)
+    assert AssumptionRange("k", lambda s: 1.0 + s, 5.0).home == 1.0
+    assert np.isclose(AssumptionRange("k", lambda s: 1.0 + s, 1.25).home, 0.25)

@@ -12,7 +12,13 @@ import pytest
 from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
 from compressor.studies.regimes import chains
-from compressor.studies.regimes.chains import Chain, Task, read_chain, read_kept_rows, run_chain
+from compressor.studies.regimes.chains import (
+    Chain,
+    ChainTask,
+    read_chain,
+    read_kept_rows,
+    run_chain,
+)
 from compressor.studies.regimes.run import chains_of
 
 TEXT = """
@@ -37,7 +43,7 @@ def whole(study, tmp_path_factory):
     """The undisturbed chain, going down, and its file."""
     folder = tmp_path_factory.mktemp("whole")
     chain = chains_of(study, 0)[1]
-    assert run_chain(Task(str(folder), chain)).values == 6
+    assert run_chain(ChainTask(str(folder), chain)).values == 6
     return chain, chain.path(folder)
 
 
@@ -82,7 +88,7 @@ def test_a_killed_chain_goes_on_and_ends_in_the_same_bits(whole, tmp_path, monke
         before = len(read_kept_rows(chain, chain.path(tmp_path)))
         stops.append(before)
         process = multiprocessing.get_context("fork").Process(
-            target=run_chain, args=(Task(str(tmp_path), chain),)
+            target=run_chain, args=(ChainTask(str(tmp_path), chain),)
         )
         process.start()
         wait_for_values(process, chain.path(tmp_path), rng.integers(1, 3))
@@ -107,7 +113,7 @@ def test_each_value_begins_where_the_last_one_ended(whole, monkeypatch, tmp_path
 
     rows = read_kept_rows(chain, path)
     monkeypatch.setattr(chains, "run_value", run)
-    run_chain(Task(str(tmp_path), chain))
+    run_chain(ChainTask(str(tmp_path), chain))
     assert [case for case, _ in begun] == [*chain.cases]
     assert begun[0][1] is None
     for (_, state), row in zip(begun[1:], rows, strict=False):
@@ -131,13 +137,13 @@ def test_a_chain_goes_on_past_a_failed_value_and_is_run_again_from_there(
 
     monkeypatch.setattr(chains, "run_value", run)
     fails = True
-    end = run_chain(Task(str(tmp_path), chain))
+    end = run_chain(ChainTask(str(tmp_path), chain))
     assert (end.values, [one[0] for one in end.failed]) == (6, [chain.values[2]])
     np.testing.assert_array_equal(states[3], rows[1]["end_state"])
-    assert run_chain(Task(str(tmp_path), chain)) == end
+    assert run_chain(ChainTask(str(tmp_path), chain)) == end
     assert len(states) == 6
     fails = False
-    assert run_chain(Task(str(tmp_path), chain, True)).failed == ()
+    assert run_chain(ChainTask(str(tmp_path), chain, True)).failed == ()
     assert len(states) == 10
 
 
@@ -145,7 +151,7 @@ def test_what_is_stored_is_not_run_again(whole, monkeypatch):
     chain, path = whole
     monkeypatch.setattr(sys.modules["compressor.studies.regimes.chains"], "run_value", pytest.fail)
     before = path.stat().st_mtime_ns
-    assert run_chain(Task(str(path.parents[2]), chain)).values == 6
+    assert run_chain(ChainTask(str(path.parents[2]), chain)).values == 6
     assert path.stat().st_mtime_ns == before
 
 
@@ -163,6 +169,6 @@ def test_another_file_of_its_name_is_refused(whole, tmp_path):
     wrong = chain.path(tmp_path)
     wrong.parent.mkdir(parents=True)
     wrong.write_bytes(path.read_bytes()[:-9])
-    found = run_chain(Task(str(tmp_path), chain))
+    found = run_chain(ChainTask(str(tmp_path), chain))
     assert isinstance(found, StoreError)
     assert "delete it" in str(found)

@@ -9,16 +9,16 @@ from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.regimes import Regimes
 from compressor.studies.regimes import confirm as module
-from compressor.studies.regimes.chains import Chain, Task, run_chain
+from compressor.studies.regimes.chains import Chain, ChainTask, run_chain
 from compressor.studies.regimes.confirm import (
     APART,
     ROOM,
     STARTS,
-    Book,
+    ChainPair,
     Doubt,
-    Pair,
-    Seen,
+    MotionSignature,
     Verdict,
+    VerdictBook,
     confirm,
     differ,
     doubts,
@@ -43,20 +43,22 @@ CASES = [
     Case.from_values({"joint": "both", "clearance_mm": c, "solve": {"accuracy": "draft"}})
     for c in ASKED.values
 ]
-PAIR = Pair(*(Chain.of("made", ASKED, way, CASES) for way in ASKED.directions))
+PAIR = ChainPair(*(Chain.of("made", ASKED, way, CASES) for way in ASKED.directions))
 
 
 def periodic(period=1, at=0.0):
     points = np.zeros((period, 2, 2))
     points[:, 0, 0] = at + 0.1 * np.arange(period)
-    return Seen("periodic", float(period), points, 200.0, 0.0)
+    return MotionSignature("periodic", float(period), points, 200.0, 0.0)
 
 
 def chaotic(rms=200.0, error=1.0):
-    return Seen("chaotic", math.nan, np.random.default_rng(1).random((64, 2, 2)), rms, error)
+    return MotionSignature(
+        "chaotic", math.nan, np.random.default_rng(1).random((64, 2, 2)), rms, error
+    )
 
 
-UNKNOWN = Seen("", math.nan, np.zeros((0, 2, 2)), math.nan, math.nan)
+UNKNOWN = MotionSignature("", math.nan, np.zeros((0, 2, 2)), math.nan, math.nan)
 UNDECIDED = chaotic()._replace(regime="undecided")
 
 
@@ -152,13 +154,13 @@ def test_other_starts_are_within_the_clearances_and_always_the_same():
 
 
 def test_verdicts_are_kept(hysteresis, tmp_path):
-    book = Book(PAIR, tmp_path, 0.0)
+    book = VerdictBook(PAIR, tmp_path, 0.0)
     assert [doubt.number for doubt in book.missing] == [1]
     assert book.count() == (1, 0)
     told = Verdict(1, 1, 2, 3, 5)
     book.add(1, told)
     assert read_verdicts(PAIR, tmp_path)[1] == told
-    again = Book(PAIR, tmp_path, 0.0)
+    again = VerdictBook(PAIR, tmp_path, 0.0)
     assert again.missing == []
     assert again.count() == (1, 1)
 
@@ -168,9 +170,9 @@ def test_a_machine_with_two_motions_is_found_and_confirmed(tmp_path, monkeypatch
     path = tmp_path / "two.yaml"
     path.write_text(TWO, encoding="utf-8")
     (study,) = load_studies(path)
-    pair = Pair(*chains_of(study, 0))
+    pair = ChainPair(*chains_of(study, 0))
     for chain in (pair.up, pair.down):
-        assert run_chain(Task(str(tmp_path), chain)).failed == ()
+        assert run_chain(ChainTask(str(tmp_path), chain)).failed == ()
     (doubt,) = doubts(pair, tmp_path)
     assert doubt.number == 1
     monkeypatch.setattr(module, "FURTHER", 20)
@@ -185,7 +187,7 @@ def test_the_paper_s_machine_has_one_motion():
     case = Case.from_values(
         {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
     )
-    pair = Pair(*(Chain.of("real", ASKED, way, [case] * 3) for way in ASKED.directions))
+    pair = ChainPair(*(Chain.of("real", ASKED, way, [case] * 3) for way in ASKED.directions))
     seen = [module.later(one, None, pair.up) for one in other_starts(case)[:2]]
     assert [one.regime for one in seen] == ["periodic"] * 2
     assert not differ(*seen, WITHIN)

@@ -15,7 +15,7 @@ from compressor.store.studies import swept_column
 from compressor.studies.regimes.chains import FOLDER
 from compressor.studies.regimes.dataset import of_joint, open_regimes
 from compressor.studies.regimes.values import NUMBERS, TEXTS
-from compressor.sweep.worker import Done
+from compressor.sweep.worker import JobResult
 
 TEXT = """
 joint: big_end
@@ -48,7 +48,7 @@ def begun(monkeypatch):
     def run_here(work, jobs, needs, workers, remark, pulse=lambda: None):
         for name, payload, _ in jobs:
             found.append(name)
-            yield Done(name, work(payload), 0.0)
+            yield JobResult(name, work(payload), 0.0)
 
     monkeypatch.setattr(sys.modules["compressor.studies.regimes.run"], "run_here", run_here)
     return found

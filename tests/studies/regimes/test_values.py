@@ -8,8 +8,8 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.regimes import Regimes
-from compressor.solve.attempts import attempt
-from compressor.solve.legs import Stretch, follow, leg_case, settle
+from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.legs import Stretch, follow_revolutions, leg_case, settle_motion
 from compressor.solve.simulate import simulate
 from compressor.studies.regimes.values import NUMBERS, TEXTS, empty, run_value
 
@@ -52,14 +52,14 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
     """
     after, state, section = case(0.25), row["end_state"], Stretch(12, 0.0, 60.0)
     found = run_value(after, state, ASKED)
-    settled, since = settle(after, state, section)
-    first = follow(after, state, Stretch(1, 0.0, 60.0))
-    run = attempt(leg_case(after, 1), after.rtol, 60.0, False, None, state)
+    settled, since = settle_motion(after, state, section)
+    first = follow_revolutions(after, state, Stretch(1, 0.0, 60.0))
+    run = run_at_tolerance(leg_case(after, 1), after.rtol, 60.0, False, None, state)
     np.testing.assert_array_equal(run.trajectory.states[0], state)
     np.testing.assert_allclose(first.state, run.trajectory.states[-1], rtol=1e-9)
     np.testing.assert_allclose(settled.points[0], first.points[0], rtol=1e-9)
     assert found["settled_rev"] == since == 1
-    rest = follow(after, settled.state, Stretch(6, 0.0, 60.0))
+    rest = follow_revolutions(after, settled.state, Stretch(6, 0.0, 60.0))
     np.testing.assert_allclose(found["end_state"], rest.state, rtol=1e-9)
     np.testing.assert_allclose(found["section"][0, 0], rest.points[-1, 0], rtol=1e-9)
     assert np.isnan(found["section"][0, 1]).all()  # the small end is ideal

@@ -9,15 +9,15 @@ from compressor.outcome import ROW
 from compressor.studies.search.find import Point, extremum, first
 from compressor.studies.search.question import (
     Goal,
+    JobReading,
     Question,
     QuestionError,
-    Reading,
     comparison,
     goal_of,
 )
 
 SCAN = [number / 8 for number in range(9)]
-FAILED = Reading(reason="the job failed, budget_steps: more than 5 steps")
+FAILED = JobReading(reason="the job failed, budget_steps: more than 5 steps")
 ABOVE = comparison("peak_acceleration > 1")
 
 
@@ -30,7 +30,7 @@ def jobs(function, bar=0.0, calls=None):
         found = []
         for share in shares:
             value = function(share)
-            told = FAILED if value is None else Reading(value, bar)
+            told = FAILED if value is None else JobReading(value, bar)
             found.append(Point(share, 10.0 * share, told, failed=value is None))
         return found
 
@@ -184,15 +184,15 @@ def numbers(**values):
 def test_a_reading_is_number_and_bar():
     goal = goal_of("contact_loss_fraction.small_end", "greatest")
     row = numbers(contact_loss_fraction=[0.1, 0.2], contact_loss_fraction_error=[1e-3, 2e-3])
-    assert goal.read(row, "predictable") == Reading(0.2, 2e-3)
+    assert goal.read(row, "predictable") == JobReading(0.2, 2e-3)
     row["contact_loss_fraction_error"] = np.nan
-    assert goal.read(row, "") == Reading(0.2, 0.0, barred=False)
+    assert goal.read(row, "") == JobReading(0.2, 0.0, barred=False)
     row["contact_loss_fraction_error"] = np.inf
     assert "not known" in goal.read(row, "undecided").reason
     assert "has no" in goal.read(numbers(), "predictable").reason
     axis = goal_of("peak_contact_force_axis.big_end.y", "least")
     row = numbers(peak_contact_force_axis=[[1, 2], [3, 4]], peak_contact_force_axis_error=0.5)
-    assert axis.read(row, "periodic") == Reading(2.0, 0.5)
+    assert axis.read(row, "periodic") == JobReading(2.0, 0.5)
 
 
 def test_a_chaotic_peak_is_the_mean_of_revolutions():
@@ -212,8 +212,8 @@ def test_a_chaotic_peak_is_the_mean_of_revolutions():
     ("sign", "there"), [(">", False), (">=", True), ("<", False), ("<=", True)]
 )
 def test_a_limit_without_a_bar_is_decided(sign, there):
-    assert Goal("peak_acceleration", (), sign, 5.0).holds(Reading(5.0, 0.0)) is there
-    assert Goal("peak_acceleration", (), sign, 5.0).holds(Reading(5.0, 1e-9)) is None
+    assert Goal("peak_acceleration", (), sign, 5.0).holds(JobReading(5.0, 0.0)) is there
+    assert Goal("peak_acceleration", (), sign, 5.0).holds(JobReading(5.0, 1e-9)) is None
     assert Goal("peak_acceleration", (), sign, 5.0).holds(FAILED) is None
 
 

@@ -18,7 +18,7 @@ from compressor.studies.stress.extremes import SPANS, Budget, is_supported, plac
 from compressor.studies.stress.figures import draw_outcomes, outcomes
 from compressor.studies.stress.judge import (
     PARTS,
-    Finding,
+    StressFinding,
     agreed_verdict,
     compare,
     compare_statistics,
@@ -27,7 +27,14 @@ from compressor.studies.stress.judge import (
     judges,
     shorten_case,
 )
-from compressor.studies.stress.stress import FILE, campaign, counts, dataset, slowest, worst
+from compressor.studies.stress.stress import (
+    FILE,
+    campaign,
+    campaign_dataset,
+    counts,
+    slowest,
+    worst,
+)
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
 COUNT, SEED = 36, 1
@@ -141,7 +148,7 @@ def run():
 
 
 def finding(found):
-    return Finding(found, 0.0, 0.0)
+    return StressFinding(found, 0.0, 0.0)
 
 
 def test_a_good_run_is_confirmed(run):
@@ -208,7 +215,7 @@ def row(number, verdict, **more):
 def test_the_worst_come_first():
     rows = [row(0, "ok"), row(1, "failed", reason="non_finite"), row(2, "ok", excess=0.5),
             row(3, "silent_wrong", excess=3.0), row(4, "unjudged", seconds=9.0)]  # fmt: skip
-    study = dataset(rows, SEED)
+    study = campaign_dataset(rows, SEED)
     assert worst(study)["scene"].values.tolist() == [3, 4, 2, 0]
     assert slowest(study)["scene"].item() in (0, 2)
     assert counts(study)["whole"] == {"non_finite": 1, "silent_wrong": 1}
@@ -223,7 +230,7 @@ def test_a_map_marks_every_outcome():
     rows += [row(4, "ok"), row(5, "silent_wrong"), row(6, "unjudged")]
     for one in rows:
         one |= place(Case.from_values(values(one["scene"], SEED)))
-    study = dataset(rows, SEED)
+    study = campaign_dataset(rows, SEED)
     assert [*outcomes(study)] == [
         "budget", "budget", "penetration_implausible", "other failure", "ok", "silent_wrong",
         "unjudged",

@@ -14,7 +14,7 @@ from compressor.studies.tradeoff.explain import (
     paid_value,
     promise,
     terms,
-    unknowns,
+    unknown_names,
 )
 from compressor.studies.tradeoff.features import FEATURES
 
@@ -126,7 +126,7 @@ def test_scales_are_those_of_the_machine_without_features():
     more = {"guide": {"clearance_mm": 0.1}, "drive": True, "rod": True, "lubricant": True}
     plain, full = Case.from_values(values), Case.from_values(values | more)
     assert [*ideal_scales(full)] == [*ideal_scales(plain)]
-    names = unknowns(full)
+    names = unknown_names(full)
     assert len(names) == 11
     assert names[4:6] == ("height in the guide, m", "tilt in the guide, rad")
     assert names[-1] == "crank's lag, s"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.solve import rub
-from compressor.studies.wear.stages import Worn, dataset, first, following, life, when
+from compressor.solve import wear_bores
+from compressor.studies.wear.stages import Worn, first, following, life, stages_dataset, when
 
 VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
 
@@ -30,14 +30,14 @@ def machine():
 def test_a_volume_is_the_coefficient_times_what_has_slid(machine):
     """V = k N |v| t: by the motions midway, run again from where each began."""
     of, stages = machine
-    found = dataset(of, stages)
+    found = stages_dataset(of, stages)
     k = 1e-8 * 1e-9  # m3/(N m)
     volume = 0.0
     for before, after in itertools.pairwise(stages):
         turns = (after["hours"] - before["hours"]) * 3600.0 / of.case.turn
         half = 0.5 * (after["hours"] - before["hours"]) * 3600.0 / before["turn"]
         depth = half * k * before["rubbing_work"] / of.sector_area[:, np.newaxis]
-        midway = rub(of.case, before["worn_depth"] + depth, before["end_state"])
+        midway = wear_bores(of.case, before["worn_depth"] + depth, before["end_state"])
         volume += k * midway.work.sum() * turns
     assert found["worn_volume"].values[-1, 0] == pytest.approx(volume, rel=1e-9)
     assert not found["worn_volume"].values[:, 1].any()
@@ -71,7 +71,7 @@ def test_hours_converge_with_the_square_of_the_step(machine):
     lives = []
     for step in (0.04, 0.02, 0.0025):
         of, stages = followed({"step_mm": step, "limit_mm": 0.28})
-        lives.append(life(of, dataset(of, stages)).hours)
+        lives.append(life(of, stages_dataset(of, stages)).hours)
     coarse, fine = (abs(value - lives[-1]) for value in lives[:2])
     assert coarse < 0.03 * lives[-1]
     assert fine < 0.4 * coarse
@@ -94,7 +94,7 @@ def test_a_coefficient_is_a_scale_of_hours(machine):
     of, stages = machine
     tenfold, faster = followed({"step_mm": 0.01, "coefficient_mm3_per_N_m": 1e-7})
     one, other = (life(*pair) for pair in (
-        (of, dataset(of, stages)), (tenfold, dataset(tenfold, faster))))  # fmt: skip
+        (of, stages_dataset(of, stages)), (tenfold, stages_dataset(tenfold, faster))))  # fmt: skip
     assert other.hours == pytest.approx(one.hours / 10, rel=1e-6)
     assert (one.low, one.high) == pytest.approx((one.hours / 2, one.hours * 2))
     assert one.joint == "big_end"
@@ -103,13 +103,13 @@ def test_a_coefficient_is_a_scale_of_hours(machine):
 def test_a_life_beyond_the_hours_is_not_told(machine):
     """Where even the greatest coefficient does not wear a joint out, no hours are named."""
     of, stages = followed({"hours": 1.0})
-    found = life(of, dataset(of, stages))
+    found = life(of, stages_dataset(of, stages))
     assert [math.isnan(v) for v in (found.low, found.hours, found.high)] == [True] * 3
     assert stages[-1]["hours"] == 2.0  # of the given coefficient: as the greatest wears in one
     assert found.clearance > 0.2e-3
-    whole = life(machine[0], dataset(*machine))
+    whole = life(machine[0], stages_dataset(*machine))
     of, stages = followed({"step_mm": 0.01, "hours": 0.75 * whole.hours})
-    found = life(of, dataset(of, stages))
+    found = life(of, stages_dataset(of, stages))
     assert found.low == pytest.approx(whole.low, rel=1e-3)
     assert math.isnan(found.hours)
     assert math.isnan(found.high)
@@ -130,6 +130,6 @@ def test_a_motion_that_fails_ends_its_machine():
 def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
     soft = {"drive": {"slope_N_m_s": 10.0, "flywheel_kg_m2": 5.0}, "load": "gas"}
     case = Case.from_values({**VALUES, **soft, "wear": True})
-    found = rub(case, np.zeros((2, 72)), None)
+    found = wear_bores(case, np.zeros((2, 72)), None)
     assert not found.reason
     assert found.turn > 1.001 * case.turn

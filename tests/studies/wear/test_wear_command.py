@@ -13,7 +13,7 @@ from compsim.cli import main
 from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
 from compressor.studies.wear import stages
-from compressor.studies.wear.run import Task, follow_wear, run_wear
+from compressor.studies.wear.run import WearTask, follow_wear, run_wear
 from compressor.studies.wear.stages import Worn, open_wear, wear_file
 
 TEXT = """
@@ -95,7 +95,7 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
         before = len(stages.read_kept_stages(worn, path))
         stops.append(before)
         process = multiprocessing.get_context("fork").Process(
-            target=follow_wear, args=(Task(str(tmp_path), worn),)
+            target=follow_wear, args=(WearTask(str(tmp_path), worn),)
         )
         process.start()
         seen = path.stat().st_mtime_ns if path.exists() else 0
@@ -115,19 +115,19 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
 def test_a_failed_machine_is_told_and_goes_on_when_asked(place, tmp_path, capsys, monkeypatch):
     file = place / "failing.yaml"
     file.write_text(TEXT.replace("[400, 500]", "400"), encoding="utf-8")
-    rub, calls = stages.rub, []
+    rub, calls = stages.wear_bores, []
 
     def failing(*given):
         calls.append(given)
         found = rub(*given)
         return found._replace(reason="budget_seconds", detail="slow") if len(calls) == 4 else found
 
-    monkeypatch.setattr(stages, "rub", failing)
+    monkeypatch.setattr(stages, "wear_bores", failing)
     (case,) = load_cases(file)
     worn = Worn(case)
-    end = follow_wear(Task(str(tmp_path), worn))
+    end = follow_wear(WearTask(str(tmp_path), worn))
     assert (end.reason, end.detail) == ("budget_seconds", "slow")
-    again = follow_wear(Task(str(tmp_path), worn))
+    again = follow_wear(WearTask(str(tmp_path), worn))
     assert (again.stages, again.reason) == (end.stages, end.reason)
     assert main(["wear", str(file), "-o", str(tmp_path)]) == 3
     said = capsys.readouterr()
@@ -140,7 +140,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(place, tmp_path, capsys
 
 def whole(worn, folder):
     """The stages of an undisturbed run."""
-    follow_wear(Task(str(folder), worn))
+    follow_wear(WearTask(str(folder), worn))
     return open_wear(folder, worn.case)
 
 
