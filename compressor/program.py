@@ -17,7 +17,7 @@ VERSION = "0.1.0"
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
 COMPILED = Path(__file__).parent / "physics"  # the sources that are compiled
 CODE_VARIABLE = "NUMBA_CACHE_DIR"
-MOST_MEANT = 3  # words that may have been meant
+MAX_MEANT = 3  # words that may have been meant
 LONGEST_WORD = 100  # characters of a word that others are compared with
 
 
@@ -83,7 +83,7 @@ def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | N
     sought = [word[:LONGEST_WORD].casefold()]
     sought.append(Path(sought[0]).stem)
     near = next(
-        (found for one in sought if (found := get_close_matches(one, names, MOST_MEANT))), []
+        (found for one in sought if (found := get_close_matches(one, names, MAX_MEANT))), []
     )
     exact = next(([one] for one in sought if one in names), [])
     found = [str((told or {}).get(names[one], names[one])) for one in exact or near]

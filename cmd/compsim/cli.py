@@ -43,7 +43,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
 NO_ROOM = ("failed to map segment", "Cannot allocate memory")  # as a library that is loaded says
 UNREAD = 141  # exit code, as of a program that SIGPIPE ends, which Windows does not have
 COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click prints and exits
-AGAIN = 0.02  # s until a dropped signal is sent again
+SECONDS_TO_RESEND = 0.02  # s until a dropped signal is sent again
 
 
 class Interrupted(BaseException):
@@ -112,7 +112,9 @@ def interruptible() -> Iterator[None]:
         number = what.exc_value.number
         for other in caught:
             signal.signal(other, interrupt)
-        again = threading.Timer(AGAIN, signal.pthread_kill, (threading.get_ident(), number))
+        again = threading.Timer(
+            SECONDS_TO_RESEND, signal.pthread_kill, (threading.get_ident(), number)
+        )
         again.daemon = True
         again.start()
 

@@ -14,7 +14,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-MOST_BYTES = 5_000_000  # of the files of studies that are read for keys and axes
+MAX_BYTES = 5_000_000  # of the files of studies that are read for keys and axes
 HEXADECIMAL = re.compile("[0-9a-f]{2,20}")
 ONE_JOB = "JOB | STUDY [AXIS=VALUE]..."  # what `show` and `plot` take
 STUDY_FILES = ("studies/{}.json", "former/{}.json", "regimes/{}/study.json")
@@ -124,7 +124,7 @@ def study_files(folder: str) -> dict[str, Path]:
 def read_study_file(path: Path) -> dict[str, Any]:
     """Return a study's file; nothing where it is large, or damaged."""
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if path.stat().st_size > MAX_BYTES:
             return {}
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -137,7 +137,7 @@ def keys(folder: str, known: dict[str, Path]) -> list[str]:
     are small.
     """
     found = {path.name[:20] for path in Path(folder).glob("jobs/*.h5")}
-    if sum(path.stat().st_size for path in known.values()) <= MOST_BYTES:
+    if sum(path.stat().st_size for path in known.values()) <= MAX_BYTES:
         found.update(
             key for path in known.values() for key in read_study_file(path).get("keys", ())
         )

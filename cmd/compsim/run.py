@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from compressor.sweep import Summary, SweepProgress
     from compsim.watch import PageWatch
 
-MOST_FAILURES = 20  # listed one by one
+MAX_FAILURES = 20  # listed one by one
 
 
 class ShardType(click.ParamType):
@@ -250,14 +250,14 @@ def report_failures(summary: "Summary") -> None:
     from compressor.reasons import remedy
 
     say(f"{plural(len({failure.key for failure in failures}))} failed:")
-    for failure in failures[:MOST_FAILURES]:
+    for failure in failures[:MAX_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
         say(
             f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}\n"
             f"    job {failure.key}"
         )
-    if len(failures) > MOST_FAILURES:
-        say(f"  and {len(failures) - MOST_FAILURES} more")
+    if len(failures) > MAX_FAILURES:
+        say(f"  and {len(failures) - MAX_FAILURES} more")
     say("what to do:")
     for reason, number in Counter(failure.reason for failure in failures).items():
         say(f"  {reason} ({number}): {remedy(reason)}")

@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from compsim.live import ProgressLine
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
-MOST_CAUTIONS = 5  # told of one case file
+MAX_CAUTIONS = 5  # told of one case file
 # of lines of progress where stderr is no terminal: until the first, and between two others
 FIRST_SECONDS, QUIET_SECONDS, QUIET_SHARE = 1.0, 10.0, 0.05
-MANY = 20_000  # cases that take seconds to be read
-FEWEST = 5  # things done that a guess of the time rests on
+MANY_CASES = 20_000  # cases that take seconds to be read
+MIN_DONE_FOR_ETA = 5  # things done that a guess of the time rests on
 
 CASE_FILE = re.compile(r"^(joint|clearance_mm|load|machine|blocks|regimes)\s*:", re.MULTILINE)
 PLACES = (".", "configs")  # where case files are looked for, if none is named
-MOST_NEAR = 4  # of them named
-MOST_HEAD = 100_000  # bytes of a file that are looked at
+MAX_NEAR = 4  # of them named
+MAX_HEAD = 100_000  # bytes of a file that are looked at
 
 
 class CaseFile(click.ParamType):
@@ -45,8 +45,8 @@ class CaseFile(click.ParamType):
         near = nearby_case_files()
         if not near:
             return f"Name a case file; {made}"
-        more = f" and {len(near) - MOST_NEAR} more" if len(near) > MOST_NEAR else ""
-        return f"Name a case file, such as {', '.join(near[:MOST_NEAR])}{more}; {made}"
+        more = f" and {len(near) - MAX_NEAR} more" if len(near) > MAX_NEAR else ""
+        return f"Name a case file, such as {', '.join(near[:MAX_NEAR])}{more}; {made}"
 
 
 def nearby_case_files() -> list[str]:
@@ -56,7 +56,7 @@ def nearby_case_files() -> list[str]:
         with contextlib.suppress(OSError):
             for path in sorted([*place.glob("*.yaml"), *place.glob("*.yml")]):
                 with contextlib.suppress(OSError):
-                    head = path.read_bytes()[:MOST_HEAD].decode(errors="replace")
+                    head = path.read_bytes()[:MAX_HEAD].decode(errors="replace")
                     if CASE_FILE.search(head):
                         found.append(str(path))
     return found
@@ -199,7 +199,7 @@ class ReadingProgress:
 
     def __call__(self, study: str, done: int, total: int) -> None:
         """Take note of how many cases of a study have been read; its first word is their number."""
-        if total >= MANY:
+        if total >= MANY_CASES:
             self.screen(done, total, f"{study}: {plural(total)}" if done == 0 else "")
 
 
@@ -224,7 +224,7 @@ class Pace:
         if not self.first or not self.last:
             return None
         things, seconds = self.last[0] - self.first[0], self.last[1] - self.first[1]
-        if things < FEWEST or seconds < FIRST_SECONDS:
+        if things < MIN_DONE_FOR_ETA or seconds < FIRST_SECONDS:
             return None
         since = time.monotonic() - self.last[1]
         return max(0.0, seconds / things * (total - self.last[0]) - since)
@@ -296,7 +296,7 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
     return commands
 
 
-def caution(studies: "Sequence[Study]", most: int | None = MOST_CAUTIONS) -> None:
+def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None:
     """Say once what is odd about case files, `most` lines a file however many jobs it has."""
     from compressor.solve import cautions
 

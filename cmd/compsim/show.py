@@ -20,8 +20,8 @@ from compsim.screen import (
 if TYPE_CHECKING:
     from compressor.store import JobReport
 
-SHORT = 8  # digits of a key in a name
-MOST_NAME = 64 - 1 - SHORT  # characters of a study's name
+KEY_DIGITS = 8  # digits of a key in a name
+MAX_NAME = 64 - 1 - KEY_DIGITS  # characters of a study's name
 
 
 def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[float, float]:
@@ -120,7 +120,7 @@ def whole_case(found: "JobReport", folder: str) -> str:
         run = "; ".join(run_commands(found.again, folder)) or "run its case file"
         raise click.UsageError(f"job {found.key} was not run yet: {run}")
     case = Case.from_attribute(found.attributes["case"])
-    name = f"{case.name[:MOST_NAME]}-{found.key[:SHORT]}"
+    name = f"{case.name[:MAX_NAME]}-{found.key[:KEY_DIGITS]}"
     return to_yaml(dataclasses.replace(case, name=name))
 
 

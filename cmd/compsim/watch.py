@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from compressor.sweep import SweepProgress
 
 SECONDS = 5.0  # between two pages, and before the first
-SHARE = 20.0  # times what drawing takes: how long until figures are drawn anew
+REDRAW_FACTOR = 20.0  # times what drawing takes: how long until figures are drawn anew
 NICENESS = 5  # of the process: jobs go first
-MOST_DEATHS = 3  # of the process, before it is given up
+MAX_DEATHS = 3  # of the process, before it is given up
 
 
 class PageWatch:
@@ -69,13 +69,13 @@ class PageWatch:
             again = "" if isinstance(error, Exception) else "; Ctrl-C again ends at once"
             say(f"writing {self.page} once more{again}")
         self.hear()
-        while self.deaths < MOST_DEATHS and not self.finished():
+        while self.deaths < MAX_DEATHS and not self.finished():
             pass
 
     def stands(self, now: "SweepProgress") -> None:
         """Have a page written if it is time; called several times a second."""
         self.hear()
-        if not self.idle or time.monotonic() < self.due or self.deaths >= MOST_DEATHS:
+        if not self.idle or time.monotonic() < self.due or self.deaths >= MAX_DEATHS:
             return
         running = {
             "done": now.done, "failed": now.failed, "total": now.total, "eta_s": now.left,
@@ -123,7 +123,7 @@ class PageWatch:
                 self.tell(f"what writes it ended with {exit_text(answer['ended'])}")
         self.due = time.monotonic() + SECONDS
         if answer.get("drawn", True):
-            self.draw_due = time.monotonic() + SHARE * answer.get("seconds", 0.0)
+            self.draw_due = time.monotonic() + REDRAW_FACTOR * answer.get("seconds", 0.0)
         if answer.get("problem"):
             self.tell(answer["problem"])
 

@@ -18,7 +18,7 @@ import xarray as xr
 
 from compressor.analysis.cam import Cam
 from compressor.analysis.contacts import MODES, contact_modes, mode_shares
-from compressor.analysis.orbit import APART, JournalMotion, course, orbit
+from compressor.analysis.orbit import SAME_TURN_DEGREES, JournalMotion, course, orbit
 from compressor.analysis.plot_captions import newtons
 from compressor.analysis.runs import (
     CLEARANCES,
@@ -36,7 +36,7 @@ from compressor.analysis.shaking import AFTER, BEFORE, ORDER, Shaking
 
 Runs = Mapping[str, xr.Dataset]
 
-ENLARGED = (
+ENLARGED_VIEWS = (
     "Left, the last revolution, acceleration in a row a clearance, with the motion without "
     "clearance dotted; right, the part in the black rectangles, where the curves differ most."
 )
@@ -45,8 +45,8 @@ LOOP = {
     "small_end": "What is left of a loop is the load; without it the force is all inertia.",
 }
 SERIES = ("displacement", "velocity", "acceleration")
-SAME = 1e-9  # of a curve's range: what cannot be seen, and is rounding
-LEAST_ANGLE, LEAST_GAP = 0.005, 1e-6  # degrees, m: what the captions can tell
+SAME_CURVE = 1e-9  # of a curve's range: what cannot be seen, and is rounding
+MIN_ANGLE, MIN_GAP = 0.005, 1e-6  # degrees, m: what the captions can tell
 
 
 def pressure_volume(runs: Runs) -> str:
@@ -54,7 +54,7 @@ def pressure_volume(runs: Runs) -> str:
     cam = Cam(runs["typical"])
     used, exact = np.degrees(load_corners(runs["typical"])), np.degrees(cam.gas_corners)
     away = float(np.abs(used - exact).max())
-    which = f", up to {away:.1g}° off the exact ones" if away > LEAST_ANGLE else ""
+    which = f", up to {away:.1g}° off the exact ones" if away > MIN_ANGLE else ""
     return (
         "Cylinder pressure over gas volume in the typical model, made from the stored piston force "
         "and displacement; arrows point in the direction of time. Suction and discharge keep their "
@@ -67,7 +67,7 @@ def cam(runs: Runs) -> str:
     """Of the cam: whether it closes as printed, and what ours does."""
     found = Cam(runs["design"])
     rise, fall = found.printed_heights
-    closes = abs(rise - fall) < LEAST_GAP
+    closes = abs(rise - fall) < MIN_GAP
     printed = "so that the cam closes" if closes else "so that the cam does not close"
     return (
         "(a) The path of the roller's centre around the base circle, at rest while the gas would "
@@ -86,7 +86,7 @@ def load_response(runs: Runs) -> str:
         float(np.abs(one[name].values - other[name].values).max() / np.ptp(other[name].values))
         for name in SERIES
     )
-    how = "coincide, as they must" if away <= SAME else f"differ by up to {100 * away:.2g} %"
+    how = "coincide, as they must" if away <= SAME_CURVE else f"differ by up to {100 * away:.2g} %"
     return (
         f"Without clearance, both models. The curves {how}: ideal joints and a crank of prescribed "
         "speed leave the load no say in the motion. Left, the last revolution; right, the part in "
@@ -115,7 +115,7 @@ def in_degrees(found: np.ndarray) -> str:
 def response(runs: Runs, fault: str) -> str:
     """Of displacement, velocity and acceleration with one fault at three clearances."""
     of = [runs[label(fault, c)] for c in CLEARANCES]
-    sentences = [ENLARGED, deviations(of)]
+    sentences = [ENLARGED_VIEWS, deviations(of)]
     for joint in faulty_joints(fault):
         courses = [course(run, joint) for run in of]
         sentences.append(motion(courses))
@@ -147,7 +147,7 @@ def motion(courses: Sequence[JournalMotion]) -> str:
     apart = [one.apart for one in courses]
     spans = angle_spans([one.turns for one in courses])
     if any(one.turns for one in courses):
-        near = spans and max(high - low for low, high in spans) <= APART
+        near = spans and max(high - low for low, high in spans) <= SAME_TURN_DEGREES
         at = " and ".join(map(format_span, spans)) if near else apart_from_each_other(courses)
         reverses = f"The horizontal force at the {joint} changes its sign near {at}."
     else:
@@ -170,7 +170,11 @@ def rings(courses: Sequence[JournalMotion]) -> list[str]:
     """Return the frequencies after the first change of sign, where all runs have the same one."""
     found = [one.rings for one in courses]
     spans = angle_spans([one.turns[:1] for one in courses])
-    if not np.isfinite(found).all() or not spans or max(spans[0]) - min(spans[0]) > APART:
+    if (
+        not np.isfinite(found).all()
+        or not spans
+        or max(spans[0]) - min(spans[0]) > SAME_TURN_DEGREES
+    ):
         return []
     return [f"After the first change acceleration rings at {list_by_clearance(found, 0)} Hz."]
 
@@ -293,7 +297,7 @@ def caption(number: int, runs: Runs) -> str:
 
 Shakings = Mapping[str, Shaking]
 
-ALONE = FAULTS[:2]
+SINGLE_FAULTS = FAULTS[:2]
 SPAN = f"{CLEARANCES[0]:g} to {CLEARANCES[-1]:g} mm"
 
 
@@ -306,7 +310,11 @@ def spectra(found: Shakings, runs: Runs) -> str:
     ]
     for fault in FAULTS:
         above = [found[label(fault, c)].spectrum.above for c in CLEARANCES]
-        where = f"the {SPOKEN[fault]}'s clearance" if fault in ALONE else "clearance at both joints"
+        where = (
+            f"the {SPOKEN[fault]}'s clearance"
+            if fault in SINGLE_FAULTS
+            else "clearance at both joints"
+        )
         sentences.append(
             f"With {where} from {SPAN} the rms of X above order {ORDER} {course_of(above)}."
         )
@@ -317,7 +325,7 @@ def orbits(found: Shakings, runs: Runs) -> str:
     """Of the journals' orbits: off the wall or not, and how they go round."""
     known = {
         joint: [orbit(runs[label(joint, c)]).sel(joint=joint) for c in CLEARANCES]
-        for joint in ALONE
+        for joint in SINGLE_FAULTS
     }
     off = max(float(one["off_wall_share"]) for each in known.values() for one in each)
     stays = "No journal leaves its wall" if off == 0.0 else (
@@ -328,7 +336,7 @@ def orbits(found: Shakings, runs: Runs) -> str:
     rounds = "; ".join(
         f"at the {SPOKEN[joint]} it goes round {abs(laps[joint]):.1f} times a revolution, "
         f"{ways[joint]}"
-        for joint in ALONE
+        for joint in SINGLE_FAULTS
     )
     return (
         "The journal's centre in its bore over the last revolution, all to one scale. Without "
@@ -343,7 +351,7 @@ def angles(found: Shakings, runs: Runs) -> str:
         f"{AFTER:g}° after a change of direction of the joint's force along the cylinder, at "
         f"{CLEARANCES[-1]:g} mm."
     ]
-    for joint in ALONE:
+    for joint in SINGLE_FAULTS:
         of = [found[label(joint, c)] for c in CLEARANCES]
         if not all(one.turns for one in of):
             continue
@@ -392,7 +400,7 @@ def friction(of: list[Shaking], run) -> list[str]:
 def flights(runs: Runs) -> str:
     """Return whether any joint is ever in flight."""
     following, most = True, 0.0
-    for joint in ALONE:
+    for joint in SINGLE_FAULTS:
         for clearance in CLEARANCES:
             shares = mode_shares(contact_modes(runs[label(joint, clearance)]))["share"]
             of = shares.sel(joint=joint)

@@ -130,7 +130,7 @@ def flights(series: ContactSeries) -> np.ndarray:
 
 
 STENCIL = 4  # samples that the journal's path before first touch is a polynomial through
-FINER = 16  # points a sample step in which force times rate is summed
+WORK_SAMPLES = 16  # points a sample step in which force times rate is summed
 COLUMNS = {  # over impact: unit, long name
     "joint": ("", "joint of the impact"),
     "time": ("s", "time of first touch"),
@@ -324,7 +324,7 @@ def impulse_and_loss(
     force = PchipInterpolator(time, normal)
     around = slice(max(0, span.first - 2), span.last + 3)
     path = CubicSpline(series.time[around], series.place[around])
-    fine = np.linspace(time[0], time[-1], FINER * (time.size - 1) + 1)
+    fine = np.linspace(time[0], time[-1], WORK_SAMPLES * (time.size - 1) + 1)
     place = path(fine)
     rate = (place * path(fine, 1)).sum(axis=1) / np.linalg.norm(place, axis=1)
     return float(force.integrate(time[0], time[-1])), float(np.trapezoid(force(fine) * rate, fine))

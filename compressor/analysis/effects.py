@@ -93,12 +93,12 @@ def saltelli_design(columns: np.ndarray) -> SaltelliDesign | None:
     return SaltelliDesign(np.arange(n), np.arange(n, 2 * n), mixed)
 
 
-MOST_GAPS = 0.2  # of a grid's points
+MAX_GAPS = 0.2  # of a grid's points
 FILLS = 500  # rounds of filling
 FILLED = 1e-9  # of the values' span: no round changes more
-FEWEST = 8  # points of a ranking or a trend
-MOST_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
-MOST_POINTS = 4000  # of the resampling
+MIN_POINTS = 8  # points of a ranking or a trend
+MAX_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
+MAX_POINTS = 4000  # of the resampling
 RANKING_RESAMPLES = 400
 RANKING_SEED = 1
 ORDER = 2  # of a trend
@@ -137,14 +137,14 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     55, 2001, 271-280) is exact: S_i = V(E(y | x_i)) / V(y) and T_i = 1 - V(E(y | all but x_i)) /
     V(y) (Saltelli et al., Global Sensitivity Analysis: The Primer, 2008, chapters 1 and 4). Both
     are nan where all values are the same. Values of an axis at which nothing is known are left
-    out. Other unknown points, at most MOST_GAPS of all, take the sum of their axes' main effects
+    out. Other unknown points, at most MAX_GAPS of all, take the sum of their axes' main effects
     (Healy and Westmacott, Applied Statistics 5, 1956, 203-206).
     """
     for axis in range(values.ndim):
         rest = tuple(n for n in range(values.ndim) if n != axis)
         values = np.compress(np.isfinite(values).any(axis=rest), values, axis=axis)
     unknown = ~np.isfinite(values)
-    if not values.size or unknown.mean() > MOST_GAPS:
+    if not values.size or unknown.mean() > MAX_GAPS:
         return None
     values = fill_unknown(values, unknown)
     axes = range(values.ndim)
@@ -185,18 +185,18 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
 
     columns: a key's value at each point, or words; values: (points,), nan where unknown. Of a
     `saltelli` design Sobol's indices, unknown points having the median, of a large one of
-    its first MOST_BASE points; else correlations, each over the points that have its key.
+    its first MAX_BASE points; else correlations, each over the points that have its key.
     """
     good = np.isfinite(values)
-    if good.sum() < FEWEST:
+    if good.sum() < MIN_POINTS:
         return None
     if not np.ptp(values[good]):
         return Effects("rank", np.full(len(columns), math.nan))
     numeric = all(column.dtype.kind in "fiu" for column in columns)
     design = saltelli_design(np.stack(columns, axis=1).astype(float)) if numeric else None
-    if design is not None and good.mean() >= 1.0 - MOST_GAPS:
+    if design is not None and good.mean() >= 1.0 - MAX_GAPS:
         whole = np.where(good, values, np.median(values[good]))
-        found = design.first(MOST_BASE).indices(whole, RANKING_RESAMPLES)
+        found = design.first(MAX_BASE).indices(whole, RANKING_RESAMPLES)
         if not all(np.isfinite(row).all() for row in found.values()):
             return None  # so few points differ that some resamples are all the same
         ends = {
@@ -205,7 +205,7 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
         }
         return Effects(
             "saltelli", found["first_order"], found["total_order"], ends["first_order"],
-            ends["total_order"], int((~good).sum()), MOST_BASE if design.a.size > MOST_BASE else 0,
+            ends["total_order"], int((~good).sum()), MAX_BASE if design.a.size > MAX_BASE else 0,
         )  # fmt: skip
     there = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
     rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, there, strict=True)])
@@ -221,7 +221,7 @@ def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, f
     """
     from scipy.stats import norm, spearmanr  # takes half a second
 
-    if values.size < FEWEST:
+    if values.size < MIN_POINTS:
         return math.nan, math.nan, math.nan
     if column.dtype.kind not in "fiu":
         return correlation_ratio(np.unique(column, return_inverse=True)[1], values)
@@ -246,7 +246,7 @@ def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, flo
     groups = [values[codes == code] for code in np.unique(codes)]
     found = math.sqrt(max(0.0, float(kruskal(*groups).statistic)) / (values.size - 1))
     rng = np.random.default_rng(RANKING_SEED)
-    ranks, size = rankdata(values), min(values.size, MOST_POINTS)
+    ranks, size = rankdata(values), min(values.size, MAX_POINTS)
     draws = []
     for _ in range(RANKING_RESAMPLES):
         picked = rng.integers(values.size, size=size)
@@ -272,7 +272,7 @@ def trend(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...
 
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
-    if x.size < FEWEST or np.unique(x).size <= ORDER:
+    if x.size < MIN_POINTS or np.unique(x).size <= ORDER:
         return None
     middle, half = 0.5 * (x.max() + x.min()), 0.5 * np.ptp(x)
     powers = np.vander((x - middle) / half, ORDER + 1)

@@ -14,11 +14,11 @@ from compressor.analysis.contacts import (
 )
 from compressor.analysis.runs import case_of, ideal_motion, settled_part
 
-APART = 20.0  # degrees: changes of sign nearer to each other are one turn
+SAME_TURN_DEGREES = 20.0  # degrees: changes of sign nearer to each other are one turn
 AFTER, SPAN = 5.0, 90.0  # degrees after a turn, and how long its ringing is looked at
 PADDED = 16  # times longer with zeros, so that the lines of its spectrum lie close
 DRIFT = 5  # degree of the polynomial that is taken off what rings
-LEAST_RING = 12.0  # of the crank's frequency: below it a motion is the machine's
+MIN_RING = 12.0  # of the crank's frequency: below it a motion is the machine's
 
 
 @dataclass(frozen=True)
@@ -63,17 +63,17 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
     """Return the crank angles (degrees, 0 to 360) at which a force changes its sign.
 
     angle: of the samples, (m,) degrees; changes of several revolutions, and of a force that
-    trembles about zero, are put together where they are nearer than `APART`.
+    trembles about zero, are put together where they are nearer than `SAME_TURN_DEGREES`.
     """
     at = np.sort(angle[1:][np.diff(np.sign(force)) != 0] % 360.0)
     if not at.size:
         return ()
     groups: list[list[float]] = [[at[0]]]
     for one, other in itertools.pairwise(at):
-        if other - one > APART:
+        if other - one > SAME_TURN_DEGREES:
             groups.append([])
         groups[-1].append(float(other))
-    if len(groups) > 1 and groups[0][0] + 360.0 - groups[-1][-1] <= APART:
+    if len(groups) > 1 and groups[0][0] + 360.0 - groups[-1][-1] <= SAME_TURN_DEGREES:
         groups[0] = [one - 360.0 for one in groups.pop()] + groups[0]
     return tuple(sorted(float(np.mean(group)) % 360.0 for group in groups))
 
@@ -97,7 +97,7 @@ def ringing(kept: xr.Dataset, turn: float) -> float:
     how = {"nfft": PADDED * rest.size, "detrend": False}
     frequency, power = periodogram(rest, rate, np.hanning(rest.size), **how)
     lines, _ = find_peaks(power)  # an end of the spectrum is no line, but a slower motion's foot
-    lines = lines[frequency[lines] >= LEAST_RING * case_of(kept).omega / (2.0 * np.pi)]
+    lines = lines[frequency[lines] >= MIN_RING * case_of(kept).omega / (2.0 * np.pi)]
     return float(frequency[lines[np.argmax(power[lines])]]) if lines.size else float("nan")
 
 

@@ -75,7 +75,7 @@ CHAOTIC = (
     "revolutions (solve.duration_rev) make averages that hold."
 )
 FILM = " The joints have oil: contact is dry contact, and without it the film bears the journal."
-LEAST = 0.05  # N: below it a force is told as less than 0.1
+MIN_FORCE = 0.05  # N: below it a force is told as less than 0.1
 
 
 def caution(run: xr.Dataset) -> str:
@@ -119,7 +119,7 @@ def spectra(run: xr.Dataset, twin: Twin) -> str:
     if twin is not None:
         sentences[-1] += f"; without clearance {newtons(shaking(twin).spectrum.above)}"
     deviation = deviation_spectrum(run).above
-    text = f"{deviation:.1f}" if deviation >= LEAST else "less than 0.1"
+    text = f"{deviation:.1f}" if deviation >= MIN_FORCE else "less than 0.1"
     sentences[-1] += f". Of the crosshead's deviation above it: {text} m/s²."
     envelope = sensor_envelope(run)
     if envelope is not None:
@@ -242,7 +242,7 @@ def span(values: np.ndarray, form: str = ".2f") -> str:
 
 def newtons(force: float) -> str:
     """Return a force (N) in words."""
-    if force < LEAST:
+    if force < MIN_FORCE:
         return "less than 0.1 N"
     return f"{force:.0f} N" if force >= 9.95 else f"{force:.1f} N"
 

@@ -87,10 +87,10 @@ def healthy_twin(run: xr.Dataset) -> xr.Dataset:
 
 ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing
 BEFORE, AFTER = 10.0, 50.0  # degrees about a change of direction that count as belonging to it
-SILENT = 1e-9  # of the greatest force: what lies below is rounding
+SILENT_SHARE = 1e-9  # of the greatest force: what lies below is rounding
 LEVELS = 5  # of the kurtogram that chooses a sensor's band, at most
-LEAST_SHARE = 0.01  # of the record's energy that this band has
-LEAST_LINES = 128  # samples that a level of it needs, twice over for each further one
+MIN_SHARE = 0.01  # of the record's energy that this band has
+MIN_LINES = 128  # samples that a level of it needs, twice over for each further one
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def shaking(run: xr.Dataset) -> Shaking:
     rest = np.where(np.tile(near, high.size // a_turn), 0.0, high)
     lines = line_amplitudes(rest, a_turn, "rectangular", True)
     lines[: ORDER + 1] = 0.0
-    rings = lines.max() > SILENT * np.abs(force).max()
+    rings = lines.max() > SILENT_SHARE * np.abs(force).max()
     return Shaking(
         revolutions,
         order_lines(even, a_turn),
@@ -225,7 +225,7 @@ class SensorEnvelope:
     """The envelope spectrum of a sensor's record: orders and amplitudes (m/s2), (k,) each.
 
     `band`: in Hz, the one with the greatest `kurtosis` of those bands of the kurtogram that hold
-    `LEAST_SHARE`; beyond the sensor's filter there is rounding alone.
+    `MIN_SHARE`; beyond the sensor's filter there is rounding alone.
     """
 
     orders: np.ndarray
@@ -243,17 +243,17 @@ def sensor_envelope(run: xr.Dataset) -> SensorEnvelope | None:
     if "sensor_acceleration" not in run:
         return None
     values, time = run["sensor_acceleration"].values, run["sensor_time"].values
-    if values.size < 4 * LEAST_LINES or not np.isfinite(values).all() or not np.ptp(values):
+    if values.size < 4 * MIN_LINES or not np.isfinite(values).all() or not np.ptp(values):
         return None
     rate = (time.size - 1) / (time[-1] - time[0])
-    levels = min(LEVELS, int(math.log2(values.size // LEAST_LINES)))
+    levels = min(LEVELS, int(math.log2(values.size // MIN_LINES)))
     found = kurtogram(values, rate, levels)
     power = line_amplitudes(values, values.size, "rectangular", True) ** 2
     lines = np.arange(power.size) * rate / values.size
     edges = found.frequency - found.bandwidth / 2, found.frequency + found.bandwidth / 2
     held = np.append(0.0, np.cumsum(power))
     low, high = (np.searchsorted(lines, edge) for edge in edges)
-    strong = held[high] - held[low] >= LEAST_SHARE * power.sum()
+    strong = held[high] - held[low] >= MIN_SHARE * power.sum()
     best = int(np.nanargmax(np.where(strong, found.kurtosis, np.nan)))
     band = float(edges[0][best]), float(edges[1][best])
     speed = 1.0 / case_of(run).turn

@@ -222,7 +222,7 @@ MAPPINGS = {  # of these, what stands in them
         "exponent",
     ),
 }  # fmt: skip
-MOST_MEANT = 3  # keys that an unknown one may have meant
+MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
 def known_keys(group: str, file: bool = True) -> list[str]:
@@ -311,7 +311,7 @@ def _holding(name: str, within: str = "") -> list[str]:
         for key in table()
         if key.startswith(within) and words and words <= {*_leaf(key).lower().split("_")}
     ]
-    return found if len(found) <= MOST_MEANT else []
+    return found if len(found) <= MAX_MEANT else []
 
 
 def _leaf(key: str) -> str:
@@ -342,7 +342,7 @@ def _stem(name: str) -> str:
     return name
 
 
-PLAIN = (int, float, str)
+PLAIN_TYPES = (int, float, str)
 
 
 def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
@@ -355,7 +355,7 @@ def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
     if row.kind == "accuracy" and isinstance(value, Mapping):
         targets = checked_targets(key, value, problems)
         return targets if len(problems) == before else row.default
-    if not isinstance(value, PLAIN):
+    if not isinstance(value, PLAIN_TYPES):
         value = _scalar(value)
     message = row.check(value)
     if message:

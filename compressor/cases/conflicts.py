@@ -17,7 +17,7 @@ from typing import Any, cast
 
 from compressor.cases.checks import SHORTHANDS, row_of, value_in
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
-from compressor.cases.optional_groups import GREATEST_RATIO, LEAST_RATIO
+from compressor.cases.optional_groups import GREATEST_RATIO, MIN_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, Problem, Reader
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
@@ -224,11 +224,11 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
     for joint in JOINTS:
         width = 2.0 * case.machine.pin_radius(joint)
         ratio = case.lubricant.bearing_length_mm / width
-        if case.joint in (joint, "both") and not LEAST_RATIO <= ratio <= GREATEST_RATIO:
+        if case.joint in (joint, "both") and not MIN_RATIO <= ratio <= GREATEST_RATIO:
             yield Problem(
                 "lubricant.bearing_length_mm",
                 f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
-                f"hold from {LEAST_RATIO:g} to {GREATEST_RATIO:g} times",
+                f"hold from {MIN_RATIO:g} to {GREATEST_RATIO:g} times",
             )
 
 
@@ -285,8 +285,8 @@ IN_PLACE_OF = (
     ("contact.materials", "contact.modulus_GPa"),
 )
 HEAVIEST = 0.1  # the moving parts' share of a body's mass
-MOST_BACK = 0.3  # of a force that a body's motion may change at the speed's first two orders
-MANY = 1e9  # revolutions, more than any run has
+MAX_BACK = 0.3  # of a force that a body's motion may change at the speed's first two orders
+MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
@@ -377,7 +377,7 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         yield from _resonance_conflicts(case, axis)
     # `auto` settles at a whole revolution, and measures whole ones from there on
     span = (case.duration - case.settle) / case.turn
-    whole = abs(span) < MANY and abs(span - round(span)) <= 1e-9
+    whole = abs(span) < MAX_REVOLUTIONS_TOLD and abs(span - round(span)) <= 1e-9
     if body.start == "steady" and not whole:
         yield Problem(
             "body.start",
@@ -395,7 +395,7 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
     for order in (1, 2):
         frequency = order * case.machine.speed_rpm / 60.0
         back = abs(back_action(case, axis, frequency))
-        if back > MOST_BACK:
+        if back > MAX_BACK:
             key = f"frequency_{axis}_Hz"
             yield Problem(
                 f"body.{key}",

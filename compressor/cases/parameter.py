@@ -269,16 +269,16 @@ class CaseError(CompsimError, ValueError):
         return "\n".join(map(str, self.problems))
 
 
-MOST_WORD = 100  # characters that are looked at to find what was meant
-SHORT = reprlib.Repr()
-SHORT.maxstring = SHORT.maxother = SHORT.maxlong = 60
+MAX_WORD = 100  # characters that are looked at to find what was meant
+SHORT_REPR = reprlib.Repr()
+SHORT_REPR.maxstring = SHORT_REPR.maxother = SHORT_REPR.maxlong = 60
 
 
 def quote_value(value: Any) -> str:
     """Return a value as an error message quotes it: control characters escaped, long values cut."""
     if isinstance(value, bool):
         return str(value).lower()
-    return SHORT.repr(value)
+    return SHORT_REPR.repr(value)
 
 
 @lru_cache(4096)  # the jobs of a study share most of their values
@@ -404,10 +404,10 @@ class Parameter:
             return message
         lower = dict(self.aliases)
         lower |= {choice.lower(): choice for choice in (*self.choices, "true", "false")}
-        near = get_close_matches(word[:MOST_WORD].lower(), lower, n=1)
+        near = get_close_matches(word[:MAX_WORD].lower(), lower, n=1)
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"
-        if self.kind in ("number", "integer") and (number := WRITTEN.fullmatch(word[:MOST_WORD])):
+        if self.kind in ("number", "integer") and (number := WRITTEN.fullmatch(word[:MAX_WORD])):
             plain, comma, unit = number[1].replace(",", "."), number[2] == ",", number[3]
             if unit and unit != self.unit:
                 return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
@@ -514,7 +514,8 @@ ACCURACY = {
     "reference": Tier(5e-11, 1e-6),
 }
 LOOSEST, TIGHTEST = 2e-4, 1e-12  # of first runs for accuracy by number, and of any run for it
-FIRST = 0.01  # of the error asked for: the first tolerance. Bars are some 26 rtol in the median
+# of the error asked for: the first tolerance. Bars are some 26 rtol in the median
+FIRST_TOLERANCE_FACTOR = 0.01
 
 TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")
 
@@ -523,7 +524,7 @@ Targets = tuple[tuple[str, float], ...]  # (metric, greatest relative error), by
 
 def first_rung(targets: Targets) -> float:
     """Return the tolerance of the first run where accuracy is asked for by number."""
-    return min(LOOSEST, *(FIRST * target for _, target in targets))
+    return min(LOOSEST, *(FIRST_TOLERANCE_FACTOR * target for _, target in targets))
 
 
 def checked_targets(key: str, value: Mapping[Any, Any], problems: list[Problem]) -> Targets:

@@ -20,7 +20,7 @@ from compressor.cases.combinations import Alike
 from compressor.cases.conflicts import RULES
 from compressor.cases.keys import nest_values
 
-HELD = re.compile(r'"@(\d+)"')  # where a column stands in a text
+COLUMN_PLACE = re.compile(r'"@(\d+)"')  # where a column stands in a text
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class CaseBatch:
             return [self.at(place).key for place in range(len(self))]
         if not columns:
             return [digest(text)] * len(self)
-        pieces = HELD.split(text)
+        pieces = COLUMN_PLACE.split(text)
         frame = "%s".join(piece.replace("%", "%%") for piece in pieces[::2])
         texts = {id(column): list(map(repr, column.numbers.tolist())) for column in columns}
         rows = zip(*(texts[id(columns[int(place)])] for place in pieces[1::2]), strict=True)

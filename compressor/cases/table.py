@@ -37,7 +37,7 @@ from compressor.cases.parameter import (
     choice,
 )
 
-MOST_REV = 50.0  # with `duration_rev: auto`
+MAX_REV = 50.0  # with `duration_rev: auto`
 
 GROUPS: dict[str, type] = {
     "clearance_mm": PerJoint,
@@ -121,7 +121,7 @@ class Settings:
         if self.solve.duration_s is not None:
             return self.solve.duration_s
         given = self.solve.duration_rev
-        return (MOST_REV if isinstance(given, str) else given or 0.0) * self.turn
+        return (MAX_REV if isinstance(given, str) else given or 0.0) * self.turn
 
     @property
     def settle(self) -> float:

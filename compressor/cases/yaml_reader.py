@@ -23,8 +23,8 @@ from compressor.program import CompsimError, did_you_mean, printable
 SUFFIXES = (".yaml", ".yml")
 RESULTS = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")  # how HDF5 and netCDF files begin
 START = "compsim init writes a case file to start from"
-MOST_LOOKED_AT = 1000  # entries of a folder
-MOST_NAMES = 5
+MAX_LOOKED_AT = 1000  # entries of a folder
+MAX_NAMES = 5
 
 
 def unreadable(path: str, error: OSError | ValueError) -> str:
@@ -49,7 +49,7 @@ def no_text(data: bytes) -> str:
 def case_files(folder: Path) -> list[Path]:
     """Return the case files in a folder, by their names."""
     try:
-        entries = sorted(islice(folder.iterdir(), MOST_LOOKED_AT))
+        entries = sorted(islice(folder.iterdir(), MAX_LOOKED_AT))
     except OSError:
         return []
     return [path for path in entries if path.suffix in SUFFIXES and path.is_file()]
@@ -64,7 +64,7 @@ def _instead(path: Path) -> str:
     if near or not found:
         return near or START
     names = [*map(str, found.values())]
-    return f"there are {', '.join(names[:MOST_NAMES])}{', …' * (len(names) > MOST_NAMES)}"
+    return f"there are {', '.join(names[:MAX_NAMES])}{', …' * (len(names) > MAX_NAMES)}"
 
 
 MAX_BYTES = 1 << 20

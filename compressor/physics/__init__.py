@@ -22,7 +22,7 @@ from compressor.physics.observe import (
 )
 from compressor.physics.onset import meeting
 from compressor.physics.record import (
-    MOST_SECTORS,
+    MAX_SECTORS,
     Coordinate,
     Load,
     Scene,

@@ -22,8 +22,8 @@ from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import STAGES, A, C, E, RungeKuttaPair
 
 LANES = 16
-MOST = 8  # numbers of a motion
-STATE = MOST + 4  # and energy flows
+MAX_STATES = 8  # numbers of a motion
+STATE = MAX_STATES + 4  # and energy flows
 STAGE_COUNT = 7
 SEEN_COUNT = 18  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potential energy
 PEAKED = 7  # of these the first ones, of which the greatest size is kept
@@ -61,7 +61,7 @@ T, H, PHASE, RTOL, SETTLE, END, NEXT_SAMPLE = (_rows() for _ in range(7))
 ERROR, REMEMBERED = _rows(), _rows()
 STEPS, REFUSED, BUDGET, REST, HELD, TOO_DEEP = (_rows() for _ in range(6))
 ALIVE, PLAIN, NEAR, MEASURED, CALL = (_rows() for _ in range(5))
-ATOL, SIZE = _rows(MOST), _rows(MOST)
+ATOL, SIZE = _rows(MAX_STATES), _rows(MAX_STATES)
 Z = _rows(STATE)
 NEW = _rows(STATE)
 OUT = _rows(STATE)  # dz/dt of the stage at hand

@@ -72,8 +72,8 @@ from compressor.physics.step_control import (
     EXPLICIT_ORDER,
     GROW,
     INTEGRAL,
-    LEAST_ERROR,
-    LEAST_STEP,
+    MIN_ERROR,
+    MIN_STEP,
     PROPORTIONAL,
     SAFETY,
     SHRINK,
@@ -81,7 +81,7 @@ from compressor.physics.step_control import (
     STIFF_STEPS,
     SUSPECT,
 )  # fmt: skip
-from compressor.physics.tally import NEAR as NEAR_SHARE
+from compressor.physics.tally import PEAK_NEARNESS as NEAR_SHARE
 from compressor.physics.tally import vertex
 
 
@@ -155,7 +155,7 @@ def control(scene, W, k):
         longer = h * min(GROW, max(SHRINK, factor)) if plain else h
         longer = h * max(SHRINK, shorter) if refused else longer
         reached = t + h if plain else t
-        W[REMEMBERED + j] = max(now, LEAST_ERROR) if plain else remembered
+        W[REMEMBERED + j] = max(now, MIN_ERROR) if plain else remembered
         W[REFUSED + j] += 1.0 if refused else 0.0
         W[H + j] = longer
         W[T + j] = reached
@@ -163,7 +163,7 @@ def control(scene, W, k):
         call = (reached + 1.01 * longer >= W[END + j]) | (turning > SMALL)
         call = call | (W[HELD + j] >= STIFF_STEPS) | (W[DEEPEST + j] > W[TOO_DEEP + j])
         call = call | (not (plain | refused)) | (W[STEPS + j] + W[REFUSED + j] >= W[BUDGET + j])
-        call = call | (longer < LEAST_STEP * (reached + 1.0 / W[FIRST_FIELD + j]))
+        call = call | (longer < MIN_STEP * (reached + 1.0 / W[FIRST_FIELD + j]))
         W[CALL + j] = 1.0 if call & alive else 0.0
 
 

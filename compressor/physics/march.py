@@ -35,7 +35,7 @@ from compressor.physics.observe import (
     ECCENTRICITY,
     NEARNESS,
 )
-from compressor.physics.onset import LANDED, change, first_onset, meeting, remember
+from compressor.physics.onset import LANDED_SHARE, change, first_onset, meeting, remember
 from compressor.physics.record import MECHANISM, zero
 from compressor.physics.runge_kutta import (
     FLOWS,
@@ -51,8 +51,8 @@ from compressor.physics.runge_kutta import (
     weights_at,
 )
 from compressor.physics.step_control import (
-    LEAST_ERROR,
-    LEAST_STEP,
+    MIN_ERROR,
+    MIN_STEP,
     REST,
     Mode,
     choose_method,
@@ -154,7 +154,7 @@ def new_walker(mode):
     """Return a walker at the start of its first segment."""
     walker = zero(WALKER)
     walker["fresh"] = 1
-    walker["error"] = LEAST_ERROR
+    walker["error"] = MIN_ERROR
     walker["mode"] = mode
     walker["pause"] = REST // 2
     walker["stiff"] = mode == Mode.STIFF
@@ -307,7 +307,7 @@ def onset_ahead(w, h, every, work, phase, p):
     found = False
     if w.watch and w.laid and may_touch(work.rows, p):
         begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
-        if begin < 1.0 and not (w.landed and begin < LANDED):
+        if begin < 1.0 and not (w.landed and begin < LANDED_SHARE):
             found = True
             w.landing = begin * h
             pulse = (end - begin) * h if end < 1.0 else math.inf
@@ -457,7 +457,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         if not landing:
             if not error <= 1.0:
                 refuse(w, h, error)
-                if w.h < LEAST_STEP * (w.t + 1.0 / p.omega):
+                if w.h < MIN_STEP * (w.t + 1.0 / p.omega):
                     w.status = STEP_UNDERFLOW if is_finite(work.k[0]) else NON_FINITE
                 continue
             longer = next_step_length(w, h, error)

@@ -29,8 +29,8 @@ from compressor.physics.mechanism import (
     unpack,
 )
 
-MOST_ROUNDS = 50  # in which friction and the forces that it depends on agree
-AGREED = 1e-14  # of the friction
+MAX_ROUNDS = 50  # in which friction and the forces that it depends on agree
+FRICTION_AGREED = 1e-14  # of the friction
 
 
 class Reactions(NamedTuple):
@@ -144,7 +144,7 @@ def apart(one, other):
     size = abs(other.big_torque) + abs(other.small_torque)
     far = abs(one.big_torque - other.big_torque) + abs(one.small_torque - other.small_torque)
     pushed = abs(one.rubbing - other.rubbing)
-    return far > AGREED * size or pushed > AGREED * abs(other.rubbing)
+    return far > FRICTION_AGREED * size or pushed > FRICTION_AGREED * abs(other.rubbing)
 
 
 @jit
@@ -175,7 +175,7 @@ def solve(motion, y, phase, p):
         steady[row] = own[row] - steady[row]
     add_forces(pose, joints, p, steady)
     reactions = Reactions(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         force[:] = steady
         add_rubbing(pose, reactions, p, force)
         project(pose, force, p, pushed)

@@ -13,11 +13,11 @@ from compressor.physics.runge_kutta import interpolate
 from compressor.physics.systems import contact_at, derivative
 
 SAMPLES = 12  # intervals of a step that are looked at
-EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
+STEP_EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
 LOOKS = SAMPLES + 2
 HALVINGS = 40
 PLACED = 1e-5  # of a step: as well as a change of contact is placed for the metrics
-LANDED = 1e-3  # of a step: an onset nearer to its start is the one it started from
+LANDED_SHARE = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NEVER = 2.0  # a fraction of the step beyond its end
 
 
@@ -74,9 +74,9 @@ def touching_between(joint, low, high, t, h, dense, phase, p, y):
 def place(i):
     """Return the fraction of a step at which look i, 0 to LOOKS, is taken."""
     if i <= 1:
-        return i * EDGE
+        return i * STEP_EDGE
     if i >= LOOKS - 1:
-        return 1.0 - (LOOKS - i) * EDGE
+        return 1.0 - (LOOKS - i) * STEP_EDGE
     return (i - 1) / SAMPLES
 
 
@@ -179,7 +179,7 @@ def remember(w, t, work, phase, p, tally):
         flown = tally.flown[joint] > 0 or apart < 0.0
         if p.clearance[joint] > 0.0 and flown and not tally.touching[joint]:
             depth, speed = meeting(joint, t, work.new[:n], phase, p, work.y, work.column[:n])
-            if depth + LANDED * w.h * speed > 0.0:
+            if depth + LANDED_SHARE * w.h * speed > 0.0:
                 work.new[2 * p.freedoms + joint] = max(speed, p.least_approach)
                 met = True
     return met

@@ -149,13 +149,13 @@ FILM: list[tuple] = [
     ("film_share", "f8"),  # of the clearance: the film's last, in which the contact takes over
     ("film_constants", "f8", (2, 51)),  # of each joint, `film.film_constants`
 ]
-MOST_SECTORS = 180
+MAX_SECTORS = 180
 # of a mechanism whose bores wear
 WEAR: list[tuple] = [
     ("sectors", "i8"),  # that a bore is divided into by angle; 0: round bores
     ("sector", "f8"),  # width of one, rad
-    ("towards", "f8", (MOST_SECTORS, 2)),  # directions of the nodes between them, x and y
-    ("worn", "f8", (2, MOST_SECTORS)),  # per joint, m
+    ("towards", "f8", (MAX_SECTORS, 2)),  # directions of the nodes between them, x and y
+    ("worn", "f8", (2, MAX_SECTORS)),  # per joint, m
 ]
 # of a mechanism with more freedom than ideal guides, a steady crank and a rigid rod leave it
 FEATURES: list[tuple] = [

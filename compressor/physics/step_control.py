@@ -17,8 +17,8 @@ from compressor.physics.systems import derivative_with_flows
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
-LEAST_ERROR = math.log(1e-4)  # that the control remembers
-LEAST_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
+MIN_ERROR = math.log(1e-4)  # that the control remembers
+MIN_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 # stiffness: an explicit step is held by stability where h |lambda| exceeds the limit
 STABILITY_LIMIT = 3.25  # of both pairs on the negative real axis, about
@@ -88,7 +88,7 @@ def next_step_length(w, h, error):
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
     now = logarithm(max(error, 1e-10))
     factor = SAFETY * exponential((INTEGRAL * w.error - PROPORTIONAL * now) / order)
-    w.error = max(now, LEAST_ERROR)
+    w.error = max(now, MIN_ERROR)
     return h * min(GROW, max(SHRINK, factor))
 
 

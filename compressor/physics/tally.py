@@ -23,9 +23,10 @@ from compressor.physics.observe import (
     PENETRATION,
     POTENTIAL,
 )
-from compressor.physics.record import MECHANISM, MOST_SECTORS, is_featured, zero
+from compressor.physics.record import MAX_SECTORS, MECHANISM, is_featured, zero
 
-NEAR = 0.98  # of a peak: nodes between which a step resolved to its tolerance may rise above it
+# of a peak: nodes between which a step resolved to its tolerance may rise above it
+PEAK_NEARNESS = 0.98
 PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
 
 
@@ -74,7 +75,7 @@ WORN = np.dtype(
         # first: to numba, a record with fields behind another's is one of those
         ("steady_seconds", "f8"),  # that a steady crank takes for the angle of `seconds`
         ("slid", "f8", (2,)),  # integral of N |v| by joint, J: what wear is in proportion to
-        ("worn", "f8", (2, MOST_SECTORS)),  # its parts, by node of the bore
+        ("worn", "f8", (2, MAX_SECTORS)),  # its parts, by node of the bore
         *[(name, TALLY[name]) for name in TALLY.names or ()],
     ],
     align=True,
@@ -184,12 +185,12 @@ def near_record(rows, middle, tally):
     for k in range(PEAKED):
         column = ACCELERATION + k
         top = max(abs(rows[0, column]), abs(rows[middle, column]), abs(rows[last, column]))
-        if top >= NEAR * tally.peak[k] and top > 0.0:
+        if top >= PEAK_NEARNESS * tally.peak[k] and top > 0.0:
             return True
     for joint in range(2):
         column = PENETRATION + joint
         top = max(rows[0, column], rows[middle, column], rows[last, column])
-        if top > 0.0 and top >= NEAR * tally.max_penetration[joint]:
+        if top > 0.0 and top >= PEAK_NEARNESS * tally.max_penetration[joint]:
             return True
     return False
 

@@ -18,7 +18,7 @@ import numpy as np
 from compressor.physics._jit import jit, square_root
 from compressor.physics.contact import ContactState, friction_coefficient
 from compressor.physics.contact_laws import in_contact, normal_force
-from compressor.physics.record import MOST_SECTORS
+from compressor.physics.record import MAX_SECTORS
 
 FULL = 16.0 * math.sqrt(2.0) / 15.0  # S = FULL c^2 x^(5/2) (1 + ...) at a small depth x = delta / c
 SERIES = np.array(
@@ -36,7 +36,7 @@ def bore_fields(sectors: int) -> dict:
     """
     width = 2.0 * math.pi / sectors
     angles = width * np.arange(sectors)
-    towards = np.zeros((MOST_SECTORS, 2))
+    towards = np.zeros((MAX_SECTORS, 2))
     towards[:sectors] = np.stack((np.cos(angles), np.sin(angles)), axis=1)
     longer = 1.0 + width**2 / 12.0
     return {"sectors": sectors, "sector": width, "towards": longer * towards}

@@ -196,7 +196,7 @@ def provenance_section(studies: Sequence[StoredStudy], results: Folder, command:
     return Section("provenance", "Where this comes from", "provenance.html", content)
 
 
-MOST_FINDINGS = 3
+MAX_FINDINGS = 3
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 FROM_ZERO = 5.0  # rank of what appears: as of a value 150 times as large
 
@@ -316,7 +316,7 @@ def rank_findings(
         found = finding(measure, values, bars, names)
         if found and (measure.variable not in best or found.rank > best[measure.variable].rank):
             best[measure.variable] = found
-    return sorted(best.values(), key=lambda found: -found.rank)[:MOST_FINDINGS]
+    return sorted(best.values(), key=lambda found: -found.rank)[:MAX_FINDINGS]
 
 
 def finding(
@@ -357,7 +357,7 @@ def round_robin(
     each: Sequence[tuple[str, Sequence[MetricChange]]],
 ) -> Iterator[tuple[str, Sequence[MetricChange]]]:
     """At most so many findings in all, the first of each first."""
-    room = MOST_FINDINGS
+    room = MAX_FINDINGS
     counts = [0] * len(each)
     while room and any(n < len(found) for n, (_, found) in zip(counts, each, strict=True)):
         for place, (_, found) in enumerate(each):

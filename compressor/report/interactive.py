@@ -22,7 +22,7 @@ from compressor.report.figures.extract import FigureData, Panel, PanelText, Scal
 from compressor.store import DamagedJob, Stored, publish
 
 LIBRARY = "plotly.min.js"
-MOST_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
+MAX_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
 FLOAT = np.dtype("f4").newbyteorder("little")
 EVEN = 1e-6  # of a step: how far evenly spaced numbers may be off
 
@@ -154,13 +154,13 @@ def visible(trace: Trace, panel: Panel) -> Any:
     if trace.kind not in ("line", "points") or x.size < 3 or not np.isfinite(x).all():
         return slice(None)
     if trace.kind == "points" or (np.diff(x) < 0).any():
-        return slice(None) if x.size <= 2 * MOST_POINTS else every(x.size, 2 * MOST_POINTS)
+        return slice(None) if x.size <= 2 * MAX_POINTS else every(x.size, 2 * MAX_POINTS)
     low, high = sorted((panel.x.low, panel.x.high))
     first = max(0, int(np.searchsorted(x, low, "left")) - 1)
     last = min(x.size, int(np.searchsorted(x, high, "right")) + 1)
-    if last - first <= MOST_POINTS:
+    if last - first <= MAX_POINTS:
         return slice(first, last)
-    return first + extremes(y[first:last], MOST_POINTS // 2)
+    return first + extremes(y[first:last], MAX_POINTS // 2)
 
 
 def every(size: int, count: int) -> np.ndarray:
@@ -205,7 +205,7 @@ def describe_figure(sheet: FigureData) -> str:
     return several + "; ".join(dict.fromkeys(told))
 
 
-MOST_SERIES = 60  # jobs of a study whose time series lie beside the page
+MAX_SERIES = 60  # jobs of a study whose time series lie beside the page
 COLORS = {"big_end": "#1f4488", "small_end": "#d0583b"}
 ANGLE = "crank angle (°), 0 = top dead centre"
 ACCELERATION, FORCE = "acceleration (m/s²)", "contact force (kN)"
@@ -216,7 +216,7 @@ def job_scripts(stored: Stored, keys: Iterable[str]) -> Iterator[tuple[str, str]
     found = 0
     for key in dict.fromkeys(keys):
         status = stored.status(key)
-        if found == MOST_SERIES:
+        if found == MAX_SERIES:
             return
         if status is None or status.status != "ok" or not status.samples:
             continue

@@ -52,7 +52,7 @@ from compressor.report.page import (
     status_text,
     value_cell,
 )
-from compressor.report.study_section import SHORT, file_name
+from compressor.report.study_section import KEY_DIGITS, file_name
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, StoreWarning
 
 
@@ -220,12 +220,12 @@ def spelt(value: Any, unit: str) -> str:
     return str(value)
 
 
-WORN = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
+WORN_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
 IDEAL = ("design", "typical")
 # what the motion of a worn machine depends on; the gas does not push with the spring load
 MACHINE = ("machine", "spring", "contact", "friction")
-WHOLE = 1e-6  # revolutions: rounding of a whole one
-SET = tuple(figure for figure in FIGURES if {*WORN} & {*figure.needs})
+REVOLUTION_ROUNDING = 1e-6  # revolutions: rounding of a whole one
+SET = tuple(figure for figure in FIGURES if {*WORN_LABELS} & {*figure.needs})
 NO_IDEAL = (
     "{} are not drawn: no run without clearance of a machine with this motion is stored on the "
     "same output grid. A block with joint: none in the case file gives it."
@@ -293,9 +293,9 @@ def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSe
         return None  # a sweep over machines is drawn as one
     (cases,) = machines
     runs = find_runs(stored, [study], cases)
-    if not runs.usable.keys() >= {*WORN} or not comparable(runs.usable.values()):
+    if not runs.usable.keys() >= {*WORN_LABELS} or not comparable(runs.usable.values()):
         return None
-    case = case_of(runs.usable[WORN[-1]])
+    case = case_of(runs.usable[WORN_LABELS[-1]])
     drawn, judged = (
         default_machine_runs(case, paper, loads) | runs.usable for loads in (False, True)
     )
@@ -324,7 +324,7 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
         if ideal in seen or not is_other(case):
             continue
         seen.add(ideal)
-        if all(cases[name].physics_key.encode() in held for name in WORN):
+        if all(cases[name].physics_key.encode() in held for name in WORN_LABELS):
             yield cases
 
 
@@ -342,7 +342,11 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
     grids = [settled_part(run)["crank_angle"].values for run in runs]
     turns = (grids[0][-1] - grids[0][0]) / (2.0 * np.pi)
     fine = grids[0].size - 1 > 2 * (ORDER + 1) * turns
-    return turns > 1.0 - WHOLE and fine and all(np.array_equal(g, grids[0]) for g in grids)
+    return (
+        turns > 1.0 - REVOLUTION_ROUNDING
+        and fine
+        and all(np.array_equal(g, grids[0]) for g in grids)
+    )
 
 
 def default_machine_runs(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]:
@@ -467,7 +471,7 @@ def cases_table(paper: PaperRuns) -> PageTable:
         metrics = [measured_cell(m, *value_of(m, run)) for m in shown]
         residual = number_cell(float(run.get("energy_residual", math.nan)))
         tolerance = value_cell(run.attrs.get("rtol", ""))
-        trust = [residual, tolerance, Cell(key[:SHORT], "code")]
+        trust = [residual, tolerance, Cell(key[:KEY_DIGITS], "code")]
         rows.append(job_row([*start, *metrics, *trust], status, regime, key))
     return PageTable(head, rows)
 

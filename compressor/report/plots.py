@@ -93,8 +93,8 @@ def publish_drawings(
 
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
 OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
-MOST_ROWS = 200  # of a map
-SHORT = 10  # digits of a key in the name of a file
+MAX_ROWS = 200  # of a map
+KEY_DIGITS = 10  # digits of a key in the name of a file
 KEEP = "run it again with --set output.keep=series"
 
 
@@ -115,7 +115,7 @@ def write_plots(
     else:
         key = find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
-        stem = key[:SHORT]
+        stem = key[:KEY_DIGITS]
     yield from publish_drawings(drawn, output, stem, choice.kinds)
 
 
@@ -166,16 +166,16 @@ def study_figures(
 ) -> Iterator[tuple[str, str, Drawing]]:
     """Yield the names, captions and drawings of a study along one axis."""
     if choice.what and {*choice.what} <= {*JOB}:
-        first = study.keys[0][:SHORT]
+        first = study.keys[0][:KEY_DIGITS]
         raise PlotError(
             f"{study.name} is a study: for {choice.what[0]} name a job, such as {first}"
         )
     wanted = choose_figures(choice.what, [*STUDY], f"study {study.name}")
     over = axis_of(study, choice.over)
     jobs, where = select_jobs(study, over, choice.at)
-    if len(jobs) > MOST_ROWS:
-        where += f" {MOST_ROWS} of {len(jobs)} jobs, evenly chosen."
-        jobs = [jobs[n * len(jobs) // MOST_ROWS] for n in range(MOST_ROWS)]
+    if len(jobs) > MAX_ROWS:
+        where += f" {MAX_ROWS} of {len(jobs)} jobs, evenly chosen."
+        jobs = [jobs[n * len(jobs) // MAX_ROWS] for n in range(MAX_ROWS)]
     rows = [swept_row(stored, value, key) for value, key in jobs]
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
@@ -257,7 +257,10 @@ def value_of(study: StoredStudy, key: str, text: str) -> Any:
 
 def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
     """Return what one job tells, or why it tells nothing."""
-    name, status = format_swept_value(value) if value != "" else key[:SHORT], stored.status(key)
+    name, status = (
+        format_swept_value(value) if value != "" else key[:KEY_DIGITS],
+        stored.status(key),
+    )
     if status is None or status.status != "ok" or not status.samples:
         problem = "not run" if status is None else "failed" if status.reason else "no series"
         return SweptRow(name, problem=problem)

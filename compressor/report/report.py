@@ -66,7 +66,7 @@ from compressor.report.paper_sections import (
     shakings,
 )
 from compressor.report.study_section import (
-    MOST_ROWS,
+    MAX_ROWS,
     file_name,
     job_counts,
     job_facts,
@@ -222,7 +222,7 @@ def drawn_study(
             for one in ([] if whole else draw_sweep(data))
         ]  # fmt: skip
         figures, table = study_sections(stored, study, data, plates, anchor, notes)
-        keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MOST_ROWS]]
+        keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(
             figures, table, plates, study_findings(data),

@@ -26,10 +26,10 @@ from compressor.report.page import (
 )
 from compressor.store import Folder, Stored, StoredStudy, study_caveats
 
-MOST_DETAILS = 20
-MOST_ROWS = 500
-MOST_FACTS = 2000  # jobs whose points tell where they are
-SHORT = 10  # digits of a job's key
+MAX_DETAILS = 20
+MAX_ROWS = 500
+MAX_FACTS = 2000  # jobs whose points tell where they are
+KEY_DIGITS = 10  # digits of a job's key
 
 
 class Counts(NamedTuple):
@@ -136,19 +136,19 @@ def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[st
     """Return what a click on the point of a job tells: where it is in the sweep, how it ended, a
     command.
 
-    keys: of the jobs, of which the first MOST_FACTS are told of.
+    keys: of the jobs, of which the first MAX_FACTS are told of.
     """
     swept = swept_values(data)
     place = {str(key): n for n, key in enumerate(data["key"].values.flat)}
     status, reason = (data[name].values.ravel() for name in ("status", "reason"))
     found = {}
-    for key in [key for key in dict.fromkeys(keys) if key in place][:MOST_FACTS]:
+    for key in [key for key in dict.fromkeys(keys) if key in place][:MAX_FACTS]:
         n = place[key]
         point = {name: value_cell(values[n]).text for name, values in swept.items()}
         found[key] = {
             "values": point,
             "status": status_text(status[n], reason[n]),
-            "command": f"compsim show {key[:SHORT]} -i {shlex.quote(str(results))}",
+            "command": f"compsim show {key[:KEY_DIGITS]} -i {shlex.quote(str(results))}",
         }
     return found
 
@@ -158,12 +158,12 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
     failed = np.flatnonzero(data["status"].values == "failed")
     swept = swept_values(data)
     told = []
-    for place in failed[:MOST_DETAILS]:
+    for place in failed[:MAX_DETAILS]:
         job = stored.status(str(data["key"].values.flat[place]))
         point = [f"{name} {value_cell(values[place]).text}" for name, values in swept.items()]
         told.append(f"{', '.join(point)}: {status_text(job.reason, job.detail) if job else 'gone'}")
-    if len(failed) > MOST_DETAILS:
-        told.append(f"and {len(failed) - MOST_DETAILS} more")
+    if len(failed) > MAX_DETAILS:
+        told.append(f"and {len(failed) - MAX_DETAILS} more")
     return told
 
 
@@ -174,11 +174,11 @@ def jobs_table(data: xr.Dataset) -> PageTable:
     words = ("status", "reason", "regime", "key")
     ends = zip(*(data[name].values.flat for name in words), strict=True)
     rows = []
-    for place, (status, reason, regime, key) in zip(range(MOST_ROWS), ends, strict=False):
+    for place, (status, reason, regime, key) in zip(range(MAX_ROWS), ends, strict=False):
         cells = [value_cell(values[place]) for values in swept.values()]
         cells.append(Cell(status_text(status, reason, regime)))
         cells += [measured_cell(m, float(of[place]), float(bar[place])) for m, of, bar in metrics]
-        cells.append(Cell(str(key)[:SHORT], "code"))
+        cells.append(Cell(str(key)[:KEY_DIGITS], "code"))
         rows.append(job_row(cells, str(status), str(regime), str(key)))
     return PageTable([*swept, "status", *map(column_title, shown), "job"], rows)
 

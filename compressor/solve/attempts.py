@@ -137,12 +137,12 @@ def integrate(request: Request) -> Trajectory:
 
 
 PIECES = 32  # of the ideal scene's quadrature
-FINER = 0.3  # power of the tolerance by which they become more
-TIGHTER = 2.5  # times: the run that errors are estimated by
-LOOSE = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
+FINER_POWER = 0.3  # power of the tolerance by which they become more
+TIGHTER_FACTOR = 2.5  # times: the run that errors are estimated by
+OVERRUN_RTOL = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
 BLUNT = 0.02  # the same, of the journals' speed, over the speed at which friction turns about
 STIFF_TIGHTER = 10.0  # the same at loose tolerances
-LOOSER = 3.0  # times: the run that is asked as well where a motion enlarges errors
+LOOSER_FACTOR = 3.0  # times: the run that is asked as well where a motion enlarges errors
 
 
 @dataclass
@@ -202,7 +202,7 @@ def run_at_tolerance(
     """
     p, times = record(case), times_of(case, sampled)
     if is_ideal(case):
-        pieces = round(PIECES * (case.rtol / rtol) ** FINER)
+        pieces = round(PIECES * (case.rtol / rtol) ** FINER_POWER)
         return solution_of_trajectory(
             rtol, p, times, closed_form(p, times.all, case.settle, pieces, timeout)
         )
@@ -274,8 +274,8 @@ def companion_rtol(p: np.record, rtol: float) -> float | None:
     """Return the tolerance of a run's `comparison_run`, if that is by the run's own method and
     tighter.
     """
-    fits = rtol >= 0.99 * TIGHTER * TIGHTEST and not overruns_friction(p, rtol)
-    return rtol / TIGHTER if fits else None
+    fits = rtol >= 0.99 * TIGHTER_FACTOR * TIGHTEST and not overruns_friction(p, rtol)
+    return rtol / TIGHTER_FACTOR if fits else None
 
 
 def overruns_friction(p: np.record, rtol: float) -> bool:
@@ -284,7 +284,7 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
 
     Then two explicit runs may agree on a force that friction never has.
     """
-    if rtol > LOOSE:
+    if rtol > OVERRUN_RTOL:
         return True
     rubs = bool(p["friction"]) and bool(p["clearance"].any())
     return rubs and rtol * length_and_speed(p)[1] > BLUNT * p["stiction_velocity"]
@@ -317,7 +317,7 @@ def looser_comparison_run(
     """
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
-    found = run_at_tolerance(case, LOOSER * solution.rtol, timeout, False)
+    found = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, False)
     return None if found.reason else found
 
 

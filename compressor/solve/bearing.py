@@ -18,7 +18,7 @@ import numpy as np
 from compressor.physics import film_constants
 
 GRID = (96, 12)  # cells around and along half the bearing
-MOST_LOOKS = 200  # in which the cells that bear are found
+MAX_LOOKS = 200  # in which the cells that bear are found
 
 
 class Reynolds(NamedTuple):
@@ -84,7 +84,7 @@ def _forces(
     right = np.repeat(source, along)
     open_end = np.zeros(cell.size, bool) if squeeze else i == 0
     bears, pressure = ~open_end, np.zeros(cell.size)
-    for _ in range(MOST_LOOKS):
+    for _ in range(MAX_LOOKS):
         pressure[:] = 0.0
         here = np.flatnonzero(bears)
         pressure[here] = spsolve(matrix[here][:, here].tocsc(), right[here])

@@ -40,7 +40,8 @@ from compressor.solve.si_record import record, scene
 
 # Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.
 PER_RADIAN = {"big_end": 0.3, "small_end": 0.5, "both": 0.7}
-HELD = 0.5  # of the steps that stability asks for: joints are not in contact, or deep, always
+# of the steps that stability asks for: joints are not in contact, or deep, always
+STABILITY_SHARE = 0.5
 ORDER = 5
 STEP_SECONDS = {"big_end": 3.5e-6, "small_end": 3.5e-6, "both": 4.5e-6}  # of compiled methods
 SCIPY_SECONDS = 2.5e-4  # of a step of SciPy's methods, with its tally
@@ -144,7 +145,7 @@ def expected_steps(case: Case, joints: Sequence[JointScales]) -> float:
     joint = joints[0].joint if len(joints) == 1 else "both"
     radians = case.duration / min(one.implicit_step for one in joints)
     accurate = PER_RADIAN[joint] * case.rtol ** (-1.0 / ORDER)
-    stable = HELD * case.duration / min(one.explicit_step for one in joints)
+    stable = STABILITY_SHARE * case.duration / min(one.explicit_step for one in joints)
     return max(radians * accurate, min(stable, radians * max(accurate, 2.0)))
 
 
@@ -272,11 +273,11 @@ def describe_slip(key: str, usual: Usual, values: Sequence[float], other: str) -
     return f"{given} {verb} unusual ({range_} is usual); read as {other}, {them}"
 
 
-SHALLOW = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
+SHALLOW_CLEARANCES = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
 LONGEST_CRANK = 0.35  # of the rod's length; 0.15 to 0.3 is usual
-LEAST_STICTION = 0.1  # mm/s: below it, friction all but sticks
-MOST_JOBS = 500  # of a study that are looked at
-SHORT = 4.0  # a budget this many times below what is expected; so far is that to be trusted
+MIN_STICTION = 0.1  # mm/s: below it, friction all but sticks
+MAX_JOBS = 500  # of a study that are looked at
+SHORT_BUDGET = 4.0  # a budget this many times below what is expected; so far is that to be trusted
 NEAR_BUCKLING = 0.5  # of Euler's load, beyond which a rod bends by more than its own inertia asks
 TURN_PIECES = 8  # of the quadrature over a revolution of the ideal machine
 DENSITIES = 1000.0, 20_000.0  # kg/m3, of what rods are made of
@@ -316,9 +317,9 @@ def remarks(case: Case) -> Iterator[Remark]:
     if friction and friction.law in (None, "lugre") and friction.static < friction.dynamic:
         text = f"{friction.static:g} is below the dynamic one, {friction.dynamic:g}"
         yield Remark("friction.static", f"{text}: friction grows as bodies slide", "coefficients")
-    if joints and friction and 0 < friction.stiction_velocity_mm_per_s < LEAST_STICTION:
+    if joints and friction and 0 < friction.stiction_velocity_mm_per_s < MIN_STICTION:
         key = "friction.stiction_velocity_mm_per_s"
-        slow = f"{friction.stiction_velocity_mm_per_s:g} mm/s, below {LEAST_STICTION:g} mm/s"
+        slow = f"{friction.stiction_velocity_mm_per_s:g} mm/s, below {MIN_STICTION:g} mm/s"
         yield Remark(key, f"{slow}: friction all but sticks, and steps get short", "stiction")
     yield from _budgets(case, joints)
 
@@ -362,7 +363,7 @@ def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:
         key = "contact.length_mm" if cylinder else "contact.stiffness_N_per_mm15"
         yield Remark(key, text, "deep")
         return
-    if depth > SHALLOW * clearance:
+    if depth > SHALLOW_CLEARANCES * clearance:
         text = f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm"
         yield Remark(
             "clearance_mm",
@@ -413,15 +414,15 @@ def _drive(case: Case) -> Iterator[Remark]:
 def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
     """Yield the budgets that are likely to run out."""
     solve, (steps, seconds) = case.solve, expected_cost(case, joints)
-    if steps > SHORT * solve.max_steps:
+    if steps > SHORT_BUDGET * solve.max_steps:
         text = f"{solve.max_steps} steps, but about {steps:.1g} are expected"
         yield Remark("solve.max_steps", text, "steps")
-    if seconds > SHORT * solve.timeout_s:
+    if seconds > SHORT_BUDGET * solve.timeout_s:
         text = f"{solve.timeout_s:g} s, but about {seconds:.1g} s are expected"
         yield Remark("solve.timeout_s", text, "seconds")
 
 
-def cautions(study: Study, most: int = MOST_JOBS) -> list[Caution]:
+def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:
     """Return what is odd about the selected jobs of a study, an entry for each oddity.
 
     A key whose values look like another unit's has that remark alone, with the judged range where

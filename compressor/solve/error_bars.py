@@ -25,7 +25,7 @@ from compressor.metrics import METRICS, SERIES
 
 PER_TURN = 10.0  # of rtol: the residual that a revolution may leave
 ROUNDING = 1e-9  # a residual below it says nothing of a run
-GREATEST = 0.05  # a residual above it is too large at any tolerance
+MAX_RESIDUAL = 0.05  # a residual above it is too large at any tolerance
 RUNGS = 2  # by tens of the tolerance, for a run that fails its audit to be repeated at
 
 
@@ -45,16 +45,17 @@ def allowed_residual(rtol: float, revolutions: float) -> float:
     stiction and mass ratio, mostly keep it at a tenth of the tolerance; those that never do are
     far off (mu 0.5 at rtol 2e-8: 1.6e-4 of the acceleration).
     """
-    return min(max(PER_TURN * rtol * max(revolutions, 1.0), ROUNDING), GREATEST)
+    return min(max(PER_TURN * rtol * max(revolutions, 1.0), ROUNDING), MAX_RESIDUAL)
 
 
 Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
 
-WHOLE = 3.0  # of the distance of a time series to a tighter run's
+TIGHTER_DISTANCE_FACTOR = 3.0  # of the distance of a time series to a tighter run's
 LOOSER, TEN, FALL = 0.37, 10.0, 0.65  # share of a run TEN times looser, and how it falls beyond
 FLOOR = 0.1  # of the energy residual, relative to the metric
 ORDER = 0.8  # power of the tolerance with which errors fall
-ENLARGED = 50.0  # times rtol ** ORDER: a distance of accelerations beyond ten times the usual one
+# times rtol ** ORDER: a distance of accelerations beyond ten times the usual one
+AMPLIFIED_FACTOR = 50.0
 
 
 class Companion(NamedTuple):
@@ -85,7 +86,7 @@ def is_amplified(rtol: float, apart: Mapping[str, Any]) -> bool:
     """Return whether a motion enlarges errors, by how far a run is apart from one at a like
     tolerance.
     """
-    return bool(apart["acceleration"] > ENLARGED * rtol**ORDER)
+    return bool(apart["acceleration"] > AMPLIFIED_FACTOR * rtol**ORDER)
 
 
 def longest(found: Sequence[Metrics]) -> Metrics:
@@ -117,7 +118,7 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
         if not row.is_pure_number:
             found[name] = np.maximum(found[name], max(FLOOR * residual, bar.least) * size)
             farthest = np.maximum(other.apart[row.series], other.apart["acceleration"])
-            lost = WHOLE * other.closeness * farthest >= 1.0
+            lost = TIGHTER_DISTANCE_FACTOR * other.closeness * farthest >= 1.0
             found[name] = np.where(to_metric_shape(lost, np.ndim(value)), np.inf, found[name])
     return found
 
@@ -132,7 +133,10 @@ def series_errors(other: Companion | None) -> Metrics:
     if other is None:
         shape = {name: (2,) if "joint" in dims else () for name, (dims, _, _) in SERIES.items()}
         return {name: np.full(shape[name], np.inf) for name in SERIES}
-    return {name: WHOLE * other.closeness * value for name, value in other.apart.items()}
+    return {
+        name: TIGHTER_DISTANCE_FACTOR * other.closeness * value
+        for name, value in other.apart.items()
+    }
 
 
 def unmet(

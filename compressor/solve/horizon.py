@@ -31,13 +31,13 @@ from compressor.solve.march_driver import CHUNK, check_march, ready_walker
 from compressor.solve.request import Request, Stop, with_cuts
 from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record
 
-CLOSE = 1e-9  # of the clearance: how far from the motion its twin starts
-FAR = 1e-2  # of the clearance: how far apart they are no longer one motion
-RTOL = 1e-12  # of the twins, whatever the case asks for
+TWIN_DISTANCE = 1e-9  # of the clearance: how far from the motion its twin starts
+PARTED_DISTANCE = 1e-2  # of the clearance: how far apart they are no longer one motion
+TWINS_RTOL = 1e-12  # of the twins, whatever the case asks for
 
 
 def predictability_horizon(
-    case: Case, timeout: float = math.inf, rtol: float = RTOL, close: float = CLOSE
+    case: Case, timeout: float = math.inf, rtol: float = TWINS_RTOL, close: float = TWIN_DISTANCE
 ) -> float:
     """Return time (s) until a twin, shifted by 1e-9 of the clearance, is 1 % of the clearance away.
 
@@ -128,7 +128,7 @@ class Twins:
         check_march(self.request, self.walker, self.z, float(self.tally.deepest), self.deadline)
 
 
-def follow_twins(request: Request, shifted: np.ndarray, far: float = FAR) -> Parting:
+def follow_twins(request: Request, shifted: np.ndarray, far: float = PARTED_DISTANCE) -> Parting:
     """Follow a motion and its twin until they are `far` apart, as a share of the clearance.
 
     request: of a compiled method; shifted: the twin's initial state.

@@ -27,7 +27,7 @@ from compressor.solve.run_metrics import metrics, statistics
 from compressor.solve.si_record import record
 from compressor.solve.simulate import with_series
 
-SHIFT = 1e-6  # rev: half the span that the rate of an eccentricity is a difference over
+RATE_SHIFT_REV = 1e-6  # rev: half the span that the rate of an eccentricity is a difference over
 
 Enough = Callable[[Turns, np.ndarray], bool]  # of revolutions so far, and their Poincaré points
 
@@ -183,7 +183,7 @@ def eccentricities(p: np.record, at: float, state: np.ndarray) -> np.ndarray:
     z = np.append(state, np.zeros(FLOWS))
     rates = np.empty_like(z)
     derivative_with_flows(at, z, 0, p, rates)
-    span = SHIFT * 2.0 * math.pi / float(p["omega"])
+    span = RATE_SHIFT_REV * 2.0 * math.pi / float(p["omega"])
     shifts, rows = np.array([0.0, -span, span]), np.empty((3, COLUMNS))
     states = state + shifts[:, np.newaxis] * rates[:-FLOWS]
     observe_all(at + shifts, states, np.zeros(3, dtype=np.int64), p, rows)

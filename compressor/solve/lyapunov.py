@@ -27,11 +27,12 @@ from compressor.solve.si_record import is_ideal, record
 
 METHOD = "RODAS"  # of the twins, whatever the case asks for
 RTOLS = (1e-8, 1e-7, 1e-6)  # the next one where steps shrink to nothing, on a contact's edge
-CLOSE = 1e-7  # natural sizes: how far from the motion its twin starts
-LEAST = 1e-12  # natural sizes: a distance that rounding alone makes, and below
+TWIN_DISTANCE = 1e-7  # natural sizes: how far from the motion its twin starts
+LOST_DISTANCE = 1e-12  # natural sizes: a distance that rounding alone makes, and below
 INTERVALS = 36  # in a revolution: a joint's differences grow or shrink by some 20 times in one
-TURNING = 4  # revolutions at least, and a quarter of those counted, in which the difference turns
-MOST_BATCHES, LEAST_BATCH = 16, 4  # batches, and revolutions in one: whole periods of 1, 2 and 4
+# revolutions at least, and a quarter of those counted, in which the difference turns
+MIN_TURNING_REV = 4
+MAX_BATCHES, MIN_BATCH = 16, 4  # batches, and revolutions in one: whole periods of 1, 2 and 4
 # 1/revolution: what steps of RTOLS change; the paper's joints were measured at half of the first
 # two, the third goes on in their course
 OF_STEPS = 0.01, 0.03, 0.1
@@ -55,22 +56,22 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
     """Return the largest Lyapunov exponent of a case's motion from a state on.
 
     state: the motion, (2 n,) in m, rad and their rates, at a whole revolution (crank angle 0), as
-    `Request.start` takes it; revolutions: how many are counted, after `TURNING` or a quarter as
-    many in which the difference turns, fewer than 8 give no error (inf); timeout: wall time (s).
-    The case's own method, tolerance and max_steps do not count. The same call gives the same
-    numbers to the bit, unless the time is up. Raises ValueError where all joints are
-    ideal: there is no motion of theirs.
+    `Request.start` takes it; revolutions: how many are counted, after `MIN_TURNING_REV` or a
+    quarter as many in which the difference turns, fewer than 8 give no error (inf); timeout: wall
+    time (s). The case's own method, tolerance and max_steps do not count. The same call gives the
+    same numbers to the bit, unless the time is up. Raises ValueError where all joints are ideal:
+    there is no motion of theirs.
     """
     if is_ideal(case):
         raise ValueError("all joints are ideal: the crank alone moves the machine")
     if revolutions < 1:
         raise ValueError(f"{revolutions} revolutions: an exponent needs one at least")
-    turning = max(TURNING, math.ceil(revolutions / 4))
+    turning = max(MIN_TURNING_REV, math.ceil(revolutions / 4))
     times = case.turn * np.arange(1, INTERVALS * (turning + revolutions) + 1) / INTERVALS
     # positions and rates alone: what else a state holds, such as a crank's lag, need not fade
     moving = 2 * int(record(case)["freedoms"])
     push = np.zeros(state.size)
-    push[:moving] = CLOSE / math.sqrt(moving)
+    push[:moving] = TWIN_DISTANCE / math.sqrt(moving)
     deadline = time.monotonic() + timeout
     p, ends = record(case), np.array([0.0, times[-1]])
     for rtol, of_steps in zip(RTOLS, OF_STEPS, strict=True):
@@ -78,7 +79,7 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
         request = Request(p, state, ends, 0.0, rtol, METHOD, NO_LIMIT, left, Cuts(times))
         twins = Twins(request, state)
         try:
-            found, lost = growths(partial(follow, twins), push, times.size, LEAST)
+            found, lost = growths(partial(follow, twins), push, times.size, LOST_DISTANCE)
         except Stop as stop:
             if stop.reason == Reason.BUDGET_SECONDS:
                 break
@@ -128,5 +129,5 @@ def mean_with_error(values: np.ndarray) -> tuple[float, float]:
 
     Of values that too few batches hold, the first are left out; inf where there is one batch.
     """
-    means = np.array([part.mean() for part in parts(values, MOST_BATCHES, LEAST_BATCH)])
+    means = np.array([part.mean() for part in parts(values, MAX_BATCHES, MIN_BATCH)])
     return float(means.mean()), float(sure(standard_error(means), len(means)))

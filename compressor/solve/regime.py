@@ -28,18 +28,18 @@ from compressor.solve.series import a_turn, distances
 from compressor.solve.si_record import is_ideal, record
 
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
-BUDGET = 3.0  # times the evaluations of the runs, for twins
+TWINS_BUDGET = 3.0  # times the evaluations of the runs, for twins
 WORK = 20.0  # times the evaluations of the first run, for tighter runs and twins together
 FOR_RUNS = 0.75  # of that, for runs: what they leave shows whether the motion is chaotic
-LEAST_WORK = 20_000_000  # evaluations that they may take at least: about 2 s
+MIN_WORK = 20_000_000  # evaluations that they may take at least: about 2 s
 TWO = 2  # motions that march in step
-SHORT = 0.5  # rev: looked at first
+FIRST_LOOK_REV = 0.5  # rev: looked at first
 RTOL = 1e-9  # of the twins, at first
-SURE = 10.0  # times tighter: where twins part, these are to part as well
-CLOSE = 1e-6  # of the clearance: how far from the motion its twin starts
-LATER = 1.5  # times the first horizon, within which they are to
-MOMENT = 1e-6  # rev
-SAME = 1e-9  # relative distance of revolutions that rounding makes
+SURE_FACTOR = 10.0  # times tighter: where twins part, these are to part as well
+TWIN_DISTANCE = 1e-6  # of the clearance: how far from the motion its twin starts
+LATER_FACTOR = 1.5  # times the first horizon, within which they are to
+MOMENT_REV = 1e-6  # rev
+SAME_REVOLUTION = 1e-9  # relative distance of revolutions that rounding makes
 
 
 class HorizonSearch:
@@ -70,7 +70,7 @@ class HorizonSearch:
     @property
     def work(self) -> float:
         """Evaluations that the job's runs and twins may take together."""
-        return max(WORK * self.first, LEAST_WORK)
+        return max(WORK * self.first, MIN_WORK)
 
     @property
     def work_left(self) -> float:
@@ -116,8 +116,8 @@ class HorizonSearch:
         end = self.case.duration
         if self.case.solve.horizon != "auto":
             return self.horizon < end
-        for span in [min(SHORT * self.case.turn, end), end][: 1 + whole]:
-            work = min(BUDGET * self.of_runs - self.of_twins, self.work_left)
+        for span in [min(FIRST_LOOK_REV * self.case.turn, end), end][: 1 + whole]:
+            work = min(TWINS_BUDGET * self.of_runs - self.of_twins, self.work_left)
             if math.isnan(self.horizon) and span > self.seen:
                 may = work > 0.0 and self.left > 0.0
                 self.stopped = not (may and self.twins(span, work))
@@ -134,19 +134,19 @@ class HorizonSearch:
 
         def follow(span: float, rtol: float) -> Parting:
             case = self.within_budget(self.case, (most - self.of_twins) / TWO)
-            found = follow_case_twins(case, span, rtol, CLOSE, self.left)
+            found = follow_case_twins(case, span, rtol, TWIN_DISTANCE, self.left)
             self.of_twins += TWO * found.attempts * self.per_step
             return found
 
         found = follow(span, self.rtol)
-        while found.parted and self.rtol > TIGHTEST * SURE:
-            again = min(LATER * found.time, self.case.duration)
-            surely = follow(again, self.rtol / SURE)
+        while found.parted and self.rtol > TIGHTEST * SURE_FACTOR:
+            again = min(LATER_FACTOR * found.time, self.case.duration)
+            surely = follow(again, self.rtol / SURE_FACTOR)
             if surely.parted:
                 self.horizon = surely.time
             if not surely.whole:
                 return surely.parted
-            self.rtol /= SURE
+            self.rtol /= SURE_FACTOR
             found = follow(span, self.rtol)
         if found.whole:
             self.seen = span
@@ -157,7 +157,7 @@ class HorizonSearch:
 def load_twins(case: Case) -> float:
     """Load what twins need, or compile it once on a machine; the time (s) that took counts not."""
     began = time.monotonic()
-    follow_case_twins(case, MOMENT * case.turn, RTOL, CLOSE, math.inf)
+    follow_case_twins(case, MOMENT_REV * case.turn, RTOL, TWIN_DISTANCE, math.inf)
     return time.monotonic() - began
 
 
@@ -185,7 +185,7 @@ def repeats(
     for period in range(1, count // 2 + 1):
         same = [
             all(
-                (apart <= 2.0 * np.asarray(errors[name]) + SAME).all()
+                (apart <= 2.0 * np.asarray(errors[name]) + SAME_REVOLUTION).all()
                 for name, apart in distances(turns[k], turns[k + period]).items()
             )
             for k in range(count - period)
@@ -196,8 +196,8 @@ def repeats(
     return None, math.nan
 
 
-MEASURED = 3  # revolutions after settling with `duration_rev: auto`: as the default's
-LONGEST = 4  # rev: period that is looked for
+MEASURED_REV = 3  # revolutions after settling with `duration_rev: auto`: as the default's
+MAX_PERIOD_REV = 4  # rev: period that is looked for
 AGREEMENTS = 2  # revolutions in a row, at least, that are to agree with earlier ones
 
 
@@ -246,7 +246,7 @@ def with_settle_rev(case: Case, settle: float, period: int, duration: float | No
     period (rev): of which whole ones are measured; duration (rev): in place of the case's.
     """
     if duration is None and case.solve.duration_rev == "auto":
-        duration = settle + period * math.ceil(MEASURED / period)
+        duration = settle + period * math.ceil(MEASURED_REV / period)
     if duration is None and settle == case.solve.settle_rev:
         return case
     how = replace(case.solve, settle_rev=settle)
@@ -271,7 +271,7 @@ def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
     """Return the first of the last revolutions that agree, and their period; None where they do
     not.
     """
-    for period in range(1, LONGEST + 1):
+    for period in range(1, MAX_PERIOD_REV + 1):
         needed = max(AGREEMENTS, period)
         first = len(turns) - needed - period
         if first >= 0 and all(

@@ -24,8 +24,8 @@ SUMS = (
     "seconds", "square_acceleration", "square_deviation", "crank_torque", "guide_moment",
     "loss_seconds", "impacts", "releases",
 )  # fmt: skip
-GREATEST = ("peak", "max_penetration")  # the others go on from the start of the run
-WORN = ("steady_seconds", "slid", "worn")  # sums of a mechanism with features
+GREATEST_FIELDS = ("peak", "max_penetration")  # the others go on from the start of the run
+WEAR_SUMS = ("steady_seconds", "slid", "worn")  # sums of a mechanism with features
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
 
@@ -51,7 +51,7 @@ class Cuts:
         self.states.append(z[:-FLOWS].copy())
         self.turns.append(tally.copy())
         fresh = new_tally()
-        for name in SUMS + GREATEST:
+        for name in SUMS + GREATEST_FIELDS:
             tally[name] = fresh[name]
         for name in worn_sums(tally):
             tally[name] = 0.0
@@ -65,7 +65,7 @@ def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
 
 def worn_sums(tally: np.record) -> tuple[str, ...]:
     """Return the sums that a tally has beside `SUMS`."""
-    return WORN if "worn" in (tally.dtype.names or ()) else ()
+    return WEAR_SUMS if "worn" in (tally.dtype.names or ()) else ()
 
 
 def merge_turns(turns: Sequence[np.record]) -> np.record:
@@ -73,7 +73,7 @@ def merge_turns(turns: Sequence[np.record]) -> np.record:
     whole = turns[-1].copy()
     for name in (*SUMS, *worn_sums(whole)):
         whole[name] = sum(turn[name] for turn in turns)
-    for name in GREATEST:
+    for name in GREATEST_FIELDS:
         whole[name] = np.max([turn[name] for turn in turns], axis=0)
     return whole
 

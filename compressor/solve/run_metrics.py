@@ -6,7 +6,7 @@ its smaller side, and how great its peak on that side is beside the other one's.
 
 What is known of a chaotic motion: averages and peaks over revolutions, with standard errors.
 Revolutions follow on each other and are no independent draws. So standard errors come from batch
-means (Schmeiser, Operations Research 30, 1982): of up to `MOST_BATCHES` batches of as many
+means (Schmeiser, Operations Research 30, 1982): of up to `MAX_BATCHES` batches of as many
 revolutions each. A quantile's is that of the batches' own quantiles (sectioning: Asmussen and
 Glynn, Stochastic Simulation, 2007, III.5).
 """
@@ -130,10 +130,10 @@ def reversal_bars(rows: np.ndarray, other: Companion | None, others: np.ndarray)
     return found
 
 
-MOST_BATCHES = 30
-LEAST_SECTION = 5  # revolutions of which a quantile is taken
-SURE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
-AIM = 0.01  # of rms_acceleration: its standard error that revolutions are counted for
+MAX_BATCHES = 30
+MIN_SECTION = 5  # revolutions of which a quantile is taken
+T_QUANTILE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
+RMS_ERROR_AIM = 0.01  # of rms_acceleration: its standard error that revolutions are counted for
 
 
 def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
@@ -144,7 +144,7 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
     found: Metrics = {"revolutions": float(len(turns))}
     whole = metrics(p, merge_turns(turns))
     each = [metrics(p, turn) for turn in turns]
-    batches = [metrics(p, merge_turns(part)) for part in parts(turns, MOST_BATCHES, 1)]
+    batches = [metrics(p, merge_turns(part)) for part in parts(turns, MAX_BATCHES, 1)]
     for name, row in METRICS.items():
         if row.kind == "greatest":
             found |= of_peaks(name, np.array([one[name] for one in each]))
@@ -158,7 +158,9 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
             error = standard_error(averages)
         found[f"{name}_standard_error"] = error
     share = found["rms_acceleration_standard_error"] / whole["rms_acceleration"]
-    found["revolutions_to_one_percent"] = max(1.0, np.ceil(len(turns) * (share / AIM) ** 2))
+    found["revolutions_to_one_percent"] = max(
+        1.0, np.ceil(len(turns) * (share / RMS_ERROR_AIM) ** 2)
+    )
     return found
 
 
@@ -166,8 +168,8 @@ def of_peaks(name: str, values: np.ndarray) -> Metrics:
     """Return the mean and quantiles of the revolutions' greatest values, (n, ...), with standard
     errors.
     """
-    means = np.array([part.mean(axis=0) for part in parts(values, MOST_BATCHES, 1)])
-    sections = parts(values, MOST_BATCHES, LEAST_SECTION)
+    means = np.array([part.mean(axis=0) for part in parts(values, MAX_BATCHES, 1)])
+    sections = parts(values, MAX_BATCHES, MIN_SECTION)
     own = np.array([quantiles(part) for part in sections])
     return {
         f"{name}_mean": values.mean(axis=0),
@@ -199,10 +201,10 @@ def standard_error(means: np.ndarray) -> np.ndarray:
 
 def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
     """Return half the length of the interval that holds in 95 % of cases, by Student's t."""
-    batches = len(parts(range(revolutions), MOST_BATCHES, 1))
+    batches = len(parts(range(revolutions), MAX_BATCHES, 1))
     from scipy.special import stdtrit  # takes a tenth of a second, of chaotic motions alone
 
-    return np.asarray(error) * float(stdtrit(max(batches - 1, 1), SURE))
+    return np.asarray(error) * float(stdtrit(max(batches - 1, 1), T_QUANTILE))
 
 
 def mean_bar(values: np.ndarray) -> float:
@@ -211,7 +213,7 @@ def mean_bar(values: np.ndarray) -> float:
 
     inf of a single one.
     """
-    means = np.array([part.mean() for part in parts(values, MOST_BATCHES, 1)])
+    means = np.array([part.mean() for part in parts(values, MAX_BATCHES, 1)])
     return float(sure(standard_error(means), len(values)))
 
 

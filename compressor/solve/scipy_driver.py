@@ -46,9 +46,9 @@ from compressor.solve.request import (
 )
 from compressor.solve.si_record import absolute_tolerances, length_and_speed
 
-LOOKS = 17  # times in a step at which gaps are looked at, both ends included
+LOOKS_IN_STEP = 17  # times in a step at which gaps are looked at, both ends included
 HALVINGS = 50
-LANDED = 1e-3  # of a step: a gap that closes nearer to its end closes at its end
+LANDED_SHARE = 1e-3  # of a step: a gap that closes nearer to its end closes at its end
 
 
 def needs_landings(p: np.record) -> bool:
@@ -76,7 +76,7 @@ class Landings:
         def depths(times: np.ndarray) -> np.ndarray:
             return self.depths(times, np.ascontiguousarray(dense(times)[:-FLOWS].T))
 
-        times = np.linspace(begin, end, LOOKS)
+        times = np.linspace(begin, end, LOOKS_IN_STEP)
         seen, first = depths(times), end
         for joint in self.worn:
             closing = (seen[:-1, joint] < 0.0) & (seen[1:, joint] >= 0.0)
@@ -91,7 +91,7 @@ class Landings:
                 if touching > self.deaf[joint]:
                     first = min(first, touching)
                     break
-        return first if end - first > LANDED * (end - begin) else None
+        return first if end - first > LANDED_SHARE * (end - begin) else None
 
     def land(self, begin: float, end: float, dense, z: np.ndarray) -> None:
         """At the end of a step that began apart: joints whose gaps close there carry their speed.
@@ -102,7 +102,7 @@ class Landings:
         apart = self.depths(np.array([begin]), np.ascontiguousarray(dense([begin])[:-FLOWS].T))[0]
         for joint in self.worn:
             depth, speed = meeting(joint, end, y, self.phase, self.p, rates, before)
-            if apart[joint] < 0.0 < speed and abs(depth) <= LANDED * (end - begin) * speed:
+            if apart[joint] < 0.0 < speed and abs(depth) <= LANDED_SHARE * (end - begin) * speed:
                 place = 2 * self.p["freedoms"] + joint
                 z[place] = max(speed, self.p["least_approach"])
                 self.deaf[joint] = end + 2.0 * max(0.0, -depth) / speed
@@ -111,7 +111,7 @@ class Landings:
 # Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
 # revolution at the small end (LSODA up to 4 times, BDF 2.5, RK45 2), so they get a share of it.
 LOCAL = {"LSODA": 0.1, "BDF": 0.1, "RK45": 0.3}
-LEAST_RTOL = 2.3e-14  # SciPy's own floor
+MIN_RTOL = 2.3e-14  # SciPy's own floor
 BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
 NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
@@ -210,7 +210,7 @@ class LoadStretch:
         Returns where it stands, and the next bound: that step is then to be taken again.
         """
         request, result = self.request, self.result
-        rtol = max(request.rtol * LOCAL.get(request.method, 1.0), LEAST_RTOL)
+        rtol = max(request.rtol * LOCAL.get(request.method, 1.0), MIN_RTOL)
         atol = absolute_tolerances(request.p, rtol)
         solver = scipy_method(request.method)(
             self.right_hand_side, t, z, bound, rtol=rtol, atol=atol

@@ -17,7 +17,7 @@ from compressor.cases import Case, Guide, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     FLOWS,
-    MOST_SECTORS,
+    MAX_SECTORS,
     Coordinate,
     Load,
     Scene,
@@ -68,7 +68,7 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
         _features(case, p)
     if worn is not None:
         p |= bore_fields(worn.shape[1])
-        p["worn"] = np.pad(worn, ((0, 0), (0, MOST_SECTORS - worn.shape[1])))
+        p["worn"] = np.pad(worn, ((0, 0), (0, MAX_SECTORS - worn.shape[1])))
     complete(p, ratio, printed=case.gas.switching == "paper")
     filled = new_record(case.chooses_laws, featured)
     for name, value in p.items():
@@ -341,8 +341,8 @@ def absolute_tolerances(p: np.record, rtol: float) -> np.ndarray:
     return rtol * np.concatenate((natural_sizes(p), np.full(FLOWS, energy)))
 
 
-ROUNDS = 4  # in which the rod's deflection is found: nearly linear
-SHIFT = 1e-7  # m, by which its modes are moved to learn how they answer
+DEFLECTION_ROUNDS = 4  # in which the rod's deflection is found: nearly linear
+MODE_SHIFT = 1e-7  # m, by which its modes are moved to learn how they answer
 
 
 def initial_state(case: Case, p: np.record, shift: np.ndarray | float = 0.0) -> np.ndarray:
@@ -363,13 +363,13 @@ def deflect(p: np.record, y: np.ndarray) -> None:
     z = np.append(y, np.zeros(FLOWS))
     rates = np.empty_like(z)
     answer = np.empty((4, 4))
-    for _ in range(ROUNDS):
+    for _ in range(DEFLECTION_ROUNDS):
         derivative_with_flows(0.0, z, 0, p, rates)
         here = rates[n:][modes].copy()
         for mode in range(4):
             moved = z.copy()
-            moved[first + mode] += SHIFT
+            moved[first + mode] += MODE_SHIFT
             derivative_with_flows(0.0, moved, 0, p, rates)
-            answer[:, mode] = (rates[n:][modes] - here) / SHIFT
+            answer[:, mode] = (rates[n:][modes] - here) / MODE_SHIFT
         z[modes] -= np.linalg.solve(answer, here)
     y[modes] = z[modes]

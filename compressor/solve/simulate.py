@@ -118,7 +118,7 @@ def one_way_errors(case: Case, velocities: tuple, step: float) -> list[float]:
     return found
 
 
-MOST_KEPT = 1_000_000  # samples of a Dataset whose like is kept
+MAX_KEPT = 1_000_000  # samples of a Dataset whose like is kept
 LIKE: dict[tuple, "xr.Dataset"] = {}  # the last Dataset without its values, by names and shapes
 
 
@@ -179,7 +179,7 @@ def as_dataset(table: DatasetParts) -> "xr.Dataset":
         }
         like = xr.Dataset(hollow | indexes)
         LIKE.clear()
-        if all(size <= MOST_KEPT for size in like.sizes.values()):
+        if all(size <= MAX_KEPT for size in like.sizes.values()):
             LIKE[shape] = like
     made = like.copy(data={str(name): table.variables[str(name)].values for name in like.data_vars})
     for name, variable in made.variables.items():

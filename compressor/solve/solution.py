@@ -55,9 +55,9 @@ from compressor.solve.request import Cuts, Trajectory, revolutions, with_edge
 from compressor.solve.run_metrics import chaotic_bars, statistics
 from compressor.solve.si_record import natural_sizes, record, scene
 
-MOST_ATTEMPTS = 200_000  # of a step, of a run in a lane: a longer one is looked at by the clock
-LEAST_TIME = 10.0  # s of wall time that a case must have: the clock is not looked at in lanes
-MOST_SAMPLES = 100_000  # of a run in a lane
+MAX_ATTEMPTS = 200_000  # of a step, of a run in a lane: a longer one is looked at by the clock
+MIN_TIME = 10.0  # s of wall time that a case must have: the clock is not looked at in lanes
+MAX_SAMPLES = 100_000  # of a run in a lane
 
 
 class LaneRequest(NamedTuple):
@@ -83,7 +83,7 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
         if not attempts:
             continue
         began = time.perf_counter()
-        ended = march_side_by_side([one.run for one in attempts], MOST_ATTEMPTS)
+        ended = march_side_by_side([one.run for one in attempts], MAX_ATTEMPTS)
         whole = sum(int(run.walker["evaluations"]) for run in ended if run)
         each = (time.perf_counter() - began) / max(whole, 1)
         for one, run in zip(attempts, ended, strict=True):
@@ -97,7 +97,7 @@ def may_run_in_lanes(case: Case) -> bool:
     how = case.solve
     ready = case.is_plain and not case.problems and how.method in LANE_METHODS
     ready = ready and how.settle_rev != "auto"
-    return ready and how.timeout_s >= LEAST_TIME and how.max_steps >= MOST_ATTEMPTS
+    return ready and how.timeout_s >= MIN_TIME and how.max_steps >= MAX_ATTEMPTS
 
 
 def attempts_of(number: int, case: Case) -> list[LaneRequest]:
@@ -110,7 +110,7 @@ def attempts_of(number: int, case: Case) -> list[LaneRequest]:
             found.append(lane_request(number, case, tighter, p, times_of(case, False)))
         else:  # all but the tolerance is the same
             found.append(with_tolerance(found[0], tighter))
-    return [one for one in found if one.times.all.size <= MOST_SAMPLES]
+    return [one for one in found if one.times.all.size <= MAX_SAMPLES]
 
 
 def with_tolerance(one: LaneRequest, rtol: float) -> LaneRequest:
@@ -147,8 +147,8 @@ OUT_OF_BUDGET = (
     Reason.BUDGET_SECONDS,
     Reason.STEP_UNDERFLOW,
 )  # a tighter run may end so
-AIM = 0.7  # of what is allowed: where the next run's error is aimed at
-LEAST, MOST = 10.0, 1000.0  # times tighter that the next run may be
+ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
+MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run may be
 
 
 def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> Solution:
@@ -264,7 +264,7 @@ def tighten_factor(excess: float, ratio: float) -> float:
     excess: of the pair's estimate over what is promised; ratio: of their tolerances.
     """
     error = excess * max(ratio, 1.0 / ratio) ** -ORDER / closeness(ratio)
-    return min(max(ratio_of(AIM / error), LEAST), MOST)
+    return min(max(ratio_of(ERROR_AIM / error), MIN_TIGHTENING), MAX_TIGHTENING)
 
 
 def round_rtol(rtol: float) -> float:

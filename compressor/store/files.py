@@ -24,16 +24,16 @@ KEY = re.compile(HEX20)
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
 
 LOCK_NAME = "writer.lock"
-FULL = "free some space there, then run the same command again"
+FREE_SPACE_REMEDY = "free some space there, then run the same command again"
 IS_FILE = "is a file, where a folder is needed"
 ELSEWHERE = "choose another folder"
 NO_SYNC = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP)  # of a folder, as FUSE and SMB say
 NO_LOCKS = "choose a folder on a file system with locks"
 FORBIDDEN = f"get the permission to use it, or {ELSEWHERE}"
 REMEDIES = {
-    errno.ENOSPC: FULL,
-    errno.EDQUOT: FULL,
-    errno.EFBIG: FULL,
+    errno.ENOSPC: FREE_SPACE_REMEDY,
+    errno.EDQUOT: FREE_SPACE_REMEDY,
+    errno.EFBIG: FREE_SPACE_REMEDY,
     errno.EACCES: FORBIDDEN,
     errno.EPERM: FORBIDDEN,
     errno.EROFS: FORBIDDEN,
@@ -257,9 +257,9 @@ def discard_leftovers(folder: Folder) -> None:
 
 # folders in a store
 PARTS = ("rows", "jobs", "studies", "shards", "regimes", "features", "wear", "models")
-HELD = ("studies/*.json", "regimes/*/*.json", "wear/*.nc")  # of which each is a result
-MOST_LOOKED_AT = 1000  # entries of a folder in which results are sought
-MOST_NAMES = 5  # that are listed
+RESULT_FILES = ("studies/*.json", "regimes/*/*.json", "wear/*.nc")  # of which each is a result
+MAX_LOOKED_AT = 1000  # entries of a folder in which results are sought
+MAX_NAMES = 5  # that are listed
 MAKE = "make one: compsim run CONFIG..."
 
 
@@ -267,7 +267,7 @@ def holds_results(folder: Folder) -> bool:
     """Return whether a folder holds a study, of jobs or of regimes, or a machine's wear."""
     place = Path(folder)
     try:
-        return any(any(place.glob(one)) for one in HELD)
+        return any(any(place.glob(one)) for one in RESULT_FILES)
     except OSError:
         return False
 
@@ -288,7 +288,7 @@ def no_results(folder: Folder) -> WrongName:
     if followed:
         problem = f"holds no study of jobs, only machines that were followed: {followed}"
         return WrongName(folder, problem, "compsim plot STUDY draws one")
-    if any(place.glob(HELD[-1])):
+    if any(place.glob(RESULT_FILES[-1])):
         problem = "holds no study of jobs, only how machines have worn"
         return WrongName(folder, problem, "compsim wear CONFIG... tells of them")
     return WrongName(folder, "holds no study", remedy_for(place))
@@ -303,7 +303,7 @@ def remedy_for(place: Path) -> str:
         return f"did you mean {place.parent}?"
     inside = [*found_in(place)]
     if inside:
-        return f"did you mean {' or '.join(str(one) for one in inside[:MOST_NAMES])}?"
+        return f"did you mean {' or '.join(str(one) for one in inside[:MAX_NAMES])}?"
     beside = {
         one.name: place.parent / one.name for one in found_in(above) if one.name != place.name
     }
@@ -318,7 +318,7 @@ def remedy_for(place: Path) -> str:
 def found_in(folder: Path) -> Iterator[Path]:
     """Yield the folders in a folder that hold results, in their order."""
     try:
-        entries = sorted(islice(folder.iterdir(), MOST_LOOKED_AT))
+        entries = sorted(islice(folder.iterdir(), MAX_LOOKED_AT))
     except OSError:
         return
     yield from (one for one in entries if one.is_dir() and holds_results(one))
@@ -331,4 +331,4 @@ def models_file(folder: Folder, study: str) -> Path:
 
 def list_few(names: list[str]) -> str:
     """Return a few names, and whether there are more."""
-    return ", ".join(names[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")
+    return ", ".join(names[:MAX_NAMES]) + (", …" if len(names) > MAX_NAMES else "")

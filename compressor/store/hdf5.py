@@ -32,12 +32,12 @@ OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"}  # attributes
 LAYOUTS = {h5d.COMPACT, h5d.CONTIGUOUS, h5d.CHUNKED}  # a virtual dataset lies in other files
 FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
 GZIP_LEVEL = 4
-MOST_EXPANSION = 1100  # deflate's limit is 1032: what claims to hold more is no honest file
+MAX_EXPANSION = 1100  # deflate's limit is 1032: what claims to hold more is no honest file
 HEAP = b"GCOL\1\0\0\0"  # begins a global heap (version 1), where HDF5 keeps texts of any length
 HEAP_HEAD = struct.Struct("<8sQ")  # signature and version, size with this head
 HEAP_ITEM = struct.Struct("<H6xQ")  # number, size without this head; but of the free rest with it
 TEXT_PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("item", "<u4")])
-MOST_TEXT = 60_000  # bytes in an attribute, which HDF5 limits to 64 KiB
+MAX_TEXT = 60_000  # bytes in an attribute, which HDF5 limits to 64 KiB
 BARE = "This is a netCDF dimension but not a netCDF variable."  # what netCDF calls such a scale
 # what h5py, numpy and who reads raise on a file that is none of ours
 FOREIGN = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError,
@@ -108,7 +108,7 @@ def image(
 def _set_attributes(stored: Any, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
         if isinstance(value, str):  # of a fixed length: HDF5 is not safe with hostile other ones
-            encoded = storable(value).encode()[:MOST_TEXT].decode(errors="ignore").encode()
+            encoded = storable(value).encode()[:MAX_TEXT].decode(errors="ignore").encode()
             kind = h5py.string_dtype("utf-8", max(1, len(encoded)))
             stored.attrs.create(name, encoded, dtype=kind)
         else:
@@ -195,7 +195,7 @@ def _objection(file: h5py.File, name: str, data: bytes) -> str:
     dtype = entry.dtype
     if dtype.kind not in "fiuS" and not h5py.check_string_dtype(dtype):
         return f"holds {dtype}, neither numbers nor text"
-    if math.prod(entry.shape) * dtype.itemsize > len(data) * MOST_EXPANSION:
+    if math.prod(entry.shape) * dtype.itemsize > len(data) * MAX_EXPANSION:
         return "claims more data than the file can hold"
     if dtype.kind == "O" and not _texts_are_there(entry, data):
         return "holds texts that are not where it says"

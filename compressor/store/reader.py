@@ -98,7 +98,12 @@ def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
 
 
 # reasons that leave no time series
-BROKEN = {Reason.INTERNAL_ERROR, Reason.WORKER_DIED, Reason.OUT_OF_MEMORY, Reason.INVALID_INPUT}
+RERUN_REASONS = {
+    Reason.INTERNAL_ERROR,
+    Reason.WORKER_DIED,
+    Reason.OUT_OF_MEMORY,
+    Reason.INVALID_INPUT,
+}
 NAMED = re.compile(rf"{HEX20}-{HEX20}\.h5")  # a file of time series that waits no longer
 ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 
@@ -131,7 +136,7 @@ class JobStatus:
         """
         if self.reason == Reason.BUDGET_SECONDS:
             return False  # a machine with more time to spare may do it
-        if self.reason in BROKEN:
+        if self.reason in RERUN_REASONS:
             return True
         if self.reason == Reason.ACCURACY_NOT_REACHED and not case.wants_bars:
             return False  # nothing is promised without error bars

@@ -45,7 +45,7 @@ WORDS = {  # columns -> what their texts look like
     "given": re.compile(rb"([0-9a-f]{8})?"),
 }
 FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
-MOST_LINE = 1 << 20  # bytes that are known of one job, on average over a segment
+MAX_LINE = 1 << 20  # bytes that are known of one job, on average over a segment
 
 # columns that are no numbers of ROW: (type, phrase)
 COLUMNS = {
@@ -63,7 +63,7 @@ COLUMNS = {
     "signals": ("S", "yes where signals are kept beside the time series"),
     "given": ("S8", "hash of the program, its model and the names of its metrics"),
 }
-LATER = ("promise", "regime", "signals", "given")  # columns that older files do not have
+LATER_COLUMNS = ("promise", "regime", "signals", "given")  # columns that older files do not have
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ def unpack_lines(packed: bytes, segment: Segment) -> list[bytes]:
     """Return a line for each row of a segment. Raises DamagedJob."""
     try:
         inflater = zlib.decompressobj()
-        lines = inflater.decompress(packed, MOST_LINE * (len(segment) + 1)).split(b"\n")
+        lines = inflater.decompress(packed, MAX_LINE * (len(segment) + 1)).split(b"\n")
         if inflater.eof and len(lines) == max(1, len(segment)):
             return lines
         raise ValueError(f"{len(lines)} lines")
@@ -209,7 +209,7 @@ def decode(data: bytes, path: Path) -> Segment:
         rows = len(file["key"])
         absent = np.full(rows, b"", "S1")
         columns = {
-            name: absent if name in LATER and name not in file else file[name][()]
+            name: absent if name in LATER_COLUMNS and name not in file else file[name][()]
             for name in COLUMNS
         }
         for name, (kind, _) in COLUMNS.items():

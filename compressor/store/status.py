@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from compressor.cases import Study
 
 AUTO = "solve: {settle_rev: auto, duration_rev: auto} waits for that"
-LONGER = "a longer run may give other numbers, or be chaotic"
+LONGER_REMEDY = "a longer run may give other numbers, or be chaotic"
 
 
 def study_caveats(rows: Rows, study: StoredStudy) -> list[str]:
@@ -116,7 +116,7 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
         if case.solve.duration_rev != "auto":
             count = (case.duration - case.settle) / case.turn
             within = f"{count:.3g} settled revolution{'s' * (round(count, 9) != 1)}"
-        found.append(f"the motion was not seen to repeat within {within}; {LONGER}; {AUTO}")
+        found.append(f"the motion was not seen to repeat within {within}; {LONGER_REMEDY}; {AUTO}")
     if is_late(regime, settled, begin):
         found.append(
             f"the motion repeats from revolution {settled:g} on, and metrics count from "
@@ -134,7 +134,7 @@ def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
     word = "job" if jobs == 1 else "jobs"
     if unrepeated:
         was = "was" if unrepeated == 1 else "were"
-        yield f"{unrepeated} of {jobs} {word} {was} not seen to repeat; {LONGER}; {AUTO}"
+        yield f"{unrepeated} of {jobs} {word} {was} not seen to repeat; {LONGER_REMEDY}; {AUTO}"
     if late:
         yield (
             f"{late} of {jobs} {word} settled after solve.settle_rev, with start-up in the "

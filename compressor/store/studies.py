@@ -363,8 +363,8 @@ def _unit(key: str) -> str:
     return (row.unit or "1") if row and row.kind in ("number", "integer") else ""
 
 
-MOST_LIKE = 5  # keys, or values of an axis, that are offered
-CLOSE = 1e-9  # relative; the decimal fractions of a case file are not meant to the last bit
+MAX_LIKE = 5  # keys, or values of an axis, that are offered
+SAME_VALUE = 1e-9  # relative; the decimal fractions of a case file are not meant to the last bit
 
 
 def find_study(
@@ -496,7 +496,7 @@ def _equal(text: str, value: Any) -> bool:
     return (
         not isinstance(value, str | tuple | bool | None)
         and number is not None
-        and math.isclose(number, value, rel_tol=CLOSE)
+        and math.isclose(number, value, rel_tol=SAME_VALUE)
     )
 
 
@@ -529,7 +529,7 @@ def _some(values: Sequence[Any], near: str = "") -> str:
     found = [value for value in dict.fromkeys(values) if value is not None]
     number = _number(near)
     numeric = all(isinstance(value, int | float) for value in found)
-    if number is not None and numeric and len(found) > MOST_LIKE:
-        found = sorted(sorted(found, key=lambda value: abs(value - number))[:MOST_LIKE])
+    if number is not None and numeric and len(found) > MAX_LIKE:
+        found = sorted(sorted(found, key=lambda value: abs(value - number))[:MAX_LIKE])
         return f"{', '.join(map(in_words, found))} next to it"
     return list_few([*map(in_words, found)])

@@ -43,11 +43,11 @@ from compressor.store.rows import (
 )
 from compressor.store.series_file import series_path
 
-MOST_ROWS = 4096  # in a segment that is written at once; one with fewer is small
-MOST_AGE = 1.0  # s between two writings, if they are small
-MOST_SMALL = 32  # small segments before they are merged
+MAX_ROWS = 4096  # in a segment that is written at once; one with fewer is small
+MAX_AGE = 1.0  # s between two writings, if they are small
+MAX_SMALL = 32  # small segments before they are merged
 FEW_SMALL = 8  # that may stay when the writer ends
-PATIENCE = 1.0  # s for which a lock's holder may leave its file empty
+LOCK_SECONDS = 1.0  # s for which a lock's holder may leave its file empty
 SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}")
 
 
@@ -75,7 +75,7 @@ class Writer:
         self.wait, self.command = wait, command
         self.pending: dict[str, Outcome] = {}
         self.flushed = -math.inf  # monotonic time of the last writing
-        self.small: dict[Path, int] = {}  # segments below MOST_ROWS -> their rows
+        self.small: dict[Path, int] = {}  # segments below MAX_ROWS -> their rows
 
     def __enter__(self) -> "Writer":
         self.lock = _lock(self.place / LOCK_NAME, self.wait, self.command)
@@ -93,7 +93,7 @@ class Writer:
                 self.unowned = 0 if damaged else len(unowned_series(self.place, rows))
                 if self.place == self.folder:
                     self._mend_idle_shards()
-            self.small = {s.path: len(s) for s in mine if len(s) < MOST_ROWS}
+            self.small = {s.path: len(s) for s in mine if len(s) < MAX_ROWS}
         except BaseException:
             _release(self.lock)
             raise
@@ -120,7 +120,7 @@ class Writer:
 
     def flush_if_due(self) -> list[str]:
         """Write what waits, but not more than once a second; call it often. Keys now on disk."""
-        due = time.monotonic() - self.flushed >= MOST_AGE or len(self.pending) >= MOST_ROWS
+        due = time.monotonic() - self.flushed >= MAX_AGE or len(self.pending) >= MAX_ROWS
         return self.flush() if due else []
 
     def flush(self) -> list[str]:
@@ -135,10 +135,10 @@ class Writer:
                 sync_folder(self.place / "jobs")
         path = self._publish(encode(segment))
         name_pending(series)
-        if len(segment) < MOST_ROWS:
+        if len(segment) < MAX_ROWS:
             self.small[path] = len(segment)
         self.pending, self.flushed = {}, time.monotonic()
-        if len(self.small) >= MOST_SMALL:
+        if len(self.small) >= MAX_SMALL:
             self._merge_small()
         return keys
 
@@ -149,11 +149,11 @@ class Writer:
         return path
 
     def _merge_small(self) -> None:
-        """Merge the small segments, about MOST_ROWS rows to one."""
+        """Merge the small segments, about MAX_ROWS rows to one."""
         batch: list[Path] = []
         for path in sorted(self.small):
             batch.append(path)
-            if sum(self.small[one] for one in batch) >= MOST_ROWS:
+            if sum(self.small[one] for one in batch) >= MAX_ROWS:
                 self._merge(batch)
                 batch = []
         self._merge(batch)
@@ -169,7 +169,7 @@ class Writer:
             for path in paths:
                 path.unlink()
                 del self.small[path]
-        if len(segment) < MOST_ROWS:
+        if len(segment) < MAX_ROWS:
             self.small[merged] = len(segment)
 
     def _all_paths(self) -> list[Path]:
@@ -237,7 +237,7 @@ def _number(path: Path) -> int:
 
 def _holder(descriptor: int) -> str:
     """Return who holds a lock, from its file; who took it just now is about to say so."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + LOCK_SECONDS
     while not (text := os.pread(descriptor, 1000, 0)) and time.monotonic() < deadline:
         time.sleep(0.01)
     return text.decode(errors="replace").strip() or "another process"

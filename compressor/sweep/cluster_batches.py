@@ -19,7 +19,7 @@ from joblib._dask import DaskDistributedBackend
 
 from compressor.reasons import Reason
 from compressor.sweep.execution import (
-    AGAIN,
+    FAILED_ALONE,
     MEMORY_SHARE,
     Batches,
     End,
@@ -33,7 +33,9 @@ from compressor.sweep.execution import (
 from compressor.sweep.versions import ClusterError, Unfit, differences, unfitness, versions
 from compressor.sweep.worker import JobLost, Workers
 
-ONE = threading.Lock()  # joblib has one pool a process: threads take turns, each with all of it
+POOL_LOCK = (
+    threading.Lock()
+)  # joblib has one pool a process: threads take turns, each with all of it
 KEPT: dict[bytes, Local] = {}  # the pool that is kept for the next batch, by what it does
 
 
@@ -61,7 +63,7 @@ def on_worker(number: int, data: bytes) -> tuple[int, bytes | Unfit]:
         count = worker.state.nthreads
         share = int(MEMORY_SHARE * most / count) if most else memory_share(max(cores(), count))
         rules = replace(batch.rules, count=count, memory=share)
-        with ONE:
+        with POOL_LOCK:
             return number, in_processes(batch.work, rules, batch.jobs)
     except (Unfit, WorkersFailed) as error:
         return number, Unfit(f"{worker.address}: {error}")
@@ -87,9 +89,9 @@ def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) ->
 
 CENSUS = 2.0  # s between two counts of the workers
 A_THREAD = 3  # batches that a thread of a worker has at most: one at work, others on their way
-MOST_BYTES = 100_000_000  # of results that may be on their way
-PATIENCE = 5.0  # s without a result before a remark on it
-STARTING = "the cluster's workers load, or compile, the equations (under a minute)"
+MAX_BYTES = 100_000_000  # of results that may be on their way
+SECONDS_TO_REMARK = 5.0  # s without a result before a remark on it
+STARTING_REMARK = "the cluster's workers load, or compile, the equations (under a minute)"
 WAITING = "the cluster has no workers: waiting for the first"
 
 
@@ -154,7 +156,7 @@ class Remote(Batches):
         self.threads, self.census = -1, 0.0  # of all workers, when they were counted
         self.size, self.renew = 0.0, False  # bytes of a result; whether the round should end
         self.backend: Dask | None = None
-        self.patience = time.monotonic() + PATIENCE
+        self.patience = time.monotonic() + SECONDS_TO_REMARK
 
     def begin(self) -> bool:
         self.renew = False
@@ -169,7 +171,7 @@ class Remote(Batches):
     def next_batch(self) -> list[Job]:
         """As ever, but a round ends when workers come or go, or large results wait."""
         on_way = sum(map(len, [*self.out.values()])) + self.arrived.qsize()
-        return [] if self.renew or self.size * on_way > MOST_BYTES else super().next_batch()
+        return [] if self.renew or self.size * on_way > MAX_BYTES else super().next_batch()
 
     def call(self, batch: list[Job]) -> Any:
         number = next(self.numbers)
@@ -192,7 +194,7 @@ class Remote(Batches):
         self.threads, self.census, self.width = sum(threads), now, max(len(threads), 1)
         self.target_seconds = self.rules.target_seconds * max(sum(threads) / self.width, 1)
         if threads and not self.weight and now > self.patience:
-            self.remark(STARTING)
+            self.remark(STARTING_REMARK)
             self.patience = math.inf
 
     def finish(self, batch: list[Job], found: Any) -> Iterator[End]:
@@ -211,7 +213,7 @@ class Remote(Batches):
             raise ClusterError(f"worker {unfit}") from error
         if self.alone and len(batch) == 1:
             how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
-            yield JobLost(batch[0].id, Reason.WORKER_DIED, f"{how}, {AGAIN}")
+            yield JobLost(batch[0].id, Reason.WORKER_DIED, f"{how}, {FAILED_ALONE}")
         else:
             self.suspects.extend([[job] for job in batch] if self.alone else [batch])
 

@@ -53,10 +53,10 @@ Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may t
 End = JobResult | JobLost
 
 TICK = 0.1  # s between two looks at the clocks of the jobs
-MOST_BATCH = 200  # jobs
-MOST_READY = 4  # batches a worker that wait to be taken before workers wait, too
+MAX_BATCH = 200  # jobs
+MAX_READY = 4  # batches a worker that wait to be taken before workers wait, too
 MEMORY = 50  # jobs that a mean of their seconds rests on
-AGAIN = "also when it ran again alone"
+FAILED_ALONE = "also when it ran again alone"
 
 
 class Job(NamedTuple):
@@ -90,7 +90,7 @@ class Batches:
         self.out: dict[int, list[Job]] = {}  # batches that joblib has, by number
         self.arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()  # None: a round has ended
         self.mean, self.weight = 0.0, 0  # seconds a job; how many jobs that rests on
-        self.most = MOST_BATCH
+        self.most = MAX_BATCH
         self.stopped = self.alone = False  # alone: a suspect is tried
         self.round: Future[None] | None = None
         self.thread = ThreadPoolExecutor(1)
@@ -173,7 +173,7 @@ class Batches:
             size = min(size, (self.left + len(self.waiting)) / (2 * self.width))
         batch: list[Job] = []
         while len(batch) < min(size, self.most):
-            if self.stopped or self.arrived.qsize() > MOST_READY * self.width:
+            if self.stopped or self.arrived.qsize() > MAX_READY * self.width:
                 break
             job = self.waiting.popleft() if self.waiting else self.issue()
             if job is None:
@@ -197,7 +197,7 @@ class Batches:
         self.waiting.extendleft(reversed(batch[len(found) :]))
         for job, end in zip(batch, found, strict=False):
             if isinstance(end, JobLost):
-                again = end.reason == Reason.OUT_OF_MEMORY and AGAIN not in end.detail
+                again = end.reason == Reason.OUT_OF_MEMORY and FAILED_ALONE not in end.detail
                 yield from self.lose(job, end, again)
                 continue
             known = min(self.weight, MEMORY)
@@ -213,16 +213,20 @@ class Batches:
         if again and not job.retried:
             self.suspects.append([job._replace(retried=True)])
         else:
-            yield replace(end, id=job.id, detail=f"{end.detail}, {AGAIN}" if again else end.detail)
+            yield replace(
+                end, id=job.id, detail=f"{end.detail}, {FAILED_ALONE}" if again else end.detail
+            )
 
 
 STALL = 60.0  # s without any result, while no job runs, after which all workers are killed
-STARTING = 600.0  # s that workers may take to begin: what they prepare may have to be compiled
+# s that workers may take to begin: what they prepare may have to be compiled
+MAX_START_SECONDS = 600.0
 UNSEEN = 3.0  # s that joblib may take to see that a worker died
 FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
 ELSEWHERE = "run these jobs in a process of their own"
 POOL = threading.Lock()
-BROKEN = (BrokenProcessPool, BrokenPipeError)  # the latter: loky's own helper was killed
+# BrokenPipeError: loky's own helper was killed
+BROKEN_POOL_ERRORS = (BrokenProcessPool, BrokenPipeError)
 MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
 MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
@@ -357,7 +361,7 @@ class Local(Batches):
         revive_tracker()
         self.processes |= {child.pid: child for child in children()}
         if news:
-            self.heard, self.fruitless, self.most = now, 0, MOST_BATCH
+            self.heard, self.fruitless, self.most = now, 0, MAX_BATCH
         latest, at_work = self.heard, False
         for place, batch in list(self.out.items()):
             pid, position, since = self.note(place)
@@ -368,7 +372,11 @@ class Local(Batches):
         dead = any(child.exitcode for child in self.processes.values())
         self.died = min(self.died, now) if dead else math.inf
         self.begun = self.begun or latest > self.heard
-        if self.round and not at_work and now - latest > (STALL if self.begun else STARTING):
+        if (
+            self.round
+            and not at_work
+            and now - latest > (STALL if self.begun else MAX_START_SECONDS)
+        ):
             kill(self.processes)
         if self.round and now - self.died > UNSEEN:
             self.unblock()
@@ -389,7 +397,7 @@ class Local(Batches):
         """Yield the pool has broken: see to its jobs. The one that ran in a dead process may be
         why.
         """
-        if not isinstance(error, BROKEN):
+        if not isinstance(error, BROKEN_POOL_ERRORS):
             if isinstance(error, OSError) and not self.processes:
                 raise WorkersFailed(f"no worker process can be started: {error}") from error
             raise error

@@ -21,8 +21,8 @@ from compressor.sweep.wanted import RequestedJobs, revolutions, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
 
 ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
-MOST_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
-DRAWN = 12  # jobs of a study that are timed
+MAX_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
+TIMED_JOBS = 12  # jobs of a study that are timed
 TIMING = 4.0  # s of timing, of all studies, after which no further job is begun
 SEARCHED: list[str] = []  # the first job of this process in which chaos was looked for
 
@@ -146,8 +146,8 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
         told.update(mine)
         new = [key for key in mine if key not in done]
         missing[study.name] = new
-        few = len(new) <= MOST_CASES
-        looked_at.update(new if few else random.Random(0).sample(new, MOST_CASES))
+        few = len(new) <= MAX_CASES
+        looked_at.update(new if few else random.Random(0).sample(new, MAX_CASES))
         parts.append(StudyShare(study.name, len(mine), len(mine) - len(new), len(new)))
         ahead += next_of(study, {*new}, first - len(ahead))
     counts = Forecast(len(told), len(done), len(told) - len(done), tuple(parts), tuple(ahead))
@@ -180,7 +180,7 @@ def drawn_from(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
     random order: any first few are spread, too.
     """
     known, chance = [key for key in keys if key in cases], random.Random(0)
-    count = min(DRAWN, len(known))
+    count = min(TIMED_JOBS, len(known))
     bounds = [len(known) * i // count for i in range(count + 1)]
     found = [known[chance.randrange(*pair)] for pair in itertools.pairwise(bounds)]
     chance.shuffle(found)
@@ -193,7 +193,7 @@ def timed_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[s
     """
     end = time.perf_counter() + seconds
     costs: dict[str, list[Cost]] = {study: [] for study in drawn}
-    for number in range(DRAWN):
+    for number in range(TIMED_JOBS):
         for study, cases in drawn.items():
             if number < len(cases) and (number == 0 or time.perf_counter() < end):
                 costs[study].append(measure_cost(cases[number]))

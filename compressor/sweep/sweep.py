@@ -31,7 +31,7 @@ from compressor.sweep.worker import JobLost, JobResult, Workers
 
 Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
-MANY = 100_000  # jobs whose cases take a while to be made
+MANY_JOBS = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
 
 
@@ -134,7 +134,7 @@ def sweep(
         studies = [study.shard(*options.part) for study in studies]
         name = "{}-of-{}".format(*options.part)
     jobs = sum(len(study.selected) for study in studies)
-    if jobs > MANY:
+    if jobs > MANY_JOBS:
         progress(0, jobs, f"preparing {jobs} jobs")
     cases = RequestedJobs(studies)
     with Writer(folder, name, options.wait, options.command) as writer:

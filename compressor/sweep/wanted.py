@@ -141,9 +141,9 @@ def stored_ends(store: Stored, wanted: RequestedJobs) -> dict[str, JobEnd]:
     return found
 
 
-FEWEST = 5  # jobs that a guess rests on
+MIN_JOBS_FOR_ETA = 5  # jobs that a guess rests on
 SOONEST = 1.0  # s of work before there is one
-KNOWN = 0.5  # of the revolutions ahead must be of kinds that are measured
+MIN_MEASURED_SHARE = 0.5  # of the revolutions ahead must be of kinds that are measured
 
 
 class SweepProgress(NamedTuple):
@@ -197,10 +197,10 @@ class SweepWork:
     def left(self) -> RemainingWork | None:
         """Return what is left to do; None as long as too little is known to say."""
         elapsed = self.last - self.began
-        if self.ends < FEWEST or elapsed < SOONEST or not self.seconds:
+        if self.ends < MIN_JOBS_FOR_ETA or elapsed < SOONEST or not self.seconds:
             return None
         unknown = sum(turns for of, turns in self.ahead.items() if of not in self.behind)
-        if unknown > (1.0 - KNOWN) * sum(self.ahead.values()):
+        if unknown > (1.0 - MIN_MEASURED_SHARE) * sum(self.ahead.values()):
             return None
         seconds = sum(
             turns * self.behind[of][1] / self.behind[of][0]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
 
-PATIENCE = 2.0  # s of compiling before a remark on it
+SECONDS_TO_REMARK = 2.0  # s of compiling before a remark on it
 COMPILING = (
     "compiling the equations, part {number} of {count}: {what}, about {seconds} s; "
     "each part once for each version of the program, and a stop loses nothing"
@@ -37,7 +37,7 @@ WHAT = {
 }  # by part: what it is, and the seconds that it takes an idle core
 LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes of which runs march side by side
 FEWEST, MANY = 16, 4000  # jobs of a scene that lanes are loaded for, and compiled for
-SEEN = 1000  # jobs that are looked at for it
+MAX_JOBS_SEEN = 1000  # jobs that are looked at for it
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
 
@@ -87,7 +87,7 @@ class Needs(NamedTuple):
         Results are the same to the bit without: where no lanes have been compiled yet, many more
         jobs are asked for than where they need but be loaded.
         """
-        step = max(1, len(cases) // SEEN)
+        step = max(1, len(cases) // MAX_JOBS_SEEN)
         looked = (cases[i] for i in range(0, len(cases), step))
         seen = Counter(case.joint for case in looked if case.is_plain)
         least = {of: FEWEST if marker(f"lanes-{of}").exists() else MANY for of in LANES}
@@ -124,7 +124,7 @@ def load(needs: Needs) -> None:
 
 def load_telling(needs: Needs, told: str, remark: Callable[[str], None]) -> None:
     """`load`; what takes long is told, in these words."""
-    timer = threading.Timer(PATIENCE, remark, [told])
+    timer = threading.Timer(SECONDS_TO_REMARK, remark, [told])
     timer.daemon = True
     timer.start()
     began = time.monotonic()
@@ -134,7 +134,7 @@ def load_telling(needs: Needs, told: str, remark: Callable[[str], None]) -> None
         timer.cancel()
         timer.join()
     seconds = time.monotonic() - began
-    if seconds > PATIENCE:
+    if seconds > SECONDS_TO_REMARK:
         remark(f"compiled in {seconds:.0f} s")
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from compressor.reasons import Reason
 
 OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
-MOST_TEXT = 20_000  # characters of a traceback
+MAX_TEXT = 20_000  # characters of a traceback
 ENDING = [signal.SIGINT, signal.SIGTERM]
 if hasattr(signal, "SIGHUP"):  # not on Windows
     ENDING.append(signal.SIGHUP)
@@ -170,4 +170,4 @@ def perform(job: Callable[[], tuple[Any, ...]], start: float) -> JobResult | Job
 def describe_error(error: BaseException) -> tuple[str, str]:
     """Return an exception in a line, and its traceback."""
     what = traceback.format_exception_only(error)[-1].strip()
-    return what[:MOST_TEXT], "".join(traceback.format_exception(error))[-MOST_TEXT:]
+    return what[:MAX_TEXT], "".join(traceback.format_exception(error))[-MAX_TEXT:]

@@ -18,7 +18,8 @@ from compressor.vibration.body import (
 
 AXES = ("x", "y")
 POLES = 8  # of the anti-aliasing filter, Butterworth
-FINER = 8.0  # times the sampling rate, and the highest resonance, at which the analogue side runs
+# times the sampling rate, and the highest resonance, at which the analogue side runs
+ANALOGUE_RATE_FACTOR = 8.0
 USUAL = 2.56  # sampling rate over the highest frequency of interest
 LEAD_IN = 1  # revolutions before the record, in which filters forget their start
 
@@ -40,7 +41,7 @@ class Record:
 def analogue_rate(body: Body, sensor: Sensor) -> float:
     """Return the least rate (Hz) at which forces are to be known for a record."""
     casing = body.casing_frequency_Hz if body.casing else 0.0
-    return FINER * max(sensor.rate_Hz, sensor.mounting_Hz, casing)
+    return ANALOGUE_RATE_FACTOR * max(sensor.rate_Hz, sensor.mounting_Hz, casing)
 
 
 def point_of(body: Body, sensor: Sensor, guide: float) -> tuple[float, float]:

@@ -27,10 +27,10 @@ from compressor.vibration.spectra import (
     whole_revolutions,
 )
 
-LEAST_BAND = 64  # lines in the narrowest band, and so independent samples of its envelope
-EDGE = 0.25  # of a band's width: how far its gain falls off on either side of its edge
+MIN_BAND = 64  # lines in the narrowest band, and so independent samples of its envelope
+BAND_EDGE = 0.25  # of a band's width: how far its gain falls off on either side of its edge
 ENDS = 4  # samples of an envelope left out at either end, where it feels a jump from end to start
-SILENT = 1e-10  # share of the signal's rms: a band below it holds rounding
+SILENT_SHARE = 1e-10  # share of the signal's rms: a band below it holds rounding
 
 
 @dataclass(frozen=True)
@@ -114,13 +114,13 @@ def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
 
     Large slow motion reaches into the lowest bands alone, but a jump from the end to the start
     of a signal that is not periodic is an impulse; the samples about it are left out. Raises
-    SignalError if the narrowest band has less than `LEAST_BAND` lines, or the signal is constant.
+    SignalError if the narrowest band has less than `MIN_BAND` lines, or the signal is constant.
     """
     found, rate = checked_signal(values), checked_positive(rate, "the rate")
     levels = checked_count(levels, 1, "the number of levels")
     half = found.size // 2
-    if half < LEAST_BAND * 2**levels:
-        need = f"{levels} levels need {2 * LEAST_BAND * 2**levels} samples, and there are"
+    if half < MIN_BAND * 2**levels:
+        need = f"{levels} levels need {2 * MIN_BAND * 2**levels} samples, and there are"
         raise SignalError(f"{need} {found.size}: choose fewer levels, or pass a longer signal")
     if np.ptp(found) == 0.0:
         raise SignalError("the signal is constant, so that it has no kurtosis: pass another one")
@@ -138,16 +138,16 @@ def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
 def _kurtosis_of_parts(lines: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the kurtosis and its scatter of as many equal bands, (parts,) each; lines: (k,)."""
     width = (lines.size - 1) / parts
-    reach = math.ceil(width * (0.5 + EDGE)) + 1
+    reach = math.ceil(width * (0.5 + BAND_EDGE)) + 1
     centre = ((np.arange(parts) + 0.5) * width)[:, None]
     index = np.floor(centre).astype(int) + np.arange(-reach, reach)
-    past = np.clip((np.abs(index - centre) / width - 0.5) / EDGE, -1.0, 1.0)  # 0 at an edge
+    past = np.clip((np.abs(index - centre) / width - 0.5) / BAND_EDGE, -1.0, 1.0)  # 0 at an edge
     gain = np.cos((past + 1.0) * (math.pi / 4))
     gain[(index < 0) | (index >= lines.size)] = 0.0
     envelope = ifft(np.pad(lines, reach)[index + reach] * gain, axis=1)[:, ENDS:-ENDS]
     power = np.abs(envelope) ** 2
     mean, fourth = np.mean(power, axis=1), np.mean(power**2, axis=1)
-    silent = mean <= SILENT**2 * np.sum(np.abs(lines) ** 2) / index.shape[1] ** 2
+    silent = mean <= SILENT_SHARE**2 * np.sum(np.abs(lines) ** 2) / index.shape[1] ** 2
     alike = np.abs(ifft(gain**2, axis=1))
     scatter = 2.0 * np.sqrt(np.sum((alike / alike[:, :1]) ** 4, axis=1) / power.shape[1])
     return np.where(silent, np.nan, fourth / np.where(silent, 1.0, mean**2) - 2.0), scatter

@@ -94,7 +94,7 @@ def whole_revolutions(count: int, a_turn: int) -> int:
 
 
 WINDOWS = {"rectangular": "boxcar", "hann": "hann", "flattop": "flattop"}  # ours -> SciPy's
-LONG = 4096  # samples, by which a noise bandwidth no longer depends on their number
+WINDOW_SAMPLES = 4096  # samples, by which a noise bandwidth no longer depends on their number
 
 
 def scipy_window(window: str) -> str:
@@ -110,7 +110,7 @@ def noise_bandwidth(window: str) -> float:
     n sum(w^2) / sum(w)^2: 1 for rectangular, 1.5 for hann, 3.77 for flattop (Harris, Proceedings
     of the IEEE 66, 1978, Eq. 11). White noise raises each line of a mean square by as much.
     """
-    taper = get_window(scipy_window(window), LONG)
+    taper = get_window(scipy_window(window), WINDOW_SAMPLES)
     return float(taper.size * np.sum(taper**2) / np.sum(taper) ** 2)
 
 
@@ -136,7 +136,7 @@ def line_amplitudes(values: np.ndarray, block: int, window: str, rms: bool) -> n
 
 
 TURN = 2.0 * math.pi
-CLOSE = 1e-9  # share of an interval of angle, or of an order: nearer ones are the same
+SAME_ANGLE = 1e-9  # share of an interval of angle, or of an order: nearer ones are the same
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def resample_angle(angle: np.ndarray, values: np.ndarray, a_turn: int) -> np.nda
     at, found = checked_angle(angle, values)
     a_turn = checked_count(a_turn, 2, "the number of samples a revolution")
     step = TURN / a_turn
-    count = math.floor((at[-1] - at[0]) / step + CLOSE) + 1  # points that samples surround
+    count = math.floor((at[-1] - at[0]) / step + SAME_ANGLE) + 1  # points that samples surround
     if count < a_turn:
         reach = f"the samples reach over {math.degrees(at[-1] - at[0]):.6g} degrees"
         raise SignalError(f"{reach}: pass at least one revolution, {360 - 360 / a_turn:.6g}")
@@ -228,7 +228,7 @@ def rms_above(
     at, found = checked_signal(orders, "the order"), checked_signal(rms_amplitudes, "the spectrum")
     if at.size != found.size:
         raise SignalError(f"{at.size} orders and {found.size} amplitudes: pass one for each")
-    above = at > order + CLOSE * abs(order)
+    above = at > order + SAME_ANGLE * abs(order)
     return math.sqrt(float(np.sum(found[above] ** 2)) / noise_bandwidth(window))
 
 
@@ -267,10 +267,10 @@ def angle_window(angle: np.ndarray, values: np.ndarray, begin: float, end: float
     if width < 0.0:
         width += 360.0
     weight = np.gradient(at)
-    turn, place = np.divmod((at - math.radians(begin)) / TURN + CLOSE, 1.0)
-    first = math.ceil((at[0] - math.radians(begin)) / TURN - CLOSE)
+    turn, place = np.divmod((at - math.radians(begin)) / TURN + SAME_ANGLE, 1.0)
+    first = math.ceil((at[0] - math.radians(begin)) / TURN - SAME_ANGLE)
     # a window may end where the sample after the last one would be
-    last = math.floor((at[-1] + weight[-1] - math.radians(begin + width)) / TURN + CLOSE)
+    last = math.floor((at[-1] + weight[-1] - math.radians(begin + width)) / TURN + SAME_ANGLE)
     count = last - first + 1
     if count < 1:
         text = f"no window from {begin} to {end} degrees is wholly sampled"
@@ -286,7 +286,7 @@ def angle_window(angle: np.ndarray, values: np.ndarray, begin: float, end: float
     return AngleWindow(np.sqrt(mean), peak, inside)
 
 
-FEWEST_PULSES = 3  # with two, there is one revolution time and no change of it
+MIN_PULSES = 3  # with two, there is one revolution time and no change of it
 # the least of the variances that are tried, in variances of a pulse: it smooths over some sixty
 # revolutions, and the matrix of thousands of pulses stays well conditioned
 STEADIEST, TRIED = 1e-6, 41
@@ -308,9 +308,9 @@ def smooth_pulses(pulses: np.ndarray, within: np.ndarray) -> np.ndarray:
     Raises SignalError for fewer than three pulses, or one that may not be wrong at all.
     """
     count = len(pulses)
-    if count < FEWEST_PULSES or len(within) != count or not (np.asarray(within) > 0.0).all():
+    if count < MIN_PULSES or len(within) != count or not (np.asarray(within) > 0.0).all():
         problem = f"{count} pulses, {len(within)} bounds of their errors"
-        raise SignalError(f"{problem}: pass at least {FEWEST_PULSES}, and a bound above 0 for each")
+        raise SignalError(f"{problem}: pass at least {MIN_PULSES}, and a bound above 0 for each")
     variance = np.asarray(within, float) ** 2 / 3.0  # of any time within the bounds alike
     # the second differences D t have the covariance D diag(variance) D' + q I: three bands
     changes = np.diff(pulses, 2)

@@ -19,7 +19,7 @@ from random_cases import strangers
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.solve.attempts import run_at_tolerance
-from compressor.solve.error_bars import WHOLE, Companion, bars, closeness
+from compressor.solve.error_bars import TIGHTER_DISTANCE_FACTOR, Companion, bars, closeness
 from compressor.solve.series import distances
 
 SEEDS = (101, 102, 103)
@@ -82,7 +82,7 @@ def series_row(rows, ratio):
         "ratio": ratio,
         "pairs": len(over),
         "error_over_distance": percentiles(over, LIMITS),
-        "share": short(WHOLE * closeness(ratio)),
+        "share": short(TIGHTER_DISTANCE_FACTOR * closeness(ratio)),
     }
 
 

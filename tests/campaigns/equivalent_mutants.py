@@ -4,7 +4,7 @@
 """
 
 EQUIVALENT: dict[str, str] = {
-    "march.py, march: w.h < LEAST_STEP * (w.t + 1.0 / p.omega)"
-    " -> w.h <= LEAST_STEP * (w.t + 1.0 / p.omega)":
+    "march.py, march: w.h < MIN_STEP * (w.t + 1.0 / p.omega)"
+    " -> w.h <= MIN_STEP * (w.t + 1.0 / p.omega)":
         "differs only for a step that is refused at the limit to the last bit",
 }  # fmt: skip

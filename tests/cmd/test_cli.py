@@ -316,7 +316,7 @@ def test_many_failures_are_counted(case_file, capsys):
               machine={"rod_mass_kg": rods})  # fmt: skip
     assert cli.main(["run", "all.yaml", "-j", "1"]) == 3
     err = capsys.readouterr().err
-    assert err.count("more than 5 steps") == run.MOST_FAILURES
+    assert err.count("more than 5 steps") == run.MAX_FAILURES
     assert "and 5 more" in err
     assert "budget_steps (25)" in err
 

@@ -129,12 +129,12 @@ def test_a_page_that_fails_is_told_once_and_the_run_goes_on(watched, capsys):
 def test_a_process_that_dies_is_started_again_a_few_times(watched, capsys):
     made, noted = watched
     with made("die") as one:
-        for deaths in range(1, watch.MOST_DEATHS + 1):
+        for deaths in range(1, watch.MAX_DEATHS + 1):
             answered(one)
             until(lambda deaths=deaths: one.hear() or one.deaths == deaths)
         one.due = 0.0
         one.stands(NOW)  # given up
-    assert len(noted()) == watch.MOST_DEATHS
+    assert len(noted()) == watch.MAX_DEATHS
     err = capsys.readouterr().err
     assert err.count("is not fresh: what writes it ended with exit code 7") == 1
 

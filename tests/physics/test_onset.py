@@ -24,11 +24,11 @@ from compressor.physics.observe import (
     observe_contact,
 )
 from compressor.physics.onset import (
-    EDGE,
     LOOKS,
     NEVER,
     PLACED,
     SAMPLES,
+    STEP_EDGE,
     change,
     crossing,
     first_onset,
@@ -178,7 +178,7 @@ def test_a_journal_that_rests_at_the_edge_does_not_touch():
 def test_looks_stand_evenly_and_beside_both_ends():
     looks = [place(i) for i in range(LOOKS + 1)]
     inner = [i / SAMPLES for i in range(1, SAMPLES)]
-    assert looks == pytest.approx([0.0, EDGE, *inner, 1.0 - EDGE, 1.0], abs=1e-15)
+    assert looks == pytest.approx([0.0, STEP_EDGE, *inner, 1.0 - STEP_EDGE, 1.0], abs=1e-15)
 
 
 FIRST = {

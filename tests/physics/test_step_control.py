@@ -13,8 +13,8 @@ from compressor.physics.runge_kutta import FLOWS, STAGES, A, RungeKuttaPair
 from compressor.physics.step_control import (
     CALM_STEPS,
     EVERY,
-    LEAST_ERROR,
     LONGEST_REST,
+    MIN_ERROR,
     REST,
     STABILITY_LIMIT,
     STIFF_STEPS,
@@ -58,7 +58,7 @@ def test_a_step_grows_and_shrinks_within_limits():
     assert next_step_length(walker(error=math.log(1e-30)), H, 1.0) == pytest.approx(0.2 * H)
     w = walker()
     next_step_length(w, H, 1e-9)
-    assert w.error == LEAST_ERROR == pytest.approx(math.log(1e-4))
+    assert w.error == MIN_ERROR == pytest.approx(math.log(1e-4))
 
 
 @pytest.mark.parametrize(("stiff", "order"), [(0, 5), (1, 4)])

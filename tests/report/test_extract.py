@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from compressor.report.figures.extract import FigureData, as_csv, extract, with_jobs
 from compressor.report.interactive import (
-    MOST_POINTS,
+    MAX_POINTS,
     content,
     describe_figure,
     extremes,
@@ -163,8 +163,8 @@ def test_long_curves_keep_their_extremes():
     """A peak of a single sample among 100,000 is drawn."""
     y = np.sin(np.linspace(0, 20, 100_000))
     y[[31_234, 77_777]] = 9.0, -9.0
-    places = extremes(y, MOST_POINTS // 2)
-    assert places.size <= 2 * MOST_POINTS
+    places = extremes(y, MAX_POINTS // 2)
+    assert places.size <= 2 * MAX_POINTS
     assert {31_234, 77_777, 0, 99_999} <= {*places.tolist()}
     assert (np.diff(places) > 0).all()
     flat = extremes(np.zeros(100_000), 100)

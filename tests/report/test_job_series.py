@@ -32,7 +32,7 @@ def test_only_jobs_that_kept_their_series_have_scripts(paper_store, monkeypatch)
     found = dict(job_scripts(stored, ["0" * 20, *keys]))
     assert {*found} == {*keys}
     assert all(text.startswith(f'compsimFigure("job-{key}"') for key, text in found.items())
-    monkeypatch.setattr(interactive, "MOST_SERIES", 2)
+    monkeypatch.setattr(interactive, "MAX_SERIES", 2)
     assert [key for key, _ in job_scripts(stored, keys)] == keys[:2]
 
 

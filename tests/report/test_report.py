@@ -410,7 +410,7 @@ def test_failed_jobs_are_highlighted_and_everything_is_escaped(own, tmp_path):
 
 
 def test_long_tables_are_cut_and_say_so(own, tmp_path, monkeypatch):
-    monkeypatch.setattr(sys.modules["compressor.report.study_section"], "MOST_ROWS", 3)
+    monkeypatch.setattr(sys.modules["compressor.report.study_section"], "MAX_ROWS", 3)
     write_report(own, tmp_path / "out")
     found = read(tmp_path / "out")
     assert "The first 3 of 4 jobs" in found.text

@@ -18,7 +18,12 @@ from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import CARRIED
 from compressor.solve.attempts import integrate
 from compressor.solve.cautions import remarks
-from compressor.solve.horizon import CLOSE, FAR, follow_twins, predictability_horizon
+from compressor.solve.horizon import (
+    PARTED_DISTANCE,
+    TWIN_DISTANCE,
+    follow_twins,
+    predictability_horizon,
+)
 from compressor.solve.request import Request
 from compressor.solve.scipy_driver import needs_landings
 from compressor.solve.si_record import natural_sizes, offsets, record
@@ -92,15 +97,15 @@ def test_a_horizon_is_that_of_two_separate_runs():
     contact = {**DRY["contact"], "law": "flores", "restitution": 0.99}
     solve = {"duration_rev": 2, "settle_rev": 0}
     case, pair = Case.resolve({**DRY, "contact": contact, "solve": solve}), []
-    for shift in (0.0, CLOSE):
+    for shift in (0.0, TWIN_DISTANCE):
         asked = request(case, shift, 1e-13, samples=20_000)
         run = integrate(asked)
         rows = np.empty((asked.times.size, COLUMNS))
         observe_all(asked.times, run.states, run.phases, asked.p, rows)
         pair.append(rows[:, Column.ECCENTRICITY + 2 : Column.ECCENTRICITY + 4])
     apart = np.hypot(*(pair[1] - pair[0]).T) / 0.5e-3
-    twin = request(case, CLOSE, 1e-13).start
-    for far, rel in ((1e-7, 0.01), (1e-5, 0.01), (FAR, 0.06)):
+    twin = request(case, TWIN_DISTANCE, 1e-13).start
+    for far, rel in ((1e-7, 0.01), (1e-5, 0.01), (PARTED_DISTANCE, 0.06)):
         parted = case.duration * np.flatnonzero(apart > far)[0] / 20_000
         found = follow_twins(request(case, 0.0, 1e-13), twin, far=far).horizon
         assert found == pytest.approx(parted, rel=rel)

@@ -6,7 +6,13 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.solve import attempts
-from compressor.solve.error_bars import GREATEST, ROUNDING, RUNGS, allowed_residual, energy_residual
+from compressor.solve.error_bars import (
+    MAX_RESIDUAL,
+    ROUNDING,
+    RUNGS,
+    allowed_residual,
+    energy_residual,
+)
 from compressor.solve.simulate import measure, simulate
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}
@@ -44,7 +50,7 @@ def test_what_is_allowed_follows_the_tolerance():
     assert allowed_residual(1e-6, 0.25) == pytest.approx(
         1e-5
     )  # an impact costs as much in a short run
-    assert (allowed_residual(1e-13, 4), allowed_residual(1e-2, 4)) == (ROUNDING, GREATEST)
+    assert (allowed_residual(1e-13, 4), allowed_residual(1e-2, 4)) == (ROUNDING, MAX_RESIDUAL)
 
 
 def test_a_run_that_balances_is_run_once(unbalance):

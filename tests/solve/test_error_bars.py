@@ -14,7 +14,7 @@ from compressor.solve.error_bars import (
     FLOOR,
     LOOSER,
     TEN,
-    WHOLE,
+    TIGHTER_DISTANCE_FACTOR,
     Companion,
     bars,
     closeness,
@@ -122,9 +122,11 @@ def test_the_energy_residual_is_a_floor():
 def test_an_error_of_each_series_follows_from_its_distance():
     apart = APART | {"acceleration": 1e-3, "contact_force": np.array([2e-3, 4e-3])}
     tighter, looser = (series_errors(Companion({}, ratio, apart)) for ratio in (0.5, 10.0))
-    assert tighter["acceleration"] == pytest.approx(WHOLE * 1e-3)
-    assert tighter["contact_force"].tolist() == pytest.approx([WHOLE * 2e-3, WHOLE * 4e-3])
-    assert looser["acceleration"] == pytest.approx(WHOLE * LOOSER * 1e-3)
+    assert tighter["acceleration"] == pytest.approx(TIGHTER_DISTANCE_FACTOR * 1e-3)
+    assert tighter["contact_force"].tolist() == pytest.approx(
+        [TIGHTER_DISTANCE_FACTOR * 2e-3, TIGHTER_DISTANCE_FACTOR * 4e-3]
+    )
+    assert looser["acceleration"] == pytest.approx(TIGHTER_DISTANCE_FACTOR * LOOSER * 1e-3)
 
 
 def test_without_another_run_nothing_is_known():

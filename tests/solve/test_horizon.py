@@ -18,7 +18,13 @@ from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
 from compressor.solve.attempts import integrate
-from compressor.solve.horizon import CLOSE, FAR, RTOL, follow_twins, predictability_horizon
+from compressor.solve.horizon import (
+    PARTED_DISTANCE,
+    TWIN_DISTANCE,
+    TWINS_RTOL,
+    follow_twins,
+    predictability_horizon,
+)
 from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure, simulate
@@ -90,7 +96,7 @@ def test_twins_that_start_alike_stay_alike_to_the_bit():
 
 @pytest.mark.parametrize(("joint", "method", "damping"), SCENES)
 def test_rounding_does_not_part_compiled_twins(joint, method, damping):
-    asked = request(damped(joint, damping), 0.0, RTOL, method)
+    asked = request(damped(joint, damping), 0.0, TWINS_RTOL, method)
     assert follow_twins(asked, asked.start.copy(), far=1e-5).horizon == math.inf
 
 
@@ -104,9 +110,9 @@ def eccentricities(asked):
 def test_a_horizon_is_that_of_two_separate_runs():
     """Each with its own steps, so tight that their errors are far below the shift."""
     made = case(CHAOTIC)
-    pair = [eccentricities(request(made, s, 1e-13, samples=20000)) for s in (0.0, CLOSE)]
+    pair = [eccentricities(request(made, s, 1e-13, samples=20000)) for s in (0.0, TWIN_DISTANCE)]
     apart = np.hypot(*(pair[1] - pair[0]).T) / 0.3e-3
-    parted = made.duration * np.flatnonzero(apart > FAR)[0] / 20000
+    parted = made.duration * np.flatnonzero(apart > PARTED_DISTANCE)[0] / 20000
     horizon = predictability_horizon(made)
     assert 0.9 * made.turn < horizon < made.duration
     assert horizon == pytest.approx(parted, rel=0.01)

@@ -12,10 +12,16 @@ from compressor.cases.parameter import ACCURACY, TIGHTEST, first_rung
 from compressor.metrics import ERRORS, METRICS, SERIES_ERRORS
 from compressor.physics import Column
 from compressor.solve import attempts, solution
-from compressor.solve.error_bars import ENLARGED, ORDER, closeness, is_amplified, unmet
+from compressor.solve.error_bars import AMPLIFIED_FACTOR, ORDER, closeness, is_amplified, unmet
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.solution import AIM, LEAST, MOST, solve, tighten_factor
+from compressor.solve.solution import (
+    ERROR_AIM,
+    MAX_TIGHTENING,
+    MIN_TIGHTENING,
+    solve,
+    tighten_factor,
+)
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -58,7 +64,7 @@ def settled(found):
 def test_a_run_that_keeps_its_promise_takes_two(asked):
     found = measure(of(BOTH, accuracy="standard"))
     rtol = ACCURACY["standard"].rtol
-    assert asked == pytest.approx([rtol, rtol / attempts.TIGHTER])
+    assert asked == pytest.approx([rtol, rtol / attempts.TIGHTER_FACTOR])
     assert (found.status, found.attributes["promise"]) == ("ok", "kept")
     assert found.attributes["rtol"] == rtol
     assert 0 < found.numbers["acceleration_error"] <= ACCURACY["standard"].promise
@@ -72,7 +78,7 @@ def test_an_ill_conditioned_case_is_run_tighter_until_it_keeps_its_word(word, as
     *climbed, last = asked
     assert found.attrs["rtol"] == min(climbed) < 0.11 * tier.rtol
     assert climbed == sorted(climbed, reverse=True)
-    assert last == pytest.approx(min(climbed) / attempts.TIGHTER)  # the third run
+    assert last == pytest.approx(min(climbed) / attempts.TIGHTER_FACTOR)  # the third run
     exact = settled(simulate(of(ILL, rtol=1e-11, error_bars=False)))
     first = settled(simulate(of(ILL, rtol=tier.rtol, error_bars=False)))
     first_error, error = (
@@ -105,7 +111,7 @@ def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
     """Of both the longest bars count."""
     rtol, case = 1e-5, of(ILL, rtol=1e-5)
     found = solve(case)
-    expected = [rtol, rtol / attempts.TIGHTER, rtol * attempts.LOOSER]
+    expected = [rtol, rtol / attempts.TIGHTER_FACTOR, rtol * attempts.LOOSER_FACTOR]
     assert asked == pytest.approx(expected)
     again, *others = (attempts.run_at_tolerance(case, one, 60.0, False) for one in expected)
     assert is_amplified(rtol, distances(again.samples, others[0].samples))
@@ -123,8 +129,8 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
     def lucky(case, solution, timeout, ahead=attempts.NOTHING_AHEAD):
         if solution.rtol < ACCURACY["draft"].rtol:
             return attempts.comparison_run(case, solution, timeout)
-        other = replace(solution, rtol=solution.rtol / attempts.TIGHTER)
-        much = 1.2 * ENLARGED * solution.rtol**ORDER
+        other = replace(solution, rtol=solution.rtol / attempts.TIGHTER_FACTOR)
+        much = 1.2 * AMPLIFIED_FACTOR * solution.rtol**ORDER
         other.samples = solution.samples.copy()
         other.samples[:, Column.ACCELERATION] *= 1.0 + much
         return other
@@ -133,7 +139,7 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
     monkeypatch.setattr(solution, "comparison_run", lucky)
     found = solve(alone)
     first = ACCURACY["draft"].rtol
-    assert asked[:2] == pytest.approx([first, first * attempts.LOOSER])
+    assert asked[:2] == pytest.approx([first, first * attempts.LOOSER_FACTOR])
     assert len(asked) > 2
     assert min(asked) < 0.11 * first
     assert found.promise == "kept"
@@ -180,8 +186,8 @@ def test_a_third_run_that_tells_more_is_what_the_next_run_is_compared_with(monke
     monkeypatch.setattr(solution, "recheck", wary)
     found = solve(of(ILL, accuracy="standard"))
     first, again = made
-    assert again * attempts.TIGHTER == pytest.approx(found.rtol)
-    assert found.rtol <= 1.01 * first / LEAST
+    assert again * attempts.TIGHTER_FACTOR == pytest.approx(found.rtol)
+    assert found.rtol <= 1.01 * first / MIN_TIGHTENING
     assert found.promise == "kept"
     assert asked[0] == rtol
 
@@ -262,13 +268,13 @@ def test_the_next_run_is_as_tight_as_its_error_needs():
     """Where errors fall as assumed, its estimate is AIM of what is allowed."""
     for excess, ratio in ((3.0, 0.5), (30.0, 0.5), (5.0, 40.0)):
         q = tighten_factor(excess, ratio)
-        assert LEAST <= q <= MOST
+        assert MIN_TIGHTENING <= q <= MAX_TIGHTENING
         error = excess / closeness(ratio)  # of the looser of the two, over what is allowed
         tightest = error * max(ratio, 1 / ratio) ** -ORDER
-        if LEAST < q < MOST:
-            assert closeness(q) * tightest == pytest.approx(AIM)
-    assert tighten_factor(1.01, 0.5) == LEAST
-    assert tighten_factor(1e9, 0.5) == MOST
+        if MIN_TIGHTENING < q < MAX_TIGHTENING:
+            assert closeness(q) * tightest == pytest.approx(ERROR_AIM)
+    assert tighten_factor(1.01, 0.5) == MIN_TIGHTENING
+    assert tighten_factor(1e9, 0.5) == MAX_TIGHTENING
 
 
 # Accuracy by number

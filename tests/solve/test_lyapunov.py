@@ -10,7 +10,7 @@ from compressor.physics.motion import start
 from compressor.physics.record import FREEDOMS
 from compressor.solve import lyapunov
 from compressor.solve.attempts import integrate
-from compressor.solve.horizon import CLOSE, FAR, predictability_horizon
+from compressor.solve.horizon import PARTED_DISTANCE, TWIN_DISTANCE, predictability_horizon
 from compressor.solve.lyapunov import OF_STEPS, growths, largest_exponent, mean_with_error
 from compressor.solve.request import Request
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
@@ -115,7 +115,7 @@ def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
 def test_of_a_chaotic_motion_it_is_the_rate_at_which_twins_part():
     made = case(LIGHT)
     found = largest_exponent(made, settled(made, 4, 1e-8), 12, math.inf)
-    rate = math.log(FAR / CLOSE) / (predictability_horizon(made) / made.turn)
+    rate = math.log(PARTED_DISTANCE / TWIN_DISTANCE) / (predictability_horizon(made) / made.turn)
     assert found.value - found.error > 0.0
     assert 0.5 * rate < found.value < 2.0 * rate
 
@@ -141,7 +141,7 @@ def test_a_value_is_a_bound_where_rounding_is_reached(monkeypatch):
     made = case({"joint": "big_end", "clearance_mm": 0.2})
     y = at_rest(made)
     plain = largest_exponent(made, y, 1, math.inf)
-    monkeypatch.setattr(lyapunov, "LEAST", 0.5 * lyapunov.CLOSE)
+    monkeypatch.setattr(lyapunov, "LOST_DISTANCE", 0.5 * lyapunov.TWIN_DISTANCE)
     found = largest_exponent(made, y, 1, math.inf)
     assert (plain.at_most, found.at_most) == (False, True)
     assert found.value > plain.value

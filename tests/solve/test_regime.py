@@ -16,13 +16,13 @@ from compressor.physics import COLUMNS, Column
 from compressor.solve import regime
 from compressor.solve.horizon import Parting, predictability_horizon
 from compressor.solve.regime import (
-    BUDGET,
-    CLOSE,
+    FIRST_LOOK_REV,
     FOR_RUNS,
-    LEAST_WORK,
+    MIN_WORK,
     RTOL,
-    SHORT,
-    SURE,
+    SURE_FACTOR,
+    TWIN_DISTANCE,
+    TWINS_BUDGET,
     WORK,
     HorizonSearch,
     repeats,
@@ -48,7 +48,7 @@ def test_chaos_is_found_without_being_asked(chaotic):
     assert (chaotic.status, chaotic.attributes["regime"]) == ("ok", "chaotic")
     assert chaotic.attributes["promise"] == "none"
     horizon = chaotic.numbers["predictability_horizon"]
-    twins = predictability_horizon(case(CHAOTIC), close=CLOSE)
+    twins = predictability_horizon(case(CHAOTIC), close=TWIN_DISTANCE)
     assert horizon == pytest.approx(twins, rel=0.05)
     assert chaotic.numbers["revolutions"] == 13
     assert chaotic.numbers["revolutions_to_one_percent"] > 13
@@ -145,7 +145,10 @@ def test_a_short_span_is_looked_at_first(monkeypatch):
     search = searched(of, 600_000)
     assert search.look(whole=True)
     assert search.horizon == parted.time
-    assert [row[:2] for row in asked] == [(SHORT, RTOL), (pytest.approx(0.15), RTOL / SURE)]
+    assert [row[:2] for row in asked] == [
+        (FIRST_LOOK_REV, RTOL),
+        (pytest.approx(0.15), RTOL / SURE_FACTOR),
+    ]
 
 
 def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
@@ -155,8 +158,13 @@ def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
     search = searched(of, 600_000)
     assert not search.look(whole=True)
     assert search.horizon == math.inf
-    tight = pytest.approx(RTOL / SURE)
-    expected = [(SHORT, RTOL), (pytest.approx(0.15), tight), (SHORT, tight), (4.0, tight)]
+    tight = pytest.approx(RTOL / SURE_FACTOR)
+    expected = [
+        (FIRST_LOOK_REV, RTOL),
+        (pytest.approx(0.15), tight),
+        (FIRST_LOOK_REV, tight),
+        (4.0, tight),
+    ]
     assert [row[:2] for row in asked] == expected
 
 
@@ -181,7 +189,7 @@ def test_the_search_takes_no_more_than_its_share(monkeypatch, needs):
     for _ in range(4):  # a run, and a look
         search.count(run_of(60_000))
         search.look(whole=True)
-        assert search.of_twins <= BUDGET * search.of_runs
+        assert search.of_twins <= TWINS_BUDGET * search.of_runs
     assert asked
     assert search.horizon == math.inf or needs > 12_000
     assert search.stopped == (needs > 12_000)
@@ -191,7 +199,7 @@ def test_runs_and_twins_have_twenty_times_the_first_run_s_work(monkeypatch):
     """Or two seconds' worth, if that is more; a first run has the case's limit alone."""
     of = case()
     assert HorizonSearch(of).within_budget(of) is of
-    assert searched(of, 6000).work_left == LEAST_WORK - 6000
+    assert searched(of, 6000).work_left == MIN_WORK - 6000
     asked = followed(monkeypatch, Parting(0.0, False, True), needs=10**7)
     search = searched(of, 6_000_000, 42_000_000)
     left = FOR_RUNS * WORK * 6_000_000 - 48_000_000
@@ -201,7 +209,7 @@ def test_runs_and_twins_have_twenty_times_the_first_run_s_work(monkeypatch):
     left = WORK * 6_000_000 - 90_000_000
     assert search.work_left == left
     search.look(whole=True)
-    assert asked == [(SHORT, RTOL, left // 6 // 2)]
+    assert asked == [(FIRST_LOOK_REV, RTOL, left // 6 // 2)]
     assert search.stopped
     assert search.work_left == 0
 
@@ -216,7 +224,7 @@ def test_a_run_that_the_budget_ended_says_so():
 
 def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkeypatch):
     """However fast the clock runs: the budget counts evaluations."""
-    monkeypatch.setattr(regime, "LEAST_WORK", 0)
+    monkeypatch.setattr(regime, "MIN_WORK", 0)
     monkeypatch.setattr(regime, "WORK", 4.0)
     machine = {"rod_mass_kg": 6.276, "reciprocating_mass_kg": 11.54, "speed_rpm": 190.1}
     values = {"joint": "big_end", "clearance_mm": 0.06779, "machine": machine}  # ill-conditioned

@@ -7,9 +7,9 @@ import pytest
 from conftest import CHAOTIC
 
 from compressor.cases.case import Case, CaseError
-from compressor.cases.table import MOST_REV
+from compressor.cases.table import MAX_REV
 from compressor.metrics import METRICS
-from compressor.solve.regime import MEASURED, agree, least_promise, steady
+from compressor.solve.regime import MEASURED_REV, agree, least_promise, steady
 from compressor.solve.simulate import measure, simulate
 
 PAPER = {"joint": "big_end", "clearance_mm": 0.2}
@@ -39,7 +39,7 @@ def test_a_case_settles_where_its_revolutions_agree():
     of = case()
     assert settled == pytest.approx(found.attributes["settle"] / of.turn)
     assert settled in (0, 1)
-    same = measure(case(settle_rev=settled, duration_rev=settled + MEASURED))
+    same = measure(case(settle_rev=settled, duration_rev=settled + MEASURED_REV))
     for name in METRICS:
         np.testing.assert_array_equal(found.numbers[name], same.numbers[name])
     assert found.key != same.key
@@ -59,7 +59,7 @@ def test_metrics_of_the_settled_part_do_not_change_when_it_goes_on(values):
 def test_the_time_series_end_with_the_run():
     found = simulate(Case.from_values({**PAPER, "solve": {**AUTO, "output_step_deg": 3.6}}))
     turns = float(found["time"][-1]) / case().turn
-    assert turns == pytest.approx(float(found["settled_rev"]) + MEASURED)
+    assert turns == pytest.approx(float(found["settled_rev"]) + MEASURED_REV)
     assert found.sizes["time"] == 100 * round(turns) + 1
 
 
@@ -86,7 +86,7 @@ def test_a_motion_that_does_not_settle_says_so_with_its_numbers():
 def test_a_chaotic_motion_never_settles_and_is_measured_by_its_second_half():
     found = measure(case(CHAOTIC, **AUTO))
     assert (found.status, found.attributes["regime"]) == ("ok", "chaotic")
-    assert found.numbers["revolutions"] == MOST_REV / 2
+    assert found.numbers["revolutions"] == MAX_REV / 2
     assert math.isnan(found.numbers["settled_rev"])
 
 

@@ -16,7 +16,7 @@ from compressor.physics.lane_march import fits
 from compressor.physics.record import RECORD
 from compressor.solve.si_record import record
 from compressor.solve.simulate import measure, observe
-from compressor.solve.solution import MOST_ATTEMPTS, side_by_side
+from compressor.solve.solution import MAX_ATTEMPTS, side_by_side
 
 pytestmark = pytest.mark.compiled
 
@@ -91,7 +91,7 @@ def test_a_run_that_fails_touches_no_neighbour():
         {"solve": {"method": "DOPRI5"}},
         {"solve": {"settle_rev": "auto"}},
         {"solve": {"timeout_s": 1}},
-        {"solve": {"max_steps": MOST_ATTEMPTS - 1}},
+        {"solve": {"max_steps": MAX_ATTEMPTS - 1}},
         {"solve": {"output_step_deg": 0.001}},
     ],
 )

@@ -9,8 +9,8 @@ from compressor.metrics import METRICS, QUANTILES, STATISTICS
 from compressor.physics import new_record, new_tally
 from compressor.solve.request import merge_turns
 from compressor.solve.run_metrics import (
-    LEAST_SECTION,
-    MOST_BATCHES,
+    MAX_BATCHES,
+    MIN_SECTION,
     chaotic_bars,
     metrics,
     of_peaks,
@@ -106,12 +106,12 @@ def test_greatest_values_have_no_bar_but_an_ideal_joint_has_none_to_err_in(recor
 
 @pytest.mark.parametrize("count", [1, 2, 29, 30, 31, 59, 60, 100, 1000])
 def test_batches_are_alike_and_few(count):
-    batches = parts(range(count), MOST_BATCHES, 1)
+    batches = parts(range(count), MAX_BATCHES, 1)
     assert len({len(batch) for batch in batches}) == 1
-    assert len(batches) <= MOST_BATCHES
+    assert len(batches) <= MAX_BATCHES
     assert batches[-1][-1] == count - 1  # what is left out is the beginning
     assert sum(map(len, batches)) > count / 2
-    assert all(len(s) >= min(count, LEAST_SECTION) for s in parts(range(count), 30, LEAST_SECTION))
+    assert all(len(s) >= min(count, MIN_SECTION) for s in parts(range(count), 30, MIN_SECTION))
 
 
 def test_the_error_of_a_mean():

@@ -17,7 +17,7 @@ from compressor.solve.simulate import measure, simulate
 from compressor.store.export import export
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import open_study, read_store
-from compressor.store.rows import LATER, decode, encode, of_outcomes
+from compressor.store.rows import LATER_COLUMNS, decode, encode, of_outcomes
 from compressor.store.status import standings
 from compressor.store.studies import write_study
 
@@ -62,11 +62,11 @@ def test_results_of_before_are_read_without_either(plain, tmp_path):
     data = encode(of_outcomes([plain], 1))
     with io.BytesIO(data) as stream:
         with h5py.File(stream, "r+") as file:
-            for name in LATER:
+            for name in LATER_COLUMNS:
                 del file[name]
         older = decode(stream.getvalue(), tmp_path / "rows/000000001-0.h5")
     newer = decode(data, tmp_path / "rows/000000001-0.h5")
-    for name in LATER:
+    for name in LATER_COLUMNS:
         assert older.columns[name].tolist() == [b""]
         assert newer.columns[name].tolist() != [b""] or name == "signals"
     for name in NUMBERS:

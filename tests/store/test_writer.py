@@ -144,7 +144,7 @@ def test_a_segment_of_an_older_version_lacks_a_number(tmp_path, monkeypatch):
 
 
 def test_small_segments_are_merged_and_nothing_else_changes(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "MOST_AGE", 0)
+    monkeypatch.setattr(writer, "MAX_AGE", 0)
     with Writer(tmp_path) as open_writer:
         for number in range(100):
             kept = outcome(number % 75, number, detail=f"the {number}th")
@@ -256,7 +256,7 @@ def test_a_file_system_without_locks_is_told(number, tmp_path, monkeypatch):
 
 
 def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "PATIENCE", 60.0)
+    monkeypatch.setattr(writer, "LOCK_SECONDS", 60.0)
     with Writer(tmp_path, command="the first"):
         pass
     assert (tmp_path / writer.LOCK_NAME).read_text() == ""
@@ -267,7 +267,7 @@ def test_a_lock_that_was_just_taken_is_soon_named(tmp_path, monkeypatch):
         with pytest.raises(StoreError, match="in use by the second; wait"):
             Writer(tmp_path).__enter__()
         named.join()
-        monkeypatch.setattr(writer, "PATIENCE", 0.0)
+        monkeypatch.setattr(writer, "LOCK_SECONDS", 0.0)
         lock.truncate(0)
         with pytest.raises(StoreError, match="in use by another process; wait"):
             Writer(tmp_path).__enter__()
@@ -301,7 +301,7 @@ DRIVER = """
     from compressor.store import writer
     from test_writer import outcome
     folder, begin = sys.argv[1], int(sys.argv[2])
-    writer.MOST_AGE, writer.MOST_SMALL = 0.002, 4
+    writer.MAX_AGE, writer.MAX_SMALL = 0.002, 4
     with writer.Writer(folder) as open_writer:
         for number in range(begin, begin + 10**6):
             for key in open_writer.add(outcome(number)):

@@ -269,7 +269,7 @@ def large(payload):
 
 
 def test_few_large_results_are_on_their_way(client, monkeypatch):
-    monkeypatch.setattr(cluster_batches, "MOST_BYTES", 3_000_000)
+    monkeypatch.setattr(cluster_batches, "MAX_BYTES", 3_000_000)
     issued = itertools.count()
     ends = remote(client, large, Many((n, 1_000_000, 9.0) for n in issued), 1e-9)
     for taken in range(1, 30):

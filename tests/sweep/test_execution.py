@@ -22,7 +22,7 @@ from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from compressor.sweep import execution
 from compressor.sweep.execution import WorkersFailed, rest, run_batches
-from compressor.sweep.worker import MOST_TEXT, JobLost, JobResult, Workers
+from compressor.sweep.worker import MAX_TEXT, JobLost, JobResult, Workers
 
 RULES = {"memory": LEAST, "grace": 0.3}
 HERE = str(Path(__file__).parent)
@@ -221,7 +221,7 @@ def test_a_poison_job_costs_itself_only(name):
     assert (end.id, end.reason) == (name, POISON[name][1])
     assert POISON[name][2] in end.detail
     assert (end.reason == "internal_error") == ("Traceback" in end.traceback)
-    assert len(end.traceback) <= MOST_TEXT
+    assert len(end.traceback) <= MAX_TEXT
 
 
 def test_a_payload_that_does_not_pickle_is_a_lost_job():

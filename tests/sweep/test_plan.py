@@ -84,7 +84,7 @@ def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
     (study,) = studies(one=NINE)
     monkeypatch.setattr(plan, "TIMING", 60.0)
     whole = forecast([study], "results", 0).timed(2, str)
-    monkeypatch.setattr(plan, "MOST_CASES", 3)
+    monkeypatch.setattr(plan, "MAX_CASES", 3)
     study = noted(study)
     found = forecast([study], "results", 0)
     assert len({*study.cases.made}) == 3
@@ -117,12 +117,12 @@ def test_a_dozen_jobs_drawn_over_the_design_tell_the_time(studies, monkeypatch):
     axes = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 100]}}}
     found = forecast(studies(one=axes), "results", 0).timed(1, str)
     true = 80 * 1.0 + 20 * 20.0
-    assert found.timed == len(made) == plan.DRAWN
+    assert found.timed == len(made) == plan.TIMED_JOBS
     assert 0.5 * true < found.seconds < 2.0 * true
     assert found.least <= true <= found.most
     masses = sorted(case.machine.rod_mass_kg for case in made)
-    stretches = np.histogram(masses, np.linspace(3, 5.0001, plan.DRAWN + 1))[0]
-    assert (stretches >= 1).sum() >= plan.DRAWN - 2
+    stretches = np.histogram(masses, np.linspace(3, 5.0001, plan.TIMED_JOBS + 1))[0]
+    assert (stretches >= 1).sum() >= plan.TIMED_JOBS - 2
     again = timed_as(monkeypatch, lambda case: 1.0)
     forecast(studies(one=axes), "results", 0).timed(1, str)
     assert [case.key for case in again] == [case.key for case in made]
@@ -197,7 +197,7 @@ def test_nothing_ahead_costs_nothing(studies):
 @pytest.mark.parametrize("command", ["plan", "run"])
 def test_large_files_are_counted_before_they_are_read(command, studies, monkeypatch, capsys):
     studies(one=NINE)
-    monkeypatch.setattr(screen, "MANY", 9)
+    monkeypatch.setattr(screen, "MANY_CASES", 9)
     monkeypatch.setattr(screen, "FIRST_SECONDS", 0)
     assert cli.main([command, "one.yaml", "-j", "1"]) == 0
     assert capsys.readouterr().err.startswith("one: 9 jobs\n0 of 9 cases read, 0 %\n")

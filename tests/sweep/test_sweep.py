@@ -186,7 +186,7 @@ def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path):
 
 def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypatch):
     """A shard keeps the time series of a job that another run, which ends later, runs without."""
-    monkeypatch.setattr(compressor.store.writer, "MOST_AGE", 0)
+    monkeypatch.setattr(compressor.store.writer, "MAX_AGE", 0)
     shared = studies(all={"machine": {"rod_mass_kg": 6}})
     masses = {"machine": {"rod_mass_kg": [3, 4, 5, 6]}}
     fewer = studies(few={**masses, "output": {"keep": "metrics"}})
@@ -254,7 +254,7 @@ def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path):
 
 
 def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch):
-    monkeypatch.setattr(warm_up, "PATIENCE", 0)
+    monkeypatch.setattr(warm_up, "SECONDS_TO_REMARK", 0)
     told = []
     for name in ("one", "one", "two"):
         monkeypatch.setattr(warm_up, "machine_code_folder", lambda name=name: tmp_path / name)

@@ -6,7 +6,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.reasons import Reason
-from compressor.sweep.wanted import FEWEST, SweepProgress, SweepWork
+from compressor.sweep.wanted import MIN_JOBS_FOR_ETA, SweepProgress, SweepWork
 from compressor.sweep.worker import JobLost, JobResult
 
 START_UP = 40.0  # s: the equations are compiled, workers start
@@ -47,7 +47,7 @@ def good(left, true, share):
 def test_alike_jobs_are_foretold_from_the_fifth_on():
     found = list(guesses([case() for _ in range(200)]))
     for number, (at, true, left) in enumerate(found, 1):
-        if number < FEWEST or at - START_UP < 1.0:
+        if number < MIN_JOBS_FOR_ETA or at - START_UP < 1.0:
             assert left is None
         else:  # one of two workers may have been counted once less
             assert good(left, true, 1 / number + 0.01)

@@ -24,9 +24,9 @@ ANGLE_AXIS = "crank angle (°), 0 = top dead centre"
 LOADS = {"typical": "typical model (gas force)", "design": "design model (spring and cam)"}
 KILONEWTON = 1e-3
 TICK = 90.0  # degrees between ticks
-SAME = 1e-9  # curves closer than this share of their range are one curve
+SAME_CURVE = 1e-9  # curves closer than this share of their range are one curve
 NEARLY = 0.98  # of the greatest difference: the first window that has this much is taken
-LEAST_MARK = 0.05  # of a panel's height: a flatter mark would not be seen
+MIN_MARK = 0.05  # of a panel's height: a flatter mark would not be seen
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def plot_enlarged(
     enlarged.set_xlim(angle[0], angle[-1])
     enlarged.set_ylim(low, high)
     bottom, top = full[0].get_ylim()
-    lift = max(0.0, LEAST_MARK * (top - bottom) - (high - low)) / 2
+    lift = max(0.0, MIN_MARK * (top - bottom) - (high - low)) / 2
     low, high = low - lift, high + lift
     room = 0.01 * (top - bottom)
     for panel in full:
@@ -161,8 +161,8 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
     count = min(angle.size, round(quantity.window / (angle[1] - angle[0])) + 1)
     half = count // 2
     inner = slice(half, half + angle.size - count + 1)  # the middle of every window
-    differs = bool((high - low).max() > SAME * np.ptp(values))
-    nearly = NEARLY if differs else 1 - SAME
+    differs = bool((high - low).max() > SAME_CURVE * np.ptp(values))
+    nearly = NEARLY if differs else 1 - SAME_CURVE
     if not differs:
         score = np.abs(values[0])[inner]
     elif quantity.steep:

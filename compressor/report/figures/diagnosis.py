@@ -44,14 +44,14 @@ from compressor.report.figures.style import (
 
 Shakings = Mapping[str, Shaking]  # by label of the paper's cases
 
-ALONE = FAULTS[:2]  # clearance at one joint
+SINGLE_FAULTS = FAULTS[:2]  # clearance at one joint
 BY_FAULT = {
     "big_end": (LineStyle(BLUE, "-", 1.2, 2.3), "o"),
     "small_end": (LineStyle(RED, (0, (6, 1.2)), 1.2, 2.2), "D"),
     "both": (LineStyle(GOLD, (0, (6, 1, 1.2, 1)), 1.8, 2.1), "s"),
 }
 BIN = 5.0  # degrees over which the rms is taken
-NEAR = "#f2ead9"
+NEAR_COLOR = "#f2ead9"
 
 
 @in_style
@@ -61,7 +61,7 @@ def draw_diagnosis_spectra(found: Shakings) -> Figure:
     """
     figure, panels = sheet(1, 2, 4.6, width_ratios=(2.3, 1))
     lines, trend = panels.flat
-    for fault in ALONE:
+    for fault in SINGLE_FAULTS:
         plot_lines(lines, found[label(fault, CLEARANCES[-1])].spectrum.lines, BY_FAULT[fault][0])
     bottom, top = lines.get_ylim()
     plot_lines(lines, found["design"].spectrum.lines, IDEAL)
@@ -80,7 +80,7 @@ def draw_diagnosis_spectra(found: Shakings) -> Figure:
     trend.set_ylim(bottom=0)
     handles = [Line2D([], [], label="no clearance", **IDEAL.properties())]
     for fault, (line, marker) in BY_FAULT.items():
-        only = "" if fault in ALONE else ", (b) only"
+        only = "" if fault in SINGLE_FAULTS else ", (b) only"
         handles.append(
             Line2D([], [], label=SPOKEN[fault] + only, marker=marker, **line.properties())
         )
@@ -91,8 +91,8 @@ def draw_diagnosis_spectra(found: Shakings) -> Figure:
 @in_style
 def draw_diagnosis_orbits(runs: Runs) -> Figure:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
-    figure, panels = sheet(len(ALONE), len(CLEARANCES), 7.2, sharex=True, sharey=True)
-    for row, joint in zip(panels, ALONE, strict=True):
+    figure, panels = sheet(len(SINGLE_FAULTS), len(CLEARANCES), 7.2, sharex=True, sharey=True)
+    for row, joint in zip(panels, SINGLE_FAULTS, strict=True):
         for panel, clearance in zip(row, CLEARANCES, strict=True):
             plot_orbit(panel, runs[label(joint, clearance)], joint)
             panel.set_title(f"{SPOKEN[joint]}, {clearance:g} mm")
@@ -107,8 +107,8 @@ def draw_diagnosis_orbits(runs: Runs) -> Figure:
 @in_style
 def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Figure:
     """Return when X has its high orders, and the joints' contact modes, over the crank angle."""
-    figure, panels = sheet(2 * len(ALONE), 1, 8.4, sharex=True, height_ratios=(2.6, 1) * 2)
-    for joint, profile, strip in zip(ALONE, panels[::2, 0], panels[1::2, 0], strict=True):
+    figure, panels = sheet(2 * len(SINGLE_FAULTS), 1, 8.4, sharex=True, height_ratios=(2.6, 1) * 2)
+    for joint, profile, strip in zip(SINGLE_FAULTS, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)
         rows = [SweptRow(f"{c:g}", modes=angle_modes(runs[label(joint, c)])) for c in CLEARANCES]
         plot_modes(strip, rows_modes(rows)[joint])
@@ -122,7 +122,7 @@ def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Figure:
     handles = [
         Line2D([], [], label=f"{c:g} mm", **BY_CLEARANCE[c].properties()) for c in CLEARANCES
     ]
-    near = Patch(facecolor=NEAR, label="the force turns")
+    near = Patch(facecolor=NEAR_COLOR, label="the force turns")
     legend_above(figure, [*handles, near, *mode_handles()])
     return figure
 
@@ -141,7 +141,7 @@ def plot_profiles(panel: Axes, found: Shakings, joint: str) -> None:
     fine = np.arange(0.0, 360.0, 0.5)
     near = one.near(fine)
     panel.fill_between(fine, 0, 1, where=near, transform=panel.get_xaxis_transform(),
-                       color=NEAR, linewidth=0, zorder=0.5)  # fmt: skip
+                       color=NEAR_COLOR, linewidth=0, zorder=0.5)  # fmt: skip
     panel.set_title(f"rms of X above order {ORDER} in {BIN:g}°, clearance at the {SPOKEN[joint]}")
     panel.set_ylabel("rms (N)")
     panel.set_ylim(bottom=0)

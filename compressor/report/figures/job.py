@@ -185,8 +185,8 @@ THIS = LineStyle(BLUE, "-", 1.1, 2.3)
 TWIN = LineStyle(GOLD, "-", 2.2, 2.1)  # broader and lighter, below
 MARK = LineStyle(RED, (0, (4, 1.5)), 1.0, 2.2)
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
-MOST_ORDERS = 200  # that are drawn
-MOST_ENVELOPE = 60  # of an envelope
+MAX_ORDERS = 200  # that are drawn
+MAX_ENVELOPE = 60  # of an envelope
 ROUNDING = 1e-6  # m/s2, of an acceleration
 DECADES = 4  # below the greatest line
 ORDERS_AXIS = "order (cycles per revolution)"
@@ -275,7 +275,7 @@ def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
 
 def plot_lines(panel: Axes, lines: tuple[np.ndarray, np.ndarray], line: LineStyle) -> None:
     """Orders and amplitudes, (k,) each, on a log scale from order 1 on, with `ORDER` marked."""
-    shown = (lines[0] >= 1) & (lines[0] <= MOST_ORDERS)
+    shown = (lines[0] >= 1) & (lines[0] <= MAX_ORDERS)
     orders, amplitudes = (values[shown] for values in lines)
     panel.plot(orders, amplitudes, **line.properties())
     top = max(amplitudes.max(), panel.dataLim.y1 if panel.lines[1:] else 0.0)
@@ -294,7 +294,7 @@ def plot_deviation(panel: Axes, lines: tuple[np.ndarray, np.ndarray]) -> None:
         return
     panel.text(0.5, 0.5, "none: the motion is that of ideal joints", ha="center",
                transform=panel.transAxes)  # fmt: skip
-    panel.set(yticks=[], xlim=(0, MOST_ORDERS))
+    panel.set(yticks=[], xlim=(0, MAX_ORDERS))
 
 
 def mark_order(panel: Axes) -> None:
@@ -310,18 +310,18 @@ def plot_envelope(
     panel: Axes, lines: tuple[np.ndarray, np.ndarray], band: tuple[float, float]
 ) -> None:
     """A sensor's envelope spectrum, orders and amplitudes (k,), without its mean; band in Hz."""
-    shown = (lines[0] > 0.01) & (lines[0] <= MOST_ENVELOPE)
+    shown = (lines[0] > 0.01) & (lines[0] <= MAX_ENVELOPE)
     panel.plot(*(values[shown] for values in lines), **THIS.properties())
     low, high = (edge / 1e3 for edge in band)
     panel.set_title(f"envelope of the sensor between {low:.3g} and {high:.3g} kHz")
     panel.set_ylabel("amplitude (m/s²)")
     panel.set_xlabel(ORDERS_AXIS)
     panel.set_ylim(bottom=0)
-    panel.set_xlim(0, MOST_ENVELOPE)
+    panel.set_xlim(0, MAX_ENVELOPE)
 
 
-MOST_TICKS = 12
-MOST_MAP_ORDERS = 150
+MAX_TICKS = 12
+MAX_MAP_ORDERS = 150
 MAP_DECADES = 3  # below the greatest line above `ORDER`
 ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
@@ -332,7 +332,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
     figure, panels = sheet(1, 2, height(len(rows)) + 0.9, width_ratios=(3, 1), sharey=True)
     image, beside = panels.flat
     found = [row.shaking for row in rows]
-    size = min(MOST_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
+    size = min(MAX_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
     table = np.full((len(rows), size), np.nan)
     for number, one in enumerate(found):
         if one:
@@ -391,7 +391,7 @@ def plot_modes(panel: Axes, table: np.ndarray) -> None:
 
 def label_rows(panel: Axes, rows: Sequence[SweptRow], title: str) -> None:
     """The swept values at some of the rows, with what became of those that have no series."""
-    each = -(-len(rows) // MOST_TICKS)
+    each = -(-len(rows) // MAX_TICKS)
     named = [*range(0, len(rows), each)]
     words = [f"{row.value} ({row.problem})" if row.problem else row.value for row in rows]
     panel.set_yticks(named, [words[number] for number in named])

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from compressor.report.figures.style import render
 
 KINDS = ("png", "svg")
-FEWEST = 3  # figures for which a second process is worth its start
+MIN_FIGURES_FOR_TWO = 3  # figures for which a second process is worth its start
 
 _inherited: dict[str, Figure] = {}  # what a process finds that was forked while they stood here
 
@@ -27,7 +27,7 @@ def pictures(figures: Mapping[str, Figure], headings: Mapping[str, str]) -> dict
     figure need not be sent then, which matplotlib's formatters often forbid. Where threads run,
     whose locks a fork may copy, or the system has no fork, all is done here.
     """
-    alone = len(figures) < FEWEST or threading.active_count() > 1 or not can_fork()
+    alone = len(figures) < MIN_FIGURES_FOR_TWO or threading.active_count() > 1 or not can_fork()
     made = one_by_one(figures, headings) if alone else by_two(figures, headings)
     return {
         f"{name}.{kind}": picture

@@ -18,7 +18,7 @@ from compressor.report.figures.sweep_maps import (
     ranking,
 )
 from compressor.report.figures.sweep_panels import (
-    MOST_COLUMNS,
+    MAX_COLUMNS,
     draw_curves,
     draw_multiples,
     draw_overview,
@@ -27,8 +27,8 @@ from compressor.report.figures.sweep_panels import (
     roles_of,
 )
 
-MOST_ROWS = 3  # measures that stand in a figure with rows of them
-MOST_DETAILED = 2  # measures that have a figure of their own
+MAX_ROWS = 3  # measures that stand in a figure with rows of them
+MAX_DETAILED = 2  # measures that have a figure of their own
 
 
 class SweepFigure(NamedTuple):
@@ -87,8 +87,8 @@ def several(
     yield SweepFigure("overview", title, caption, draw_overview(sweep, role, shown))
     if len(sweep.axes) == 2:
         return
-    leaders = leading(sweep, shown, MOST_ROWS)
-    groups = [leaders] if len(sweep.axes) == 3 else [[one] for one in leaders[:MOST_DETAILED]]
+    leaders = leading(sweep, shown, MAX_ROWS)
+    groups = [leaders] if len(sweep.axes) == 3 else [[one] for one in leaders[:MAX_DETAILED]]
     for group in groups:
         own = found.get(group[0])
         role = roles_of(sweep, order_of(own) if own and len(group) == 1 else order, True)
@@ -117,8 +117,8 @@ def draw_sampled(
                       draw_points(sweep, strongest, shown))  # fmt: skip
     if len(numbers) < 2:
         return
-    columns = numbers[:MOST_COLUMNS]
-    group = leading(sweep, shown, MOST_ROWS)
+    columns = numbers[:MAX_COLUMNS]
+    group = leading(sweep, shown, MAX_ROWS)
     caption = captions.join_sentences(captions.scatter(sweep, columns, len(numbers)), marks[0])
     title = f"{', '.join(one.title for one in group)} over each key"
     yield SweepFigure("scatter", title, caption, draw_scatter(sweep, columns, group))

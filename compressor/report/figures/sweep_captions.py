@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from compressor.report.figures.sweep_data import Measure, PlottedAxis, PlottedSweep, shown_value
-from compressor.report.figures.sweep_maps import MOST_CELLS, Ranking, describe_ranking
+from compressor.report.figures.sweep_maps import MAX_CELLS, Ranking, describe_ranking
 from compressor.report.figures.sweep_panels import (
-    MOST_COLUMNS,
-    MOST_JOBS,
-    MOST_LINES,
-    MOST_PLACES,
-    MOST_POINTS,
-    MOST_ROWS,
+    MAX_COLUMNS,
+    MAX_JOBS,
+    MAX_LINES,
+    MAX_PLACES,
+    MAX_POINTS,
+    MAX_ROWS,
     Roles,
     grouping,
 )
@@ -77,7 +77,7 @@ def curves(sweep: PlottedSweep) -> str:
     return join_sentences(
         f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
         "is long enough to be seen.",
-        thinned_told(sweep.axes[0], MOST_JOBS),
+        thinned_told(sweep.axes[0], MAX_JOBS),
     )
 
 
@@ -85,7 +85,7 @@ def maps(sweep: PlottedSweep) -> str:
     """Return a sweep along two axes."""
     return join_sentences(
         "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
-        *(thinned_told(axis, MOST_CELLS) for axis in sweep.axes),
+        *(thinned_told(axis, MAX_CELLS) for axis in sweep.axes),
     )
 
 
@@ -117,15 +117,15 @@ def overview(sweep: PlottedSweep, role: Roles) -> str:
         if len(sweep.axes) > 2
         else f"Every metric over {sweep.axes[role.x].phrase}, a colour for each {color.phrase}.",
         points_told(sweep, role),
-        thinned_told(sweep.axes[role.x], MOST_PLACES),
-        thinned_told(color, MOST_LINES),
+        thinned_told(sweep.axes[role.x], MAX_PLACES),
+        thinned_told(color, MAX_LINES),
     )
 
 
 def multiples(sweep: PlottedSweep, role: Roles) -> str:
     """Return the panels for the values of an axis, or of two."""
     places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
-    limits = zip(role, (MOST_PLACES, MOST_LINES, MOST_COLUMNS, MOST_ROWS), strict=True)
+    limits = zip(role, (MAX_PLACES, MAX_LINES, MAX_COLUMNS, MAX_ROWS), strict=True)
     return join_sentences(
         f"A panel for each {' and '.join(places)}, a colour for each value of "
         f"{sweep.axes[role.color].phrase}.",
@@ -155,9 +155,9 @@ def describe_trends(sweep: PlottedSweep) -> Iterator[str]:
     if phrase:
         yield f"A colour for each {phrase}."
     count = sweep.place.size
-    if count > MOST_POINTS:
+    if count > MAX_POINTS:
         yield (
-            f"{MOST_POINTS:,} of {count:,} jobs are drawn; trends and the ranking are those of all."
+            f"{MAX_POINTS:,} of {count:,} jobs are drawn; trends and the ranking are those of all."
         )
 
 

@@ -13,11 +13,11 @@ from compressor.analysis import SPOKEN
 from compressor.metrics import JOINTS, METRICS
 from compressor.report.figures.style import RED
 
-ALONE = {"linestyle": "none", "zorder": 4}
+MARKER_ALONE = {"linestyle": "none", "zorder": 4}
 MARKS: dict[str, dict[str, Any]] = {
-    "failed": {"marker": "x", "color": RED, "markersize": 7, "markeredgewidth": 1.8} | ALONE,
+    "failed": {"marker": "x", "color": RED, "markersize": 7, "markeredgewidth": 1.8} | MARKER_ALONE,
     "missing": {"marker": "o", "color": "#606060", "markersize": 6, "markerfacecolor": "none"}
-    | ALONE,
+    | MARKER_ALONE,
 }
 NAMES = {"failed": "a job failed here", "missing": "a job was not run"}
 FOOT = {"failed": 0.04, "missing": 0.11}  # height in a panel
@@ -107,8 +107,8 @@ def shown_value(value: Any) -> str:
 
 
 LOG_RATIO = 100.0  # numbers that span more are drawn on a log scale
-MOST_GAPS = 0.5  # of a grid: a list of jobs with more of them is no grid
-LONG = 32  # letters of a phrase
+MAX_GAPS = 0.5  # of a grid: a list of jobs with more of them is no grid
+LONG_PHRASE = 32  # letters of a phrase
 OUTSIDE = "outside"  # status of a point of the grid that the study leaves out
 
 
@@ -265,7 +265,7 @@ def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> PlottedAxis:
         "_" + unit.replace("/", "_per_").replace(" ", "_")
     )
     phrase = str(attrs.get("long_name", key))
-    if phrase in (key, name) or len(phrase) > LONG or values.dtype.kind not in "fiu":
+    if phrase in (key, name) or len(phrase) > LONG_PHRASE or values.dtype.kind not in "fiu":
         phrase = own.replace("_", " ")
     return PlottedAxis(name, phrase, unit, values)
 
@@ -288,7 +288,7 @@ def grid_jobs(data: xr.Dataset, columns: Sequence[PlottedAxis]) -> PlottedSweep 
             codes.append(code)
     shape = tuple(axis.values.size for axis in axes)
     jobs = data["status"].size
-    if math.prod(shape) * (1.0 - MOST_GAPS) > jobs:
+    if math.prod(shape) * (1.0 - MAX_GAPS) > jobs:
         return None
     place = np.full(shape, -1)
     place[tuple(codes)] = np.arange(jobs)

@@ -26,7 +26,7 @@ from compressor.report.figures.sweep_data import (
 )
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
-    MOST_KEYS,
+    MAX_KEYS,
     RING,
     in_lines,
     mark_points,
@@ -36,9 +36,9 @@ from compressor.report.figures.sweep_panels import (
 )
 
 COLORS = "cividis"
-MOST_CELLS = 64  # along an axis
-MOST_CONTOURS = 5
-FEWEST_RISEN = 0.2  # of the cells, above the least value
+MAX_CELLS = 64  # along an axis
+MAX_CONTOURS = 5
+MIN_RISEN = 0.2  # of the cells, above the least value
 NOTHING: dict[str, Any] = {"facecolor": "#f2f2f2", "edgecolor": GREY, "hatch": "////"}
 
 
@@ -61,18 +61,18 @@ class Cells(NamedTuple):
 
 @in_style
 def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
-    """Return every measure over both axes of a grid, a cell a job, at most MOST_CELLS along an
+    """Return every measure over both axes of a grid, a cell a job, at most MAX_CELLS along an
     axis.
     """
     in_x, in_y = across(sweep)
     x, y = sweep.axes[in_x], sweep.axes[in_y]
-    chosen = [thin_places(axis.values.size, MOST_CELLS) for axis in (y, x)]
+    chosen = [thin_places(axis.values.size, MAX_CELLS) for axis in (y, x)]
 
     def table(values: np.ndarray) -> np.ndarray:
         return values.transpose(in_y, in_x)[np.ix_(*chosen)]
 
     status, chaotic = table(sweep.status), table(sweep.chaotic)
-    keys = None if sweep.keys is None or status.size > MOST_KEYS else table(sweep.keys)
+    keys = None if sweep.keys is None or status.size > MAX_KEYS else table(sweep.keys)
     cells = Cells((x, y), (x.places[chosen[1]], y.places[chosen[0]]), keys)
     figure, panels = metric_panels(measures, 2.6)
     tables = [table(sweep.values(measure)) for measure in measures]
@@ -103,7 +103,7 @@ def plot_map(
         steps = LogLocator(subs=(1.0, 3.0)).tick_values(low, high)
     else:
         norm = Normalize(low, high if high > low else low + (abs(low) or 1.0))
-        steps = MaxNLocator(MOST_CONTOURS + 1).tick_values(low, high)
+        steps = MaxNLocator(MAX_CONTOURS + 1).tick_values(low, high)
     edges = [edges_of(c, axis) for c, axis in zip(cells.centres, cells.axes, strict=True)]
     mesh = panel.pcolormesh(*edges, np.ma.masked_invalid(table), norm=norm, cmap=COLORS,
                             rasterized=True)  # fmt: skip
@@ -112,7 +112,7 @@ def plot_map(
         with_jobs(mesh, cells.keys)
     bar = figure.colorbar(mesh, ax=panel, label=measure.unit, pad=0.02, aspect=14)
     inside = steps[(steps > low) & (steps < high)]
-    inside = inside[:: -(-inside.size // MOST_CONTOURS)] if inside.size else inside
+    inside = inside[:: -(-inside.size // MAX_CONTOURS)] if inside.size else inside
     if inside.size and has_lines(table, cells.axes):
         lines = panel.contour(*cells.centres, np.ma.masked_invalid(table), levels=inside,
                               colors="white", linewidths=0.9, linestyles="solid")  # fmt: skip
@@ -124,7 +124,7 @@ def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
     """Return whether lines of equal value tell something: over numbers, and not around a few
     cells.
     """
-    rising = np.nansum(table > np.nanmin(table)) >= FEWEST_RISEN * table.size
+    rising = np.nansum(table > np.nanmin(table)) >= MIN_RISEN * table.size
     return min(table.shape) >= 3 and not any(axis.is_words for axis in axes) and bool(rising)
 
 

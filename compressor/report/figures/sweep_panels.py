@@ -28,9 +28,9 @@ from compressor.report.figures.sweep_data import (
 )
 
 COLUMNS = 3
-MOST_LINES = 12  # in a panel
-MOST_KEYS = 2000  # jobs of a study of which a click tells
-ROOM = 0.18  # of a panel's height, below and above its values
+MAX_LINES = 12  # in a panel
+MAX_KEYS = 2000  # jobs of a study of which a click tells
+PANEL_MARGIN = 0.18  # of a panel's height, below and above its values
 VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = "osD^v"
 FEET = {"failed": 0.03, "missing": 0.08}  # of a panel's height
@@ -66,7 +66,7 @@ def plot_jobs(
         drawn = panel.errorbar(x, y, yerr=finite, label=name, **style).lines[0]
     else:
         (drawn,) = panel.plot(x, y, label=name, **line)
-    if keys is not None and keys.size == np.size(x) <= MOST_KEYS:
+    if keys is not None and keys.size == np.size(x) <= MAX_KEYS:
         with_jobs(drawn, keys)
 
 
@@ -76,7 +76,7 @@ def mark_points(
     """Marks at points, which the legend names."""
     if x.size:
         (drawn,) = panel.plot(x, y, label=name, **mark)
-        if keys is not None and keys.size <= MOST_KEYS:
+        if keys is not None and keys.size <= MAX_KEYS:
             with_jobs(drawn, keys)
 
 
@@ -129,10 +129,10 @@ def scale_y(panel: Axes, values: np.ndarray) -> float:
     low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
     if spans_decades(values):
         panel.set_yscale("log")
-        room = (high / low) ** ROOM
+        room = (high / low) ** PANEL_MARGIN
         panel.set_ylim(low / room, high * room)
         return float(low)
-    room = ROOM * (high - low) or 0.5 * abs(high) or 1.0
+    room = PANEL_MARGIN * (high - low) or 0.5 * abs(high) or 1.0
     panel.set_ylim(low - room, high + room)
     return float(high - low + 2.0 * room)
 
@@ -160,16 +160,16 @@ def thin_places(size: int, most: int) -> np.ndarray:
 PLAIN_LINE = LineStyle(BLUE, "-", 1.4).properties() | {"marker": "o", "markersize": 3.8}
 
 
-MOST_JOBS = 1000
+MAX_JOBS = 1000
 
 
 @in_style
 def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
     """Return every measure over the one axis of a grid, a point a job; over words without a line.
 
-    Of more than MOST_JOBS jobs as many are drawn.
+    Of more than MAX_JOBS jobs as many are drawn.
     """
-    sweep = coarse(sweep, 0, MOST_JOBS)
+    sweep = coarse(sweep, 0, MAX_JOBS)
     (axis,) = sweep.axes
     x, status, chaotic, keys = axis.places, sweep.status, sweep.chaotic, sweep.keys
     figure, panels = metric_panels(measures, 2.35)
@@ -190,8 +190,8 @@ def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
     return figure
 
 
-MOST_COLUMNS, MOST_ROWS = 4, 3
-MOST_PLACES = 200  # in x
+MAX_COLUMNS, MAX_ROWS = 4, 3
+MAX_PLACES = 200  # in x
 
 
 class Roles(NamedTuple):
@@ -242,11 +242,11 @@ def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure])
 
     What is not known within its error bar is no part of a mean.
     """
-    sweep = coarse(sweep, role.x, MOST_PLACES)
+    sweep = coarse(sweep, role.x, MAX_PLACES)
     figure, panels = metric_panels(measures, 2.35)
     entries: dict[str, Line2D] = {}
     for panel, measure in zip(panels, measures, strict=True):
-        colors = chosen_of(sweep.axes[role.color], MOST_LINES)
+        colors = chosen_of(sweep.axes[role.color], MAX_LINES)
         whole = whole_part(sweep, measure, role)
         parts = [line_part(whole, role, {role.color: int(n)}) for n in colors]
         entries |= plot_parts(panel, sweep, role, parts, whole)
@@ -269,10 +269,10 @@ def marks_of(sweep: PlottedSweep, role: Roles) -> list[Line2D]:
 @in_style
 def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Figure:
     """Return a panel for each value of one axis and, in rows, of another, or for each measure."""
-    sweep = coarse(sweep, role.x, MOST_PLACES)
-    columns = chosen_of(sweep.axes[role.column], MOST_COLUMNS)
+    sweep = coarse(sweep, role.x, MAX_PLACES)
+    columns = chosen_of(sweep.axes[role.column], MAX_COLUMNS)
     has_rows = role.row >= 0
-    rows: Sequence[int] = chosen_of(sweep.axes[role.row], MOST_ROWS).tolist() if has_rows else []
+    rows: Sequence[int] = chosen_of(sweep.axes[role.row], MAX_ROWS).tolist() if has_rows else []
     grid_rows = [(measures[0], n) for n in rows] if has_rows else [(m, -1) for m in measures]
     figure, grid = sheet(
         len(grid_rows), columns.size, 2.2 * len(grid_rows) + 1.0, sharex=True,
@@ -283,7 +283,7 @@ def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]
         whole = whole_part(sweep, measure, role)
         for panel, column in zip(line, columns, strict=True):
             at = {role.column: int(column)} | ({role.row: row} if has_rows else {})
-            colors = chosen_of(sweep.axes[role.color], MOST_LINES)
+            colors = chosen_of(sweep.axes[role.color], MAX_LINES)
             parts = [line_part(whole, role, at | {role.color: int(n)}) for n in colors]
             entries |= plot_parts(panel, sweep, role, parts, whole)
             words = [] if has_rows else [measure.title]
@@ -326,7 +326,7 @@ def plot_parts(
 ) -> dict[str, Line2D]:
     """Return a panel's lines and marks; gives the legend's entries by name."""
     axis, color = sweep.axes[role.x], sweep.axes[role.color]
-    x, chosen = axis.places, chosen_of(color, MOST_LINES)
+    x, chosen = axis.places, chosen_of(color, MAX_LINES)
     scale_x(panel, axis)
     entries = {}
     values = whole.values  # so that all panels of a measure have one scale
@@ -370,7 +370,7 @@ def mean_of(values: np.ndarray) -> np.ndarray:
     return np.where(count, np.where(known, values, 0.0).sum(axis=-1) / np.maximum(count, 1), np.nan)
 
 
-MOST_POINTS = 2000  # in a panel
+MAX_POINTS = 2000  # in a panel
 PLACES = 60  # of a trend
 
 
@@ -424,7 +424,7 @@ def plot_points(panel: Axes, sweep: PlottedSweep, axis: int, measure: Measure) -
     scale_y(panel, y)
     phrase, words, group = grouping(sweep)
     shown = np.zeros(y.size, bool)
-    shown[thin_places(y.size, MOST_POINTS)] = True
+    shown[thin_places(y.size, MAX_POINTS)] = True
     for n, word in enumerate(words):
         name = name_value(phrase, word) if phrase else "a job"
         here = shown & (group == n)

@@ -19,7 +19,7 @@ from compressor.cases import Axis, Case, Study, design, value_in
 from compressor.store import Folder, StoreError, write_dataset
 from compressor.studies.claims.study import (
     ELSEWHERE,
-    OTHERS,
+    OTHER_MACHINES,
     ClaimsError,
     Judged,
     judge_machines,
@@ -33,8 +33,8 @@ from compressor.sweep import Progress
 SEED = 1
 POPULATION = 48  # machines of a generation
 DIGITS = 6  # of an assumption's value
-FAR = 10.0  # the cost of a machine that was not judged
-STEP, LEAST_STEP = 0.05, 0.003  # of a compass search, as shares of the ranges
+UNJUDGED_COST = 10.0  # the cost of a machine that was not judged
+STEP, MIN_STEP = 0.05, 0.003  # of a compass search, as shares of the ranges
 LONGER, LONGEST = 5, 20  # times: runs by which a machine is told to be consistent
 NAMES = {1: "", LONGER: "-longer", LONGEST: "-longest"}
 HALVINGS = 4  # of each change, on the way back to the default
@@ -102,12 +102,12 @@ class MachineSearch:
         found = read_machines(path)
         at = {coordinate.attrs.get("case_key"): coordinate for coordinate in found.coords.values()}
         if any(span.key not in at for span in self.spans):
-            raise StoreError(path, OTHERS, ELSEWHERE)
+            raise StoreError(path, OTHER_MACHINES, ELSEWHERE)
         points = zip(*(at[span.key].values.tolist() for span in self.spans), strict=True)
         rows = rows_of(found)
         keys = {point: machine_key(self.case(point)) for point in points}
         if not {*keys.values()} >= {*rows}:
-            raise StoreError(path, OTHERS, ELSEWHERE)
+            raise StoreError(path, OTHER_MACHINES, ELSEWHERE)
         return {point: rows[key] for point, key in keys.items() if key in rows}
 
     @property
@@ -186,7 +186,7 @@ def cost(verdict: Judged, distance: float, sure: bool = False) -> float:
     pairs = zip(verdict.margin, verdict.error, strict=True)
     least = min(margin - error if sure else margin for margin, error in pairs)
     if not math.isfinite(least):  # not judged, or an error that is not known
-        return FAR
+        return UNJUDGED_COST
     return distance if least >= 0.0 else 1.0 - least
 
 
@@ -276,7 +276,7 @@ def descend(search: MachineSearch, best: tuple[float, ...], step: float) -> tupl
     (Kolda, Lewis and Torczon, SIAM Review 45, 2003, 385-482).
     """
     search.ask([best])
-    while step >= LEAST_STEP and search.cost(best) >= 1.0:
+    while step >= MIN_STEP and search.cost(best) >= 1.0:
         shares = np.array([s.share(value) for s, value in zip(search.spans, best, strict=True)])
         moves = step * np.vstack([np.eye(shares.size), -np.eye(shares.size)])
         around = np.clip(shares + moves, 0.0, 1.0).tolist()

@@ -106,10 +106,10 @@ def ideal_runs(text: str) -> dict[str, xr.Dataset]:
     return {name: simulate_quietly(cases[name]) for name in IDEAL}
 
 
-FLUSH = 3.0  # s between two writings of what is finished
+SECONDS_BETWEEN_WRITES = 3.0  # s between two writings of what is finished
 TIMEOUT = 900.0  # s that a machine may take, with all of its cases
 REMEDY = "delete it, or choose another folder"
-OTHERS = "holds machines of another case file, or of another version of compsim"
+OTHER_MACHINES = "holds machines of another case file, or of another version of compsim"
 ELSEWHERE = "choose another folder by -o, or delete it"
 ROLES = ("joint", "load", "clearance_mm", "initial_offset_mm", "body", "sensor")
 UNIT = {"units": "1"}
@@ -159,7 +159,7 @@ def judge_machines(
     keys = [machine_key(case) for case in cases]
     known = read_kept_machines(path)
     if not known.keys() <= {*keys}:
-        raise StoreError(path, OTHERS, ELSEWHERE)
+        raise StoreError(path, OTHER_MACHINES, ELSEWHERE)
     missing = [number for number, key in enumerate(keys) if key not in known]
     total, written, done = len(keys), time.monotonic(), len(keys) - len(missing)
     progress(done, total, "")
@@ -171,7 +171,7 @@ def judge_machines(
             known[keys[end.id]] = judge_end(end)
             done += 1
             progress(done, total, "")
-            if time.monotonic() - written > FLUSH:
+            if time.monotonic() - written > SECONDS_BETWEEN_WRITES:
                 write_dataset(path, machines_dataset(study, keys, known))
                 written = time.monotonic()
     finally:

@@ -205,8 +205,8 @@ def _share(distance: float, own: np.ndarray) -> float:
     return float((1 + len(own) - np.searchsorted(own, distance)) / (1 + len(own)))
 
 
-SHARE = 0.3  # of the jobs that is accepted
-FEWEST = 50  # accepted, or all where there are fewer
+ACCEPTED_SHARE = 0.3  # of the jobs that is accepted
+MIN_ACCEPTED = 50  # accepted, or all where there are fewer
 LEVEL = 0.9  # of the intervals
 
 
@@ -276,7 +276,7 @@ def quantiles(summary: np.ndarray, summaries: np.ndarray, logs: np.ndarray) -> n
     scale = np.maximum((summaries - logs).std(axis=0), 1e-12)
     away = (summaries - summary) / scale
     distance = np.sqrt((away**2).sum(axis=1))
-    count = min(len(distance), max(FEWEST, round(SHARE * len(distance))))
+    count = min(len(distance), max(MIN_ACCEPTED, round(ACCEPTED_SHARE * len(distance))))
     accepted = np.argpartition(distance, count - 1)[:count]
     reach = distance[accepted].max() * (1.0 + 1e-9) + 1e-12
     weights = 1.0 - (distance[accepted] / reach) ** 2

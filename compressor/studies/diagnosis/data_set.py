@@ -19,7 +19,7 @@ from compressor.cases import Case, Sensor
 from compressor.outcome import Regime, regime_words
 from compressor.program import PROGRAM, CompsimError
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, find_study, read_store
-from compressor.studies.diagnosis.features import FEATURES, FEWEST, RecordError, features
+from compressor.studies.diagnosis.features import FEATURES, MIN_REVOLUTIONS, RecordError, features
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,9 +80,9 @@ class DataSetOptions:
     signals: bool = True
 
     def __post_init__(self) -> None:
-        if self.revolutions < FEWEST:
+        if self.revolutions < MIN_REVOLUTIONS:
             raise DataSetError(
-                f"a window has at least {FEWEST} revolutions, not {self.revolutions}"
+                f"a window has at least {MIN_REVOLUTIONS} revolutions, not {self.revolutions}"
             )
         if self.hop is not None and self.hop < 1:
             raise DataSetError(f"windows are at least 1 revolution apart, not {self.hop}")

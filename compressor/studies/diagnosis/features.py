@@ -25,7 +25,7 @@ SECTORS = 24  # of crank angle, 15 degrees each
 BANDS = (0.0, 200.0, 400.0, 700.0, 1100.0, 1700.0, 2300.0, 4000.0, 7000.0)  # edges, Hz
 ENVELOPE = (1700.0, 2300.0)  # Hz: the casing's mode; of another machine give its own
 BEATS = (1, 2, 3, 4)  # orders of the envelope
-FEWEST = 2  # whole revolutions of a record
+MIN_REVOLUTIONS = 2  # whole revolutions of a record
 SMALLEST = 1e-6  # share that the logarithm of a share is taken of at least
 
 
@@ -119,8 +119,8 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
 def check_record(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
     """Return the whole revolutions of a record. Raises RecordError for one that tells nothing."""
     whole = len(tacho) - 1
-    if whole < FEWEST:
-        text = f"{len(tacho)} tacho pulses are too few: at least {FEWEST + 1}"
+    if whole < MIN_REVOLUTIONS:
+        text = f"{len(tacho)} tacho pulses are too few: at least {MIN_REVOLUTIONS + 1}"
         raise RecordError(f"{text}, for whole revolutions")
     if len(times) != len(values):
         raise RecordError(f"{len(times)} times and {len(values)} values: pass one for each")

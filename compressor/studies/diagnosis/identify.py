@@ -35,14 +35,14 @@ from compressor.studies.diagnosis.library import (
 from compressor.studies.diagnosis.record_files import SteadySpeed, read_record
 from compressor.vibration import Record
 
-FEWEST_JOBS = 30  # of one joint, for it to be told
-FEWEST_IN_ALL = 200  # jobs: with fewer, no record can lie as far off as LIMIT asks
+MIN_JOBS = 30  # of one joint, for it to be told
+MIN_IN_ALL = 200  # jobs: with fewer, no record can lie as far off as LIMIT asks
 LIMIT = 0.01  # share of the study's own jobs that lie as far off as what does not fit
 SHARES = {"none": (), "big_end": (0,), "small_end": (1,), "both": (0, 1)}  # columns of clearances
 ODD = 4  # features that are named where nothing fits
 # least spread that a feature counts with: of one that the study does not vary, such as the speed, a
 # record's timing moves the last digits alone (a thousandth is 0.2 % of the speed)
-LEAST_SPREAD = 1e-3
+MIN_SPREAD = 1e-3
 FARTHEST = 8.0  # standard deviations at which regressions see a feature that lies beyond
 
 
@@ -105,16 +105,16 @@ class Identifier:
     def fit(cls, library: Library) -> "Identifier":
         """Raises StudyError where there are too few jobs."""
         counts = {joint: int((library.joints == joint).sum()) for joint in SHARES}
-        joints = tuple(joint for joint, count in counts.items() if count >= FEWEST_JOBS)
+        joints = tuple(joint for joint, count in counts.items() if count >= MIN_JOBS)
         library = library.only(np.isin(library.joints, joints))
-        if len(library.keys) < FEWEST_IN_ALL:
+        if len(library.keys) < MIN_IN_ALL:
             told = ", ".join(f"{joint} {count}" for joint, count in counts.items())
             problem = f"study {library.study} has too few jobs with a sensor's record: {told}"
-            least = f"{FEWEST_JOBS} of each joint and {FEWEST_IN_ALL} in all, better thousands"
+            least = f"{MIN_JOBS} of each joint and {MIN_IN_ALL} in all, better thousands"
             raise StudyError(f"{problem}; draw at least {least}")
         middle = np.nan_to_num(np.nanmedian(library.features, axis=0))
         filled = np.where(np.isnan(library.features), middle, library.features)
-        scale = np.maximum(filled.std(axis=0), LEAST_SPREAD)
+        scale = np.maximum(filled.std(axis=0), MIN_SPREAD)
         points = np.clip((filled - middle) / scale, -FARTHEST, FARTHEST)
         labels = np.array([joints.index(joint) for joint in library.joints])
         scores = KernelRidge.fit(points, np.eye(len(joints))[labels])

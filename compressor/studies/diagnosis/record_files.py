@@ -24,7 +24,7 @@ from compressor.studies.diagnosis.data_set import (
     Progress,
     make_data_set,
 )
-from compressor.studies.diagnosis.features import FEWEST, RecordError
+from compressor.studies.diagnosis.features import MIN_REVOLUTIONS, RecordError
 from compressor.vibration import Record, smooth_pulses
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ TIME, VALUE, TACHO = RECORD_HEADER
 HEADER = ",".join(RECORD_HEADER)
 UNEVEN = 0.1  # of a time step, by which a step may differ from the mean one
 LOW, MIDDLE, HIGH = 0.25, 0.5, 0.75  # of a tacho's range: what lies between is no new level
-APART = 1.5  # longest over shortest time between pulses, beyond which one was missed
+MAX_PULSE_RATIO = 1.5  # longest over shortest time between pulses, beyond which one was missed
 
 
 @dataclass(frozen=True)
@@ -162,9 +162,9 @@ def read_record(path: str | Path, steady: SteadySpeed | None = None) -> Record:
         pulses, within = _pulses(path, times, columns[TACHO])
     else:
         pulses = steady.pulses(times)
-    if len(pulses) <= FEWEST:
+    if len(pulses) <= MIN_REVOLUTIONS:
         found = f"{len(pulses)} passes of top dead centre in {times[-1] - times[0]:g} s"
-        raise RecordError(f"{path}: {found}: at least {FEWEST + 1}; record for longer")
+        raise RecordError(f"{path}: {found}: at least {MIN_REVOLUTIONS + 1}; record for longer")
     if within is not None:
         pulses = smooth_pulses(pulses, within)
     return Record(times, columns[VALUE], pulses, math.nan)
@@ -257,7 +257,7 @@ def _pulses(
             found.append(times[k - 1] + part * step)
             within.append(jump * step / 2.0)
     gaps = np.diff(found)
-    if gaps.size and gaps.max() > APART * gaps.min():
+    if gaps.size and gaps.max() > MAX_PULSE_RATIO * gaps.min():
         told = f"pulses {gaps.min():g} to {gaps.max():g} s apart"
         raise RecordError(f"{path}: {TACHO}: {told}; one a revolution, none missed, none doubled")
     return np.array(found), np.array(within)

@@ -15,7 +15,7 @@ import xarray as xr
 from compressor.analysis import plural
 
 PERIOD_1 = "period 1"
-MOST_SPANS = 4  # of values that are listed; of more the first and the last
+MAX_SPANS = 4  # of values that are listed; of more the first and the last
 
 
 class SeenValue(NamedTuple):
@@ -197,7 +197,7 @@ def spans(values: np.ndarray, marked: np.ndarray) -> str:
     values, marked = values[order], marked[order]
     edges = np.flatnonzero(np.diff(np.concatenate(([0], marked.astype(int), [0]))))
     pairs = [(values[a], values[b - 1]) for a, b in edges.reshape(-1, 2)]
-    if len(pairs) > MOST_SPANS:
+    if len(pairs) > MAX_SPANS:
         return f"between {number(pairs[0][0])} and {number(pairs[-1][1])}"
     return ", ".join(
         number(low) if low == high else f"{number(low)} to {number(high)}" for low, high in pairs

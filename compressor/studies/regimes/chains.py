@@ -27,7 +27,7 @@ from compressor.store import Folder, StoreError, read_dataset, write_dataset
 from compressor.studies.regimes.values import COORDINATES, NUMBERS, TEXTS, Row, empty, run_value
 
 FOLDER = "regimes"
-FLUSH = 2.0  # s between two writings of what is finished
+SECONDS_BETWEEN_WRITES = 2.0  # s between two writings of what is finished
 REMEDY = "delete it: the same command makes it again"
 SCHEMA = 2  # of a chain's numbers: a change of what they mean makes chains anew
 
@@ -94,7 +94,7 @@ def run_chain(task: ChainTask) -> ChainEnd | StoreError:
         written, stored = time.monotonic(), len(rows)
         for case in chain.cases[len(rows) :]:
             rows.append(run_value(case, last_state(rows), chain.asked))
-            if time.monotonic() - written > FLUSH:
+            if time.monotonic() - written > SECONDS_BETWEEN_WRITES:
                 write_dataset(path, chain_dataset(chain, rows))
                 written, stored = time.monotonic(), len(rows)
         if stored < len(rows) or task.rerun:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.studies.regimes.run import ChainProgress, RegimesSummary
 
-MOST_FAILURES = 20  # listed one by one
+MAX_FAILURES = 20  # listed one by one
 
 
 def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, quiet: bool) -> int:
@@ -103,11 +103,11 @@ def report_chains(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
         return
     from compressor.reasons import remedy
 
-    for one in summary.failed[:MOST_FAILURES]:
+    for one in summary.failed[:MAX_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in one.point.items())
         say(f"  {one.study}{point} {one.direction} at {one.value:g}: {one.reason}: "
             f"{printable(one.detail)}")  # fmt: skip
-    if len(summary.failed) > MOST_FAILURES:
-        say(f"  and {len(summary.failed) - MOST_FAILURES} more")
+    if len(summary.failed) > MAX_FAILURES:
+        say(f"  and {len(summary.failed) - MAX_FAILURES} more")
     for reason in dict.fromkeys(one.reason for one in summary.failed):
         say(f"  {reason}: {remedy(reason)}")

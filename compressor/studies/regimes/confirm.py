@@ -38,11 +38,12 @@ from compressor.studies.regimes.values import (
 )
 
 FURTHER = 200  # rev that a motion runs on before it is looked at again
-STARTS = 8  # from other places
+START_COUNT = 8  # from other places
 SEED = 13  # of these places
-ROOM = 0.9  # of the clearance, within which they lie
-APART = 3.0  # tolerances: each of two sets may lie one, and a little more, beside its motion
-SURE = 3.0  # standard errors by which means of chaotic motions differ
+START_ROOM = 0.9  # of the clearance, within which they lie
+# tolerances: each of two sets may lie one, and a little more, beside its motion
+APART_TOLERANCES = 3.0
+APART_STANDARD_ERRORS = 3.0  # standard errors by which means of chaotic motions differ
 VERDICTS = {
     "differs": "1: the chains that go up and down end in different motions here",
     "confirmed": "1: two different motions were reached by further simulation here",
@@ -76,10 +77,10 @@ def differ(one: MotionSignature, other: MotionSignature, within: float) -> bool:
     """
     regimes = {one.regime, other.regime}
     if regimes == {Regime.PERIODIC}:
-        return apart(one.places, other.places) > APART * within
+        return apart(one.places, other.places) > APART_TOLERANCES * within
     if regimes == {Regime.CHAOTIC}:
         error = math.hypot(one.rms_error, other.rms_error)
-        return abs(one.rms - other.rms) > SURE * error
+        return abs(one.rms - other.rms) > APART_STANDARD_ERRORS * error
     return regimes == {Regime.PERIODIC, Regime.CHAOTIC}
 
 
@@ -112,7 +113,7 @@ class ChainPair:
 
     @cached_property
     def key(self) -> str:
-        what = f"{self.up.key} {self.down.key} {FURTHER} {STARTS} {SEED}"
+        what = f"{self.up.key} {self.down.key} {FURTHER} {START_COUNT} {SEED}"
         return hashlib.sha256(what.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
@@ -140,7 +141,7 @@ class Verdict(NamedTuple):
     starts_like_down: int
 
 
-AGREED = Verdict(0, 0, 0, 0, 0)
+AGREED_VERDICT = Verdict(0, 0, 0, 0, 0)
 
 
 def doubts(pair: ChainPair, folder: Folder) -> list[Doubt]:
@@ -196,11 +197,11 @@ def other_starts(case: Case) -> list[Case]:
     """
     rng = np.random.default_rng(SEED)
     found = []
-    for _ in range(STARTS):
+    for _ in range(START_COUNT):
         shift: dict[str, float] = {}
         for joint in JOINTS:
             radius, angle = math.sqrt(rng.random()), 2.0 * math.pi * rng.random()
-            size = ROOM * getattr(case.clearance_mm, joint) * radius
+            size = START_ROOM * getattr(case.clearance_mm, joint) * radius
             place = (size * math.cos(angle), size * math.sin(angle))
             shift |= {f"{joint}_{axis}": at for axis, at in zip(AXES, place, strict=True)}
         found.append(replace(case, initial_offset_mm=replace(case.initial_offset_mm, **shift)))
@@ -224,7 +225,7 @@ def read_verdicts(pair: ChainPair, folder: Folder) -> dict[int, Verdict]:
 
 def write_verdicts(pair: ChainPair, folder: Folder, known: Mapping[int, Verdict]) -> None:
     """Store verdicts by the number of the value, going up; the others are not known yet."""
-    rows = [known.get(n, AGREED) for n in range(len(pair.up.cases))]
+    rows = [known.get(n, AGREED_VERDICT) for n in range(len(pair.up.cases))]
     dims = ("value",)
     variables: dict[str, tuple] = {
         name: (dims, np.array([getattr(row, name) for row in rows]), attrs)
@@ -252,11 +253,11 @@ class VerdictBook:
         whole = min(stored) == len(pair.up.cases)
         doubted = doubts(pair, folder)
         self.numbers = {doubt.number for doubt in doubted}
-        self.missing = [d for d in doubted if not self.known.get(d.number, AGREED).differs]
+        self.missing = [d for d in doubted if not self.known.get(d.number, AGREED_VERDICT).differs]
         before = dict(self.known)
         if whole:
             agreed = (n for n in range(len(pair.up.cases)) if n not in self.numbers)
-            self.known |= dict.fromkeys(agreed, AGREED)
+            self.known |= dict.fromkeys(agreed, AGREED_VERDICT)
         for doubt in self.missing:
             self.known.pop(doubt.number, None)
         self.written = time.monotonic()

@@ -298,8 +298,8 @@ def unit_of(data: xr.Dataset) -> str:
     return f" {unit}" if unit not in ("", "1") else ""
 
 
-MOST_TICKS = 12
-MOST_SINGLE = 4  # periods of a map that have a colour of their own
+MAX_TICKS = 12
+MAX_SINGLE = 4  # periods of a map that have a colour of their own
 CLASSES = {
     "period 1": "#e3e9f3", "period 2": "#a5bfe3", "period 3": "#5c87c9", "period 4": BLUE,
     "period 5 to 16": GOLD, "chaotic": RED, "undecided": GREY, "failed": BLACK,
@@ -348,7 +348,7 @@ def plot_classes(panel: Axes, chain: xr.Dataset, x: np.ndarray, y: np.ndarray) -
         vmax=len(CLASSES) - 0.5, rasterized=True, edgecolors="white", linewidth=0.3,
     )  # fmt: skip
     scale_along(panel, x, chain.attrs["log"])
-    if y.size <= MOST_TICKS:
+    if y.size <= MAX_TICKS:
         panel.set_yticks(y)
     panel.grid(visible=False)
 
@@ -359,7 +359,7 @@ def period_classes(data: xr.Dataset) -> np.ndarray:
     words, period = data["regime"].values, data["period"].values
     known = (words == "periodic") & np.isfinite(period)
     number = np.where(known, period, 1.0).astype(int)
-    found = np.where(number <= MOST_SINGLE, number - 1, names.index("period 5 to 16"))
+    found = np.where(number <= MAX_SINGLE, number - 1, names.index("period 5 to 16"))
     found = np.where(known, found, names.index("undecided"))
     found = np.where(words == "chaotic", names.index("chaotic"), found)
     found = np.where(words == "", -1, found)

@@ -21,7 +21,7 @@ from compressor.studies.regimes.captions import CAPTIONS
 from compressor.studies.regimes.dataset import followed_studies, open_regimes
 from compressor.studies.regimes.figures import draw_bifurcation, draw_periods, draw_sections
 
-MOST_SECTIONS = 6
+MAX_SECTIONS = 6
 
 
 def is_stored(results: Folder, name: str) -> bool:
@@ -145,7 +145,7 @@ def check_any(part: xr.Dataset, study: str) -> None:
 
 
 def chosen_values(pair: xr.Dataset) -> list[int]:
-    """Up to `MOST_SECTIONS` values with Poincaré points, evenly among the regimes found."""
+    """Up to `MAX_SECTIONS` values with Poincaré points, evenly among the regimes found."""
     over = pair.attrs["over"]
     chain = pair.isel(direction=0)
     others = [dim for dim in chain["section"].dims if dim != over]
@@ -156,10 +156,10 @@ def chosen_values(pair: xr.Dataset) -> list[int]:
         label = (word, period if word == "periodic" else 0.0)
         by_regime.setdefault(label, []).append(int(i))
     groups = [*by_regime.values()]
-    if len(groups) > MOST_SECTIONS:
-        groups = [groups[i] for i in spread_places(len(groups), MOST_SECTIONS)]
+    if len(groups) > MAX_SECTIONS:
+        groups = [groups[i] for i in spread_places(len(groups), MAX_SECTIONS)]
     quota = [0] * len(groups)
-    while sum(quota) < min(MOST_SECTIONS, sum(map(len, groups))):
+    while sum(quota) < min(MAX_SECTIONS, sum(map(len, groups))):
         free = [i for i, group in enumerate(groups) if quota[i] < len(group)]
         quota[min(free, key=lambda i: quota[i])] += 1
     return sorted(

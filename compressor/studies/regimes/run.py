@@ -20,8 +20,8 @@ from compressor.cases import MODEL, Study, points
 from compressor.program import PROGRAM
 from compressor.store import Folder, StoreError, publish
 from compressor.studies.regimes.chains import (
-    FLUSH,
     FOLDER,
+    SECONDS_BETWEEN_WRITES,
     Chain,
     ChainEnd,
     ChainTask,
@@ -237,7 +237,7 @@ def look_again(
         for machine in machines
         if machine.pair and all(isinstance(ends[c.key], ChainEnd) for c in machine.chains)
     ]
-    books = {pair.key: VerdictBook(pair, folder, FLUSH) for pair in pairs}
+    books = {pair.key: VerdictBook(pair, folder, SECONDS_BETWEEN_WRITES) for pair in pairs}
     doubted = [doubt for book in books.values() for doubt in book.missing]
     if not doubted:
         return books

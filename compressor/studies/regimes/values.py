@@ -41,10 +41,9 @@ def exponent(
 
 
 TOLERANCE = 1e-3  # of the clearance: points so near to each other are one
-OF_PROMISE = (
-    0.2  # of the error of acceleration that accuracy allows: the tolerance, where it is more
-)
-LONGEST = 16  # rev: period that is looked for
+# of the error of acceleration that accuracy allows: the tolerance, where it is more
+OF_PROMISE = 0.2
+MAX_PERIOD = 16  # rev: period that is looked for
 MORE = 4  # revolutions, beyond two periods, in which points are to repeat
 
 
@@ -73,7 +72,7 @@ def period_of(found: np.ndarray, within: float) -> int | None:
     The shortest one, up to 16, of which the last two periods and four revolutions are the same,
     each to the last place of its phase.
     """
-    for period in range(1, LONGEST + 1):
+    for period in range(1, MAX_PERIOD + 1):
         count = 2 * period + MORE
         if count > len(found):
             return None

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from compressor.studies.search.question import Question
 
 KINDS = ("first", "greatest", "least")
-MOST_TOLD = 5  # points that do not decide, one by one
+MAX_TOLD = 5  # points that do not decide, one by one
 AVERAGED = " (mean over revolutions: chaotic)"
 UNBARRED = " (no error bar was made)"
 
@@ -108,12 +108,12 @@ def lines(question: "Question", answer: "SearchResult", folder: str) -> Iterator
     """Yield an answer as it is printed."""
     told = comparison_lines if answer.best is None else extremum_lines
     yield from told(question, answer)
-    for point in answer.blind[:MOST_TOLD]:
+    for point in answer.blind[:MAX_TOLD]:
         yield f"  {at(question, point)}: {why_undecided(question, point)}  job {point.key[:8]}"
-    if len(answer.blind) > MOST_TOLD:
-        yield f"  and {len(answer.blind) - MOST_TOLD} more"
+    if len(answer.blind) > MAX_TOLD:
+        yield f"  and {len(answer.blind) - MAX_TOLD} more"
     outside = [point for point in answer.failed if point not in answer.blind]
-    for point in outside[:MOST_TOLD]:
+    for point in outside[:MAX_TOLD]:
         yield f"  {at(question, point)}, outside: {point.told.reason}  job {point.key[:8]}"
     yield f"what is finer than the scan, {spacing(question)}, may be missed"
     yield (f"{plural(len(answer.points))}, {answer.run_now} of them run now, in study "

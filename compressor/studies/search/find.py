@@ -19,7 +19,7 @@ from compressor.store import Folder, StoreError, read_store, read_studies
 from compressor.studies.search.question import JobReading, Question
 from compressor.sweep import Options, Progress, sweep
 
-MOST_POINTS = 200  # that one search may ask for beyond its scan
+MAX_POINTS = 200  # that one search may ask for beyond its scan
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def first(
     """
     points: list[Point] = []
     wanted: Sequence[float] = shares
-    while wanted and len(points) < len(shares) + MOST_POINTS:
+    while wanted and len(points) < len(shares) + MAX_POINTS:
         points = sorted([*points, *evaluate(wanted)], key=lambda point: point.share)
         answer = interval(points, holds)
         wanted = sections(answer, tolerance, at_once)
@@ -148,7 +148,7 @@ def extremum(
     at = points.index(min(usable, key=lambda point: factor * point.told.value))
     bounds = (points[max(at - 1, 0)].share, points[min(at + 1, len(points) - 1)].share)
     minimize_scalar(cost, bounds=bounds, method="bounded",
-                    options={"xatol": tolerance, "maxiter": MOST_POINTS})  # fmt: skip
+                    options={"xatol": tolerance, "maxiter": MAX_POINTS})  # fmt: skip
     return around(known.values(), factor)
 
 

@@ -51,7 +51,7 @@ SPANS: dict[str, tuple[str, Span, Span | None, bool]] = {
     "pin_radius": ("m", _supported("machine.pin_radius_mm", 1e-3), None, True),
     "rtol": ("1", (1e-10, 1e-2), None, True),
 }  # fmt: skip
-OTHERS = 3 + 3 * len(JOINTS)  # friction's ratio, load, scene; how each journal starts
+OTHER_DRAWS = 3 + 3 * len(JOINTS)  # friction's ratio, load, scene; how each journal starts
 LOADS = ("none", "gas", "spring")
 SCENES = ("big_end", "small_end", "both")
 UNDAMPED = 0.1  # share of the scenes
@@ -204,7 +204,7 @@ def place(case: Case) -> dict[str, float]:
 @cache
 def _points(seed: int, kind: int, count: int) -> list[list[float]]:
     """At least `count` points of a kind of scene; the first ones do not depend on the count."""
-    return design("sobol", count, len(SPANS) + OTHERS, 2 * seed + kind)
+    return design("sobol", count, len(SPANS) + OTHER_DRAWS, 2 * seed + kind)
 
 
 def _numbers(point: Iterator[float], inside: bool) -> dict[str, float]:
@@ -251,7 +251,7 @@ def _round_numbers(made: Any) -> Any:
     return float(f"{made:.5g}") if isinstance(made, float) else made
 
 
-SHARE = 0.3  # of the scenes that have each feature
+FEATURE_SHARE = 0.3  # of the scenes that have each feature
 # group -> key -> (whole range, supported range), in the case file's units
 RANGES = {
     "lubricant": {
@@ -286,14 +286,14 @@ def features(made: dict[str, Any], draw: random.Random, inside: bool) -> dict[st
     """
     found: dict[str, Any] = {}
     for group, keys in RANGES.items():
-        if draw.random() < SHARE:
+        if draw.random() < FEATURE_SHARE:
             found[group] = {key: _drawn(spans, draw, inside) for key, spans in keys.items()}
     if "guide" in found and draw.random() < 0.3:  # ideal, with friction
         found["guide"]["clearance_mm"] = 0.0
     if "lubricant" in found:
         length = _drawn(LENGTHS, draw, inside) * 2.0 * made["machine"]["pin_radius_mm"]
         found["lubricant"]["bearing_length_mm"] = length
-    if draw.random() < SHARE and made["friction"]["law"] != LUGRE:
+    if draw.random() < FEATURE_SHARE and made["friction"]["law"] != LUGRE:
         found["friction"] = made["friction"] | {"ideal_joints": True}
     return found
 

@@ -37,8 +37,8 @@ from compressor.solve import (
     solve,
 )
 
-FACTOR = 10.0  # times its bar: an error beyond it is silent
-EXPECTED, MOST_EXPECTED = 1e3, 0.05  # times rtol: the relative error that nobody is surprised by
+SILENT_FACTOR = 10.0  # times its bar: an error beyond it is silent
+EXPECTED, MAX_EXPECTED = 1e3, 0.05  # times rtol: the relative error that nobody is surprised by
 TIGHTER, TENTH = 1e-2, 0.1  # a judge's tolerance, of statistics
 PARTS = 16  # of a span, in which horizons are counted
 LENGTHS = (PARTS, PARTS // 4, 1)  # parts that are judged where the whole is too much
@@ -51,8 +51,8 @@ STATISTICS = {
     "contact_loss_fraction": 0.25,
 }
 STIFF = 8.0  # evaluations a step: more are the stiff partner's
-SHORT = 2000  # steps: such a run SciPy's methods can judge
-LOOSE = 1e-9  # tolerance above which the stiff partner can judge an explicit run
+MAX_SCIPY_STEPS = 2000  # steps: such a run SciPy's methods can judge
+LOOSE_RTOL = 1e-9  # tolerance above which the stiff partner can judge an explicit run
 MORE_STEPS = 5  # times the run's budget: a judge's
 SECONDS, SCIPY_SECONDS = 30.0, 5.0  # that a judge may take, a compiled one and one of SciPy's
 
@@ -178,8 +178,8 @@ def judges(found: Solution, statistics: bool = False) -> tuple[str, ...]:
     stiff = found.trajectory.evaluations > STIFF * steps
     if stiff:
         return ("DOPRI5", "LSODA", "RODAS" if statistics else "Radau")
-    names = ("RODAS", "DOPRI5") if tolerance(found.rtol) >= LOOSE else ("DOPRI5", "RODAS")
-    return ("DOP853", *names) if steps <= SHORT else (*names, "DOP853")
+    names = ("RODAS", "DOPRI5") if tolerance(found.rtol) >= LOOSE_RTOL else ("DOPRI5", "RODAS")
+    return ("DOP853", *names) if steps <= MAX_SCIPY_STEPS else (*names, "DOP853")
 
 
 def tolerance(rtol: float, share: float = TIGHTER) -> float:
@@ -207,7 +207,7 @@ def shorten_case(case: Case, parts: int) -> Case:
 
 def compare(found: Solution, other: Solution) -> Excess:
     """Return the metric whose error is farthest beyond what the run states."""
-    expected = min(EXPECTED * found.rtol, MOST_EXPECTED)
+    expected = min(EXPECTED * found.rtol, MAX_EXPECTED)
     least = {name: max(expected, RESOLVED if name in ABSOLUTE else 0.0) for name in JUDGED}
     return max(excess(name, found, other, least[name]) for name in JUDGED)
 
@@ -226,7 +226,7 @@ def excess(name: str, found: Solution, other: Solution, least: float) -> Excess:
     one = size(name, other.metrics)
     error = float(np.abs(found.metrics[name] - np.asarray(other.metrics[name])).max()) / one
     bar = float(np.max(found.bars[name])) / one
-    return Excess(error / max(FACTOR * bar, least), name, error, bar)
+    return Excess(error / max(SILENT_FACTOR * bar, least), name, error, bar)
 
 
 def size(name: str, metrics: dict[str, Any]) -> float:

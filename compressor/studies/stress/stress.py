@@ -25,9 +25,9 @@ from compressor.studies.stress.extremes import Budget
 from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
 
 FILE = "stress.nc"
-FULL = Budget()
+FULL_BUDGET = Budget()
 TIMEOUT = 300.0  # s that a scene may take with all of its judges
-FLUSH = 30.0  # s between two writings of what is finished
+SECONDS_BETWEEN_WRITES = 30.0  # s between two writings of what is finished
 VERDICTS = ("ok", "failed", "silent_wrong", "unjudged")
 REMEDY = "give another folder, or delete it"
 
@@ -126,7 +126,7 @@ def campaign(
     seed: int,
     workers: int,
     progress: Progress = lambda done, total, remark: None,
-    budget: Budget = FULL,
+    budget: Budget = FULL_BUDGET,
 ) -> xr.Dataset:
     """Return the first `count` scenes of a seed, of which those are run that the folder does not
     hold.
@@ -147,7 +147,7 @@ def campaign(
         for end in running:
             rows[end.id] = scene_row(end)
             progress(sum(number < count for number in rows), total, "")
-            if time.monotonic() - written > FLUSH:
+            if time.monotonic() - written > SECONDS_BETWEEN_WRITES:
                 write_dataset(path, campaign_dataset(rows.values(), seed, budget))
                 written = time.monotonic()
     finally:
@@ -167,7 +167,7 @@ def scene_row(end: JobResult | JobLost) -> Row:
     return row | {"seconds": TIMEOUT if end.reason == Reason.BUDGET_SECONDS else math.nan}
 
 
-def campaign_dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL) -> xr.Dataset:
+def campaign_dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL_BUDGET) -> xr.Dataset:
     """Return the rows as a Dataset with the dimension scene, in order; numbers that there are
     not are nan.
     """

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from compressor.studies.tradeoff.page import ModelTable
 
 WIDEST = 12  # columns of a word of a head
-FIRST = "choice of the model"
+CHOICE_HEAD = "choice of the model"
 
 
 def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterator[str]:
@@ -58,7 +58,7 @@ def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterato
     rows.append(["all of them", *table.span_texts, *[""] * times])
     depth = max(map(len, heads), default=1)
     stacked = [[""] * (depth - len(head)) + head for head in heads]
-    above = [[FIRST * (n == depth - 1), *(head[n] for head in stacked)] for n in range(depth)]
+    above = [[CHOICE_HEAD * (n == depth - 1), *(head[n] for head in stacked)] for n in range(depth)]
     notes = [""] * (depth - 1) + ["assumed", "", *(row.note for row in table.rows), ""]
     yield from align_rows([*above, *rows], notes)
     if table.unknown:

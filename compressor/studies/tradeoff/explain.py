@@ -33,7 +33,7 @@ from compressor.solve import (
 )
 from compressor.studies.tradeoff.features import FEATURES, Effect, ModelFeature, comparable, compare
 from compressor.studies.tradeoff.model_choices import shown_words
-from compressor.studies.tradeoff.work_precision import SLOW, Progress, complete, faulty
+from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, Progress, complete, faulty
 
 SCENES = {  # by the joints with clearance
     (): "ideal joints",
@@ -97,12 +97,12 @@ def explain(
 ) -> Explanation:
     """Explain the first job of a study by running it, and it again without each of its features.
 
-    Times are medians of `repeats`; a job above `bench.SLOW` is timed once. progress: is told how
-    many features have been tried, of how many.
+    Times are medians of `repeats`; a job above `bench.SLOW_SECONDS` is timed once. progress: is
+    told how many features have been tried, of how many.
     """
     case = study.cases[0]
     run, seconds, solution_seconds = time_case(case, repeats)
-    repeats = repeats if seconds < SLOW else 1
+    repeats = repeats if seconds < SLOW_SECONDS else 1
     ended = complete(run)
     active, absent = terms(case)
     joints = tuple(ideal_scales(case))
@@ -156,7 +156,7 @@ def time_case(case: Case, repeats: int) -> tuple[xr.Dataset, float, float]:
     """
     run = simulate(case)
     seconds, of_solution = [], []
-    for _ in range(repeats if complete(run) and run["seconds"].item() < SLOW else 1):
+    for _ in range(repeats if complete(run) and run["seconds"].item() < SLOW_SECONDS else 1):
         began = time.perf_counter()
         run = simulate(case)
         seconds.append(time.perf_counter() - began)

@@ -22,7 +22,7 @@ from compressor.report import (
 )
 
 COLUMNS = 3
-ROOM = 4.0  # times left of the fastest point, for the words
+WORDS_ROOM = 4.0  # times left of the fastest point, for the words
 MID, LIGHT = "#7d7d7d", "#ababab"
 # compiled methods are solid and coloured, SciPy's grey and dashed
 LOOKS: dict[str, tuple[LineStyle, str, str]] = {
@@ -69,7 +69,7 @@ def draw_work_precision(study: xr.Dataset) -> Figure:
     ends = limits(study)
     for number, panel in enumerate(panels[:count]):
         panel.set_ylim(*ends)
-        panel.set_xlim(study["seconds"].min().item() / ROOM, panel.get_xlim()[1])
+        panel.set_xlim(study["seconds"].min().item() / WORDS_ROOM, panel.get_xlim()[1])
         apart = uncertainty(study.isel(scene=number))
         if apart > ends[0]:
             panel.axhspan(ends[0], apart, **UNKNOWN)

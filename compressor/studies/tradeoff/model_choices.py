@@ -34,13 +34,13 @@ from compressor.studies.tradeoff.features import (
     series_errors,
     with_values,
 )
-from compressor.studies.tradeoff.work_precision import SLOW, Progress, complete, faulty
+from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, Progress, complete, faulty
 
 ITSELF = "the case itself"
-MOST_SECONDS = 30.0  # of a choice
+MAX_SECONDS = 30.0  # of a choice
 GRID = "peaks from the output grid"
 SCALES = {"× 2": 2.0, "÷ 2": 0.5}  # of stiffness and damping
-ALIKE = 1.01  # stiffnesses of two joints
+SAME_STIFFNESS = 1.01  # stiffnesses of two joints
 GROUPS = ("contact", "friction", "lubricant", "guide", "rod")  # that a choice may fill in
 NAMES = ("status", "reason", "seconds", *(n + end for n in METRICS for end in ("", "_error")))
 
@@ -131,7 +131,7 @@ def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     # one key serves both joints: materials may give each a stiffness of its own
     middle = math.prod(each) ** (1.0 / len(each)) / 1000.0**contact.exponent
     values = {"stiffness_N_per_mm15": factor * middle, "materials": None, "geometry": None}
-    alike = max(each) <= ALIKE * min(each)
+    alike = max(each) <= SAME_STIFFNESS * min(each)
     return Choice(name, with_values(case, "contact", **values), "" if alike else "of both joints")
 
 
@@ -213,7 +213,7 @@ def run_choices(
         return runs
     for done, one in enumerate(choices, 1):
         progress(done, total, "")
-        other = one.case and bare(one.case, MOST_SECONDS)
+        other = one.case and bare(one.case, MAX_SECONDS)
         runs.append(fastest_run(other, repeats) if other else empty_run(runs[0]))
     progress(total, total, "")
     return runs
@@ -222,7 +222,7 @@ def run_choices(
 def fastest_run(case: Case, repeats: int) -> xr.Dataset:
     """Run a case, again where it is short, and return the run of the least wall time."""
     run = simulate(case)
-    again = repeats - 1 if complete(run) and run["seconds"] < SLOW else 0
+    again = repeats - 1 if complete(run) and run["seconds"] < SLOW_SECONDS else 0
     every = [run, *(simulate(case) for _ in range(again))]
     return min(every, key=lambda one: float(one["seconds"]))
 

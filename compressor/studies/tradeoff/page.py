@@ -42,8 +42,8 @@ from compressor.store import (
 
 NONE_SEEN = "none seen"  # less than both error bars
 NO_VALUE = "–"
-FINEST = 1e-5  # relative: a smaller change or error is not written out
-LEAST_ERROR = 1e-4
+MIN_SHOWN_CHANGE = 1e-5  # relative: a smaller change or error is not written out
+MIN_ERROR = 1e-4
 
 
 @dataclass(frozen=True)
@@ -154,8 +154,8 @@ def change_text(measure: Measure, size: float) -> str:
 
 def percent(size: float) -> str:
     """Return a relative change in percent, to two digits or whole."""
-    if abs(size) < FINEST:
-        return f"below {100 * FINEST:g} %"
+    if abs(size) < MIN_SHOWN_CHANGE:
+        return f"below {100 * MIN_SHOWN_CHANGE:g} %"
     return f"{100 * size:+.0f} %" if abs(size) >= 0.995 else f"{100 * size:+.2g} %"
 
 
@@ -165,7 +165,9 @@ def span_text(measure: Measure, low: float, high: float) -> str:
         return NONE_SEEN
     unit = "%" if measure.is_relative else "points"
     texts = [
-        change_text(measure, size).removesuffix(f" {unit}") if abs(size) >= FINEST else "0"
+        change_text(measure, size).removesuffix(f" {unit}")
+        if abs(size) >= MIN_SHOWN_CHANGE
+        else "0"
         for size in (low, high)
     ]
     return f"{' to '.join(texts)} {unit}"
@@ -191,7 +193,7 @@ def headline(table: ModelTable) -> str:
     measure, value, bar = table.measures[n], table.values[n], table.bars[n]
     number = f"{by_bar(value, bar, measure.is_relative, bare=True)} {measure.unit}"
     share = bar / value
-    error = f"below {100 * LEAST_ERROR:g}" if share < LEAST_ERROR else f"{100 * share:.1g}"
+    error = f"below {100 * MIN_ERROR:g}" if share < MIN_ERROR else f"{100 * share:.1g}"
     word = "peak" if peaks else "number"
     span = table.span_texts[n]
     moved = f"choices of the model move this {word} by {span}"

@@ -20,15 +20,15 @@ from compressor.program import PROGRAM, CompsimError
 from compressor.reasons import Reason
 from compressor.solve import LOCAL, simulate
 
-MEASURED = tuple(method for method in METHODS if method != "TSIT5")  # which auto steps by
+MEASURED_METHODS = tuple(method for method in METHODS if method != "TSIT5")  # which auto steps by
 # those behind the words of `accuracy`, and some between
 WORDS = {tier.rtol for tier in ACCURACY.values()}
 TOLERANCES = tuple(sorted(WORDS | {1e-3, 2e-4, 1e-6}, reverse=True))
 REFERENCES = ("DOP853", "RODAS")  # SciPy's explicit one, our implicit one that lands on onsets
 REFERENCE_RTOL = 1e-12
 PAPER_METHOD, PAPER_RTOL = "BDF", 1e-5  # ADAMS's GSTIFF is a BDF code; its error tolerance
-SLOW = 0.25  # s: a longer point is timed once
-BUDGET = 4.0  # s, of a point
+SLOW_SECONDS = 0.25  # s: a longer point is timed once
+POINT_SECONDS = 4.0  # s, of a point
 DECADES = tuple(10.0**-k for k in range(1, 10))
 
 # name: what it is the relative error of
@@ -125,10 +125,10 @@ def reference(name: str, case: Case, method: str) -> dict[str, np.ndarray]:
 
 def work_precision(
     cases: Mapping[str, Case],
-    methods: Sequence[str] = MEASURED,
+    methods: Sequence[str] = MEASURED_METHODS,
     tolerances: Sequence[float] = TOLERANCES,
     repeats: int = 3,
-    budget: float = BUDGET,
+    budget: float = POINT_SECONDS,
     progress: Progress = lambda done, total, remark: None,
 ) -> xr.Dataset:
     """Run every case by every method at every tolerance; dims (scene, method, tolerance).
@@ -243,7 +243,7 @@ def measure(study: xr.Dataset, point: Point, case: Case, truth: Mapping, budget:
     seconds = study["seconds"].values
     earlier = point[:2]
     out_of_time = study["reason"].values[earlier][: point[2]] == Reason.BUDGET_SECONDS
-    if out_of_time.any() or seconds[point] > SLOW:
+    if out_of_time.any() or seconds[point] > SLOW_SECONDS:
         return
     rtol = float(study["tolerance"].values[point[2]])
     run = simulate(solve_by_method(case, method, rtol, budget))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.studies.wear.run import WearSummary, WornMachine
 
-MOST_DRAWN = 12  # machines that get a figure
+MAX_DRAWN = 12  # machines that get a figure
 HEAD = f"{'worn out after, h':>17}  {'with f times to 1/f of the wear':>31}  at the end"
 
 
@@ -176,7 +176,7 @@ def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
     from compressor.studies.wear.figures import draw_wear
     from compressor.studies.wear.stages import open_wear, wear_file
 
-    for one in [one for one in summary.machines if one.life][:MOST_DRAWN]:
+    for one in [one for one in summary.machines if one.life][:MAX_DRAWN]:
         path = wear_file(folder, one.case).with_suffix(".png")
         how = one.case.wear
         assert how

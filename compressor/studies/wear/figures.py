@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from compressor.metrics import JOINTS
 from compressor.report import BLACK, CYCLE, GREY, in_style, legend_above, sheet
 
-MOST_PROFILES = 5
+MAX_PROFILES = 5
 
 
 @in_style
@@ -43,7 +43,7 @@ def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Figure:
     panels[0, 0].set_xlim(0.0, max(float(hours[-1]), 1e-9))
     panels[0, 1].set(ylabel="greatest contact force (kN)", xlabel="operating hours", ylim=(0, None))
     deepest = max(worn, key=lambda joint: float(stages["worn_depth"].sel(joint=joint).max()))
-    shown = np.unique(np.linspace(0, hours.size - 1, MOST_PROFILES + 1).round().astype(int))[1:]
+    shown = np.unique(np.linspace(0, hours.size - 1, MAX_PROFILES + 1).round().astype(int))[1:]
     half = stages.sizes["angle"] // 2  # profiles go from -180 to 180 degrees
     angles = (np.degrees(stages["angle"].values) + 180.0) % 360.0 - 180.0
     around = np.append(np.roll(angles, half), angles.max() + angles[1])

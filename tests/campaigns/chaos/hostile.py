@@ -44,7 +44,7 @@ from compressor.sweep.sweep import Summary
 ROOT = Path(__file__).parents[3]
 SECONDS = 2.0  # of processor time that a command may take
 HANG = 20.0  # s on the clock
-MOST_SAMPLES = 20_000  # of a valid case file that is run and not only read
+MAX_SAMPLES = 20_000  # of a valid case file that is run and not only read
 SHARE_OF_CASES = 0.6  # of the trials
 STORED = re.compile(
     r"store(/(rows|jobs|studies|shards)(/[A-Za-z0-9._-]+)*|/writer\.lock|/page(/[A-Za-z0-9._-]+)*)?"
@@ -173,7 +173,7 @@ def said_of_case(words: list[object]) -> Said:
     run = door.sweep
 
     def cheap(studies: list[Study], *args: Any) -> Summary:
-        if sum(case.steps for study in studies for case in study.cases) > MOST_SAMPLES:
+        if sum(case.steps for study in studies for case in study.cases) > MAX_SAMPLES:
             raise CaseFileError([])
         return run(studies, *args)
 

@@ -25,7 +25,7 @@ from compressor.store.reader import read_store
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 WHAT = "jobs that crash, leave, hang, stand still or eat memory, among good ones"
 GOOD = [4 + n / 100 for n in range(24)]  # rod masses, kg
-MOST_BAD = 5
+MAX_BAD = 5
 SECONDS = 0.3  # that a job which never ends may take
 LEAST = 300_000_000  # bytes that a job may add
 FOREIGN = ("case", "name")  # they hold the time that a job may take, and its study
@@ -89,7 +89,7 @@ def mixed(folder, draw):
     """
     keep = draw.choice(["metrics", "series"])
     jobs = [(mass, "") for mass in draw.sample(GOOD, draw.randint(1, len(GOOD)))]
-    kinds = [draw.choice(list(KINDS)) for _ in range(draw.randint(1, MOST_BAD))]
+    kinds = [draw.choice(list(KINDS)) for _ in range(draw.randint(1, MAX_BAD))]
     jobs += [(5 + n / 100, kind) for n, kind in enumerate(kinds)]
     draw.shuffle(jobs)
     names, good, bad = [], set(), {}

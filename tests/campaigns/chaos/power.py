@@ -40,8 +40,8 @@ TOOLS = ("mkfs.ext4", "e2fsck", "mount", "umount")
 OPTIONS = ("commit=1", "commit=5", "commit=1,data=writeback", "commit=1,nodelalloc")
 CONTROLS = ("no fsync", "no fsync of folders")
 CONTROL_EVERY = 5  # trials; each control
-FEWEST_CONTROLS = 3
-MOST_SECONDS = 1.5  # from the first acknowledged job to the cut
+MIN_CONTROLS = 3
+MAX_SECONDS = 1.5  # from the first acknowledged job to the cut
 STUDIES = {
     "rows": {
         "joint": "big_end", "clearance_mm": {"linspace": [0.05, 0.3, 251]},
@@ -100,7 +100,7 @@ def call(*words: object, good: tuple[int, ...] = (0,)) -> None:
 def write(wanted: list[Study], store: Path, channel: int, control: str, rng: random.Random) -> None:
     """In a forked process: run a sweep that tells each acknowledged key over a pipe."""
     if rng.random() < 0.5:  # write and merge more often than the program does
-        writer.MOST_AGE, writer.MOST_SMALL, writer.FEW_SMALL = 0.05, 5, 2
+        writer.MAX_AGE, writer.MAX_SMALL, writer.FEW_SMALL = 0.05, 5, 2
     if control:
         os.fsync = without(control)
     flush = writer.Writer.flush
@@ -132,7 +132,7 @@ def next_of(reader: int, seconds: float) -> str:
         return ""
     data = os.read(reader, 1 << 20)
     if not data:
-        time.sleep(min(seconds, MOST_SECONDS))  # the sweep is over
+        time.sleep(min(seconds, MAX_SECONDS))  # the sweep is over
     return data.decode()
 
 
@@ -158,7 +158,7 @@ class Campaign:
         """Run a sweep and cut it off; the keys that were acknowledged. The image: `cut.img`."""
         shutil.copyfile(self.empty, trial / "disk.img")
         options = rng.choice(OPTIONS)
-        wait = rng.uniform(0, MOST_SECONDS)
+        wait = rng.uniform(0, MAX_SECONDS)
         promptly = bool(control) or rng.random() < 0.5  # upon an acknowledgement
         reader, channel = os.pipe()
         with mounted(trial / "disk.img", trial / "disk", options) as disk:
@@ -234,7 +234,7 @@ def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
         tried.trial(number)
     for control in CONTROLS:
         tally.counts[f"controls, {control}"] = tally.counts[f"of these lost, {control}"] = 0
-        for number in range(max(FEWEST_CONTROLS, trials // CONTROL_EVERY)):
+        for number in range(max(MIN_CONTROLS, trials // CONTROL_EVERY)):
             tally.counts[f"controls, {control}"] += 1
             tally.counts[f"of these lost, {control}"] += tried.trial(number, control)
         if not tally.counts[f"of these lost, {control}"]:

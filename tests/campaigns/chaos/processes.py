@@ -22,8 +22,8 @@ from compsim.cli import main
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 PROGRESS = re.compile(rb"(\d+) of \d+ jobs, \d+ %")
-LEAST_FILES = 3  # the first descriptor that is no standard stream
-MOST_FILES = 1024
+MIN_FILES = 3  # the first descriptor that is no standard stream
+MAX_FILES = 1024
 
 
 class Run:
@@ -124,7 +124,7 @@ def become(arguments, folder, terminal, real, prepare):
         nothing = os.open(os.devnull, os.O_RDWR)
         for stream, source in enumerate((nothing, nothing, terminal)):
             os.dup2(source, stream)
-        os.closerange(LEAST_FILES, MOST_FILES)
+        os.closerange(MIN_FILES, MAX_FILES)
         for tracker in (resource_tracker, loky_tracker):
             tracker._resource_tracker._fd = None  # it is our parent's
         if real:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from compressor.studies.diagnosis.approximate import (
-    FEWEST,
     LEVEL,
+    MIN_ACCEPTED,
     Posterior,
     misses,
     quantiles,
@@ -87,7 +87,7 @@ def test_a_clearance_that_never_changes_is_told():
 
 def test_adjustment_moves_jobs_along_the_slope():
     """Logs that are their summaries: whatever is accepted moves to the record's summary."""
-    logs = np.linspace(-1, 1, 4 * FEWEST)[:, None]
+    logs = np.linspace(-1, 1, 4 * MIN_ACCEPTED)[:, None]
     noise = 1e-3 * np.random.default_rng(5).normal(size=logs.shape)
     found = quantiles(np.array([0.3]), logs + noise, logs)
     np.testing.assert_allclose(found, 0.3, atol=4e-3)

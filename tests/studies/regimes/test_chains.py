@@ -82,7 +82,7 @@ def wait_for_values(process, path, count):
 def test_a_killed_chain_goes_on_and_ends_in_the_same_bits(whole, tmp_path, monkeypatch):
     """SIGKILL at random, until the chain is whole; each process goes on from the last value."""
     chain, path = whole
-    monkeypatch.setattr(chains, "FLUSH", 0.0)
+    monkeypatch.setattr(chains, "SECONDS_BETWEEN_WRITES", 0.0)
     rng, stops = np.random.default_rng(7), []
     for _ in range(20):
         before = len(read_kept_rows(chain, chain.path(tmp_path)))

@@ -11,9 +11,9 @@ from compressor.cases.regimes import Regimes
 from compressor.studies.regimes import confirm as module
 from compressor.studies.regimes.chains import Chain, ChainTask, run_chain
 from compressor.studies.regimes.confirm import (
-    APART,
-    ROOM,
-    STARTS,
+    APART_TOLERANCES,
+    START_COUNT,
+    START_ROOM,
     ChainPair,
     Doubt,
     MotionSignature,
@@ -66,8 +66,8 @@ UNDECIDED = chaotic()._replace(regime="undecided")
     ("one", "other", "expected"),
     [
         (periodic(), periodic(), False),
-        (periodic(), periodic(at=0.9 * APART * WITHIN), False),
-        (periodic(), periodic(at=1.1 * APART * WITHIN), True),
+        (periodic(), periodic(at=0.9 * APART_TOLERANCES * WITHIN), False),
+        (periodic(), periodic(at=1.1 * APART_TOLERANCES * WITHIN), True),
         (periodic(2), periodic(1), True),
         (periodic(2), periodic(2), False),
         (periodic(2)._replace(places=periodic(2).places * 10 * WITHIN), periodic(), False),
@@ -124,11 +124,11 @@ def test_values_at_which_chains_differ_are_doubted(hysteresis, tmp_path):
 @pytest.mark.parametrize(
     ("up", "down", "starts", "verdict"),
     [
-        (periodic(), periodic(at=0.5), periodic(), Verdict(1, 1, 2, STARTS, 0)),
-        (periodic(), periodic(at=0.5), periodic(at=0.5), Verdict(1, 1, 2, 0, STARTS)),
-        (periodic(), periodic(), periodic(), Verdict(1, 0, 1, STARTS, STARTS)),
+        (periodic(), periodic(at=0.5), periodic(), Verdict(1, 1, 2, START_COUNT, 0)),
+        (periodic(), periodic(at=0.5), periodic(at=0.5), Verdict(1, 1, 2, 0, START_COUNT)),
+        (periodic(), periodic(), periodic(), Verdict(1, 0, 1, START_COUNT, START_COUNT)),
         (periodic(), periodic(), chaotic(), Verdict(1, 1, 2, 0, 0)),
-        (UNKNOWN, periodic(), periodic(), Verdict(1, 0, 1, 0, STARTS)),
+        (UNKNOWN, periodic(), periodic(), Verdict(1, 0, 1, 0, START_COUNT)),
         (periodic(), chaotic(), periodic(at=0.3), Verdict(1, 1, 3, 0, 0)),
     ],
 )
@@ -143,12 +143,12 @@ def test_two_motions_that_are_reached_confirm(monkeypatch, up, down, starts, ver
 def test_other_starts_are_within_the_clearances_and_always_the_same():
     starts = other_starts(CASES[1])
     assert starts == other_starts(CASES[1])
-    assert len({case.key for case in starts}) == STARTS
+    assert len({case.key for case in starts}) == START_COUNT
     for case in starts:
         offset = case.initial_offset_mm
         for joint in ("big_end", "small_end"):
             size = math.hypot(getattr(offset, f"{joint}_x"), getattr(offset, f"{joint}_y"))
-            assert 0 < size < ROOM * 0.2
+            assert 0 < size < START_ROOM * 0.2
     alone = Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
     assert all(case.initial_offset_mm.small_end_x == 0 for case in other_starts(alone))
 
@@ -176,7 +176,7 @@ def test_a_machine_with_two_motions_is_found_and_confirmed(tmp_path, monkeypatch
     (doubt,) = doubts(pair, tmp_path)
     assert doubt.number == 1
     monkeypatch.setattr(module, "FURTHER", 20)
-    monkeypatch.setattr(module, "STARTS", 2)
+    monkeypatch.setattr(module, "START_COUNT", 2)
     verdict = confirm(doubt)
     assert (verdict.differs, verdict.confirmed, verdict.motions) == (1, 1, 2)
     assert verdict.starts_like_up + verdict.starts_like_down == 2

@@ -5,7 +5,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.studies.regimes.values import (
-    LONGEST,
+    MAX_PERIOD,
     MORE,
     TOLERANCE,
     apart,
@@ -23,7 +23,7 @@ def cycle(period, count, noise=0.0):
     return of[np.arange(count) % period] + noise * RNG.uniform(-1, 1, (count, 2, 2))
 
 
-@pytest.mark.parametrize("period", range(1, LONGEST + 1))
+@pytest.mark.parametrize("period", range(1, MAX_PERIOD + 1))
 def test_a_period_is_found_once_two_of_it_and_four_revolutions_are_there(period):
     found = cycle(period, 2 * period + MORE, 0.1 * TOLERANCE)
     assert period_of(found, TOLERANCE) == period
@@ -37,7 +37,7 @@ def test_what_went_before_does_not_count():
 
 
 def test_no_period_longer_than_the_longest_is_looked_for():
-    assert period_of(cycle(LONGEST + 1, 100), TOLERANCE) is None
+    assert period_of(cycle(MAX_PERIOD + 1, 100), TOLERANCE) is None
 
 
 def logistic(r, count):

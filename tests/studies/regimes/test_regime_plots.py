@@ -19,7 +19,7 @@ from compressor.studies.regimes.figures import (
     period_rows,
 )
 from compressor.studies.regimes.plots import (
-    MOST_SECTIONS,
+    MAX_SECTIONS,
     chosen_values,
     regime_figures,
 )
@@ -114,7 +114,7 @@ def test_failed_values_are_marked_in_every_panel(data):
 def test_sections_show_the_points_of_their_values(data):
     chosen = chosen_values(data)
     figure = draw_sections(data.isel({OVER: chosen}))
-    assert len(figure.axes) == len(chosen) == MOST_SECTIONS
+    assert len(figure.axes) == len(chosen) == MAX_SECTIONS
     for place, panel in zip(chosen, figure.axes, strict=True):
         stored = data["section"].isel({OVER: place}).sel(direction="up", joint="big_end")
         x, rate = (stored.sel(coordinate=name).values for name in ("x", "x_rate"))
@@ -141,13 +141,13 @@ def test_sections_are_chosen_evenly_among_the_regimes(data):
     one["regime"][0], one["period"][0] = "periodic", 1.0
     one["regime"][0, 37:], one["period"][0, 37:] = "chaotic", np.nan
     chosen = chosen_values(one)
-    assert len(chosen) == MOST_SECTIONS
+    assert len(chosen) == MAX_SECTIONS
     assert sum(place >= 37 for place in chosen) == 3
     assert chosen_values(failed(one, "up", [*range(1, 40)])) == [0]
     many = one.copy(deep=True)
     many["regime"][0], many["period"][0] = "periodic", 1.0 + np.arange(40) // 4
     periods = many["period"].values[0, chosen_values(many)]
-    assert len({*periods}) == MOST_SECTIONS
+    assert len({*periods}) == MAX_SECTIONS
 
 
 def test_a_map_colours_each_regime():
