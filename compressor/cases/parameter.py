@@ -31,7 +31,7 @@ from compressor.program import CompsimError
 class Reader:
     """A condition under which a case reads a key; `words`: what a case file sets for it.
 
-    `reads` takes the case. Where numbers of the case are columns (`compressor.cases.sheet`), its
+    `reads` takes the case. Where numbers of the case are columns (`compressor.cases.columns`), its
     comparisons raise `Mixed` as theirs do.
     """
 
