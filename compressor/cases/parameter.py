@@ -24,7 +24,7 @@ from typing import Any, TypeVar
 
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY, law_of
 from compressor.metrics import METRICS
-from compressor.program import CompsimError
+from compressor.program import CompsimError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -534,8 +534,7 @@ def checked_targets(key: str, value: Mapping[Any, Any], problems: list[Problem])
     good = []
     for name, target in value.items():
         if name not in METRICS:
-            near = get_close_matches(str(name), METRICS, n=1)
-            hint = f"did you mean {near[0]}?" if near else "metrics are " + ", ".join(METRICS)
+            hint = did_you_mean(str(name), METRICS) or "metrics are " + ", ".join(METRICS)
             problems.append(Problem(f"{key}.{name}", f"unknown metric; {hint}"))
         elif message := TARGET.check(target):
             problems.append(Problem(f"{key}.{name}", message))

@@ -20,14 +20,13 @@ import operator
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from fractions import Fraction
 from typing import Any, NoReturn
 
 from compressor.cases.checks import row_of, suggestion
 from compressor.cases.parameter import Parameter, quote_value
 from compressor.cases.yaml_reader import FileProblem, Node, resolve_scalar, shorten
-from compressor.program import ignore_warnings
+from compressor.program import did_you_mean, ignore_warnings
 
 # designs of samples, which draw several keys together
 SAMPLED = ("random", "lhs", "sobol", "saltelli")
@@ -87,8 +86,8 @@ def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> SweptKey | No
     log = node.value.get("log")
     words = [word for word in node.value if word != "log"]
     if len(words) != 1 or words[0] not in FORMS:
-        near = get_close_matches(words[0] if words else "", FORMS, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        near = did_you_mean(words[0], FORMS) if words else ""
+        hint = f"; {near}" if near else ""
         refuse(f"needs a value, a list of values or a mapping with one of {' '.join(FORMS)}{hint}")
     elif log and (words[0] not in SAMPLED or not isinstance(log.value, bool)):
         refuse(f"log is true or false, and for {' '.join(SAMPLED)} alone", log)

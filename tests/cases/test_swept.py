@@ -109,7 +109,8 @@ def test_a_range_is_that_of_decimal_numbers(first, step, count):
         ("{range: [1, 2, 0]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
         ("{range: [1, 2, -1]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
         ("{lnspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of values or a mapping "
-         "with one of linspace logspace range random lhs sobol saltelli; did you mean linspace?"),
+         "with one of linspace logspace range random lhs sobol saltelli; did you mean linspace or "
+         "logspace?"),
         ("{range: [1, 2, 1], linspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of "
          "values or a mapping with one of linspace logspace range random lhs sobol saltelli; "
          "did you mean range?"),

@@ -9,14 +9,13 @@ import operator
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from compressor.cases import Study, load_studies, row_of
 from compressor.metrics import AXES, JOINTS, METRICS, NUMBERS, ROD_LOAD
-from compressor.program import CompsimError
+from compressor.program import CompsimError, did_you_mean
 from compressor.solve import sure
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
@@ -127,8 +126,7 @@ def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:
     known = METRICS | ROD_LOAD
     metric, *place = text.strip().split(".")
     if metric not in known:
-        near = get_close_matches(metric, known, n=3)
-        hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}"
+        hint = did_you_mean(metric, known) or f"there are {', '.join(known)}"
         raise QuestionError(f"unknown metric {metric!r}; {hint}")
     dims = known[metric].dims
     good = len(place) == len(dims) and all(w in WORDS[d] for w, d in zip(place, dims, strict=True))
