@@ -57,7 +57,8 @@ SHARED = [
      "solve.accuracy: needs draft, standard, fine or reference, or errors by metric such as "
      "{peak_acceleration: 0.01}, not 'finer'; did you mean fine?"),
     ({"solve": {"accuracy": {"peak_aceleration": 0.01}}},
-     "solve.accuracy.peak_aceleration: unknown metric; did you mean peak_acceleration or rms_acceleration?"),
+     "solve.accuracy.peak_aceleration: unknown metric; did you mean peak_acceleration or "
+     "rms_acceleration?"),
     ({"load": "sprnig"}, "load: needs spring, gas or none, not 'sprnig'; did you mean spring?"),
     ({"name": "my case"},
      "name: 'my case' is no name: use [A-Za-z0-9._-], at most 64, no leading dot"),
