@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import reference
 import xarray as xr
+from campaign_figures import draw_kept_error
 from joblib import Parallel, delayed
 from random_cases import load_equations, strangers
 
@@ -27,7 +28,6 @@ from compressor.cases.case import Case
 from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
-from compressor.report.figures.kept_error import draw_kept_error
 from compressor.report.figures.style import render
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.regime import TWIN_DISTANCE

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from campaign_figures import RUNGS, draw_scaled_limit, draw_tolerance_ladder
 from measure_accuracy import provenance
 
 from compressor.analysis.runs import FAULTS
 from compressor.cases.case import Case
 from compressor.cases.groups import Contact
-from compressor.report.figures.ladders import RUNGS, draw_scaled_limit, draw_tolerance_ladder
 from compressor.report.figures.style import render
 from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.error_bars import allowed_residual
