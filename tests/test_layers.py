@@ -5,6 +5,7 @@ the sources that lists what breaks it, so that a planted fault shows that the ru
 """
 
 import ast
+import re
 import subprocess
 import tomllib
 from fnmatch import fnmatch
@@ -312,6 +313,35 @@ def test_few_names_cross_a_wall():
         if room(source) != room(module) and room(module) not in ("", "studies")
     }
     assert len(crossing) <= MAX_NAMES * len(PACKAGES)
+
+
+def floors():
+    """Return the floor of each room: above all that it imports."""
+    below = {}
+    for module in SOURCES:
+        for source, _ in ours(SOURCES, module):
+            here, there = room(module), room(source)
+            alone = module in OLD_PLACES or here in ("", there)
+            if not alone and (here, there) != ("studies", "compsim"):  # commands of studies
+                below.setdefault(here, set()).add(there)
+
+    def floor(name):
+        return 1 + max(map(floor, below.get(name, ())), default=0)
+
+    return {
+        name: floor(name) for name in {*below, *(one for some in below.values() for one in some)}
+    }
+
+
+def test_the_drawing_of_the_house_is_right():
+    page = (ROOT / "compressor/README.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^floor (\d) +(.+)$", page, re.MULTILINE)
+    drawn = {
+        name.rpartition("/")[2]: int(number)
+        for number, names in lines
+        for name in names.replace("|", " ").split()
+    }
+    assert drawn == floors()
 
 
 @pytest.mark.parametrize("module", [m for m in SOURCES if room(m) == "physics"])
