@@ -1,4 +1,4 @@
-"""The page on new contact laws, followed literally in a copy of the program."""
+"""The recipes of compressor/README.md, followed literally in a copy of the program."""
 
 import os
 import re
@@ -7,6 +7,8 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[1]
 LAWS, WORDS = "compressor/physics/contact_laws.py", "compressor/cases/laws.py"
@@ -23,10 +25,10 @@ PASS = (
 )
 
 
-def blocks():
-    """The page's blocks of code on contact laws, in their order."""
+def blocks(begin=BEGIN, end=END):
+    """The page's blocks of code from one heading to another, in their order."""
     page = (ROOT / "compressor/README.md").read_text(encoding="utf-8")
-    section = page.partition(BEGIN)[2].partition(END)[0]
+    section = page.partition(begin)[2].partition(end)[0]
     found = re.findall(r"^( *)```py\n(.*?)^ *```", section, re.DOTALL | re.MULTILINE)
     return [re.sub(f"^{indent}", "", text, flags=re.MULTILINE) for indent, text in found]
 
@@ -58,11 +60,109 @@ def branches(block):
     return dict(zip(found[::2], found[1::2], strict=True))
 
 
-def test_the_page_on_contact_laws_is_right(tmp_path):
-    for folder in ("compressor", "cmd", "tests"):
-        shutil.copytree(ROOT / folder, tmp_path / folder,
+def copy_of_the_program(place, *more):
+    for folder in ("compressor", "cmd", *more):
+        shutil.copytree(ROOT / folder, place / folder,
                         ignore=shutil.ignore_patterns("__pycache__", "results"))  # fmt: skip
-    shutil.copyfile(ROOT / "pyproject.toml", tmp_path / "pyproject.toml")
+    shutil.copyfile(ROOT / "pyproject.toml", place / "pyproject.toml")
+
+
+def run_in(copy, *words, cwd):
+    """What a command prints in a copy, which compiles nothing."""
+    environment = os.environ | {"COMPSIM_JIT": "0", "PYTHONPATH": f"{copy}:{copy / 'cmd'}"}
+    ran = subprocess.run(
+        [sys.executable, *words], cwd=cwd, capture_output=True, text=True, env=environment
+    )
+    assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr
+    return ran.stdout
+
+
+def test_the_page_on_metrics_is_right(tmp_path):
+    copy_of_the_program(tmp_path)
+    row, value = blocks("## How to add a metric", "## How to add a figure")
+    changed(
+        tmp_path, "compressor/metrics.py",
+        (textwrap.indent(row, " " * 8), '        Metric(\n            "impact_count"', False),
+    )  # fmt: skip
+    changed(
+        tmp_path, "compressor/solve/run_metrics.py",
+        (textwrap.indent(value, " " * 8), '        "impact_count"', False),
+    )  # fmt: skip
+    code = (
+        "import compressor\n"
+        "solve = {'duration_rev': 0.05, 'settle_rev': 0, 'accuracy': 'draft'}\n"
+        "values = {'joint': 'big_end', 'clearance_mm': 0.2, 'solve': solve}\n"
+        "run = compressor.simulate(compressor.Case.from_values(values))\n"
+        "print(run.contact_seconds_per_rev.attrs['units'])\n"
+        "for name in ('contact_seconds_per_rev', 'contact_seconds_per_rev_error',\n"
+        "             'contact_loss_fraction'):\n"
+        "    print(float(run[name].sel(joint='big_end')))\n"
+    )
+    unit, *numbers = run_in(tmp_path, "-c", code, cwd=tmp_path).split()
+    found, bar, lost = map(float, numbers)
+    assert unit == "s"
+    assert found == pytest.approx((1 - lost) * 60 / 500)
+    assert 0 < bar < 0.1 * found
+
+
+def test_the_page_on_figures_is_right(tmp_path, paper_store):
+    copy_of_the_program(tmp_path)
+    function, line, caption, of_captions = blocks("## How to add a figure", "## How to add a verb")
+    paper = tmp_path / "compressor/report/figures/paper.py"
+    text = paper.read_text(encoding="utf-8")
+    paper.write_text(f"{text}\n\n{function}", encoding="utf-8")
+    changed(
+        tmp_path, "compressor/report/figures/__init__.py",
+        (indented(line), "FIGURES = (\n", True),
+        ("    draw_phase_plane,\n", "    draw_piston_force,\n    draw_pressure", False),
+    )  # fmt: skip
+    changed(
+        tmp_path, "compressor/analysis/captions.py",
+        (caption + "\n\n", "CAPTIONS: dict[int,", False),
+        (indented(of_captions), "    3: pressure_volume,\n", False),
+    )  # fmt: skip
+    run_in(tmp_path, "-m", "compsim", "report", str(paper_store), "-o", "out", cwd=tmp_path)
+    page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    assert "Velocity against displacement" in page
+    assert re.search(r"The piston moves at up to 6\.\d+ m/s", page)
+    rows = (tmp_path / "out/figure-17.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) > 4 * 360
+    assert (tmp_path / "out/figure-17.png").stat().st_size > 10_000
+
+
+def test_the_page_on_verbs_is_right(tmp_path):
+    copy_of_the_program(tmp_path)
+    module, line = blocks("## How to add a verb", "## How to add a study")
+    (tmp_path / "cmd/compsim/size.py").write_text(module, encoding="utf-8")
+    changed(
+        tmp_path, "cmd/compsim/cli.py",
+        ("    size,\n", "    show,\n    status,\n", False),
+        (indented(line), "    show.show,\n", True),
+    )  # fmt: skip
+    (tmp_path / "some").mkdir()
+    (tmp_path / "some/file").write_text("four", encoding="utf-8")
+    assert run_in(tmp_path, "-m", "compsim", "size", "some", cwd=tmp_path) == "4\n"
+    assert "Print how many bytes" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
+
+
+def test_the_page_on_studies_is_right(tmp_path, paper_store):
+    copy_of_the_program(tmp_path)
+    purpose, module, line = blocks("## How to add a study", "## How to add a public name")
+    folder = tmp_path / "compressor/studies/count"
+    folder.mkdir()
+    (folder / "__init__.py").write_text(purpose, encoding="utf-8")
+    (folder / "command.py").write_text(module, encoding="utf-8")
+    changed(
+        tmp_path, "compressor/studies/__init__.py",
+        (indented(line), "STUDIES = (\n", True),
+    )  # fmt: skip
+    (tmp_path / "results").symlink_to(paper_store)
+    assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "3\n"
+    assert "Print how many jobs" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
+
+
+def test_the_page_on_contact_laws_is_right(tmp_path):
+    copy_of_the_program(tmp_path, "tests")
     member, damping, words, given, force, choice = blocks()
     chosen = branches(choice)
     number = int(member.split("=")[1])
