@@ -795,6 +795,7 @@ def numbers_list():
     word, bars = accuracy["words"]["standard"], accuracy["bars"]["standard"].values()
     within = sum(bar["within"] * bar["of"] for bar in bars) / sum(bar["of"] for bar in bars)
     range_, fresh = stress["ends"]["supported"], with_drawn(stress["fresh"], "")
+    rich = with_drawn(stress["fresh"], "features")
     unjudged = sum(ends.get("unjudged", 0) for ends in stress["ends"].values())
     link = "compressor/solve/README.md#supported-range-and-stress"
     lines = [
@@ -816,7 +817,9 @@ def numbers_list():
         f"range, {range_['ok'] / sum(range_.values()):.1%} of that half ran to a result. The "
         f"others failed with a named reason. Silently wrong ([meaning]({link})): "
         f"{stress['silent_wrong'] or 'none'}; of {sum(one['scenes'] for one in fresh):,} "
-        f"others, drawn afterwards, {silent(fresh) or 'none'}. Not judged: {unjudged}.",
+        f"others, drawn afterwards, {silent(fresh) or 'none'}; of "
+        f"{sum(one['scenes'] for one in rich):,} with laws and features, {silent(rich) or 'none'}. "
+        f"Not judged: {unjudged}.",
         f"**Kills.** Of {kills['trials']} sweeps killed at random and resumed, "
         f"{kills['failed'] or 'none'} had lost or changed a result. A sweep of {sweep['jobs']:,} "
         f"jobs, killed {len(sweep['kills'])} times and resumed, equals the undisturbed one "
