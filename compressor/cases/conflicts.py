@@ -205,7 +205,7 @@ def friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Proble
 
 
 def cylinder_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield a pin in a bore is known by its length and by what both are made of."""
+    """Yield what a pin in a bore lacks: its length, or what both are made of."""
     contact = case.contact
     needed = f"is needed with contact.law: {contact.law}; give it, such as"
     if contact.length_mm is None:

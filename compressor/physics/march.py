@@ -307,9 +307,11 @@ def onset_ahead(w, h, every, work, phase, p):
     found = False
     if w.watch and w.laid and may_touch(work.rows, p):
         begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
+        # a step that begins on an onset finds it again at its start: to land there would never end
         if begin < 1.0 and not (w.landed and begin < LANDED_SHARE):
             found = True
             w.landing = begin * h
+            # the error control knows nothing of a pulse that the last step did not see
             pulse = (end - begin) * h if end < 1.0 else math.inf
             w.h = min(w.h, w.contact_step, 0.5 * pulse)
     w.landed = 0
@@ -341,6 +343,7 @@ def measure_apart(w, h, every, work, phase, p):
     for joint in range(2):
         apart = 0.0
         if p.clearance[joint] > 0.0:
+            # F_N has a corner where contact changes, so that no quadrature over nodes is exact
             for i in range(every, NODES.size, every):
                 low, high = NODES[i - every], NODES[i]
                 before = work.rows[i - every, NEARNESS + joint]

@@ -99,6 +99,7 @@ def joint_onset(joint, t, h, dense, phase, p, y):
         elif now > 0.0:
             if before <= 0.0:
                 begin = crossing(joint, place(i - 1), s, t, h, dense, phase, p, y)
+        # a pulse shorter than the distance of two looks shows as a maximum between them
         elif i > 1 and before >= earlier and before >= now and before <= 0.0:
             low, middle = place(i - 2), place(i - 1)
             # where the nearness is concave, its top lies below the two chords prolonged
@@ -134,6 +135,7 @@ def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
     through both ends crosses zero, then one halfway: where contact ends, the nearness has a corner.
     """
     looks = 0
+    # the secant alone stalls at the corner: one end of the bracket would never move
     while high - low > PLACED:
         looks += 1
         s = 0.5 * (low + high)
@@ -157,6 +159,7 @@ def meeting(joint, t, y, phase, p, rates, before):
     scratch, (n,).
     """
     now = contact_at(joint, t, y, phase, p)
+    # the landing lies within HALVINGS of the onset, not on it: go back, or on, by the difference
     since = now.penetration / now.rate if now.rate > 0.0 else 0.0
     derivative(t, y, phase, p, rates)
     for i in range(y.size):

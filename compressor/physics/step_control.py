@@ -86,6 +86,7 @@ def first_step(w, z, work, atol, phase, p, end):
 def next_step_length(w, h, error):
     """Return the next step's length after an accepted step (PI control)."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
+    # the last error damps steps that stability holds, which I control lets swing about the limit
     now = logarithm(max(error, 1e-10))
     factor = SAFETY * exponential((INTEGRAL * w.error - PROPORTIONAL * now) / order)
     w.error = max(now, MIN_ERROR)
@@ -139,7 +140,7 @@ def choose_method(w, h, z, work, size):
         w.rest -= 1
         return
     if not w.stiff and w.steps % EVERY:
-        return
+        return  # an estimate costs a tenth of an explicit step
     reach = h * stiff_rate(w, h, z, work, size) / STABILITY_LIMIT
     if w.stiff:
         price = (size.size + rosenbrock.STIFF_STAGES + 0.2 * size.size**2) / (STAGES - 1)
@@ -147,6 +148,7 @@ def choose_method(w, h, z, work, size):
         w.gain += reach - price
         if w.calm >= CALM_STEPS:
             w.stiff, w.calm, w.held = 0, 0, 0
+            # a machine that changes at every contact would pay for each change: rest longer
             w.pause = REST if w.gain > 0.0 else min(2 * w.pause, LONGEST_REST)
             w.rest = w.pause
             w.h = min(w.h, h / max(reach, 1.0))

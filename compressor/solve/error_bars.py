@@ -112,6 +112,7 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
     for name, value in metrics.items():
         row = METRICS[name]
         bar, size = row.bar, np.ones(np.shape(value)) if row.is_pure_number else np.abs(value)
+        # a metric's own difference may be small by chance, that of its series is not
         own = bar.own * np.abs(np.asarray(value) - other.metrics[name])
         path = bar.path * to_metric_shape(other.apart[row.series], np.ndim(value)) * size
         found[name] = other.closeness * np.hypot(own, path)

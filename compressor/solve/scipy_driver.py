@@ -195,7 +195,7 @@ class LoadStretch:
         self.landings = Landings(p, right_hand_side.phase) if needs_landings(p) else None
 
     def run(self, z: np.ndarray) -> np.ndarray:
-        """Return the step to the segment's end and return state and flows there; raises Stop."""
+        """Integrate to the segment's end; return state and flows there. Raises Stop."""
         result, t, bound = self.result, self.begin, self.end
         result.stop_time, result.stop_state = t, z[:-FLOWS]
         while t < self.end:

@@ -163,9 +163,8 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
     """
     rtol = case.rtol
     best: Solution | None = None  # the last whole run
-    before: Solution | None = (
-        None  # the tightest one that balances, which the next is compared with
-    )
+    # the tightest run that balances, which the next one is compared with
+    before: Solution | None = None
     unsound = 0  # runs that did not balance
     while True:
         now = ahead.get(rtol) or run_at_tolerance(
@@ -176,6 +175,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
         search.count(now.trajectory)
         best = now
         if not energy_balances(case, now):
+            # error bars compare two runs: where both lack the same energy they would agree
             unsound += 1
             if unsound > RUNGS or rtol < 9.9 * TIGHTEST:
                 return fail_energy_audit(case, now, f"at rtol {rtol:.2g}")
@@ -191,6 +191,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
         estimate_errors(now, other)
         excess, third = excess_over_promise(case, now), None
         if excess <= 1.0:
+            # two runs may agree by chance where the motion enlarges their errors: ask a third
             excess, third = recheck(case, now, other, before is None, search)
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"

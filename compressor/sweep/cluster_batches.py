@@ -205,7 +205,7 @@ class Remote(Batches):
             yield from self.lost_batch(batch, found)
 
     def lost_batch(self, batch: list[Job], error: BaseException) -> Iterator[JobLost]:
-        """Yield a batch has lost its workers: it is tried alone, then each of its jobs."""
+        """Yield the jobs of a batch that lost its workers twice; it runs alone, then each job."""
         from distributed import KilledWorker
 
         if not isinstance(error, KilledWorker):
@@ -234,6 +234,6 @@ class Remote(Batches):
 
 
 def describe_lost_scheduler(client: Any) -> ClusterError:
-    """Return the scheduler has gone."""
+    """Return the error of a scheduler that has gone."""
     address = client.scheduler.address if client.scheduler else "the scheduler"
     return ClusterError(f"{address}: the scheduler was lost; the same command goes on with another")

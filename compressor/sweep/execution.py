@@ -209,7 +209,7 @@ class Batches:
             yield end
 
     def lose(self, job: Job, end: JobLost, again: bool) -> Iterator[JobLost]:
-        """Yield a job is lost, or tried again, once and alone."""
+        """Yield a job as lost where it has run again alone; else put it aside for that."""
         if again and not job.retried:
             self.suspects.append([job._replace(retried=True)])
         else:
@@ -366,6 +366,7 @@ class Local(Batches):
         for place, batch in list(self.out.items()):
             pid, position, since = self.note(place)
             latest, at_work = max(latest, abs(since)), at_work or since > 0
+            # compiled code looks at the clock itself: this is for jobs that hang outside of it
             if since > 0 and now - since > batch[position].timeout + self.rules.grace:
                 self.late.add(pid)
                 kill([pid])
@@ -394,13 +395,16 @@ class Local(Batches):
                 os.dup2(nobody.fileno(), results._writer.fileno())
 
     def fail(self, error: BaseException) -> Iterator[JobLost]:
-        """Yield the pool has broken: see to its jobs. The one that ran in a dead process may be
-        why.
+        """Yield the jobs that are lost with a broken pool; the others wait to run again.
+
+        A job that ran in the process that died may be the cause, and is tried alone.
         """
         if not isinstance(error, BROKEN_POOL_ERRORS):
             if isinstance(error, OSError) and not self.processes:
                 raise WorkersFailed(f"no worker process can be started: {error}") from error
             raise error
+        # loky ends the whole pool with one process: the others die by SIGKILL, and their jobs are
+        # no culprits, unless no process died by itself and so nobody can be named
         codes = {pid: child.exitcode for pid, child in self.processes.items()}
         died = {pid for pid, code in codes.items() if code not in (None, -signal.SIGKILL)}
         notes = {place: self.note(place) for place in self.out}
@@ -424,7 +428,7 @@ class Local(Batches):
         self.discard()
 
     def blame(self, job: Job, late: bool, code: int | None) -> Iterator[JobLost]:
-        """Yield a job was at work in a process that died, or was killed since it took too long."""
+        """Yield a job whose process died, or was killed since the job took too long, as lost."""
         reason, text = Reason.WORKER_DIED, f"its worker ended by {batch_ending(code)}"
         if late:
             reason = Reason.BUDGET_SECONDS
