@@ -4,6 +4,7 @@ import fcntl
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -30,6 +31,12 @@ from compressor.store.writer import Writer
 from compressor.sweep.run_job import run_job
 from compressor.sweep.worker import JobResult
 
+# nohup ignores SIGHUP, and a shell SIGINT of what it runs behind: tests that send them, and the
+# commands that they start, are to get them
+for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        usual = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+        signal.signal(number, usual)
 hypothesis.settings.register_profile("untimed", deadline=None)  # other work shares the machine
 hypothesis.settings.load_profile("untimed")
 
