@@ -151,8 +151,8 @@ def load(W, j, runs, job, work, most):
     W[PHASE + j] = runs.phases[runs.places[job, 0] + w.segment]
     W[RTOL + j], W[SETTLE + j], W[TOO_DEEP + j] = w.rtol, w.settle, w.deepest
     W[NEXT_SAMPLE + j] = next_sample(runs, job)
-    W[REMEMBERED + j], W[HELD + j] = w.error, w.held
-    W[REST + j] = w.rest if w.mode == AUTO else NO_TEST
+    W[REMEMBERED + j], W[HELD + j] = w.error, w.stability_limited
+    W[REST + j] = w.steps_to_test if w.mode == AUTO else NO_TEST
     W[STEPS + j], W[REFUSED + j] = w.steps, 0.0
     W[BUDGET + j] = most - w.rejected - w.onsets
     W[ALIVE + j], W[CALL + j] = 1.0, 0.0
@@ -193,12 +193,12 @@ def unload(W, j, runs, job, work):
         w.landed = 0
     w.t, w.h, w.error, w.steps = W[T + j], W[H + j], W[REMEMBERED + j], steps
     w.rejected += refused
-    w.held = np.int64(W[HELD + j])
-    if w.held >= STIFF_STEPS:
-        w.stiff, w.held, w.calm, w.gain = 1, 0, 0, 0.0
+    w.stability_limited = np.int64(W[HELD + j])
+    if w.stability_limited >= STIFF_STEPS:
+        w.stiff, w.stability_limited, w.explicit_would_do, w.steps_saved = 1, 0, 0, 0.0
     if w.mode == AUTO:
-        w.rest = np.int64(W[REST + j])
-    w.laid = 0
+        w.steps_to_test = np.int64(W[REST + j])
+    w.has_dense = 0
     for i in range(n + FLOWS):
         runs.z[job, i] = W[Z + i * LANES + j]
         work.k[0, i] = W[K + i * LANES + j]

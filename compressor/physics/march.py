@@ -108,7 +108,7 @@ WALKER = np.dtype(
         ("error", "f8"),  # of the last accepted step: logarithm of its norm
         ("fresh", "i8"),  # whether dz/dt at t is still to be evaluated
         ("observed", "i8"),  # whether work.row holds what is observed at t, in this phase
-        ("laid", "i8"),  # whether work.dense holds the step's interpolant
+        ("has_dense", "i8"),  # whether work.dense holds the step's interpolant
         ("landing", "f8"),  # length of the step that ends on the onset ahead, or 0
         ("landed", "i8"),  # whether the last step ended on an onset
         ("segment", "i8"),
@@ -121,11 +121,11 @@ WALKER = np.dtype(
         ("watch", "i8"),  # whether onsets of contact are watched
         ("mode", "i8"),  # Mode
         ("stiff", "i8"),  # whether the present step is the stiff partner's
-        ("held", "i8"),  # explicit steps in a row that stability has held
-        ("calm", "i8"),  # stiff steps in a row that an explicit method could have h
-        ("rest", "i8"),  # steps until stiffness is tested again
-        ("pause", "i8"),  # the rest after the last change back
-        ("gain", "f8"),  # stable explicit steps' worth that stiff ones have saved since the change
+        ("stability_limited", "i8"),  # explicit steps in a row that stability has held
+        ("explicit_would_do", "i8"),  # stiff steps in a row that an explicit method could have h
+        ("steps_to_test", "i8"),  # steps until stiffness is tested again
+        ("test_pause", "i8"),  # the rest after the last change back
+        ("steps_saved", "f8"),  # stable explicit steps that stiff ones have saved since the change
         ("rtol", "f8"),
         ("settle", "f8"),
         ("contact_step", "f8"),  # s: a step that resolves the contact's own frequency
@@ -156,7 +156,7 @@ def new_walker(mode):
     walker["fresh"] = 1
     walker["error"] = MIN_ERROR
     walker["mode"] = mode
-    walker["pause"] = REST // 2
+    walker["test_pause"] = REST // 2
     walker["stiff"] = mode == Mode.STIFF
     return walker
 
@@ -268,7 +268,7 @@ def observe_step(w, base, h, z, work, phase, p, tally):
     if w.stiff:
         rosenbrock_extend(z, work.new, work.k[1:], work.dense)
         observe_with_energy(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
-    w.laid = w.stiff
+    w.has_dense = w.stiff
     if w.observed:  # the last step's end is this step's begin
         for j in range(ACCELERATION, COLUMNS):
             work.rows[0, j] = work.row[j]
@@ -287,12 +287,12 @@ def observe_step(w, base, h, z, work, phase, p, tally):
             if may_change(work.rows, p):
                 every = 1
                 extend(w.pair, h, z, work.k, work.dense)
-                w.laid = 1
+                w.has_dense = 1
             elif w.t >= w.settle and near_record(work.rows, MIDDLE, tally):
                 every = 1
-    if every == 1 and not w.laid and may_touch(work.rows, p):
+    if every == 1 and not w.has_dense and may_touch(work.rows, p):
         extend(w.pair, h, z, work.k, work.dense)
-        w.laid = 1
+        w.has_dense = 1
     return every
 
 
@@ -305,7 +305,7 @@ def onset_ahead(w, h, every, work, phase, p):
     within the pulse that begins, or to the contact's own time scale.
     """
     found = False
-    if w.watch and w.laid and may_touch(work.rows, p):
+    if w.watch and w.has_dense and may_touch(work.rows, p):
         begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
         # a step that begins on an onset finds it again at its start: to land there would never end
         if begin < 1.0 and not (w.landed and begin < LANDED_SHARE):
@@ -326,7 +326,7 @@ def sample_grid(w, t_end, h, z, work, times, states):
     """
     while w.sample < times.size and times[w.sample] <= t_end:
         s = min(1.0, max(0.0, (times[w.sample] - w.t) / h))
-        if w.laid:
+        if w.has_dense:
             interpolate(s, work.dense, states[w.sample])
         else:
             weights_at(w.pair, s, work.weights)
@@ -349,7 +349,7 @@ def measure_apart(w, h, every, work, phase, p):
                 before = work.rows[i - every, NEARNESS + joint]
                 after = work.rows[i, NEARNESS + joint]
                 share = share_apart(before, after)
-                if 0.0 < share < 1.0 and w.laid:
+                if 0.0 < share < 1.0 and w.has_dense:
                     s = change(
                         joint, low, high, before, after, w.t, h, work.dense, phase, p, work.y
                     )

@@ -136,23 +136,25 @@ def choose_method(w, h, z, work, size):
     """
     if w.mode != AUTO:
         return
-    if w.rest > 0:
-        w.rest -= 1
+    if w.steps_to_test > 0:
+        w.steps_to_test -= 1
         return
     if not w.stiff and w.steps % EVERY:
         return  # an estimate costs a tenth of an explicit step
     reach = h * stiff_rate(w, h, z, work, size) / STABILITY_LIMIT
     if w.stiff:
         price = (size.size + rosenbrock.STIFF_STAGES + 0.2 * size.size**2) / (STAGES - 1)
-        w.calm = w.calm + 1 if reach < price else 0
-        w.gain += reach - price
-        if w.calm >= CALM_STEPS:
-            w.stiff, w.calm, w.held = 0, 0, 0
+        w.explicit_would_do = w.explicit_would_do + 1 if reach < price else 0
+        w.steps_saved += reach - price
+        if w.explicit_would_do >= CALM_STEPS:
+            w.stiff, w.explicit_would_do, w.stability_limited = 0, 0, 0
             # a machine that changes at every contact would pay for each change: rest longer
-            w.pause = REST if w.gain > 0.0 else min(2 * w.pause, LONGEST_REST)
-            w.rest = w.pause
+            w.test_pause = REST if w.steps_saved > 0.0 else min(2 * w.test_pause, LONGEST_REST)
+            w.steps_to_test = w.test_pause
             w.h = min(w.h, h / max(reach, 1.0))
     else:
-        w.held = w.held + EVERY if reach > SUSPECT else max(0, w.held - EVERY)
-        if w.held >= STIFF_STEPS:
-            w.stiff, w.held, w.calm, w.gain = 1, 0, 0, 0.0
+        w.stability_limited = (
+            w.stability_limited + EVERY if reach > SUSPECT else max(0, w.stability_limited - EVERY)
+        )
+        if w.stability_limited >= STIFF_STEPS:
+            w.stiff, w.stability_limited, w.explicit_would_do, w.steps_saved = 1, 0, 0, 0.0

@@ -149,7 +149,7 @@ def test_a_change_of_contact_is_placed(coefficients, low, high, at):
 )  # fmt: skip
 def test_the_share_of_a_step_without_contact_ends_where_contact_does(coefficients, apart):
     p, walker, work = parameters(), new_walker(1), new_work(4)
-    walker.laid, work.dense[:] = 1, small_end_only(coefficients)
+    walker.has_dense, work.dense[:] = 1, small_end_only(coefficients)
     for s, row in zip(NODES, work.rows, strict=True):
         interpolate(s, work.dense, work.y)
         observe_contact(ideal(s * H, p), work.y, 0, p, row)

@@ -183,7 +183,7 @@ def test_a_look_without_suspicion_takes_one_back():
         work, z = linear_step(w.pair, -reach * STABILITY_LIMIT / H)
         w.steps = EVERY
         choose_method(w, H, z, work, SIZE)
-        assert w.held == held
+        assert w.stability_limited == held
 
 
 def test_calm_steps_bring_the_explicit_pair_back_and_rest_ever_longer():
@@ -196,17 +196,17 @@ def test_calm_steps_bring_the_explicit_pair_back_and_rest_ever_longer():
     pauses = []
     cost = CALM_STEPS * 0.1 * price
     for saved in (0.9 * cost, 1.1 * cost, *[0.0] * 7):
-        w.stiff, w.h, w.rest = 1, H, 0
+        w.stiff, w.h, w.steps_to_test = 1, H, 0
         choose_method(w, H, z, calm, SIZE)
         choose_method(w, H, z, busy, SIZE)  # all over again
-        w.gain = saved
+        w.steps_saved = saved
         for i in range(CALM_STEPS):
             assert w.stiff, i
             choose_method(w, H, z, calm, SIZE)
         assert not w.stiff
         assert w.h == pytest.approx(H / (0.9 * price), rel=1e-3)  # what stability allows
-        assert w.rest == w.pause
-        pauses.append(int(w.pause))
+        assert w.steps_to_test == w.test_pause
+        pauses.append(int(w.test_pause))
     assert pauses == [REST, REST, 100, 200, 400, 800, 1600, LONGEST_REST, LONGEST_REST]
     explicit_steps(w, 0.1, 101)
-    assert w.rest == LONGEST_REST - 100
+    assert w.steps_to_test == LONGEST_REST - 100
