@@ -14,13 +14,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.cases import TIGHTEST, Case
+from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import DatasetParts
 from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe_all
-from compressor.reasons import Reason
 from compressor.solve.attempts import Solution, integrate, request, run_at_tolerance, times_of
-from compressor.solve.error_bars import RUNGS, Metrics, allowed_residual, energy_residual
+from compressor.solve.error_bars import (
+    Metrics,
+    allowed_residual,
+    audit_failure,
+    audit_rungs,
+    energy_residual,
+)
 from compressor.solve.regime import least_promise, steady, with_settle_rev
 from compressor.solve.request import Cuts, Turns, merge_turns, passed_time, revolutions
 from compressor.solve.run_metrics import metrics, statistics
@@ -82,8 +87,8 @@ def follow_revolutions(
     hundredth, as any run (`compressor.solve.solution`).
     """
     deadline = time.monotonic() + span.timeout
-    of, rtol = leg_case(case, span.revolutions), case.rtol
-    for rung in range(RUNGS + 1):
+    of = leg_case(case, span.revolutions)
+    for rtol in audit_rungs(case.rtol):
         course = PoincareCuts(of, span.section, enough)
         left = max(deadline - time.monotonic(), 0.0)
         run = run_at_tolerance(of, rtol, left, False, course.cuts, state)
@@ -92,11 +97,7 @@ def follow_revolutions(
         most = allowed_residual(case.rtol, len(found.turns))
         if found.reason or residual <= most:
             return found
-        if rung == RUNGS or rtol < 9.9 * TIGHTEST:
-            break
-        rtol /= 10.0
-    found.reason = Reason.ENERGY_AUDIT_FAILED
-    found.detail = f"energy residual {residual:.2g}, more than {most:.2g}, at rtol {rtol:.2g}"
+    found.reason, found.detail = audit_failure(residual, most, rtol)
     return found
 
 
@@ -216,9 +217,9 @@ def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed
     case's own. The span is in whole revolutions. A run whose energy does not balance is run again
     at a tenth of the tolerance, as any other.
     """
-    deadline, rtol = time.monotonic() + case.solve.timeout_s, case.rtol
+    deadline = time.monotonic() + case.solve.timeout_s
     ends = revolutions(case.settle, case.duration, case.turn)
-    for rung in range(RUNGS + 1):
+    for rtol in audit_rungs(case.rtol):
         p = record(case, worn)
         asked = request(case, rtol, p, times_of(case, False), state)
         cuts = Cuts(ends)
@@ -228,11 +229,8 @@ def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed
         most = allowed_residual(case.rtol, case.duration / case.turn)
         if run.reason or residual <= most:
             break
-        if rung == RUNGS or rtol < 9.9 * TIGHTEST:
-            run.reason = Reason.ENERGY_AUDIT_FAILED
-            run.detail = f"energy residual {residual:.2g}, more than {most:.2g}, at rtol {rtol:.2g}"
-            break
-        rtol /= 10.0
+    else:
+        run.reason, run.detail = audit_failure(residual, most, rtol)
     turns = cuts.turns
     if run.reason or not turns:
         nothing = np.full((len(JOINTS), worn.shape[1]), np.nan)
