@@ -49,6 +49,38 @@ def test_generated_tables_are_current(page, name):
     assert written[2] == page_tables.PAGES[page][name](), "stale: run make pages"
 
 
+SOURCES = [*ROOT.glob("compressor/**/*.py"), *ROOT.glob("cmd/**/*.py")]
+PLACES = ("", "compressor", "cmd", "tests")  # that paths on pages begin at
+EXAMPLES = ("cmd/compsim/size.py", "studies/count/", "results/", "compressor.studies.count")
+
+
+def module_of(name):
+    """The file of a dotted name, and what is left of the name: an attribute."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        base = ROOT.joinpath(*parts[:count])
+        for path in (base.with_suffix(".py"), base / "__init__.py"):
+            if path.exists():
+                return path.read_text(encoding="utf-8"), parts[count:]
+    return "", parts
+
+
+def test_modules_that_texts_name_are_there():
+    paths = [*SOURCES, *(ROOT / page for page in PAGES if "results" not in page)]
+    lost = []
+    for path in paths:
+        text = path.read_text(encoding="utf-8")
+        for name in re.findall(r"`(compressor(?:\.\w+)+)`", text):
+            source, rest = module_of(name)
+            if rest and not re.search(rf"\b{rest[0]}\b", source):
+                lost.append((path.name, name))
+        for name in re.findall(r"`((?:[a-z_]+/)+[a-z_0-9]+(?:\.py)?)`", text):
+            places = [ROOT / place / name for place in PLACES] + [path.parent / name]
+            if not any(one.exists() or one.with_suffix(".py").exists() for one in places):
+                lost.append((path.name, name))
+    assert [one for one in lost if not one[1].startswith(EXAMPLES)] == []
+
+
 def test_pages_are_known():
     tracked = subprocess.run(
         ["git", "ls-files", "*README.md"], cwd=ROOT, capture_output=True, text=True, check=True

@@ -2,7 +2,7 @@
 
 Who reads a key: conditions on a case, with the words that a case file has for them. The fields of
 the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`. A key without a
-reader is read by every job. `compressor.cases.unread` refuses what no job reads.
+reader is read by every job. `compressor.cases.conflicts` refuses what no job reads.
 
 `compressor.cases.table` builds the whole table from these; units are those of the case file, and
 `to_si` turns a value into SI.

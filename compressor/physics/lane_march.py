@@ -1,8 +1,8 @@
 """Runs that march side by side, a lane each: `march` for all of them, to rounding.
 
-Steps in which nothing begins or ends are taken in all lanes at once (`lanes`, `lane_control`). For
-any other step a lane is given to `march` itself: at corners of the load, where contact may begin
-or end, where the stiff partner is at work. A lane whose run has ended takes the next one.
+Steps in which nothing begins or ends are taken in all lanes at once (`lane_steps`, `lane_tally`).
+For any other step a lane is given to `march` itself: at corners of the load, where contact may
+begin or end, where the stiff partner is at work. A lane whose run has ended takes the next one.
 """
 
 import math

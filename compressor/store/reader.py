@@ -12,7 +12,7 @@ no index: what is stored is read from the rows. `compressor.store.writer` writes
 
 Stored jobs of which this version of the program would tell more, or other numbers. A key holds the
 version of the model, and results of one version agree within their error bars but for what a
-revision has mended (`compressor.cases.revisions`): a job that another version of the program has
+revision has mended (`compressor.cases.case`): a job that another version of the program has
 made is not stale for that alone.
 """
 
