@@ -27,6 +27,7 @@ from compressor.physics import (
     new_work,
     segments,
 )
+from compressor.reasons import Reason
 from compressor.solve.march_driver import CHUNK, check_march, ready_walker
 from compressor.solve.request import Request, Stop, with_cuts
 from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record
@@ -124,8 +125,10 @@ class Twins:
         return bool(fellow.status == Status.DONE)
 
     def check(self) -> None:
-        """Raise Stop where the motion may go no further, or the time is up."""
+        """Raise Stop where one of the two may go no further, or the time is up."""
         check_march(self.request, self.walker, self.z, float(self.tally.deepest), self.deadline)
+        if not np.isfinite(self.twin).all():
+            raise Stop(Reason.NON_FINITE, "the twin is no longer finite")
 
 
 def follow_twins(request: Request, shifted: np.ndarray, far: float = PARTED_DISTANCE) -> Parting:
