@@ -315,7 +315,7 @@ def test_a_stored_job_without_bars_does_not_serve_a_case_that_wants_them(tmp_pat
     ("text", "place", "message"),
     [
         ("{peak_accelaration: 0.01}", "2:21", "solve.accuracy.peak_accelaration: unknown metric; "
-         "did you mean peak_acceleration?"),
+         "did you mean peak_acceleration or "),
         ("{loudness: 0.01}", "2:21", "solve.accuracy.loudness: unknown metric; metrics are "
          "peak_acceleration, "),
         ("{peak_acceleration: 0.6}", "2:40",

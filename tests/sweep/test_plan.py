@@ -214,6 +214,6 @@ def test_counts_are_told_before_anything_is_timed(studies, monkeypatch, capsys):
 
 def test_a_study_that_is_prepared_for_long_says_so(studies, monkeypatch):
     told = []
-    monkeypatch.setattr(sys.modules["compressor.sweep.sweep"], "MANY", 8)
+    monkeypatch.setattr(sys.modules["compressor.sweep.sweep"], "MANY_JOBS", 8)
     sweep(studies(one=NINE), "results", 1, lambda *event: told.append(event))
     assert told[0] == (0, 9, "preparing 9 jobs")

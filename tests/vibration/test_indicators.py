@@ -124,7 +124,7 @@ def test_high_pass_counts_lines_exactly():
         (lambda: gini(np.array([1.0, np.inf])), "first at index 1"),
         (lambda: energy_angle(SINE, 0.0), "choose one above 0"),
         (lambda: energy_angle(SINE, 1.1), "1 at most"),
-        (lambda: high_pass_orders(SINE[1:], M, 12), "by `resampled`"),
+        (lambda: high_pass_orders(SINE[1:], M, 12), "by `resample_angle`"),
         (lambda: high_pass_orders(SINE, M, M / 2), "choose a lower order"),
         (lambda: high_pass_orders(SINE, M, -1), "choose a lower order"),
         (lambda: high_pass_orders(SINE, M, math.nan), "choose a lower order"),
