@@ -5,5 +5,5 @@ from compressor.sweep.execution import cores
 from compressor.sweep.plan import Forecast, forecast
 from compressor.sweep.sweep import Options, Progress, Summary, run_here, sweep
 from compressor.sweep.wanted import SweepProgress
-from compressor.sweep.warm_up import Needs
+from compressor.sweep.warm_up import Needs, compile_once
 from compressor.sweep.worker import JobLost, JobResult

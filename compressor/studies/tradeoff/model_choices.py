@@ -5,10 +5,10 @@ oil, an elastic rod, play in the guide. `explain_models` runs those of one case,
 features of several; `compressor.studies.tradeoff.page` tells changes from error bars.
 """
 
-import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +35,7 @@ from compressor.studies.tradeoff.features import (
     with_values,
 )
 from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, Progress, complete, faulty
+from compressor.sweep import Needs, compile_once
 
 ITSELF = "the case itself"
 MAX_SECONDS = 30.0  # of a choice
@@ -207,6 +208,10 @@ def run_choices(
     A choice that cannot be has a run of nan. Ends early where the case itself fails.
     """
     total = 1 + len(choices)
+    # each choice has little time, which compiling its equations would use up
+    every = [case, *(one.case for one in choices if one.case)]
+    needs = Needs.of(every)._replace(horizon=True)
+    compile_once(needs, lambda remark: progress(0, total, remark))
     progress(0, total, "")
     runs = [fastest_run(bare(case), max(2, repeats))]  # the first one may load compiled code
     if not complete(runs[0]):
@@ -257,6 +262,11 @@ def tabulate(every: Sequence[Choice], runs: Sequence[xr.Dataset]) -> xr.Dataset:
     return table.assign_attrs(attrs | {"detail": runs[0].attrs.get("detail", "")})
 
 
+def tell_part(progress: Progress, before: int, total: int, done: int, of: int, remark: str) -> None:
+    """Tell progress of a part as progress of the whole: `before` were done of `total`."""
+    progress(before + done, total, remark)
+
+
 def trade(
     cases: Mapping[str, Case],
     repeats: int = 3,
@@ -269,11 +279,13 @@ def trade(
     case needs a joint with clearance.
     """
     found = {name: model_variants(case) for name, case in cases.items()}
-    total, done = sum(2 + len(choices) for choices in found.values()), itertools.count(1)
+    total, before = sum(2 + len(choices) for choices in found.values()), 1
     tables = []
     for scene, case in cases.items():
         choices = found[scene]
-        runs = run_choices(case, choices, repeats, lambda *_: progress(next(done), total, ""))
+        own = partial(tell_part, progress, before, total)
+        runs = run_choices(case, choices, repeats, own)
+        before += 2 + len(choices)
         if complete(runs[0]):
             runs.append(read_from_grid(runs[0], simulate(replace(bare(case), output=Output()))))
         tables.append(tabulate([Choice(ITSELF, case), *choices, Choice(GRID, case)], runs))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compressor.cases import Lubricant
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.materials import contact_stiffness
@@ -96,6 +97,20 @@ def test_pins_that_are_not_the_paper_s_have_a_choice_of_their_own_stiffness():
     assert one.case.contact.materials == ("steel", "steel")
     expected = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True)
     assert stiffness_of(one.case, "small_end") == pytest.approx(expected)
+
+
+def test_equations_are_compiled_before_a_choice_has_its_time(few, monkeypatch):
+    few()
+    done = []
+    monkeypatch.setattr(module, "compile_once", lambda needs, remark: done.append(needs))
+    real = module.fastest_run
+    monkeypatch.setattr(module, "fastest_run", lambda *of: done.append("run") or real(*of))
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": SHORT})
+    others = [Choice("oil", replace(case, lubricant=Lubricant())), *module.model_choices(case)]
+    run_choices(case, others, 1, lambda *_: None)
+    needs, *runs = done
+    assert (needs.horizon, needs.features) == (True, True)
+    assert runs == ["run"] * (1 + len(others))
 
 
 def test_a_choice_says_what_it_assumes():
