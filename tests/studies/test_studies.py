@@ -1,5 +1,6 @@
 """The table of studies: what each gives the program, and that the program does without each."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -65,10 +66,12 @@ def copy_without(folder, names):
 
 
 def run_in(folder, code):
-    """Run Python in a copy, and return what it prints."""
+    """Run Python in a copy, which compiles nothing, and return what it prints."""
     begin = f"import sys; sys.path[:0] = [{str(folder)!r}, {str(folder / 'cmd')!r}]\n"
-    done = subprocess.run([sys.executable, "-c", begin + code], capture_output=True, text=True,
-                          cwd=folder)  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", begin + code], capture_output=True, text=True, cwd=folder,
+        env=os.environ | {"COMPSIM_JIT": "0"},
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout
 
