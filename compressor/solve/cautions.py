@@ -313,6 +313,8 @@ def remarks(case: Case) -> Iterator[Remark]:
         yield from _depths(case, joint)
     yield from _rod(case)
     yield from _drive(case)
+    if case.wear:
+        yield Remark("wear", "compsim wear alone reads it: a run has bores that are new", "unread")
     friction = case.friction
     if friction and friction.law in (None, "lugre") and friction.static < friction.dynamic:
         text = f"{friction.static:g} is below the dynamic one, {friction.dynamic:g}"

@@ -136,6 +136,15 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
     assert len(whole) == 8
 
 
+def test_wear_is_said_to_be_of_its_own_command(tmp_path):
+    path = tmp_path / "worn.yaml"
+    path.write_text("joint: big_end\nclearance_mm: 0.2\nwear: true\n")
+    (found,) = cautions(*load_studies(path))
+    assert (found.key, found.message) == (
+        "wear", "compsim wear alone reads it: a run has bores that are new"
+    )  # fmt: skip
+
+
 def test_a_slip_of_units_hides_no_value_outside_the_judged_range(tmp_path):
     path = tmp_path / "slow.yaml"
     path.write_text("joint: big_end\nclearance_mm: 0.2\nmachine: {speed_rpm: 24}\n")
