@@ -210,22 +210,44 @@ def features(
     return found
 
 
-def signals(p: np.record, rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the `SIGNALS` by name from observed rows, (m, WIDE) of a mechanism with features."""
-    force = block("contact_force", rows)
-    load, torque = block("piston_force", rows), rows[:, Column.CRANK_TORQUE]
-    guide = -force[:, 1, 1] - p["reciprocating_mass"] * p["gravity"]
-    moment, bearing = rows[:, Column.GUIDE_MOMENT], -force[:, 0]
-    shaking = bearing + np.stack((load, guide), axis=1)
-    if is_featured(p):
-        unbalance = rows[:, Column.UNBALANCE : Column.UNBALANCE + 2]
-        guide, bearing = rows[:, Column.GUIDE_FORCE], bearing + unbalance
-        shaking = bearing + np.stack((load + rows[:, Column.GUIDE_FRICTION], guide), axis=1)
+def ideal_guide_force(p: np.record, force: np.ndarray) -> np.ndarray:
+    """Return the force on a guide without play along y, N, (m,), by the joints' on the rod."""
+    return -force[:, 1, 1] - p["reciprocating_mass"] * p["gravity"]
+
+
+def frame_signals(
+    p: np.record,
+    force: np.ndarray,
+    load: np.ndarray,
+    torque: np.ndarray,
+    moment: np.ndarray,
+    rows: np.ndarray | None = None,
+) -> dict[str, np.ndarray]:
+    """Return the `SIGNALS` by name, each over time; the one place with their formulas and signs.
+
+    force: of the joints on the rod, N, (m, joint, axis); load: the piston force, N; torque, moment:
+    on the crank and on the guide, N m; rows: observed ones of a mechanism with features, (m, WIDE).
+    """
+    bearing, along = -force[:, 0], load
+    guide = ideal_guide_force(p, force)
+    if rows is not None:  # its guide may rub and have play, its crank may be out of balance
+        guide = rows[:, Column.GUIDE_FORCE]
+        bearing = bearing + rows[:, Column.UNBALANCE : Column.UNBALANCE + 2]
+        along = load + rows[:, Column.GUIDE_FRICTION]
     return {
-        "shaking_force": shaking, "bearing_force": bearing, "guide_force": guide.copy(),
-        "guide_moment": moment.copy(), "crank_torque": torque.copy(),
+        "shaking_force": bearing + np.stack((along, guide), axis=1), "bearing_force": bearing,
+        "guide_force": guide.copy(), "guide_moment": moment.copy(), "crank_torque": torque.copy(),
         "rod_load": force[:, 1, 0].copy(),
     }  # fmt: skip
+
+
+def signals(p: np.record, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the `SIGNALS` by name from observed rows, (m, WIDE) of a mechanism with features."""
+    return frame_signals(
+        p, block("contact_force", rows), block("piston_force", rows),
+        rows[:, Column.CRANK_TORQUE], rows[:, Column.GUIDE_MOMENT],
+        rows if is_featured(p) else None,
+    )  # fmt: skip
 
 
 def signals_of_scene(p: np.record, run: xr.Dataset) -> dict[str, np.ndarray]:
@@ -242,14 +264,10 @@ def signals_of_scene(p: np.record, run: xr.Dataset) -> dict[str, np.ndarray]:
     friction[:, p["clearance"] == 0.0] = 0.0
     couple = (p["pin_radius"] - run["penetration"].transpose("time", "joint").values) * friction
     angle, x = run["crank_angle"].values, run["displacement"].values
-    (bx, by), (sx, sy) = force[:, 0].T, force[:, 1].T
-    load, guide = run["piston_force"].values, -sy - p["reciprocating_mass"] * p["gravity"]
-    return {
-        "shaking_force": np.stack((load - bx, guide - by), axis=1),
-        "bearing_force": -force[:, 0],
-        "guide_force": guide,
-        "guide_moment": guide * x + couple[:, JOINTS.index("small_end")],
-        "crank_torque": p["crank_radius"] * (np.cos(angle) * by - np.sin(angle) * bx)
-        - couple[:, JOINTS.index("big_end")],
-        "rod_load": sx.copy(),
-    }
+    bx, by = force[:, 0].T
+    torque = p["crank_radius"] * (np.cos(angle) * by - np.sin(angle) * bx)
+    guide = ideal_guide_force(p, force)
+    return frame_signals(
+        p, force, run["piston_force"].values, torque - couple[:, JOINTS.index("big_end")],
+        guide * x + couple[:, JOINTS.index("small_end")],
+    )  # fmt: skip
