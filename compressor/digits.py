@@ -48,8 +48,9 @@ def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) 
 
 
 def _rounded_up(bar: float) -> tuple[float, int]:
-    """Return a bar to one digit, two where the first is 1, never shorter; and its last digit's
-    power.
+    """Return a bar to one digit, two where the first is 1, never shorter.
+
+    And its last digit's power.
     """
     place = math.floor(math.log10(bar))
     if bar / 10.0**place < 2.0:

@@ -150,8 +150,9 @@ class DatasetParts:
 
 
 def coordinates(used: Iterable[Any] = SIZES) -> dict[str, tuple]:
-    """Return the coordinates of those dimensions that are used as xarray variables; always the
-    space's.
+    """Return the coordinates of those dimensions that are used as xarray variables.
+
+    Always the space's.
     """
     wanted = {"joint", "axis", *used}
     every = {

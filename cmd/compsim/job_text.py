@@ -27,8 +27,9 @@ FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
 
 def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[str, list[str]]]:
-    """Yield the headings and lines of a job; limits: of the rod load's reversal, degrees and
-    percent.
+    """Yield the headings and lines of a job.
+
+    limits: of the rod load's reversal, degrees and percent.
     """
     yield "", align_lines(stop(found))
     # a count grows with the run: the number per revolution is shown in its place
@@ -50,8 +51,9 @@ def align_lines(lines: list[Line]) -> list[str]:
 
 
 def stop(found: "JobReport") -> list[Line]:
-    """Return where a job's run stopped, and how its last steps went, a line each; none that
-    ended.
+    """Return where a job's run stopped, and how its last steps went, a line each.
+
+    No lines for a run that ended.
     """
     told = found.attributes
     if "stop_history_words" not in told:
@@ -114,8 +116,9 @@ def series_errors(found: "JobReport", names: list[str]) -> list[Line]:
 
 
 def bar_of(found: "JobReport", name: str) -> tuple[Any, bool, str]:
-    """Return the errors of a number, None without; whether they are relative; and what kind they
-    are.
+    """Return the errors of a number, whether they are relative, and what kind they are.
+
+    None in place of errors where there are none.
     """
     barred = metrics.METRICS | metrics.ROD_LOAD
     if name in barred:
@@ -184,8 +187,9 @@ def format_measured(value: float, error: float, relative: bool) -> str:
 
 
 def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[Line]:
-    """Return whether the rod load changes its side for long and far enough; none without
-    signals.
+    """Return whether the rod load changes its side for long and far enough.
+
+    None without signals.
     """
     worst, told = math.inf, []
     for name, unit, least in (("angle", math.degrees(1.0), degrees), ("share", 100.0, percent)):

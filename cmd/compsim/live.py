@@ -27,8 +27,9 @@ class Words(ProgressColumn):
         self.words = words
 
     def render(self, task: Task) -> Text:
-        """Return the counts, failures in red, and the time that is left; cut where the line is
-        too short.
+        """Return the counts, failures in red, and the time that is left.
+
+        Cut where the line is too short.
         """
         counts, failed, left = self.words()
         return Text.assemble(counts, (failed, "red"), left, no_wrap=True, overflow="ellipsis")

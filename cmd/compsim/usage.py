@@ -47,8 +47,9 @@ class Commands(click.Group):
 
 
 def one_line(error: click.ClickException, arguments: Sequence[str]) -> str:
-    """Return a mistake in the use of a command, and where to read on; arguments: after
-    `compsim`.
+    """Return a mistake in the use of a command, and where to read on.
+
+    arguments: after `compsim`.
     """
     context = getattr(error, "ctx", None)
     path = context.command_path if context else " ".join(["compsim", *arguments[:1]])

@@ -395,8 +395,9 @@ def mode_shares(modes: xr.Dataset) -> xr.Dataset:
 
 
 def angle_modes(run: xr.Dataset) -> xr.Dataset:
-    """Return `mode_map` of a run's `contact_modes`, in bins of 1 degree; raises ValueError as
-    they do.
+    """Return `mode_map` of a run's `contact_modes`, in bins of 1 degree.
+
+    Raises ValueError as they do.
     """
     return mode_map(contact_modes(run))
 

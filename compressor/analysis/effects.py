@@ -27,8 +27,9 @@ class SaltelliDesign:
     mixed: np.ndarray
 
     def first(self, count: int) -> "SaltelliDesign":
-        """Return the design of the first points of the sequence; a power of two keeps its
-        balance.
+        """Return the design of the first points of the sequence.
+
+        A power of two keeps its balance.
         """
         return SaltelliDesign(self.a[:count], self.b[:count], self.mixed[:, :count])
 
@@ -73,8 +74,9 @@ def seed_global_draws() -> Iterator[None]:
 
 
 def saltelli_design(columns: np.ndarray) -> SaltelliDesign | None:
-    """Return the parts of a `saltelli` design; None where the columns, (points, k), are no such
-    design.
+    """Return the parts of a `saltelli` design.
+
+    None where the columns, (points, k), are no such design.
     """
     count, keys = columns.shape
     n, rest = divmod(count, keys + 2)

@@ -220,8 +220,9 @@ def told_by(found: Evidence, joint: str) -> Continuity:
 
 
 def measured_shares(run: xr.Dataset, joint: str) -> Shares:
-    """Return the settled shares of a joint with clearance; errors as far as the run's error bars
-    tell.
+    """Return the settled shares of a joint with clearance.
+
+    Errors as far as the run's error bars tell.
 
     Of `apart`, the error bar of the share of time without contact, and two samples for each impact;
     of `hit`, a window for each impact that is within the velocity's error of `SLOWEST`, or within a

@@ -64,8 +64,9 @@ class Draft:
         )
 
     def block(self) -> Block:
-        """Return the block, its values made; wrong ones join `problems`, and leave it without
-        jobs.
+        """Return the block, its values made.
+
+        Wrong ones join `problems`, and leave it without jobs.
         """
         factors = tuple((keys, self.rows(keys)) for keys in self.factors)
         count = math.prod(len(rows) for _, rows in factors)
@@ -81,8 +82,9 @@ class Draft:
         return replace(found, kept=kept.nonzero()[0].tolist())
 
     def rows(self, keys: tuple[str, ...]) -> list[Row]:
-        """Return the values of keys that advance together; each wrong one, and repetition, is
-        told.
+        """Return the values of keys that advance together.
+
+        Each wrong one, and repetition, is told.
         """
         points: list[list[float]] = []
         if self.sweeps[keys[0]].kind in SAMPLED:
@@ -139,8 +141,9 @@ def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
 
 
 def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
-    """Return a node with its value as the case holds it; None if that is wrong, which joins
-    `problems`.
+    """Return a node with its value as the case holds it.
+
+    None if that is wrong, which joins `problems`.
     """
     if node.value is None or key in WORDS:  # told when it was read; or its word, which is valid
         return node if key in WORDS and node.value is WORDS[key] else None

@@ -87,8 +87,9 @@ def value_of(case: Settings, key: str) -> Any:
 
 
 def value_in(values: Mapping[str, Any], key: str) -> Any:
-    """Return the value of a dotted key in nested values; None where they have none, or no single
-    one.
+    """Return the value of a dotted key in nested values.
+
+    None where they have none, or no single one.
     """
     value: Any = values
     for part in key.split("."):
@@ -226,8 +227,9 @@ MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
 def known_keys(group: str, file: bool = True) -> list[str]:
-    """Return the keys that a group (or, for "", the top) may hold; of a `file`, those of sweeps,
-    too.
+    """Return the keys that a group (or, for "", the top) may hold.
+
+    Of a `file`, those of sweeps, too.
     """
     if group in MAPPINGS:
         return [*MAPPINGS[group]]
@@ -346,8 +348,9 @@ PLAIN_TYPES = (int, float, str)
 
 
 def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
-    """Return a value as its dataclass holds it; its default if it is wrong, which joins
-    `problems`.
+    """Return a value as its dataclass holds it.
+
+    Its default if it is wrong, which joins `problems`.
     """
     row, before = table()[key], len(problems)
     if value is None and row.optional:
@@ -399,8 +402,9 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
 
 @lru_cache(maxsize=256)
 def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[Any, list[Problem]]:
-    """Return a group from its values, and what is wrong; jobs of a sweep share those they have
-    alike.
+    """Return a group from its values, and what is wrong.
+
+    Jobs of a sweep share those they have alike.
 
     Types are part of the values, since 1, 1.0 and true are equal.
     """

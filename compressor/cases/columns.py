@@ -27,8 +27,9 @@ def _numbers(value: Any) -> Any:
 
 
 def _by(operation: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return the operator and its reflection; what is neither a number nor a column is left to
-    Python.
+    """Return the operator and its reflection.
+
+    What is neither a number nor a column is left to Python.
     """
 
     def direct(self: "ArrayValue", other: Any) -> Any:

@@ -41,8 +41,9 @@ class Leaves:
 
 
 def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
-    """Return the leaves of a tree; keys that are unknown, or no group where one is due, are
-    problems.
+    """Return the leaves of a tree.
+
+    Keys that are unknown, or no group where one is due, are problems.
     """
     found = Leaves({}, {})
     for name, node in _known("", root, problems, root):

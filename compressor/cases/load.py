@@ -156,8 +156,9 @@ def load_studies(
     told: Told = unheard,
     variants: Variants = itself,
 ) -> list[Study]:
-    """Return the studies of YAML case files; each override, `key=value`, replaces a value in all of
-    them.
+    """Return the studies of YAML case files.
+
+    Each override, `key=value`, replaces a value in all of them.
 
     A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
     comparison, selects the jobs to be run. A file with `regimes` is refused where the caller cannot
@@ -321,8 +322,9 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told, read: Ke
 
 
 def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
-    """Yield the leaves of each block, over those of the file; the file's alone where it has no
-    blocks.
+    """Yield the leaves of each block, over those of the file.
+
+    The file's alone where it has no blocks.
     """
     node = draft.leaves.values.get("blocks")
     own = {key: item for key, item in draft.leaves.values.items() if key != "blocks"}
@@ -396,8 +398,9 @@ def _refuse_conflicts(draft: _Draft, cases: Cases) -> None:
 
 
 def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
-    """Return the cases of each chain; what cannot be followed, and too many values, are
-    problems.
+    """Return the cases of each chain.
+
+    What cannot be followed, and too many values, are problems.
     """
     asked, places = draft.regimes, draft.leaves.places
     assert asked

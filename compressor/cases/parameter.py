@@ -283,8 +283,9 @@ def quote_value(value: Any) -> str:
 
 @lru_cache(4096)  # the jobs of a study share most of their values
 def to_si(value: float, unit: str) -> float:
-    """Return a case-file value in SI; powers of ten are divided, so that 0.1 mm is exactly 1e-4
-    m.
+    """Return a case-file value in SI.
+
+    Powers of ten are divided, so that 0.1 mm is exactly 1e-4 m.
     """
     _, numerator, denominator = UNITS[unit]
     return value * numerator / denominator
@@ -396,8 +397,9 @@ class Parameter:
         return None
 
     def _refused(self, value: Any, word: Any = None) -> str:
-        """Return the error of a value of another kind; `word`: what may be a choice that is
-        misspelt.
+        """Return the error of a value of another kind.
+
+        `word`: what may be a choice that is misspelt.
         """
         message = f"needs {self.needed}, not {quote_value(value)}"
         if not isinstance(word, str):
@@ -439,8 +441,9 @@ def _is_finite(value: float) -> bool:
 def parameter(
     default: Any, unit: str, span: tuple[float, float], source: str, phrase: str, **more: Any
 ) -> Any:
-    """Return a dataclass field that is also a row of the table; `more`: other fields of
-    `Parameter`.
+    """Return a dataclass field that is also a row of the table.
+
+    `more`: other fields of `Parameter`.
     """
     row = {"unit": unit, "low": span[0], "high": span[1], "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "number"}

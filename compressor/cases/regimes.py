@@ -97,8 +97,9 @@ class Regimes:
 
 
 def read_regimes(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
-    """Return what `regimes` asks for in a file's leaves; None without it, or with something wrong
-    in it.
+    """Return what `regimes` asks for in a file's leaves.
+
+    None without it, or with something wrong in it.
 
     What is wrong joins `problems`.
     """

@@ -36,8 +36,9 @@ class CaseBatch:
 
     @classmethod
     def of(cls, name: str, jobs: Alike, before: int) -> "CaseBatch":
-        """Return the sheet of jobs of a block, `before` which the study has others; `name`: the
-        study's.
+        """Return the sheet of jobs of a block, `before` which the study has others.
+
+        `name`: the study's.
 
         Raises CaseError where values do not fit that all jobs share.
         """

@@ -155,8 +155,9 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
 
 
 def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | None:
-    """Return the value of a YAML text, or None; a `start` without a line places everything
-    there.
+    """Return the value of a YAML text, or None.
+
+    A `start` without a line places everything there.
     """
     builder = _Builder(text, start, problems)
     if odd := ODD_BREAKS.search(text):

@@ -76,8 +76,9 @@ def stribeck(slip, p):
 
 @jit
 def bristle_rate(slip, bristle, p):
-    """Return how fast LuGre's bristles bend (m/s), of a mean deflection (m); there are none at
-    mu 0.
+    """Return how fast LuGre's bristles bend (m/s), of a mean deflection (m).
+
+    There are none at mu 0.
     """
     if p.static == 0.0 and p.dynamic == 0.0:
         return 0.0
@@ -216,8 +217,9 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
 
 @inline_llvm
 def nearness(contact, stiffness, clearance, p):
-    """Return the positive in contact; otherwise how far from it: the gap (m), or the clamped force
-    as one.
+    """Return the positive in contact.
+
+    Otherwise how far from it: the gap (m), or the clamped force as one.
 
     A clamped force is turned into a length by the contact's stiffness at the penetration of full
     damping, so that both parts are small where contact is near.

@@ -128,8 +128,9 @@ def attitude(eps, b, constants):
 
 @jit
 def squeeze_number(eps, b, constants):
-    """Return `squeeze_shape` as Reynolds' equation has it; at the centre the same in all
-    directions.
+    """Return `squeeze_shape` as Reynolds' equation has it.
+
+    At the centre the same in all directions.
     """
     found = squeeze_shape(eps, b) * polynomial(constants, SQUEEZED, TERMS, eps)
     centre = 2.0 * rotation_number(0.0, b, constants)

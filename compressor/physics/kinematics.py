@@ -108,8 +108,9 @@ def exact_motion(theta, crank_radius, rod_length, omega):
 
 
 def series_motion(theta, crank_radius, rod_length, omega):
-    """Return the paper's truncated series (Eq. 3-4), in this program's frame; to be compared with
-    only.
+    """Return the paper's truncated series (Eq. 3-4), in this program's frame.
+
+    To be compared with only.
 
     Arrays of theta's shape: displacement from the crank centre (m), velocity (m/s), acceleration
     (m/s^2). Off by 0.122 mm at 90 degrees for the paper's geometry.

@@ -254,8 +254,9 @@ def work_of(runs, job):
 
 @jit
 def next_run(W, j, runs, lane_jobs, begun, most):
-    """Give a lane whose run has ended the next one that gets to a plain step; returns how many
-    runs have begun by then. Without one the lane is empty, of which -1 tells.
+    """Give a lane whose run has ended the next one that gets to a plain step.
+
+    Returns how many runs have begun by then. Without one the lane is empty, of which -1 tells.
     """
     while begun < runs.size.shape[0]:
         begun += 1

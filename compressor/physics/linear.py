@@ -7,8 +7,9 @@ from compressor.physics._jit import jit
 
 @jit
 def factorize(matrix, pivots):
-    """Return the LU of a small square matrix in place, with partial pivoting; False if it is
-    singular.
+    """Return the LU of a small square matrix in place, with partial pivoting.
+
+    False if it is singular.
     """
     n = pivots.size
     for j in range(n):

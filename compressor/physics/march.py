@@ -298,8 +298,9 @@ def observe_step(w, base, h, z, work, phase, p, tally):
 
 @inline_llvm
 def onset_ahead(w, h, every, work, phase, p):
-    """Return whether contact begins within the step just taken; it is then to be taken again, to
-    there.
+    """Return whether contact begins within the step just taken.
+
+    It is then to be taken again, to there.
 
     Looked for only where the nodes of the step let it be. The step after the landing is kept
     within the pulse that begins, or to the contact's own time scale.

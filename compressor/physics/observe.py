@@ -166,8 +166,9 @@ def joint_forces(now, y, p):
 
 @inline_llvm
 def damping_power(contact):
-    """Return the power (W) a contact loses in its normal direction, the clamp's included; never
-    negative.
+    """Return the power (W) a contact loses in its normal direction, the clamp's included.
+
+    Never negative.
     """
     return (contact.normal - contact.elastic) * contact.rate
 

@@ -23,8 +23,9 @@ NEVER = 2.0  # a fraction of the step beyond its end
 
 @jit
 def nearness_at(joint, s, t, h, dense, phase, p, y):
-    """Return `nearness` of a joint at the fraction s of a step with interpolant `dense`; y:
-    scratch.
+    """Return `nearness` of a joint at the fraction s of a step with interpolant `dense`.
+
+    y: scratch.
     """
     interpolate(s, dense, y)
     contact = contact_at(joint, t + s * h, y, phase, p)

@@ -128,8 +128,9 @@ def nearest_wall(overlap, most, p):
 
 @jit
 def penetration_of(ex, ey, joint, p):
-    """Return the penetration (m) of a journal, negative: the gap; and its gradient. In the rod's
-    frame.
+    """Return the penetration (m) of a journal, negative: the gap.
+
+    And its gradient. In the rod's frame.
     """
     overlap = np.empty(p.sectors)
     most = overlaps(ex, ey, joint, p, overlap)

@@ -64,8 +64,9 @@ def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: 
 
 
 def last_case(stored: Stored, study: StoredStudy) -> Case | None:
-    """Return the case of a study's last stored job; None where there is none that this version
-    knows.
+    """Return the case of a study's last stored job.
+
+    None where there is none that this version knows.
     """
     for position in stored.rows.find([*study.keys])[::-1]:
         if position >= 0:

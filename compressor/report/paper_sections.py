@@ -80,8 +80,9 @@ def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
 def find_runs(
     stored: Stored, studies: Sequence[StoredStudy], cases: Mapping[str, Case]
 ) -> PaperRuns:
-    """Return the studies' runs with the physics of some cases by label; of several, the most
-    exact.
+    """Return the studies' runs with the physics of some cases by label.
+
+    Of several, the most exact.
     """
     labels = {case.physics_key: name for name, case in cases.items()}
     found: dict[str, xr.Dataset] = {}
@@ -180,8 +181,9 @@ def differences(case: Case, besides: tuple[str, ...] = ()) -> list[Difference]:
 
 
 def leaves(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the dotted keys and values; a group that the default case lacks, or has alone, is
-    one value.
+    """Yield the dotted keys and values.
+
+    A group that the default case lacks, or has alone, is one value.
     """
     for name in dict.fromkeys([*defaults, *values]):
         value, default = values.get(name), defaults.get(name)

@@ -202,8 +202,9 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
 
 
 def axis_of(study: StoredStudy, wanted: str) -> str:
-    """Return the key of the axis that is meant; by default a clearance, then the speed, then the
-    first.
+    """Return the key of the axis that is meant.
+
+    By default a clearance, then the speed, then the first.
     """
     keys = [axis.key for axis in study.axes]
     if not wanted:

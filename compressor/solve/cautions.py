@@ -222,8 +222,9 @@ def slips(cases: Sequence[Case]) -> list[Slip]:
 
 
 def values_of(case: Case, key: str) -> list[float]:
-    """Return the values of a key that a case's simulation reads; of clearances, those of worn
-    joints.
+    """Return the values of a key that a case's simulation reads.
+
+    Of clearances, those of worn joints.
     """
     group, _, name = key.partition(".")
     if not reads(case, key):

@@ -259,8 +259,9 @@ def with_settle_rev(case: Case, settle: float, period: int, duration: float | No
 
 
 def least_promise(case: Case) -> float:
-    """Return the relative error that a case's accuracy promises; of one that promises none,
-    standard's.
+    """Return the relative error that a case's accuracy promises.
+
+    Of one that promises none, standard's.
     """
     if case.targets:
         return min(target for _, target in case.targets)
@@ -268,8 +269,9 @@ def least_promise(case: Case) -> float:
 
 
 def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
-    """Return the first of the last revolutions that agree, and their period; None where they do
-    not.
+    """Return the first of the last revolutions that agree, and their period.
+
+    None where they do not.
     """
     for period in range(1, MAX_PERIOD_REV + 1):
         needed = max(AGREEMENTS, period)
@@ -282,8 +284,9 @@ def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
 
 
 def agree(one: Metrics, other: Metrics, within: float) -> bool:
-    """Return whether the metrics of two revolutions differ by less than a share; forces by the
-    joint's.
+    """Return whether the metrics of two revolutions differ by less than a share.
+
+    Forces by the joint's.
     """
     for name, row in METRICS.items():
         if not row.bar.relative:

@@ -78,8 +78,9 @@ SMALL_END = Column.FORCE + 2  # of the pin's force along x, positive in tension
 
 
 def reversal_times(case: Case) -> np.ndarray:
-    """Return the times (s) after settling at which the rod load is sampled; none without
-    signals.
+    """Return the times (s) after settling at which the rod load is sampled.
+
+    None without signals.
     """
     span = case.duration - case.settle
     count = round(min(max(A_TURN * span / case.turn, FEWEST), MOST)) if case.output.signals else 0
@@ -218,8 +219,9 @@ def mean_bar(values: np.ndarray) -> float:
 
 
 def chaotic_bars(found: Metrics, numbers: Metrics) -> Metrics:
-    """Return the error bars of a chaotic run's metrics: of averages; a greatest value is not
-    known.
+    """Return the error bars of a chaotic run's metrics: of averages.
+
+    A greatest value is not known.
     """
     bars = {}
     for name, row in METRICS.items():

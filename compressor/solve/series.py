@@ -98,8 +98,9 @@ def compared_times(case: Case) -> np.ndarray:
 
 
 def a_turn(case: Case) -> int:
-    """Return how many of these times a revolution has; 0 where the run settles within no whole
-    one.
+    """Return how many of these times a revolution has.
+
+    0 where the run settles within no whole one.
     """
     revolutions = (case.duration - case.settle) / case.turn
     return round(min(A_TURN, max(1.0, MOST / revolutions))) if revolutions >= 1.0 else 0
@@ -156,8 +157,9 @@ def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
-    """Return the greatest distance of the eccentricities of two runs, over the room; 0 for ideal
-    joints.
+    """Return the greatest distance of the eccentricities of two runs, over the room.
+
+    0 for ideal joints.
 
     ours, theirs: observed rows at the same times. A journal's room is its clearance, or how far it
     came if that is more.

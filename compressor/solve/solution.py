@@ -243,8 +243,9 @@ def has_promise(case: Case) -> bool:
 
 
 def excess_over_promise(case: Case, solution: Solution) -> float:
-    """Return the greatest estimated error over what accuracy promises; 0 where it promises
-    nothing.
+    """Return the greatest estimated error over what accuracy promises.
+
+    0 where it promises nothing.
     """
     if case.targets:
         return max(

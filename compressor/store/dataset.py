@@ -159,8 +159,9 @@ def _taken(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
 
 def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """Return all numbers of the rows; nan where a job has none. Statistics where a job is
-    chaotic.
+    """Return all numbers of the rows.
+
+    Nan where a job has none. Statistics where a job is chaotic.
     """
     found = {}
     for name, (dims, unit, phrase) in NUMBERS.items():

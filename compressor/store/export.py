@@ -118,8 +118,9 @@ def export(
 def _named_jobs(
     folder: Folder, names: Sequence[str], stored: Stored, known: Sequence[StoredStudy]
 ) -> tuple[list[StoredStudy], list[str]]:
-    """Return the studies and the keys of the jobs that are named, each once; all studies by
-    default.
+    """Return the studies and the keys of the jobs that are named, each once.
+
+    All studies by default.
     """
     by_name = {study.name for study in known}
     if not names:
@@ -188,8 +189,9 @@ def _refuse_existing(tasks: Iterable[_Task]) -> None:
 
 
 def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
-    """Return the numbers of all jobs of studies as one table; in netCDF a lone grid keeps its
-    axes.
+    """Return the numbers of all jobs of studies as one table.
+
+    In netCDF a lone grid keeps its axes.
     """
     from compressor.store.dataset import (  # loads xarray: half a second
         grid,

@@ -150,8 +150,9 @@ def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.
 
 
 def _texts_are_there(entry: h5d.DatasetID, data: bytes) -> bool:
-    """Return whether texts of any length are where a dataset says; HDF5 believes it whatever it
-    says.
+    """Return whether texts of any length are where a dataset says.
+
+    HDF5 believes it whatever it says.
     """
     offset, count = entry.get_offset(), math.prod(entry.shape)
     if offset is None or offset + count * TEXT_PLACE.itemsize > len(data):
@@ -162,8 +163,9 @@ def _texts_are_there(entry: h5d.DatasetID, data: bytes) -> bool:
 
 
 def _items(data: bytes, heap: int) -> dict[int, int]:
-    """Return the sizes of a global heap's items by number; none where they do not fill it
-    exactly.
+    """Return the sizes of a global heap's items by number.
+
+    None where they do not fill it exactly.
     """
     if heap + HEAP_HEAD.size > len(data):
         return {}

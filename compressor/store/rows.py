@@ -370,8 +370,9 @@ class Rows:
         return read_line(segment.details[self.row[position]], str, segment)
 
     def text(self, position: int) -> bytes:
-        """Return a job's attributes as JSON; quick for jobs of the same segment one after the
-        other.
+        """Return a job's attributes as JSON.
+
+        Quick for jobs of the same segment one after the other.
         """
         return _lines(self.segments[self.source[position]])[self.row[position]]
 
@@ -385,8 +386,9 @@ class Rows:
             raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY) from error
 
     def path(self, position: int) -> Path | None:
-        """Return the file with a job's time series, which may wait for its name; None without
-        any.
+        """Return the file with a job's time series, which may wait for its name.
+
+        None without any.
         """
         if not self.columns["samples"][position]:
             return None

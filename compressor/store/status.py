@@ -171,8 +171,9 @@ def _of_stiffness(rows: Rows, study: StoredStudy) -> list[str]:
 
 
 def _settle_revs(study: StoredStudy) -> list[float]:
-    """Return the revolution at which metrics of each job begin to count; nan where that is
-    `auto`.
+    """Return the revolution at which metrics of each job begin to count.
+
+    Nan where that is `auto`.
     """
     fixed = value_in(study.fixed, "solve.settle_rev")
     given = (point.get("solve.settle_rev", fixed) for point in points(study))

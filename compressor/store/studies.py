@@ -259,8 +259,9 @@ def study_paths(folder: Folder, where: str = "studies") -> list[Path]:
 
 
 def former_studies(folder: Folder) -> list[StoredStudy]:
-    """Return the studies that others of their names have replaced, by name; damaged ones are
-    told of.
+    """Return the studies that others of their names have replaced, by name.
+
+    Damaged ones are told of.
     """
     found = []
     for path in study_paths(folder, "former"):
@@ -370,8 +371,9 @@ SAME_VALUE = 1e-9  # relative; the decimal fractions of a case file are not mean
 def find_study(
     folder: Folder, name: str | None = None, known: Sequence[StoredStudy] | None = None
 ) -> StoredStudy:
-    """Return the study of a name, or the only one; `known`: the folder's studies, where they were
-    read.
+    """Return the study of a name, or the only one.
+
+    `known`: the folder's studies, where they were read.
 
     Raises WrongName with the nearest names where there is none, or without a name several.
     """
@@ -406,8 +408,9 @@ def find_job(
 def whole_key(
     folder: Folder, beginning: str, studies: Sequence[StoredStudy], stored: set[str]
 ) -> str:
-    """Return the one key, of a stored or a planned job, that begins so; WrongName where that is
-    none.
+    """Return the one key, of a stored or a planned job, that begins so.
+
+    WrongName where that is none.
     """
     known = sorted(stored.union(*(study.keys for study in studies)))
     like = [key for key in known if key.startswith(beginning)]
@@ -425,8 +428,9 @@ def whole_key(
 
 
 def _near_keys(beginning: str, known: Sequence[str]) -> str:
-    """Return the sorted keys that have most of a beginning in common; "" where that is not its
-    half.
+    """Return the sorted keys that have most of a beginning in common.
+
+    "" where that is not its half.
     """
     at = bisect.bisect(known, beginning)
     shared = {key: _in_common(key, beginning) for key in known[max(at - 1, 0) : at + 1]}

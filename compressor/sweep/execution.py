@@ -165,8 +165,9 @@ class Batches:
         self.arrived.put((self.out.pop(number), found))
 
     def next_batch(self) -> list[Job]:
-        """Return the jobs for about `target_seconds`: few at first, and towards the end; none:
-        that is all.
+        """Return the jobs for about `target_seconds`: few at first, and towards the end.
+
+        None: that is all.
         """
         size = self.target_seconds / max(self.mean, 1e-9) if self.weight else 1.0
         if self.left:
@@ -350,8 +351,9 @@ class Local(Batches):
         self.free.append(number)
 
     def note(self, place: int) -> tuple[int, int, float]:
-        """Return the process and job of a batch; since when the job runs, or minus its end; 0:
-        none yet.
+        """Return the process and job of a batch.
+
+        Since when the job runs, or minus its end; 0: none yet.
         """
         pid, position, since = NOTE.unpack_from(self.notes, place * NOTE.size)
         return int(pid), int(position), since

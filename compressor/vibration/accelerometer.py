@@ -45,8 +45,9 @@ def analogue_rate(body: Body, sensor: Sensor) -> float:
 
 
 def point_of(body: Body, sensor: Sensor, guide: float) -> tuple[float, float]:
-    """Return where a sensor sits, m from the body's mass centre; guide: mid-stroke from the
-    crank, m.
+    """Return where a sensor sits, m from the body's mass centre.
+
+    guide: mid-stroke from the crank, m.
     """
     x, y = centre(body)
     return {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]

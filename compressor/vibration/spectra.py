@@ -32,8 +32,9 @@ class SignalError(CompsimError):
 
 
 def checked_signal(values: np.ndarray, what: str = "the signal") -> np.ndarray:
-    """Return the values as floats, (m,); raises SignalError unless they are finite, real and in
-    a row.
+    """Return the values as floats, (m,).
+
+    Raises SignalError unless they are finite, real and in a row.
     """
     found = np.asarray(values)
     if found.ndim != 1 or found.size == 0:

@@ -83,8 +83,9 @@ def load_curves(runs: Runs) -> list[Curve]:
 
 
 def turn(run: xr.Dataset) -> xr.Dataset:
-    """Return the last revolution of a run; of one that has none after settling, all that has
-    settled.
+    """Return the last revolution of a run.
+
+    Of one that has none after settling, all that has settled.
     """
     try:
         return last_revolution(run)[1]

@@ -56,8 +56,9 @@ NEAR_COLOR = "#f2ead9"
 
 @in_style
 def draw_diagnosis_spectra(found: Shakings) -> Figure:
-    """Return X over orders: healthy, and each joint at the greatest clearance; rms over
-    clearance.
+    """Return X over orders: healthy, and each joint at the greatest clearance.
+
+    Rms over clearance.
     """
     figure, panels = sheet(1, 2, 4.6, width_ratios=(2.3, 1))
     lines, trend = panels.flat

@@ -246,8 +246,9 @@ def in_data(axes: Axes, artist: Artist) -> bool:
 
 
 def curve(axes: Axes, line: Any, named: Names) -> Trace | None:
-    """Return a line or its markers; None for a straight line across the panel, which `notes`
-    has.
+    """Return a line or its markers.
+
+    None for a straight line across the panel, which `notes` has.
     """
     if line.get_transform().contains_branch_seperately(axes.transData) != (True, True):
         return None

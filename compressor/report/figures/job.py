@@ -249,8 +249,9 @@ def legend() -> list[Line2D]:
 
 @in_style
 def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
-    """Return the order spectra of X and of the crosshead's deviation; with a sensor, of its
-    envelope.
+    """Return the order spectra of X and of the crosshead's deviation.
+
+    With a sensor, of its envelope.
     """
     envelope = sensor_envelope(run)
     rows = 2 if envelope is None else 3

@@ -41,8 +41,9 @@ class SweepFigure(NamedTuple):
 
 
 def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
-    """Return the drawings of a study, as `open_study` gives it; none where nothing is swept or
-    measured.
+    """Return the drawings of a study, as `open_study` gives it.
+
+    None where nothing is swept or measured.
 
     What is the same at every job is said in a caption, and not drawn.
     """

@@ -39,8 +39,9 @@ class Measure:
         return METRICS[self.variable].bar.relative
 
     def of(self, data: xr.Dataset) -> xr.DataArray:
-        """Return the metric of a job or of a study's jobs, in the unit; nan for contact in ideal
-        joints.
+        """Return the metric of a job or of a study's jobs, in the unit.
+
+        Nan for contact in ideal joints.
 
         An ideal joint has a penetration of exactly 0.
         """
@@ -81,8 +82,9 @@ def measures(data: xr.Dataset) -> list[Measure]:
 
 
 def swept_axes(study: xr.Dataset) -> list[str]:
-    """Return the axes of a study that have more than one value; of a list of jobs, the
-    coordinates.
+    """Return the axes of a study that have more than one value.
+
+    Of a list of jobs, the coordinates.
     """
     if study["status"].dims != ("job",):
         return [str(dim) for dim in study["status"].dims if study.sizes[dim] > 1]
@@ -173,8 +175,9 @@ class PlottedSweep:
     is_grid: bool
 
     def of(self, values: xr.DataArray) -> np.ndarray:
-        """Return a variable of the study's jobs at the points; nan, or no word, where there is
-        no job.
+        """Return a variable of the study's jobs at the points.
+
+        Nan, or no word, where there is no job.
         """
         flat = values.transpose(*self.data["status"].dims).values.ravel()
         found = flat[self.place]
@@ -220,8 +223,9 @@ class PlottedSweep:
 
 
 def sweep_of(data: xr.Dataset) -> PlottedSweep:
-    """Return the sweep of a study, as `open_study` gives it; a list of jobs is a grid where it
-    fills one.
+    """Return the sweep of a study, as `open_study` gives it.
+
+    A list of jobs is a grid where it fills one.
 
     Axes that advance together are one, which is named after both. Numbers of a grid are sorted.
     """

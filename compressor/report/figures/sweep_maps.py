@@ -148,8 +148,9 @@ def scale_way(panel: Axes, way: str, axis: PlottedAxis) -> None:
 
 
 def edges_of(centres: np.ndarray, axis: PlottedAxis) -> np.ndarray:
-    """Return the edges between cells: halfway, on a log scale by ratio; outer cells are
-    symmetric.
+    """Return the edges between cells: halfway, on a log scale by ratio.
+
+    Outer cells are symmetric.
     """
     at = np.log(centres) if axis.is_log else centres
     middle = 0.5 * (at[1:] + at[:-1])
@@ -167,8 +168,9 @@ Ranking = dict[Measure, Effects]
 
 
 def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
-    """Return the effects of a sweep's axes on each measure of which enough is known; all of one
-    kind.
+    """Return the effects of a sweep's axes on each measure of which enough is known.
+
+    All of one kind.
     """
     columns = [axis.values for axis in sweep.axes]
     found = {}
@@ -215,8 +217,9 @@ def overall(found: Ranking) -> list[int]:
 
 @in_style
 def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Figure:
-    """Return a panel an axis, the strongest first, with a row a measure; bars with 95 %
-    intervals.
+    """Return a panel an axis, the strongest first, with a row a measure.
+
+    Bars with 95 % intervals.
     """
     order = overall(found)
     rows, columns = math.ceil(len(order) / COLUMNS), min(COLUMNS, len(order))
@@ -267,8 +270,9 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
 
 
 def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
-    """Return the strongest axis of each measure, a sentence an axis; or axes that are not told
-    apart.
+    """Return the strongest axis of each measure, a sentence an axis.
+
+    Or axes that are not told apart.
     """
     groups: dict[tuple[int, ...], list[str]] = {}
     for measure, effects in found.items():

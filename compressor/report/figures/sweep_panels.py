@@ -296,8 +296,9 @@ def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]
 
 
 def whole_part(sweep: PlottedSweep, measure: Measure, role: Roles) -> MeasuredPoints:
-    """Return a measure over a sweep; where lines are means, what is known of it within its error
-    bar.
+    """Return a measure over a sweep.
+
+    Where lines are means, what is known of it within its error bar.
     """
     values = sweep.known(measure) if is_averaged(sweep, role) else sweep.values(measure)
     return MeasuredPoints(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
@@ -376,8 +377,9 @@ PLACES = 60  # of a trend
 
 @in_style
 def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
-    """Return every measure over the axis that matters most for it; axes: their numbers, one a
-    measure.
+    """Return every measure over the axis that matters most for it.
+
+    axes: their numbers, one a measure.
     """
     figure, panels = metric_panels(measures, 2.35)
     for panel, axis, measure in zip(panels, axes, measures, strict=True):

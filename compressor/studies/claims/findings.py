@@ -245,8 +245,9 @@ ORDERS = ("first_order", "total_order")
 
 
 def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
-    """Return Sobol's indices of each claim's margin over the swept assumptions; None without the
-    design.
+    """Return Sobol's indices of each claim's margin over the swept assumptions.
+
+    None without the design.
 
     found: of `judge_machines` on a study drawn by `saltelli`. `first_order` and `total_order` over
     (claim, assumption), with `_low` and `_high`, the ends of the 95 % bootstrap interval, by

@@ -45,8 +45,9 @@ class MachinesFile:
 
 
 def machine_files(folder: Folder) -> dict[str, xr.Dataset]:
-    """Return the files of judged machines in a folder by name, mass planes first; none without a
-    folder.
+    """Return the files of judged machines in a folder by name, mass planes first.
+
+    None without a folder.
 
     The machines that a search looked at are left out: what it found has a file of its own. Raises
     StoreError for a file that is something else.

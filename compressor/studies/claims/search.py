@@ -57,8 +57,9 @@ class AssumptionRange(NamedTuple):
         return self.share(self.default)
 
     def share(self, value: float) -> float:
-        """Return the share of the range at which a value lies; the nearest end where it is
-        outside.
+        """Return the share of the range at which a value lies.
+
+        The nearest end where it is outside.
         """
         from scipy.optimize import brentq  # takes a quarter of a second
 
@@ -121,8 +122,9 @@ class MachineSearch:
         return np.array([span.home for span in self.spans])
 
     def values(self, shares: Sequence[float]) -> tuple[float, ...]:
-        """Return the assumptions' values at shares of their ranges; the default where it is that
-        near.
+        """Return the assumptions' values at shares of their ranges.
+
+        The default where it is that near.
         """
         return tuple(
             span.default if abs(share - span.home) < 1e-9 else span.value(share)
@@ -269,8 +271,9 @@ def beginning(search: MachineSearch) -> np.ndarray:
 
 
 def descend(search: MachineSearch, best: tuple[float, ...], step: float) -> tuple[float, ...]:
-    """Return the best machine of a compass search that begins at one; until claims hold, or steps
-    end.
+    """Return the best machine of a compass search that begins at one.
+
+    Until claims hold, or steps end.
 
     All neighbours of a round, one up and one down in each assumption, are judged side by side
     (Kolda, Lewis and Torczon, SIAM Review 45, 2003, 385-482).

@@ -22,8 +22,10 @@ PENALTY = 1e-2  # on the squared weights of the logistic regression, over its po
 
 @dataclass(frozen=True)
 class KernelRidge:
-    """A regression on points (n, F) of targets (n, t); `left_out`: each point's prediction, (n, t),
-    by the n - 1 others."""
+    """A regression on points (n, F) of targets (n, t).
+
+    `left_out`: each point's prediction, (n, t), by the n - 1 others.
+    """
 
     points: np.ndarray
     width: float

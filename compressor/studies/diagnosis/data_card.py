@@ -37,8 +37,9 @@ ABSENT = (
 
 
 def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
-    """Return the card of a data set (`make_data_set`) as Markdown; parquet: whether that is
-    written.
+    """Return the card of a data set (`make_data_set`) as Markdown.
+
+    parquet: whether that is written.
     """
     fixed, models = (json.loads(dataset.attrs[name]) for name in ("fixed", "models"))
     parts = [

@@ -116,8 +116,9 @@ class Window:
 
 
 def windows(record: dict[str, np.ndarray], revolutions: int, hop: int) -> Iterator[Window]:
-    """Yield the windows of a record, by the names of `RECORD` (`features`); `hop` revolutions
-    apart.
+    """Yield the windows of a record, by the names of `RECORD` (`features`).
+
+    `hop` revolutions apart.
     """
     times, values, tacho = (record[name] for name in RECORD)
     for first in range(0, len(tacho) - revolutions, hop):
@@ -359,8 +360,9 @@ def signals(found: Sequence[Window]) -> dict[str, tuple]:
 
 
 def _reach(values: Sequence[Any]) -> list[Any]:
-    """Return the least and the greatest of a swept key's values, or its words; and how many
-    differ.
+    """Return the least and the greatest of a swept key's values, or its words.
+
+    And how many differ.
     """
     known = [value for value in values if value is not None]
     numbers = all(isinstance(value, int | float) for value in known)

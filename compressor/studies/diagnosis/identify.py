@@ -159,8 +159,9 @@ class Identifier:
 
 
 def _ends(joint: str, equal: bool) -> list[int]:
-    """Return the columns of clearances that are told of a joint; one where both are always
-    equal.
+    """Return the columns of clearances that are told of a joint.
+
+    One where both are always equal.
     """
     return list(SHARES[joint][:1] if equal else SHARES[joint])
 
@@ -185,8 +186,9 @@ def find_record(name: str, folder: Folder, steady: SteadySpeed | None) -> tuple[
 def explain_record(
     record: Record, folder: Folder, study: str, key: str, progress: Progress
 ) -> tuple[Identifier, Identification]:
-    """Return what a stored study tells of a record, and the identifier that does; key: a job left
-    out.
+    """Return what a stored study tells of a record, and the identifier that does.
+
+    key: a job left out.
 
     Raises RecordError, StoreError, and StudyError where the study cannot tell.
     """

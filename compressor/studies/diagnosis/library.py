@@ -133,8 +133,9 @@ def _kept(path: Path, made_of: str) -> xr.Dataset | None:
 
 
 def _made(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.Dataset:
-    """Return the features of all jobs with a record; those whose record tells nothing are left
-    out.
+    """Return the features of all jobs with a record.
+
+    Those whose record tells nothing are left out.
     """
     rows: list[tuple[str, str, list[float], np.ndarray]] = []
     for number, (key, place) in enumerate(positions.items()):

@@ -101,8 +101,9 @@ def columns(dataset: "xr.Dataset") -> dict[str, np.ndarray]:
 
 
 def parquet(table: dict[str, np.ndarray]) -> bytes | None:
-    """Return a table by column as the bytes of a Parquet file; None where pyarrow is not
-    installed.
+    """Return a table by column as the bytes of a Parquet file.
+
+    None where pyarrow is not installed.
     """
     try:
         import pyarrow

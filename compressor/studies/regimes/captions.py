@@ -45,8 +45,9 @@ def way(chain: xr.Dataset) -> list[SeenValue]:
 
 
 def regime_of(one: xr.Dataset) -> str:
-    """Return the regime at one value in words: period n, chaotic, undecided; "" where there is
-    none.
+    """Return the regime at one value in words: period n, chaotic, undecided.
+
+    "" where there is none.
     """
     word = str(one["regime"].values)
     if str(one["status"].values) != "ok" or word != "periodic":

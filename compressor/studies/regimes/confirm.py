@@ -209,8 +209,9 @@ def other_starts(case: Case) -> list[Case]:
 
 
 def read_verdicts(pair: ChainPair, folder: Folder) -> dict[int, Verdict]:
-    """Return the stored verdicts by the number of the value, going up; none where there is no
-    file.
+    """Return the stored verdicts by the number of the value, going up.
+
+    None where there is no file.
     """
     path = pair.path(folder)
     if not path.exists():

@@ -292,8 +292,9 @@ def describe_progress(
 def failed_values(
     machine: FollowedMachine, ends: dict[str, ChainEnd | JobLost]
 ) -> Iterator[ValueFailure]:
-    """Yield the failed values of a machine; of a chain that was lost, its first value without a
-    run.
+    """Yield the failed values of a machine.
+
+    Of a chain that was lost, its first value without a run.
     """
     for chain in machine.chains:
         end = ends[chain.key]

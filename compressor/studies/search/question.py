@@ -70,8 +70,9 @@ class Goal:
         return "" if NUMBERS[self.metric][1] == "1" else NUMBERS[self.metric][1]
 
     def holds(self, told: JobReading) -> bool | None:
-        """Return whether the comparison holds; None where the error bar does not let that be
-        told.
+        """Return whether the comparison holds.
+
+        None where the error bar does not let that be told.
         """
         compare = SIGNS[self.sign]
         ends = {bool(compare(told.value + side, self.limit)) for side in (-told.bar, told.bar)}
@@ -216,8 +217,9 @@ class Question:
         return self.study([self.argument(share) for share in self.shares])
 
     def settings(self, values: Sequence[float]) -> list[str]:
-        """Return the overrides that make the study of some values of the key; the caller sorts
-        them.
+        """Return the overrides that make the study of some values of the key.
+
+        The caller sorts them.
         """
         listed = ", ".join(map(repr, values))
         return [*self.overrides, f"name={self._name()}", f"{self.key}=[{listed}]"]

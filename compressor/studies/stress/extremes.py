@@ -281,8 +281,9 @@ LUGRE = "lugre"
 
 
 def features(made: dict[str, Any], draw: random.Random, inside: bool) -> dict[str, Any]:
-    """Return the groups that a scene has besides, as far as they are drawn; made: the scene so
-    far.
+    """Return the groups that a scene has besides, as far as they are drawn.
+
+    made: the scene so far.
     """
     found: dict[str, Any] = {}
     for group, keys in RANGES.items():

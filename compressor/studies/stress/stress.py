@@ -168,8 +168,9 @@ def scene_row(end: JobResult | JobLost) -> Row:
 
 
 def campaign_dataset(rows: Iterable[Row], seed: int, budget: Budget = FULL_BUDGET) -> xr.Dataset:
-    """Return the rows as a Dataset with the dimension scene, in order; numbers that there are
-    not are nan.
+    """Return the rows as a Dataset with the dimension scene, in order.
+
+    Numbers that there are not are nan.
     """
     rows = sorted(rows, key=lambda row: row["scene"])
     numbers = [row["scene"] for row in rows]

@@ -185,8 +185,9 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
 
 
 def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
-    """Yield what each change of the model does to each scene; those that do not apply are left
-    out.
+    """Yield what each change of the model does to each scene.
+
+    Those that do not apply are left out.
     """
     from compressor.studies.tradeoff.page import model_table
 
