@@ -308,7 +308,7 @@ def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None
             say(f"{study.path}: warning: {one.key}: {one.message}{share}")
         if most is not None and len(found) > most:
             more = plural(len(found) - most, "more warning")
-            say(f"{study.path}: and {more}, which compsim plan {study.path} lists")
+            say(f"{study.path}: and {more}, which compsim plan {shlex.quote(study.path)} lists")
 
 
 def tell_changes(studies: "Sequence[Study]", folder: str) -> None:

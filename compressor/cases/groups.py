@@ -12,12 +12,10 @@ from compressor.cases.parameter import (
     BIG_CLEARANCE,
     BIG_END,
     CLEARANCE,
-    COEFFICIENT,
     DAMPED,
     IDEAL_JOINT,
     LAW,
     MATERIALS,
-    PIN,
     RUBBING,
     SERIES,
     SMALL_CLEARANCE,
@@ -146,12 +144,12 @@ class Machine:
     pin_radius_mm: float = parameter(
         10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",
         "journal radius R_j of both joints, or of the big end", above=True,
-        read=(RUBBING, PIN), judged=(10, 100),
+        read=RUBBING, judged=(10, 100),
     )  # fmt: skip
     gravity_m_per_s2: float = parameter(0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y")
     small_end_pin_radius_mm: float | None = parameter(
         None, "mm", (0, 1e4), "as the big end's", "journal radius of the small end",
-        above=True, optional=True, read=(SMALL_RUBBING, PIN),
+        above=True, optional=True, read=SMALL_RUBBING,
     )  # fmt: skip
 
     def pin_radius(self, joint: str) -> float:
@@ -332,12 +330,11 @@ class Friction:
         "Table 3",
         "stiction transition velocity",
         above=True,
-        read=COEFFICIENT,
         judged=(0.1, 100),
     )
     friction_velocity_mm_per_s: float = parameter(
         100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True,
-        read=(by_law("friction", "friction_velocity_mm_per_s"), COEFFICIENT),
+        read=by_law("friction", "friction_velocity_mm_per_s"),
     )  # fmt: skip
     law: str | None = choice(
         None, FRICTION_LAWS, "Eq. 16", "friction law (adams where none is named)", optional=True

@@ -63,22 +63,6 @@ def hears_casing(case: Any) -> bool:
     return bool(sensor.place == "bearing" or sensor.direction == "y")
 
 
-def has_coefficient(case: Any) -> bool:
-    """Return whether friction has a coefficient above 0 that its law reads."""
-    friction = case.friction
-    if not friction:
-        return False
-    reads_static = law_of(friction) in READ_BY["friction"]["static"]
-    return bool(friction.dynamic > 0) or bool(reads_static and friction.static > 0)
-
-
-def needs_pin(case: Any) -> bool:
-    """Return whether something depends on how thick pins are."""
-    return bool(
-        case.lubricant or case.wear or case.contact.materials is not None or has_coefficient(case)
-    )
-
-
 def damps_guide(case: Any) -> bool:
     """Return whether the law of the joints is that of a guide's corners, too."""
     return bool(case.contact.law == "impact" or case.contact.restitution is not None)
@@ -104,8 +88,6 @@ PLAY = Reader("guide.clearance_mm above 0", has_play)
 CONTACT = Reader(
     f"{CLEARANCE.words} or in the guide", lambda case: has_clearance(case) or has_play(case)
 )
-PIN = Reader("friction with a coefficient above 0, lubricant, contact.materials or wear", needs_pin)
-COEFFICIENT = Reader("a coefficient of friction above 0", has_coefficient)
 LAW = Reader(
     f"{CLEARANCE.words}, or a guide with play and a law with a restitution",
     lambda case: has_clearance(case) or damps_guide(case),
