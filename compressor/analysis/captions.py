@@ -50,7 +50,7 @@ MIN_ANGLE, MIN_GAP = 0.005, 1e-6  # degrees, m: what the captions can tell
 
 
 def pressure_volume(runs: Runs) -> str:
-    """Of the gas cycle, and of the angles at which it changes."""
+    """Describe the gas cycle, and the angles at which it changes."""
     cam = Cam(runs["typical"])
     used, exact = np.degrees(load_corners(runs["typical"])), np.degrees(cam.gas_corners)
     away = float(np.abs(used - exact).max())
@@ -64,7 +64,7 @@ def pressure_volume(runs: Runs) -> str:
 
 
 def cam(runs: Runs) -> str:
-    """Of the cam: whether it closes as printed, and what ours does."""
+    """Describe the cam: whether it closes as printed, and what ours does."""
     found = Cam(runs["design"])
     rise, fall = found.printed_heights
     closes = abs(rise - fall) < MIN_GAP
@@ -80,7 +80,7 @@ def cam(runs: Runs) -> str:
 
 
 def load_response(runs: Runs) -> str:
-    """Of both ideal machines: how far apart they move."""
+    """Describe both ideal machines: how far apart they move."""
     one, other = runs["design"], runs["typical"]
     away = max(
         float(np.abs(one[name].values - other[name].values).max() / np.ptp(other[name].values))
@@ -95,7 +95,7 @@ def load_response(runs: Runs) -> str:
 
 
 def piston_force(runs: Runs) -> str:
-    """Of both loads: their peaks and corners."""
+    """Describe both loads: their peaks and corners."""
     design, typical = (float(runs[load]["piston_force"].max()) for load in ("design", "typical"))
     higher = "higher than" if design > typical else "no higher than"
     corners = (np.degrees(load_corners(runs[load])) for load in ("design", "typical"))
@@ -113,7 +113,7 @@ def in_degrees(found: np.ndarray) -> str:
 
 
 def response(runs: Runs, fault: str) -> str:
-    """Of displacement, velocity and acceleration with one fault at three clearances."""
+    """Describe displacement, velocity and acceleration with one fault at three clearances."""
     of = [runs[label(fault, c)] for c in CLEARANCES]
     sentences = [ENLARGED_VIEWS, deviations(of)]
     for joint in faulty_joints(fault):
@@ -188,7 +188,7 @@ def peaks(of: Sequence[xr.Dataset]) -> str:
 
 
 def contact_force(runs: Runs, fault: str, joint: str) -> str:
-    """Of the contact force at one joint at three clearances."""
+    """Describe the contact force at one joint at three clearances."""
     of = [runs[label(fault, c)] for c in CLEARANCES]
     along, across = (
         [float(run["peak_contact_force_axis"].sel(joint=joint, axis=axis)) for run in of]
@@ -211,7 +211,7 @@ def contact_force(runs: Runs, fault: str, joint: str) -> str:
 
 
 def relation(runs: Runs, joint: str) -> str:
-    """Of acceleration against the horizontal force at one joint."""
+    """Describe acceleration against the horizontal force at one joint."""
     found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
     return (
         "A dot for each stored sample. The line is the least-squares fit of force on acceleration; "
@@ -302,7 +302,7 @@ SPAN = f"{CLEARANCES[0]:g} to {CLEARANCES[-1]:g} mm"
 
 
 def spectra(found: Shakings, runs: Runs) -> str:
-    """Of X's order spectra: the rms above `ORDER` against clearance, for each fault."""
+    """Describe X's order spectra: the rms above `ORDER` against clearance, for each fault."""
     sentences = [
         "(a) Order spectra of X, the force on the frame along the cylinder, over "
         f"{found['design'].revolutions} settled revolutions. Above order {ORDER} (dashed) the rms "
@@ -322,7 +322,7 @@ def spectra(found: Shakings, runs: Runs) -> str:
 
 
 def orbits(found: Shakings, runs: Runs) -> str:
-    """Of the journals' orbits: off the wall or not, and how they go round."""
+    """Describe the journals' orbits: off the wall or not, and how they go round."""
     known = {
         joint: [orbit(runs[label(joint, c)]).sel(joint=joint) for c in CLEARANCES]
         for joint in SINGLE_FAULTS
@@ -386,7 +386,7 @@ def why(of: list[Shaking], near: list[float], rest: list[float]) -> str:
 
 
 def friction(of: list[Shaking], run) -> list[str]:
-    """Of the share elsewhere that falls: the order at which it rings, and what feeds it."""
+    """Describe the share elsewhere that falls: the order at which it rings, and what feeds it."""
     first, last = of[0].ring, of[-1].ring
     if not np.isfinite([first, last]).all() or case_of(run).friction is None:
         return []

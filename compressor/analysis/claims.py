@@ -196,7 +196,7 @@ def proportional_force(runs: Runs) -> Verdict:
 
 
 def correlation(run: xr.Dataset, joint: str) -> BarredNumber:
-    """r² of a joint's horizontal force and acceleration.
+    """Return r² of a joint's horizontal force and acceleration.
 
     A correlation changes by at most the sum of the errors' shares of the standard deviations.
     """

@@ -89,7 +89,7 @@ def film(run: xr.Dataset) -> str:
 
 
 def signals(run: xr.Dataset, twin: Twin) -> str:
-    """Of the last revolution: the greatest and least of what is drawn."""
+    """Describe the last revolution: the greatest and least of what is drawn."""
     _, kept = last_revolution(run)
     _, count = whole_revolutions(run)
     forces = frame_forces(kept)
@@ -110,7 +110,7 @@ def signals(run: xr.Dataset, twin: Twin) -> str:
 
 
 def spectra(run: xr.Dataset, twin: Twin) -> str:
-    """Of the order spectra: what lies above `ORDER`."""
+    """Describe the order spectra: what lies above `ORDER`."""
     found = shaking(run)
     sentences = [
         f"Peak amplitudes, mean squares over {plural(found.revolutions, 'settled revolution')}.",
@@ -137,7 +137,7 @@ def spectra(run: xr.Dataset, twin: Twin) -> str:
 
 
 def orbits(run: xr.Dataset, twin: Twin) -> str:
-    """Of the orbits: how far out the journals are, and whether they leave the wall."""
+    """Describe the orbits: how far out the journals are, and whether they leave the wall."""
     found = orbit(run)
     _, kept = last_revolution(run)
     sentences = ["Journal centres in their bores to scale, last revolution."]
@@ -159,7 +159,7 @@ def orbits(run: xr.Dataset, twin: Twin) -> str:
 
 
 def modes(run: xr.Dataset, twin: Twin) -> str:
-    """Of the contact modes: their shares of the time."""
+    """Describe the contact modes: their shares of the time."""
     shares = mode_shares(contact_modes(run))["share"]
     sentences = []
     for joint in joints_with_clearance(run):
@@ -173,7 +173,7 @@ def modes(run: xr.Dataset, twin: Twin) -> str:
 
 
 def struck(run: xr.Dataset, twin: Twin) -> str:
-    """Of the impacts: how many, the hardest, and what they lost."""
+    """Describe the impacts: how many, the hardest, and what they lost."""
     found = impacts(run)
     if not found.sizes["impact"]:
         return (
@@ -212,7 +212,7 @@ def waterfall(rows: Sequence[SweptRow], axis: str) -> str:
 
 
 def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
-    """Of the mode map: the share of angles whose most frequent mode is flight."""
+    """Describe the mode map: the share of angles whose most frequent mode is flight."""
     sentences = [f"The most frequent contact mode in each degree, a row for each value of {axis}."]
     for joint, table in rows_modes(rows).items():
         flight = 100.0 * (table == MODES.index("flight")).mean(axis=1)

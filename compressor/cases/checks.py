@@ -242,7 +242,9 @@ def accepted_keys(group: str, file: bool = True) -> list[str]:
     return [*known_keys(group, file), *synonyms_of(group)]
 
 
-def unknown(name: str, group: str, file: bool = True, value: Any = None, values: Any = None) -> str:
+def describe_unknown(
+    name: str, group: str, file: bool = True, value: Any = None, values: Any = None
+) -> str:
     """Return what is said of a key that a group does not have.
 
     value: the key's. values: the whole case's, nested, as far as they are known.
@@ -394,7 +396,7 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
         problems += wrong
         return found
     if key not in table() or "." in key:
-        message = unknown(str(key), "", file=False, value=value)
+        message = describe_unknown(str(key), "", file=False, value=value)
         problems.append(Problem(str(key), message))
         return None
     return check_value(key, value, problems)
@@ -420,7 +422,7 @@ def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Proble
         if name in fields:
             good[name] = check_value(f"{key}.{name}", value, problems)
         else:
-            problems.append(Problem(f"{key}.{name}", unknown(str(name), key, value=value)))
+            problems.append(Problem(f"{key}.{name}", describe_unknown(str(name), key, value=value)))
     return GROUPS[key](**good), problems
 
 

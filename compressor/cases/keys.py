@@ -1,6 +1,6 @@
 """Values by dotted key: of a case file's tree, of `key=value` texts, of blocks, one over another.
 
-An unknown key is told what was probably meant (`unknown`).
+An unknown key is told what was probably meant (`describe_unknown`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,11 +15,11 @@ from compressor.cases.checks import (
     TWICE,
     accepted_keys,
     by_joint,
+    describe_unknown,
     halve,
     lacking_joint,
     no_mapping,
     stands_for,
-    unknown,
 )
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.swept import FORMS
@@ -117,7 +117,7 @@ def _known(
         if name not in accepted_keys(group):
             message = "unknown key"
             if len(problems) < MAX_SUGGESTIONS:
-                message = unknown(name, group, value=item.plain(), values=root.plain())
+                message = describe_unknown(name, group, value=item.plain(), values=root.plain())
             key = f"{group}.{name}" if group else name
             problems.append(FileProblem(item.key_place, key, message))
         elif item.value is not None:

@@ -322,9 +322,9 @@ class _Reader:
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             inner = self.test(node.operand, depth + 1)
             return lambda value: not inner(value)
-        return self.compared(node)
+        return self.comparison_test(node)
 
-    def compared(self, node: ast.expr) -> Test:
+    def comparison_test(self, node: ast.expr) -> Test:
         """Return the test of one comparison of a key with a value."""
         left = node.left if isinstance(node, ast.Compare) else node
         while isinstance(left, ast.BinOp):

@@ -232,7 +232,7 @@ def _square_root() -> Any:
 
 
 def fma(a: float, b: float, c: float) -> float:
-    """a b + c, rounded once: one instruction instead of two. Python itself rounds twice."""
+    """Return a b + c, rounded once: one instruction instead of two. Python itself rounds twice."""
     return a * b + c
 
 

@@ -40,7 +40,7 @@ SERIES = (
 
 @jit
 def johnson_share(depth):
-    """w = ln(4 S c / F) - 1 where a depth, over 4 c, is w exp(-1 - w): the larger solution.
+    """Return w = ln(4 S c / F) - 1 where a depth, over 4 c, is w exp(-1 - w): the larger solution.
 
     By Newton's method; depth: of (0, exp(-2)).
     """
@@ -223,7 +223,7 @@ def rise(s):
 
 @inline_llvm
 def power(base, exponent):
-    """base ** exponent for base >= 0; a square root does for Hertz's 1.5."""
+    """Return base ** exponent for base >= 0; a square root does for Hertz's 1.5."""
     if exponent == 1.5:
         return base * square_root(base)
     return base**exponent

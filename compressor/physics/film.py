@@ -139,7 +139,7 @@ def squeeze_number(eps, b, constants):
 
 @jit
 def bounded_eccentricity(eps, share):
-    """eps up to the film's last share, and from there to the wall smoothly to its middle."""
+    """Return eps up to the film's last share, and from there to the wall smoothly to its middle."""
     begin = 1.0 - share
     if eps <= begin:
         return eps

@@ -252,7 +252,7 @@ def keep_seen(W, k, i):
 
 @jit
 def stage_rates(scene, W, k, fraction, w, s):
-    """dz/dt where the stages have the weights w, at a fraction of the steps: stage s."""
+    """Compute dz/dt where the stages have the weights w, at a fraction of the steps: stage s."""
     W = without_refcount(W)
     for j in range(k):
         p = record_of(scene, W, j)
@@ -265,7 +265,7 @@ def stage_rates(scene, W, k, fraction, w, s):
 
 @jit
 def look_at_node(scene, W, k, fraction, w, i):
-    """What is seen at node i of the steps."""
+    """Return what is seen at node i of the steps."""
     W = without_refcount(W)
     for j in range(k):
         p = record_of(scene, W, j)

@@ -173,7 +173,7 @@ def new_work(n):
 
 @jit
 def nothing_worn(w, base, h, z, work, phase, p, tally):
-    """What sliding wears off where no bore can."""
+    """Return what sliding wears off where no bore can."""
 
 
 @jit

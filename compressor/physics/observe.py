@@ -281,7 +281,7 @@ def observe_contact(motion, y, phase, p, row):
 
 @inline_llvm
 def observe_with_energy(motion, y, phase, p, row):
-    """The columns from ACCELERATION on: what a step is judged, tallied and audited by."""
+    """Write the columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     now = evaluate(motion, y, phase, p)
     write_gauged(now, y, joint_forces(now, y, p), p, row)
 
@@ -295,7 +295,7 @@ def observe_all(times, states, phases, p, rows):
 
 @jit
 def derivative_with_flows(t, z, phase, p, out):
-    """dz/dt of the motion and of its four energy flows, z = (y, flows)."""
+    """Return dz/dt of the motion and of its four energy flows, z = (y, flows)."""
     write_flowing_derivative(ideal(t, p), z, phase, p, out)
 
 

@@ -200,7 +200,7 @@ def extend(pair, h, z, k, dense):
 
 @inline_llvm
 def interpolate(s, dense, out):
-    """The motion at the fraction s of a step into out, shape (n,)."""
+    """Write the motion at the fraction s of a step into out, shape (n,)."""
     for i in range(0, out.size, LANES):
         a, b, c, d = dense[4, i], dense[4, i + 1], dense[4, i + 2], dense[4, i + 3]
         for j in range(3, -1, -1):

@@ -128,7 +128,7 @@ def contact_scales(case: Case) -> Iterator[JointScales]:
 
 
 def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, float]:
-    """About how many steps a run of a case attempts, and how long they take (s)."""
+    """Return about how many steps a run of a case attempts, and how long they take (s)."""
     steps = expected_steps(case, joints)
     return steps, expected_seconds(case, steps)
 
@@ -150,7 +150,7 @@ def expected_steps(case: Case, joints: Sequence[JointScales]) -> float:
 
 
 def expected_seconds(case: Case, steps: float) -> float:
-    """About how long so many steps take (s), without error bars, on a machine of 2024."""
+    """Return about how long so many steps take (s), without error bars, on a machine of 2024."""
     if steps == 0:
         return 0.0
     joint = case.joint if case.joint in STEP_SECONDS else "both"

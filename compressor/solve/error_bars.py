@@ -107,7 +107,7 @@ def is_amplified(rtol: float, apart: Mapping[str, Any]) -> bool:
 
 
 def longest(found: Sequence[Metrics]) -> Metrics:
-    """Of several bars or errors of each name the greatest."""
+    """Return the greatest of several bars or errors of each name."""
     return {name: np.maximum.reduce([one[name] for one in found]) for name in found[0]}
 
 

@@ -94,7 +94,7 @@ def turn(run: xr.Dataset) -> xr.Dataset:
 
 
 def plot(panel: Axes, curves: Sequence[Curve], quantity: Quantity) -> None:
-    """All curves of one quantity over the revolution."""
+    """Draw all curves of one quantity over the revolution."""
     for curve in curves:
         panel.plot(
             degrees(curve.run), quantity.values(curve.run), label=curve.name,
@@ -108,7 +108,7 @@ def plot(panel: Axes, curves: Sequence[Curve], quantity: Quantity) -> None:
 
 
 def plot_rows(panels: np.ndarray, curves: Sequence[Curve], quantity: Quantity) -> None:
-    """A panel a curve, from the top; the one of no clearance is in all of them."""
+    """Draw a panel a curve, from the top; the one of no clearance is in all of them."""
     ideal = [curve for curve in curves if curve.line is IDEAL]
     worn = [curve for curve in curves if curve.line is not IDEAL]
     for panel, curve in zip(panels, worn, strict=True):
@@ -129,7 +129,7 @@ def plot_enlarged(
     quantity: Quantity,
     part: slice,
 ) -> None:
-    """The same curves over a part of the span, which is marked in the full panels."""
+    """Draw the same curves over a part of the span, which is marked in the full panels."""
     plot(enlarged, curves, quantity)
     enlarged.xaxis.set_major_locator(MultipleLocator(10 if quantity.window > 30 else 5))
     angle = degrees(curves[0].run)[part]

@@ -289,7 +289,7 @@ def plot_lines(panel: Axes, lines: tuple[np.ndarray, np.ndarray], line: LineStyl
 
 
 def plot_deviation(panel: Axes, lines: tuple[np.ndarray, np.ndarray]) -> None:
-    """The spectrum of a deviation, m/s2; in words where it is rounding, as of ideal joints."""
+    """Draw the spectrum of a deviation, m/s2; in words where it is rounding, as of ideal joints."""
     if lines[1].max() > ROUNDING:
         plot_lines(panel, lines, THIS)
         return
@@ -299,7 +299,7 @@ def plot_deviation(panel: Axes, lines: tuple[np.ndarray, np.ndarray]) -> None:
 
 
 def mark_order(panel: Axes) -> None:
-    """A vertical line at `ORDER`, with its name."""
+    """Draw a vertical line at `ORDER`, with its name."""
     panel.axvline(ORDER, **MARK.properties())
     panel.annotate(
         f"order {ORDER}", (ORDER, 1), (4, -4), xycoords=panel.get_xaxis_transform(),
@@ -391,7 +391,7 @@ def plot_modes(panel: Axes, table: np.ndarray) -> None:
 
 
 def label_rows(panel: Axes, rows: Sequence[SweptRow], title: str) -> None:
-    """The swept values at some of the rows, with what became of those that have no series."""
+    """Draw the swept values at some of the rows, with what became of those that have no series."""
     each = -(-len(rows) // MAX_TICKS)
     named = [*range(0, len(rows), each)]
     words = [f"{row.value} ({row.problem})" if row.problem else row.value for row in rows]

@@ -96,7 +96,7 @@ def enlarge(
     quantity: Quantity,
     letters: str,
 ) -> None:
-    """The view where the curves differ most, and the titles of both."""
+    """Draw the view where the curves differ most, and the titles of both."""
     part, differs = differing_part(curves, quantity)
     plot_enlarged(full, enlarged, curves, quantity, part)
     full[0].set_title(f"({letters[0]}) {full[0].get_title('left')}")
@@ -181,7 +181,7 @@ def draw_relation(runs: Runs, joint: str) -> Figure:
 
 
 def scatter(panel: Axes, run: xr.Dataset, joint: str, color: str, name: str) -> None:
-    """A dot for every stored sample."""
+    """Draw a dot for every stored sample."""
     force = contact_force(joint, "x").values(run)
     panel.plot(
         force,
@@ -197,7 +197,7 @@ def scatter(panel: Axes, run: xr.Dataset, joint: str, color: str, name: str) -> 
 
 
 def regress(panel: Axes, run: xr.Dataset, joint: str) -> None:
-    """The line of `force_relation` over the data's accelerations, and its numbers."""
+    """Draw the line of `force_relation` over the data's accelerations, and its numbers."""
     relation = force_relation(run, joint)
     a = settled_part(run)["acceleration"].values
     ends = np.array([a.min(), a.max()])
@@ -285,7 +285,7 @@ def draw_cam(runs: Runs) -> Figure:
 
 
 def draw_contour(panel: Axes, cam: Cam, angles: np.ndarray) -> None:
-    """The closed cam's pitch curve around its base circle, with rays at every quarter turn."""
+    """Draw the closed cam's pitch curve around its base circle, with rays at every quarter turn."""
     x, y = cam.contour(angles, cam.base_radius)
     disc = Circle((0, 0), cam.base_radius * 1e3, facecolor="#f1f1f1", edgecolor="none")
     panel.add_patch(disc)
@@ -305,7 +305,7 @@ def draw_contour(panel: Axes, cam: Cam, angles: np.ndarray) -> None:
 
 
 def mark_ray(panel: Axes, degrees: float, radius: float) -> None:
-    """A ray from the cam's centre to its rim (m), with its cam angle beside it."""
+    """Draw a ray from the cam's centre to its rim (m), with its cam angle beside it."""
     turn = math.radians(degrees)
     along = np.array([math.cos(turn), math.sin(turn)])
     aside = np.abs(along[::-1])
@@ -342,11 +342,11 @@ def draw_follower(panel: Axes, cam: Cam, angles: np.ndarray) -> None:
 def write_at(
     panel: Axes, text: str, point: tuple[float, float], shift: tuple[float, float], side: str
 ) -> None:
-    """A remark beside a point of a panel, shifted in points (1/72 inch)."""
+    """Draw a remark beside a point of a panel, shifted in points (1/72 inch)."""
     panel.annotate(text, point, shift, textcoords="offset points", ha=side, fontsize=9)
 
 
 def legend_below(panel: Axes, entries: Sequence[tuple[LineStyle, str]]) -> None:
-    """A panel's legend in the margin below it."""
+    """Draw a panel's legend in the margin below it."""
     handles = [Line2D([], [], label=name, **line.properties()) for line, name in entries]
     panel.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)

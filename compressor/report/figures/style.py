@@ -107,7 +107,7 @@ def sheet(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, 
 
 
 def legend_above(figure: Figure, handles: list[Any]) -> None:
-    """A legend in the margin above all axes, where it covers nothing."""
+    """Draw a legend in the margin above all axes, where it covers nothing."""
     longest = max(len(str(handle.get_label())) for handle in handles)
     columns = min(len(handles), max(1, LEGEND_WIDTH // (longest + 9)))
     figure.legend(handles=handles, loc="outside upper center", ncols=columns)

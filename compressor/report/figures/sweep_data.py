@@ -45,15 +45,15 @@ class Measure:
 
         An ideal joint has a penetration of exactly 0.
         """
-        return self.scaled(data, self.variable)
+        return self.in_unit(data, self.variable)
 
     def bar(self, data: xr.Dataset) -> xr.DataArray:
         """Return its error bar, as `of`; nan where there is none."""
         if f"{self.variable}_error" not in data:
             return self.of(data) * math.nan
-        return self.scaled(data, f"{self.variable}_error")
+        return self.in_unit(data, f"{self.variable}_error")
 
-    def scaled(self, data: xr.Dataset, name: str) -> xr.DataArray:
+    def in_unit(self, data: xr.Dataset, name: str) -> xr.DataArray:
         """Return a variable of the metric in the measure's unit."""
         values = data[name]
         if METRICS[self.variable].contact:

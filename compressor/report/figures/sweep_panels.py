@@ -58,7 +58,7 @@ def plot_jobs(
     panel: Axes, points: tuple[np.ndarray, np.ndarray, np.ndarray], keys: Keys, name: str,
     line: dict[str, Any], span: float,
 ) -> None:  # fmt: skip
-    """A line through jobs (x, y, bars), with error bars where any is seen beside the span."""
+    """Draw a line through jobs (x, y, bars), with error bars where any is seen beside the span."""
     x, y, bars = points
     finite = np.where(np.isfinite(bars), bars, 0.0)
     if (finite > VISIBLE * span).any():
@@ -353,7 +353,7 @@ def plot_parts(
 def plot_part(
     panel: Axes, x: np.ndarray, part: MeasuredPoints, name: str, style: dict[str, Any], span: float
 ) -> None:  # fmt: skip
-    """A line through jobs with their bars, or through means."""
+    """Draw a line through jobs with their bars, or through means."""
     if part.is_jobs:
         keys = None if part.keys is None else part.keys[:, 0]
         values, ring = part.values[:, 0], part.chaotic[:, 0]
@@ -419,7 +419,7 @@ def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
 
 
 def plot_points(panel: Axes, sweep: PlottedSweep, axis: int, measure: Measure) -> None:
-    """The jobs over one axis, and for each group the trend and its interval."""
+    """Draw the jobs over one axis, and for each group the trend and its interval."""
     one = sweep.axes[axis]
     x, y, keys = one.places, sweep.values(measure), sweep.keys
     scale_x(panel, one)
@@ -443,7 +443,7 @@ def plot_points(panel: Axes, sweep: PlottedSweep, axis: int, measure: Measure) -
 
 
 def plot_trend(panel: Axes, x: np.ndarray, y: np.ndarray, color: str, name: str) -> None:
-    """A parabola through points and the 95 % interval of its mean, on the panel's scales."""
+    """Draw a parabola through points and the 95 % interval of its mean, on the panel's scales."""
     logs = panel.get_xscale() == "log", panel.get_yscale() == "log"
     there = x[np.isfinite(x) & np.isfinite(y)]
     if not there.size or not np.ptp(there):

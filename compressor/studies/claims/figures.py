@@ -65,7 +65,7 @@ def draw_claims_map(found: xr.Dataset, place: tuple[float, float]) -> Figure:
 
 
 def border(panel: Axes, found: xr.Dataset, inside: np.ndarray, color: str) -> None:
-    """The line around the machines for which something is true."""
+    """Draw the line around the machines for which something is true."""
     if inside.any() and not inside.all():
         panel.contour(found[ROD], found[RECIPROCATING], inside.astype(float), [0.5], colors=color,
                       linewidths=1.0)  # fmt: skip

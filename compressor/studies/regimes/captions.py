@@ -57,7 +57,7 @@ def regime_of(one: xr.Dataset) -> str:
 
 
 def bifurcation(pair: xr.Dataset) -> str:
-    """Of one chain or of both directions: regimes, exponents, where up and down differ.
+    """Describe one chain or both directions: regimes, exponents, where up and down differ.
 
     pair: dims direction, the followed one, and the variables' own.
     """
@@ -153,7 +153,7 @@ def failures(pair: xr.Dataset) -> list[str]:
 
 
 def sections(shown: xr.Dataset, count: int) -> str:
-    """Of Poincaré sections at some of `count` values: the regime at each."""
+    """Describe Poincaré sections at some of `count` values: the regime at each."""
     over, unit = shown.attrs["over"], unit_of(shown)
     told = []
     for i in range(shown.sizes[over]):
@@ -172,7 +172,7 @@ def sections(shown: xr.Dataset, count: int) -> str:
 
 
 def periods(plane: xr.Dataset, other: str) -> str:
-    """Of a period map over the followed parameter and another: the share of each regime."""
+    """Describe a period map over the followed parameter and another: the share of each regime."""
     over = plane.attrs["over"]
     sentences = [
         f"Regimes over {said_of(plane, over)} ({plane.sizes[over]} values, followed) and "

@@ -72,7 +72,7 @@ def draw_bifurcation(pair: xr.Dataset) -> Figure:
 
 
 def plot_places(panel: Axes, pair: xr.Dataset, joint: str) -> None:
-    """The journal's place along the cylinder, once a revolution, at each value."""
+    """Draw the journal's place along the cylinder, once a revolution, at each value."""
     over = pair.attrs["over"]
     for direction, (color, size, height) in looks(pair).items():
         points = pair["section"].sel(direction=direction, joint=joint, coordinate="x")
@@ -90,7 +90,7 @@ def plot_places(panel: Axes, pair: xr.Dataset, joint: str) -> None:
 
 
 def plot_periods(panel: Axes, pair: xr.Dataset) -> None:
-    """The period at each value; above it where there is none."""
+    """Draw the period at each value; above it where there is none."""
     x = positions(pair, pair.attrs["over"])
     for direction, (color, size, height) in looks(pair).items():
         row = period_rows(pair.sel(direction=direction))
@@ -114,7 +114,7 @@ def period_rows(chain: xr.Dataset) -> np.ndarray:
 
 
 def plot_exponents(panel: Axes, pair: xr.Dataset) -> None:
-    """The largest Lyapunov exponent with its error at each value."""
+    """Draw the largest Lyapunov exponent with its error at each value."""
     x = positions(pair, pair.attrs["over"])
     for direction, (color, size, height) in looks(pair).items():
         chain = pair.sel(direction=direction)
@@ -176,7 +176,7 @@ def draw_sections(shown: xr.Dataset) -> Figure:
 
 
 def plot_section(panel: Axes, one: xr.Dataset) -> None:
-    """The Poincaré points of one value and one joint."""
+    """Draw the Poincaré points of one value and one joint."""
     for direction, (color, size, height) in looks(one).items():
         points = one["section"].sel(direction=direction)
         x, rate = (points.sel(coordinate=name).values for name in ("x", "x_rate"))
@@ -259,7 +259,7 @@ def room(panel: Axes) -> None:
 
 
 def mark_failed(panel: Axes, pair: xr.Dataset) -> None:
-    """A mark at the foot of a panel where a run of either direction failed."""
+    """Draw a mark at the foot of a panel where a run of either direction failed."""
     over = pair.attrs["over"]
     failed = (pair["status"] == "failed").any("direction").values
     x = positions(pair, over)[failed]
@@ -338,7 +338,7 @@ def draw_periods(plane: xr.Dataset, other: str) -> Figure:
 
 
 def plot_classes(panel: Axes, chain: xr.Dataset, x: np.ndarray, y: np.ndarray) -> None:
-    """The classes of one direction in their colours, dims (other, over)."""
+    """Draw the classes of one direction in their colours, dims (other, over)."""
     across, along = np.argsort(x, kind="stable"), np.argsort(y, kind="stable")
     classes = period_classes(chain)[np.ix_(along, across)]
     panel.patch.set(**HATCH)

@@ -94,7 +94,7 @@ def axis_label(study: xr.Dataset, name: str) -> str:
 
 
 def frame(panel: Axes, first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
-    """A rectangle around the supported range, where a plane has one."""
+    """Draw a rectangle around the supported range, where a plane has one."""
     if all(list(one["range"]) == list(one["supported_range"]) for one in (first, second)):
         return
     (left, right), (low, high) = first["supported_range"], second["supported_range"]

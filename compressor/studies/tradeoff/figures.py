@@ -80,7 +80,7 @@ def draw_work_precision(study: xr.Dataset) -> Figure:
 
 
 def plot_scene(panel: Axes, one: xr.Dataset) -> None:
-    """A line a method, the rings of the tiers, and the paper's star."""
+    """Draw a line a method, the rings of the tiers, and the paper's star."""
     for name in one["method"].values:
         line, marker, _ = LOOKS.get(str(name), OTHER)
         row = one.sel({"method": name})
@@ -97,7 +97,7 @@ def plot_scene(panel: Axes, one: xr.Dataset) -> None:
 
 
 def mark_tiers(panel: Axes, row: xr.Dataset) -> None:
-    """A ring and the word where a tolerance has one."""
+    """Draw a ring and the word where a tolerance has one."""
     for word, tier in ACCURACY.items():
         if tier.rtol in row["tolerance"].values:
             point = row.sel({"tolerance": tier.rtol})

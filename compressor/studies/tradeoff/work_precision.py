@@ -221,7 +221,7 @@ def empty(scenes: list[str], methods: Sequence[str], tolerances: Sequence[float]
 
 
 def compare_references(study: xr.Dataset, name: str, truth: Mapping[str, Mapping]) -> None:
-    """How far the references of a case lie apart, by quantity."""
+    """Return how far the references of a case lie apart, by quantity."""
     apart = errors(truth[REFERENCES[1]], truth[REFERENCES[0]])
     study["reference_uncertainty"].loc[name] = [apart[quantity] for quantity in ERRORS]
 
