@@ -17,6 +17,10 @@ VERSION = "0.1.0"
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
 COMPILED = Path(__file__).parent / "physics"  # the sources that are compiled
 CODE_VARIABLE = "NUMBA_CACHE_DIR"
+# that keep numeric libraries to so many threads
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
+)  # fmt: skip
 MAX_MEANT = 3  # words that may have been meant
 LONGEST_WORD = 100  # characters of a word that others are compared with
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.program import printable
+from compressor.program import THREAD_VARIABLES, printable
 from compsim.results import files, folders
 
 if TYPE_CHECKING:
@@ -90,12 +90,10 @@ limit = click.option(
     help="Refuse a case file that asks for more, before it is expanded.",
 )  # fmt: skip
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-
 
 def one_thread_each() -> None:
     """Keep numeric libraries that load later, here or in workers, to one thread a process."""
-    for name in THREADS:
+    for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
 
 

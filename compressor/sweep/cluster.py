@@ -1,26 +1,45 @@
 """Run cases on the workers of a dask.distributed cluster.
 
 Each worker of the cluster does its batches in processes of its own, as a run on one machine does
-(`execution`).
+(`execution`). A batch whose worker is lost runs elsewhere; if that happens again and again, it is
+tried alone, then job by job.
 """
 
 import contextlib
 import logging
+import math
+import multiprocessing
 import os
 import pickle
 import threading
+import time
 import uuid
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError, Future
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from compressor.cases import Case
 from compressor.outcome import Outcome
+from compressor.reasons import Reason
 from compressor.store import StoreError, publish, store_series
+from compressor.sweep.execution import (
+    FAILED_ALONE,
+    MEMORY_SHARE,
+    Batches,
+    End,
+    Input,
+    Job,
+    Local,
+    WorkersFailed,
+    cores,
+    memory_share,
+)
 from compressor.sweep.run_job import Carried, run_job
 from compressor.sweep.sweep import GRACE, LazyCases
-from compressor.sweep.versions import ClusterError, differences, unfitness, versions
+from compressor.sweep.versions import ClusterError, Unfit, differences, unfitness, versions
 from compressor.sweep.warm_up import Needs, load
 from compressor.sweep.worker import JobLost, JobResult, Workers
 
@@ -62,6 +81,148 @@ def receive_result(place: Path, result: Any) -> Any:
     except StoreError as error:
         return error
     return outcome
+
+
+POOL_LOCK = threading.Lock()  # one pool a process: threads take turns, each with all of it
+KEPT: dict[bytes, Local] = {}  # the pool that is kept for the next batch, by what it does
+
+
+class Batch(NamedTuple):
+    """What a worker of the cluster does in one go; jobs are named by their places in it."""
+
+    versions: dict[str, str]  # that are asked for
+    work: Callable[[Any], Any]
+    rules: Workers
+    jobs: list[Job]
+
+
+def on_worker(data: bytes) -> bytes:
+    """Do a pickled Batch on a worker of the cluster; return its pickled ends. Raises Unfit."""
+    from distributed import get_worker
+
+    worker, batch = get_worker(), Batch(*pickle.loads(data))
+    try:
+        if different := differences(batch.versions, versions()):
+            raise Unfit(different)
+        # dask's workers are daemons, which may have no children lest they outlive them; ours die
+        # with their parent
+        multiprocessing.current_process().daemon = False
+        most = worker.memory_manager.memory_limit  # of all threads together; None: no limit
+        count = worker.state.nthreads
+        share = int(MEMORY_SHARE * most / count) if most else memory_share(max(cores(), count))
+        rules = replace(batch.rules, count=count, memory=share)
+        with POOL_LOCK:
+            return in_processes(batch.work, rules, batch.jobs)
+    except (Unfit, WorkersFailed) as error:
+        raise Unfit(f"{worker.address}: {error}") from error
+
+
+def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) -> bytes:
+    """Do jobs in processes that stay for the next batch; their ends, in order, pickled."""
+    key = pickle.dumps((work, rules))
+    if key not in KEPT:
+        while KEPT:
+            KEPT.popitem()[1].stop()
+        KEPT[key] = Local(work, [], rules)
+        KEPT[key].decode = bytes  # results travel on as they are
+    local = KEPT[key]
+    local.waiting.extend(jobs)
+    try:
+        ends = sorted(local.run_pending(lambda: None), key=lambda end: end.id)
+    except BaseException:
+        KEPT.pop(key).stop()
+        raise
+    return pickle.dumps(ends, pickle.HIGHEST_PROTOCOL)
+
+
+CENSUS = 2.0  # s between two counts of the workers
+MAX_BYTES = 100_000_000  # of results that may be on their way
+SECONDS_TO_REMARK = 5.0  # s without a result before a remark on it
+STARTING_REMARK = "the cluster's workers load, or compile, the equations (under a minute)"
+WAITING = "the cluster has no workers: waiting for the first"
+
+
+class Remote(Batches):
+    """Jobs on a cluster; all functions that workers call are found there by their names.
+
+    What runs when it is stopped ends by itself, and is forgotten. Raises ClusterError where a
+    worker has other versions, or the scheduler is lost.
+    """
+
+    def __init__(
+        self,
+        client: Any,
+        work: Callable[[Any], Any],
+        rules: Workers,
+        jobs: Iterable[Input],
+    ):
+        super().__init__(jobs, rules.target_seconds, 1)
+        self.client, self.work, self.rules = client, work, rules
+        self.executor = client.get_executor(pure=False)
+        self.asked = versions()
+        self.remark: Callable[[str], None] = lambda text: None
+        self.threads, self.census = -1, 0.0  # of all workers, when they were counted
+        self.size = 0.0  # bytes of a result
+        self.patience = time.monotonic() + SECONDS_TO_REMARK
+
+    def next_batch(self) -> list[Job]:
+        """As ever, but while large results are on their way no more are asked for."""
+        on_way = self.size * sum(map(len, [*self.out.values()]))
+        return [] if on_way > MAX_BYTES else super().next_batch()
+
+    def submit(self, number: int, batch: list[Job]) -> "Future[bytes]":
+        jobs = [Job(n, *job[1:3]) for n, job in enumerate(batch)]
+        asked = Batch(self.asked, self.work, self.rules, jobs)
+        return self.executor.submit(on_worker, pickle.dumps(asked, pickle.HIGHEST_PROTOCOL))
+
+    def watch(self, now: float, news: bool) -> None:
+        """Count the threads of all workers now and then, and tell where there is none."""
+        if now - self.census < CENSUS:
+            return
+        try:
+            threads = [*self.client.nthreads().values()]
+        except (OSError, TimeoutError, ValueError) as error:
+            raise describe_lost_scheduler(self.client) from error
+        if not threads and self.threads:
+            self.remark(WAITING)
+        self.threads, self.census, self.width = sum(threads), now, max(len(threads), 1)
+        self.target_seconds = self.rules.target_seconds * max(sum(threads) / self.width, 1)
+        if threads and not self.weight and now > self.patience:
+            self.remark(STARTING_REMARK)
+            self.patience = math.inf
+
+    def ends_of(self, number: int, data: bytes) -> list[End]:
+        self.size = max(len(data) / len(self.out[number]), 0.9 * self.size)
+        return pickle.loads(data)
+
+    def fail(self, number: int, error: BaseException) -> Iterator[JobLost]:
+        """Yield the jobs of a batch that lost its workers twice; it runs alone, then each job."""
+        from distributed import KilledWorker
+
+        if isinstance(error, CancelledError) or self.client.status != "running":
+            raise describe_lost_scheduler(self.client) from error
+        if not isinstance(error, KilledWorker):
+            unfit = unfitness(error) or f"a batch failed: {type(error).__name__}: {error}"
+            raise ClusterError(f"worker {unfit}") from error
+        batch = self.out.pop(number)
+        if self.alone and len(batch) == 1:
+            how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
+            yield JobLost(batch[0].id, Reason.WORKER_DIED, f"{how}, {FAILED_ALONE}")
+        else:
+            self.suspects.extend([[job] for job in batch] if self.alone else [batch])
+
+    def discard(self) -> None:
+        """Nothing is shared with a suspect: no other batch is at work."""
+
+    def end_pool(self) -> None:
+        """Have what has not begun never begin."""
+        self.executor.shutdown(wait=False)
+
+
+def describe_lost_scheduler(client: Any) -> ClusterError:
+    """Return the error of a scheduler that has gone."""
+    address = client.scheduler.address if client.scheduler else "the scheduler"
+    return ClusterError(f"{address}: the scheduler was lost; the same command goes on with another")
 
 
 EXTRA = "--backend dask needs dask.distributed: pip install 'compsim[dask]'"
@@ -123,15 +284,13 @@ class Cluster:
         pulse: Callable[[], object],
     ) -> Generator[JobResult | JobLost, None, None]:
         """Run cases; `compressor.sweep.sweep.Backend` tells the rest."""
-        from compressor.sweep.cluster_batches import Remote  # loads dask: only where one is used
-
         with visible(place) as (token, text):
             rules = Workers(prepare=partial(load, Needs.of(cases)), grace=GRACE)
             work = partial(run_near, place, token, text)
             remote = Remote(self.client, work, rules, LazyCases(cases))
             remote.remark = remark
             remote.decode = lambda result: receive_result(place, pickle.loads(result))
-            yield from remote.ends(pulse)
+            yield from remote.run(pulse)
 
 
 def within(seconds: float, call: Callable[[], Any]) -> Any:

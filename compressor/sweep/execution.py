@@ -1,14 +1,12 @@
-"""Run jobs in joblib's worker processes: one that crashes, hangs or eats memory costs itself only.
+"""Run jobs in worker processes: one that crashes, hangs or eats memory costs itself only.
 
-Starting, feeding and ending processes is joblib's work (its loky backend here, its dask backend in
-`cluster`). Ours is what it cannot know: how many jobs make a batch, which job was at
-work in a process that died or took too long, and what runs again.
+Starting, feeding and ending processes is the work of an executor of `concurrent.futures`: loky's,
+which comes with joblib, here, and dask's in `cluster`. Ours is what it cannot know: how many jobs
+make a batch, which job was at work in a process that died or took too long, and what runs again.
 """
 
 import contextlib
 import itertools
-import math
-import mmap
 import multiprocessing
 import operator
 import os
@@ -16,31 +14,26 @@ import pickle
 import platform
 import queue
 import signal
-import sys
 import tempfile
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from joblib import Parallel, cpu_count, delayed
-from joblib.externals.loky import get_reusable_executor
-from joblib.externals.loky.backend import resource_tracker as loky_tracker
-from joblib.externals.loky.backend.process import LokyProcess
-from joblib.externals.loky.process_executor import BrokenProcessPool
-from joblib.parallel import LokyBackend
+from joblib import cpu_count
+from joblib.externals.loky import ProcessPoolExecutor
 
-from compressor.program import CompsimError, ignore_warnings
+from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
 from compressor.sweep.worker import (
     ENDING,
     NOTE,
-    WHY,
     JobLost,
     JobResult,
     Workers,
@@ -54,7 +47,7 @@ End = JobResult | JobLost
 
 TICK = 0.1  # s between two looks at the clocks of the jobs
 MAX_BATCH = 200  # jobs
-MAX_READY = 4  # batches a worker that wait to be taken before workers wait, too
+BATCHES_AHEAD = 3  # that a worker has at most: one at work, others on their way
 MEMORY = 50  # jobs that a mean of their seconds rests on
 FAILED_ALONE = "also when it ran again alone"
 
@@ -69,100 +62,93 @@ class Job(NamedTuple):
 
 
 class Batches:
-    """Jobs that are not finished, in batches as joblib takes them; what all its backends share.
+    """Jobs that are not finished, in batches for an executor; what both kinds of it share.
 
-    joblib waits in a thread of its own: it can do nothing else meanwhile, and an exception of a
-    signal must not hit it.
+    Batches are sent in a thread: an exception of a signal must not hit an executor.
     """
 
-    parallel: Callable[[], Parallel]  # joblib's, for one round: called in the thread
-    call: Callable[[list[Job]], Any]  # a batch as joblib takes it
-    watch: Callable[[float, bool], None]  # called often: the time, whether something has arrived
-    fail: Callable[[BaseException], Iterable[JobLost]]  # a round ended by an error
+    submit: Callable[[int, list[Job]], "Future[Any]"]  # a batch by number, to the executor
+    watch: Callable[[float, bool], None]  # called often: the time, whether a batch has ended well
+    ends_of: Callable[[int, Any], list[End]]  # what a batch gave: in order, but a rest given back
+    fail: Callable[[int, BaseException], Iterable[JobLost]]  # a batch has ended by an error
     discard: Callable[[], None]  # ends what a job that is tried alone must not share with others
-    stop: Callable[[], None]  # ends all workers; what had arrived stays
+    end_pool: Callable[[], None]  # ends all workers; what had arrived stays
 
     def __init__(self, jobs: Iterable[Input], target_seconds: float, width: int):
         self.source, self.left = iter(jobs), operator.length_hint(jobs, 0)
         self.target_seconds, self.width = target_seconds, width  # width: batches at work at once
         self.waiting: deque[Job] = deque()  # to be done again
         self.suspects: deque[list[Job]] = deque()  # batches to be tried alone
-        self.out: dict[int, list[Job]] = {}  # batches that joblib has, by number
-        self.arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()  # None: a round has ended
+        self.numbers = itertools.count()
+        self.out: dict[int, list[Job]] = {}  # batches that the executor has, by number
+        self.arrived: queue.SimpleQueue[tuple[int, Future[Any]]] = queue.SimpleQueue()
         self.mean, self.weight = 0.0, 0  # seconds a job; how many jobs that rests on
         self.most = MAX_BATCH
+        self.drained = False  # no jobs are left in the source
         self.stopped = self.alone = False  # alone: a suspect is tried
-        self.round: Future[None] | None = None
         self.thread = ThreadPoolExecutor(1)
         self.decode: Callable[[bytes], Any] = pickle.loads
 
-    def ends(self, pulse: Callable[[], object]) -> Generator[End, None, None]:
+    def run(self, pulse: Callable[[], object]) -> Generator[End, None, None]:
         """Yield how each job ended; workers end with the iterator."""
         try:
-            yield from self.done(pulse)
+            yield from self.run_pending(pulse)
         except GeneratorExit:
             raise
         except BaseException:
             self.stop()
             while not self.arrived.empty():
-                if item := self.arrived.get():
-                    yield from self.finish(*item)
+                yield from self.finish(*self.arrived.get())
             raise
         finally:
             self.stop()
+            self.discard()
 
-    def done(self, pulse: Callable[[], object]) -> Iterator[End]:
+    def stop(self) -> None:
+        """Send no more, and end all workers; what had arrived stays."""
+        self.stopped = True
+        self.thread.shutdown()
+        self.end_pool()
+
+    def run_pending(self, pulse: Callable[[], object]) -> Iterator[End]:
         """Yield how each job ended; workers stay."""
-        while self.round or self.begin() or not self.arrived.empty():
+        self.sending = self.thread.submit(self.send)
+        wait([self.sending], TICK)
+        while True:
+            if self.sending.done():
+                self.sending.result()  # raises what jobs raise
+                if self.drained and not (self.out or self.waiting or self.suspects):
+                    return
+                self.sending = self.thread.submit(self.send)
             item: Any = ()
             with contextlib.suppress(queue.Empty):
                 item = self.arrived.get(timeout=TICK)
-            self.watch(time.monotonic(), bool(item))
+            self.watch(time.monotonic(), bool(item) and not error_of(item[1]))
             if item:
                 yield from self.finish(*item)
-            elif item is None and self.round:
-                error, self.round = self.round.exception(), None
-                yield from self.fail(error) if error else ()
             pulse()
 
-    def begin(self) -> bool:
-        """Have joblib do what there is, or one suspect alone; False where all jobs are done."""
-        batch = self.next_batch()
-        batches = itertools.chain([batch], iter(self.next_batch, []))
-        self.alone = not batch and bool(self.suspects)
-        if self.alone:
+    def send(self) -> None:
+        """Send batches until enough are out; a suspect alone, once all others have ended."""
+        while not self.alone and len(self.out) < BATCHES_AHEAD * self.width:
+            if not (batch := self.next_batch()):
+                break
+            self.send_batch(batch)
+        if self.suspects and not self.out and not self.stopped:
+            self.alone = True
             self.discard()
-            batches = itertools.chain([self.suspects.popleft()])
-        if batch or self.alone:
-            self.round = self.thread.submit(self.run, batches)
-        return self.round is not None
+            self.send_batch(self.suspects.popleft())
 
-    def run(self, batches: Iterable[list[Job]]) -> None:
-        """Have joblib do batches: in the thread. What they give arrives by `hand_over`."""
-        begun = False
-
-        def calls() -> Iterator[Any]:
-            nonlocal begun
-            for batch in batches:
-                begun = True
-                yield self.call(batch)
-
+    def send_batch(self, batch: list[Job]) -> None:
+        """Send a batch; however it ends, it arrives."""
+        number = next(self.numbers)
+        self.out[number] = batch
         try:
-            for _ in self.parallel()(calls()):
-                pass
-        except BaseException:
-            for batch in itertools.islice(batches, 0 if begun else 1):  # joblib has taken none
-                if self.alone:
-                    self.suspects.append(batch)
-                else:
-                    self.waiting.extendleft(reversed(batch))
-            raise
-        finally:
-            self.arrived.put(None)
-
-    def hand_over(self, number: int, found: Any) -> None:
-        """A batch has ended: in joblib's thread."""
-        self.arrived.put((self.out.pop(number), found))
+            ended = self.submit(number, batch)
+        except Exception as error:  # the pool has broken, or cannot start
+            ended = Future()
+            ended.set_exception(error)
+        ended.add_done_callback(lambda ended: self.arrived.put((number, ended)))
 
     def next_batch(self) -> list[Job]:
         """Return the jobs for about `target_seconds`: few at first, and towards the end.
@@ -173,9 +159,7 @@ class Batches:
         if self.left:
             size = min(size, (self.left + len(self.waiting)) / (2 * self.width))
         batch: list[Job] = []
-        while len(batch) < min(size, self.most):
-            if self.stopped or self.arrived.qsize() > MAX_READY * self.width:
-                break
+        while len(batch) < min(size, self.most) and not self.stopped:
             job = self.waiting.popleft() if self.waiting else self.issue()
             if job is None:
                 break
@@ -186,15 +170,25 @@ class Batches:
         """Return the next job of the source, None at its end."""
         for name, payload, timeout in self.source:
             self.left = max(self.left - 1, 0)
-            try:
-                return Job(name, pickle.dumps(payload, pickle.HIGHEST_PROTOCOL), timeout)
-            except Exception as error:
-                lost = JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
-                self.arrived.put(([Job(name, b"", timeout)], [lost]))
+            return Job(name, pickle.dumps(payload, pickle.HIGHEST_PROTOCOL), timeout)
+        self.drained = True
         return None
 
-    def finish(self, batch: list[Job], found: Any) -> Iterator[End]:
+    def finish(self, number: int, ended: "Future[Any]") -> Iterator[End]:
         """Yield how the jobs of a batch ended; a rest that was given back waits again."""
+        if number in self.out:  # else its pool was given up, and it waits again
+            if error := error_of(ended):
+                wait([self.sending])
+                yield from () if self.stopped else self.fail(number, error)
+            else:
+                found = self.ends_of(number, ended.result())
+                yield from self.settle(self.out.pop(number), found)
+        if self.alone and not self.out:
+            self.alone = False
+            self.discard()
+
+    def settle(self, batch: list[Job], found: list[End]) -> Iterator[End]:
+        """Yield how the jobs of a batch ended, from what it gave: in order, but for a rest."""
         self.waiting.extendleft(reversed(batch[len(found) :]))
         for job, end in zip(batch, found, strict=False):
             if isinstance(end, JobLost):
@@ -219,10 +213,15 @@ class Batches:
             )
 
 
+def error_of(ended: "Future[Any]") -> BaseException | None:
+    """Return what a batch raised, CancelledError where it never ran; None where it ended well."""
+    return CancelledError() if ended.cancelled() else ended.exception()
+
+
 STALL = 60.0  # s without any result, while no job runs, after which all workers are killed
 # s that workers may take to begin: what they prepare may have to be compiled
 MAX_START_SECONDS = 600.0
-UNSEEN = 3.0  # s that joblib may take to see that a worker died
+IDLE_SECONDS = 300.0  # after which a worker without a batch ends
 FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
 ELSEWHERE = "run these jobs in a process of their own"
 POOL = threading.Lock()
@@ -262,141 +261,99 @@ def run_batches(
     """Call work(payload) for each job in worker processes; yield how each one ended.
 
     `jobs` is read as workers need it, in a thread; where it has a length, batches shrink towards
-    the end. What `work` raises makes its job Lost. `pulse` is called several times a second,
+    the end. What `work` raises makes its job a JobLost. `pulse` is called several times a second,
     whether or not jobs end.
 
     Closing the iterator kills the workers. Whatever is raised here, a signal's exception too, comes
-    after the results that had arrived (`rest` does the same for what the caller raises). Raises
+    after the results that had arrived (`drain` does the same for what the caller raises). Raises
     WorkersFailed, also where another call in this process has not ended, and what `jobs` raises.
     """
     if multiprocessing.current_process().daemon:
         raise WorkersFailed(f"a daemonic process may start no workers: {ELSEWHERE}")
-    if not POOL.acquire(blocking=False):  # loky has one for the process: two would end each other's
+    if not POOL.acquire(blocking=False):  # children() does not tell the workers of two calls apart
         raise WorkersFailed(f"other jobs run in this process: wait until they end, or {ELSEWHERE}")
     try:
-        yield from Local(work, jobs, workers).ends(pulse)
+        yield from Local(work, jobs, workers).run(pulse)
     finally:
         POOL.release()
 
 
-def rest(ends: Generator[End, None, None], error: BaseException) -> Iterator[End]:
-    """After an error in the loop over `run_batches`: what had arrived by then, then the error."""
+def drain(ends: Generator[End, None, None], error: BaseException) -> Iterator[End]:
+    """Yield what had arrived when the loop over `run_batches` failed; then raise that error."""
     with contextlib.suppress(StopIteration):
         yield ends.throw(error)
         yield from ends
 
 
-class Loky(LokyBackend):
-    """joblib's loky backend, which tells of a batch at once, in its thread.
-
-    What waits in joblib's generator would be lost, and run again, when a worker dies.
-    """
-
-    def __init__(self, hand_over: Callable[[int, Any], None]):
-        super().__init__(inner_max_num_threads=1)
-        self.hand_over = hand_over
-
-    def retrieve_result_callback(self, out: Any) -> list[None]:
-        self.hand_over(*super().retrieve_result_callback(out)[0])
-        return [None]
-
-
 class Local(Batches):
     """Jobs in processes of this machine, on a pool that ends with any of its processes.
 
-    A note in shared memory tells of every batch which process is at which of its jobs, and since
-    when. Nothing else names the job in which a process died, hung in compiled code or stood still:
-    joblib knows batches alone, and fails all of them at once.
+    Each batch has a file in memory that its worker shares. A note in it tells which process is at
+    which job, and since when: nothing else names the job in which a process died, hung in compiled
+    code or stood still. Results come in it, too: through loky's pipe a worker that died amid a long
+    message would leave loky reading the rest for ever.
     """
 
     def __init__(self, work: Callable[[Any], Any], jobs: Iterable[Input], rules: Workers):
         super().__init__(jobs, rules.target_seconds, rules.count)
         self.rules = replace(rules, memory=rules.memory or memory_share(rules.count))
-        self.places = 4 * max(rules.count, 2)  # for notes: more than joblib asks for
-        self.shared, self.path = shared_file(self.places * NOTE.size + WHY)
-        self.notes: Any = mmap.mmap(self.shared, 0)
-        self.initargs = (work, self.rules, self.path, os.getpid())
-        self.pool = self.executor = None  # type: Any
-        self.heard = 0.0  # when a batch was last handed out, or ended
-        self.died: float = math.inf  # when a process was first seen to have died
-        self.fruitless, self.begun = 0, False  # begun: a job of this pool has
-        self.discard()
+        self.work = work
+        self.files: dict[int, SharedFile] = {}  # of the batches that are out
+        self.executor: ProcessPoolExecutor | None = None
+        self.processes: dict[int, Any] = {}
+        self.late: set[int] = set()  # processes that were killed for taking too long
+        self.fruitless, self.heard = 0, 0.0  # heard: when a batch was last sent, or ended
+        self.begun = False  # whether a job of this pool has
 
-    def parallel(self) -> Parallel:
-        """Return the pool; a new one after a death, and for a suspect: in the thread.
+    def start(self) -> ProcessPoolExecutor:
+        """Return a new pool, of one process for a suspect."""
+        import resource  # not on Windows, where nothing is run
 
-        joblib would do a single job at a time in this process: it is told of two, loky of one.
-        """
         # helper processes remove what a SIGKILL of ours leaves: in silence
         os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
         resource_tracker.ensure_running()  # before: Python 3.11 lets signals in as it starts this
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in new workers, too, until they settle
-        if self.pool is None:
-            self.pool = Parallel(
-                max(self.width, 2), Loky(self.hand_over), "generator_unordered", batch_size=1,
-                pre_dispatch=2 * self.width, max_nbytes=None, temp_folder=tempfile.gettempdir(),
-                initializer=init_worker, initargs=self.initargs,
-            ).__enter__()  # fmt: skip
-            self.executor = get_reusable_executor(1 if self.alone else self.width, reuse=True)
-        return self.pool
+        if self.width > 100:  # whose files may be more than the usual 1024
+            _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+        environment = {name: os.environ.get(name, "1") for name in THREAD_VARIABLES}
+        environment["PYTHONFAULTHANDLER"] = ""  # or loky has a crash print where it was
+        return ProcessPoolExecutor(
+            1 if self.alone else self.width, timeout=IDLE_SECONDS, initializer=init_worker,
+            initargs=(self.work, self.rules, os.getpid()), env=environment,
+        )  # fmt: skip
 
-    def call(self, batch: list[Job]) -> Any:
-        place = self.free.popleft()
-        NOTE.pack_into(self.notes, place * NOTE.size, 0, 0, 0)
-        self.out[place], self.heard = batch, time.monotonic()
-        return delayed(do_batch)(place, [job.payload for job in batch])
+    def submit(self, number: int, batch: list[Job]) -> "Future[Any]":
+        self.executor = self.executor or self.start()
+        self.files[number] = file = SharedFile()
+        self.heard = time.monotonic()
+        return self.executor.submit(do_batch, file.path, [job.payload for job in batch])
 
-    def hand_over(self, number: int, found: Any) -> None:
-        super().hand_over(number, found)
-        self.free.append(number)
-
-    def note(self, place: int) -> tuple[int, int, float]:
-        """Return the process and job of a batch.
-
-        Since when the job runs, or minus its end; 0: none yet.
-        """
-        pid, position, since = NOTE.unpack_from(self.notes, place * NOTE.size)
-        return int(pid), int(position), since
+    def ends_of(self, number: int, problem: str) -> list[End]:
+        """Return how jobs ended, from the file of their batch. Raises WorkersFailed."""
+        if problem:
+            raise WorkersFailed(f"jobs could not even begin: {problem}")
+        return self.files.pop(number).read()
 
     def watch(self, now: float, news: bool) -> None:
         """Kill workers whose jobs take too long, and all of them where nothing moves any more."""
-        revive_tracker()
-        self.processes |= {child.pid: child for child in children()}
+        self.processes = self.processes | {child.pid: child for child in children()}
         if news:
             self.heard, self.fruitless, self.most = now, 0, MAX_BATCH
         latest, at_work = self.heard, False
-        for place, batch in list(self.out.items()):
-            pid, position, since = self.note(place)
+        for number, file in [*self.files.items()]:
+            pid, position, since = file.note()
             latest, at_work = max(latest, abs(since)), at_work or since > 0
             # compiled code looks at the clock itself: this is for jobs that hang outside of it
-            if since > 0 and now - since > batch[position].timeout + self.rules.grace:
+            if since > 0 and now - since > self.out[number][position].timeout + self.rules.grace:
                 self.late.add(pid)
                 kill([pid])
-        dead = any(child.exitcode for child in self.processes.values())
-        self.died = min(self.died, now) if dead else math.inf
         self.begun = self.begun or latest > self.heard
-        if (
-            self.round
-            and not at_work
-            and now - latest > (STALL if self.begun else MAX_START_SECONDS)
-        ):
+        patience = STALL if self.begun else MAX_START_SECONDS
+        if self.out and not at_work and now - latest > patience:
             kill(self.processes)
-        if self.round and now - self.died > UNSEEN:
-            self.unblock()
 
-    def unblock(self) -> None:
-        """Have joblib see that a worker died, which it should within milliseconds.
-
-        One that died amid a message leaves joblib reading the rest of it for ever, since this
-        process, too, could write there: loky keeps that end open.
-        """
-        kill(child.pid for child in children())
-        results = getattr(self.executor, "_result_queue", None)
-        if results and not children():  # loky will close it, perhaps at this moment
-            with contextlib.suppress(OSError), open(os.devnull, "wb") as nobody:
-                os.dup2(nobody.fileno(), results._writer.fileno())
-
-    def fail(self, error: BaseException) -> Iterator[JobLost]:
+    def fail(self, number: int, error: BaseException) -> Iterator[JobLost]:
         """Yield the jobs that are lost with a broken pool; the others wait to run again.
 
         A job that ran in the process that died may be the cause, and is tried alone.
@@ -405,17 +362,18 @@ class Local(Batches):
             if isinstance(error, OSError) and not self.processes:
                 raise WorkersFailed(f"no worker process can be started: {error}") from error
             raise error
+        self.end_pool()
         # loky ends the whole pool with one process: the others die by SIGKILL, and their jobs are
         # no culprits, unless no process died by itself and so nobody can be named
         codes = {pid: child.exitcode for pid, child in self.processes.items()}
         died = {pid for pid, code in codes.items() if code not in (None, -signal.SIGKILL)}
-        notes = {place: self.note(place) for place in self.out}
-        running = {place: pid for place, (pid, _, since) in notes.items() if since > 0}
-        named = [place for place, pid in running.items() if pid in died | self.late]
+        notes = {number: file.note() for number, file in self.files.items()}
+        running = {number: pid for number, (pid, _, since) in notes.items() if since > 0}
+        named = [number for number, pid in running.items() if pid in died | self.late]
         largest = max(map(len, self.out.values()), default=1)
-        for place, batch in self.out.items():
-            if place in (named or running):  # joblib has killed the others, also by SIGKILL
-                pid, position, _ = notes[place]
+        for number, batch in self.out.items():
+            if number in (named or running):  # loky has killed the others, also by SIGKILL
+                pid, position, _ = notes[number]
                 yield from self.blame(batch.pop(position), pid in self.late, codes.get(pid))
             if batch and self.alone:
                 self.suspects.append(batch)
@@ -424,8 +382,7 @@ class Local(Batches):
         if not running:  # nobody is named: smaller batches will tell
             self.fruitless, self.most = self.fruitless + 1, max(1, largest // 2)
             if self.fruitless > FRUITLESS:
-                why = self.notes[-WHY:].rstrip(b"\0").decode(errors="replace")
-                how = why or batch_ending(next((codes[pid] for pid in died), None))
+                how = batch_ending(next((codes[pid] for pid in died), None))
                 raise WorkersFailed(f"jobs could not even begin: {how}")
         self.discard()
 
@@ -437,74 +394,66 @@ class Local(Batches):
             text = f"more than {job.timeout:g} s of wall time; its worker was killed"
         yield from self.lose(job, JobLost(None, reason, text), not late)
 
-    def discard(self) -> None:
-        """End the pool, if there is one."""
+    def end_pool(self) -> None:
+        """End all processes, if there are any; what had arrived stays."""
         if self.executor:
             with contextlib.suppress(BrokenPipeError):
-                self.executor.terminate(kill_workers=True)
+                self.executor.shutdown(kill_workers=True)
             kill(child.pid for child in children())
-        self.pool = self.executor = None
-        self.processes: dict[int, Any] = {}
-        self.late: set[int] = set()  # processes that were killed for taking too long
-        self.died, self.begun = math.inf, False
-        self.out, self.free = {}, deque(range(self.places))
+        self.executor = None
 
-    def stop(self) -> None:
-        self.stopped = True
-        while self.round and not self.round.done():
-            kill(child.pid for child in children())
-            self.watch(time.monotonic(), False)
-            wait([self.round], TICK)
-        self.thread.shutdown()
-        self.discard()
-        if self.notes:
-            self.notes = self.notes.close()
-            os.close(self.shared)
-            with contextlib.suppress(OSError):
-                os.unlink(self.path)  # where it is a file on disk
+    def discard(self) -> None:
+        """End all processes, and forget the batches that they had."""
+        self.end_pool()
+        self.processes, self.late, self.begun, self.out = {}, set(), False, {}
+        while self.files:
+            self.files.popitem()[1].close()
 
 
-def shared_file(size: int) -> tuple[int, str]:
-    """Return a file that workers can map, and its path: where it can be one in memory, which ends
-    with us.
+class SharedFile:
+    """A file of a batch: a note, then results. In memory where it can be one, which ends with us.
 
     Python's own shared memory is removed by whichever process of it ends first, once the process
     that keeps count of it has been killed.
     """
-    try:
-        number = os.memfd_create("notes of compsim's workers")
-        path = f"/proc/{os.getpid()}/fd/{number}"
-        if not os.path.exists(path):
-            os.close(number)
-            raise FileNotFoundError(path)
-    except (AttributeError, OSError):  # not Linux, an old kernel, a sandbox, no /proc
-        number, path = tempfile.mkstemp()
-    os.truncate(number, size)
-    return number, path
 
+    def __init__(self) -> None:
+        try:
+            self.number = os.memfd_create("a batch of compsim")
+            self.path = f"/proc/{os.getpid()}/fd/{self.number}"
+            if not os.path.exists(self.path):
+                os.close(self.number)
+                raise FileNotFoundError(self.path)
+        except (AttributeError, OSError):  # not Linux, an old kernel, a sandbox, no /proc
+            self.number, self.path = tempfile.mkstemp()
+        os.truncate(self.number, NOTE.size)
 
-def revive_tracker() -> None:
-    """Start loky's helper again where it was killed, silent: it never knew the names it is told."""
-    pid = loky_tracker._resource_tracker._pid
-    if pid is None or sys.platform != "linux":
-        return
-    with contextlib.suppress(ChildProcessError):
-        if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
-            return
-    ours, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        with ignore_warnings():
-            loky_tracker.ensure_running()
-    finally:
-        os.dup2(ours, 2)
-        os.close(ours)
-        os.close(nowhere)
+    def note(self) -> tuple[int, int, float]:
+        """Return the process and job of a batch, and since when the job runs, or minus its end.
+
+        Zeros: none has begun.
+        """
+        pid, position, since = NOTE.unpack(os.pread(self.number, NOTE.size, 0))
+        return int(pid), int(position), since
+
+    def read(self) -> Any:
+        """Return what the worker has left, and close the file."""
+        with open(self.number, "rb", closefd=False) as file:
+            file.seek(NOTE.size)
+            found = pickle.load(file)
+        self.close()
+        return found
+
+    def close(self) -> None:
+        """Close the file, and remove it where it is one on disk."""
+        os.close(self.number)
+        with contextlib.suppress(OSError):
+            os.unlink(self.path)
 
 
 def children() -> list[Any]:
     """Return the processes that loky has started and that run."""
-    return [c for c in multiprocessing.active_children() if isinstance(c, LokyProcess)]
+    return [c for c in multiprocessing.active_children() if c.name.startswith("LokyProcess")]
 
 
 def kill(pids: Iterable[int]) -> None:

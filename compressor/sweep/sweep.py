@@ -16,7 +16,7 @@ from typing import Any, Protocol
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.store import Folder, StoreError, Writer, write_study
-from compressor.sweep.execution import Input, require_posix, rest, run_batches
+from compressor.sweep.execution import Input, drain, require_posix, run_batches
 from compressor.sweep.run_job import run_ahead, run_job
 from compressor.sweep.wanted import (
     JobEnd,
@@ -209,7 +209,7 @@ def run_missing(
         for end in running:
             keep(end)
     except BaseException as error:
-        for end in rest(running, error):  # which raises it again
+        for end in drain(running, error):  # which raises it again
             keep(end)
     finally:
         running.close()

@@ -25,8 +25,7 @@ if hasattr(signal, "SIGHUP"):  # not on Windows
     ENDING.append(signal.SIGHUP)
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 NOTE = struct.Struct("ddd")  # process; job of the batch; since when it runs, or minus its end (s)
-
-WHY = 400  # bytes behind the notes: what kept a worker from beginning
+MAX_PROBLEM = 400  # characters of what keeps a worker from beginning: a message in one piece
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,8 @@ class Workers:
 HERE: dict[str, Any] = {}  # what `init_worker` leaves for `do_batch`
 
 
-def init_worker(work: Callable[[Any], Any], rules: Workers, notes: str, parent: int) -> None:
-    """Make a new process a worker: its end, signals, streams, memory; what it is told once."""
+def init_worker(work: Callable[[Any], Any], rules: Workers, parent: int) -> None:
+    """Make a new process a worker: its end, signals and streams."""
     if sys.platform == "linux":  # die when the parent does, even amid compiled code
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # it died before
@@ -85,19 +84,20 @@ def init_worker(work: Callable[[Any], Any], rules: Workers, notes: str, parent: 
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     with contextlib.suppress(OSError):  # there may be no stderr
         os.dup2(2, 1)  # stdout is for data
-    os.environ["PYTHONFAULTHANDLER"] = ""  # or loky has a crash print where it was
+    HERE.update(work=work, rules=rules, prepared=False)
+
+
+def prepare() -> str:
+    """Make ready for the first batch; return what keeps this process from it, or ""."""
+    rules = HERE["rules"]
     try:
         rules.prepare()
-    except BaseException as error:  # which joblib would print from each worker
-        with open(notes, "r+b") as file:
-            file.seek(-WHY, os.SEEK_END)
-            file.write(describe_error(error)[0].encode()[:WHY])
-        os._exit(1)
+    except BaseException as error:
+        return describe_error(error)[0][:MAX_PROBLEM]
     gc.freeze()  # what is there by now stays: looking at it took a thirtieth of short jobs' time
-    assert rules.memory
-    with open(notes, "r+b") as file:
-        HERE.update(work=work, rules=rules, notes=mmap.mmap(file.fileno(), 0))
     limit(rules.memory)
+    HERE["prepared"] = True
+    return ""
 
 
 def limit(memory: int) -> None:
@@ -121,21 +121,30 @@ def limit(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
 
 
-def do_batch(place: int, payloads: Sequence[bytes]) -> tuple[int, list[JobResult | JobLost]]:
-    """Do the jobs of a batch: its place, and how jobs ended, all but a rest that is given back."""
-    found: list[JobResult | JobLost] = []
-    began = start = time.monotonic()
-    NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), 0, start)
-    jobs, each = look_ahead(payloads), (time.monotonic() - start) / len(payloads)
-    for position, job in enumerate(jobs):
-        start = time.monotonic()
-        NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), position, start)
-        found.append(perform(job, start - each))
-        start = time.monotonic()
-        NOTE.pack_into(HERE["notes"], place * NOTE.size, os.getpid(), position, -start)
-        if start - began > OVERRUN * HERE["rules"].target_seconds:
-            break
-    return place, found
+def do_batch(path: str, payloads: Sequence[bytes]) -> str:
+    """Do the jobs of a batch; return what keeps this process from any job, or "".
+
+    The file gets a note of who is at which job, and in the end how jobs ended, all but a rest that
+    is given back.
+    """
+    if not HERE["prepared"] and (problem := prepare()):
+        return problem
+    with open(path, "r+b") as file, mmap.mmap(file.fileno(), NOTE.size) as note:
+        found: list[JobResult | JobLost] = []
+        began = start = time.monotonic()
+        NOTE.pack_into(note, 0, os.getpid(), 0, start)
+        jobs, each = look_ahead(payloads), (time.monotonic() - start) / len(payloads)
+        for position, job in enumerate(jobs):
+            start = time.monotonic()
+            NOTE.pack_into(note, 0, os.getpid(), position, start)
+            found.append(perform(job, start - each))
+            start = time.monotonic()
+            NOTE.pack_into(note, 0, os.getpid(), position, -start)
+            if start - began > OVERRUN * HERE["rules"].target_seconds:
+                break
+        file.seek(NOTE.size)
+        pickle.dump(found, file, pickle.HIGHEST_PROTOCOL)
+    return ""
 
 
 def look_ahead(payloads: Sequence[bytes]) -> Sequence[Callable[[], tuple[Any, ...]]]:

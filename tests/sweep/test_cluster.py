@@ -8,10 +8,12 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import distributed
+import joblib
 import numpy as np
 import pytest
 from bad_jobs import POISON, Many, named
@@ -24,9 +26,9 @@ from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.files import StoreError
 from compressor.store.status import verify
-from compressor.sweep import cluster, cluster_batches
-from compressor.sweep.cluster import Cluster
-from compressor.sweep.cluster_batches import Remote
+from compressor.sweep import cluster
+from compressor.sweep.cluster import Cluster, Remote
+from compressor.sweep.execution import BATCHES_AHEAD
 from compressor.sweep.sweep import Options, sweep
 from compressor.sweep.versions import ClusterError, differences, versions
 from compressor.sweep.worker import Workers
@@ -189,7 +191,7 @@ def remote(client, work, jobs, seconds=0.2, **more):
     """The ends of jobs on a cluster."""
     made = Remote(client, work, Workers(grace=0.3, target_seconds=seconds), jobs)
     vars(made).update(more)
-    return made.ends(lambda: None)
+    return made.run(lambda: None)
 
 
 def run(client, work, payloads):
@@ -235,6 +237,25 @@ def test_a_job_that_fells_workers_is_tried_alone_then_lost(dask, client, monkeyp
     assert end.detail.endswith("also when it ran again alone")
 
 
+def fell(_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_joblib_s_own_dask_backend_waits_for_ever_for_a_lost_batch(dask, client, monkeypatch):
+    """Why batches are sent by dask's own executor; it may go once joblib tells of the loss."""
+    monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
+
+    def lose():
+        with joblib.parallel_config("dask", client=client):
+            joblib.Parallel()(joblib.delayed(fell)(n) for n in range(2))
+
+    waiting = threading.Thread(target=lose, daemon=True)
+    waiting.start()
+    wait_for(lambda: "error" in [future.status for future in [*client.futures.values()]])
+    waiting.join(2)
+    assert waiting.is_alive()
+
+
 def test_nothing_of_a_cluster_s_worker_outlives_it(dask, client):
     """Its processes die with it, though dask does not know of them."""
     pid, *_ = results(run(client, pids, range(4))).values()
@@ -261,7 +282,7 @@ def test_many_jobs_are_never_listed(client):
     first = [end.id for end in itertools.islice(ends, 3000)]
     ends.close()
     assert len(set(first)) == 3000
-    assert next(issued) < 3000 + 2 * (2 * cluster_batches.A_THREAD + 1) * 1000
+    assert next(issued) < 3000 + 2 * (2 * BATCHES_AHEAD + 1) * 1000
 
 
 def large(payload):
@@ -269,7 +290,7 @@ def large(payload):
 
 
 def test_few_large_results_are_on_their_way(client, monkeypatch):
-    monkeypatch.setattr(cluster_batches, "MAX_BYTES", 3_000_000)
+    monkeypatch.setattr(cluster, "MAX_BYTES", 3_000_000)
     issued = itertools.count()
     ends = remote(client, large, Many((n, 1_000_000, 9.0) for n in issued), 1e-9)
     for taken in range(1, 30):
@@ -341,12 +362,12 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
 
         def remark(done, total, text):
             told.append(text)
-            if text == cluster_batches.WAITING:
+            if text == cluster.WAITING:
                 empty.close()
 
         with pytest.raises(ClusterError, match="the scheduler was lost; the same command goes on"):
             sweep(studies, tmp_path / "out", progress=remark, options=Options(backend=backend))
-    assert told.count(cluster_batches.WAITING) == 1
+    assert told.count(cluster.WAITING) == 1
 
 
 def test_without_distributed_the_extra_is_named(monkeypatch):

@@ -21,7 +21,7 @@ from bad_jobs import LEAST, POISON, SECONDS, Many, named, sleep, work
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from compressor.sweep import execution
-from compressor.sweep.execution import WorkersFailed, rest, run_batches
+from compressor.sweep.execution import WorkersFailed, drain, run_batches
 from compressor.sweep.worker import MAX_TEXT, JobLost, JobResult, Workers
 
 RULES = {"memory": LEAST, "grace": 0.3}
@@ -224,12 +224,6 @@ def test_a_poison_job_costs_itself_only(name):
     assert len(end.traceback) <= MAX_TEXT
 
 
-def test_a_payload_that_does_not_pickle_is_a_lost_job():
-    ends = list(run_batches(work, [*named([1]), ("odd", lambda: None, 9.0)], Workers(1)))
-    assert results(ends) == {1: 1}
-    assert lost(ends)["odd"].reason == "internal_error"
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_mixes_of_poison(seed):
     draw = random.Random(seed)
@@ -303,23 +297,23 @@ def test_workers_that_die_between_jobs_are_replaced(tmp_path):
 
 @pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_worker_that_ends_amid_a_message_costs_nothing(number, tmp_path, monkeypatch):
-    """No job runs whose clock tells; what is left half-said would have joblib read for ever."""
+def test_a_worker_that_ends_amid_its_results_costs_nothing(number, tmp_path, monkeypatch):
+    """No job runs whose clock tells; what is left half-written is read by nobody."""
     monkeypatch.setattr(execution, "STALL", 2.0)
 
-    def end_amid_message():
-        talking, main = False, threading.main_thread().ident
-        while not talking:
+    def end_amid_results():
+        writing, main = False, threading.main_thread().ident
+        while not writing:
             time.sleep(0.001)
             frames = traceback.walk_stack(sys._current_frames()[main])
-            talking = any(frame.f_code.co_name == "_send" for frame, _ in frames)
+            writing = not any(frame.f_code.co_name == "perform" for frame, _ in frames)
         time.sleep(0.01)
         os.kill(os.getpid(), number)
 
     def large(payload):
         if payload == 3 and not (tmp_path / "tried").exists():
             (tmp_path / "tried").touch()
-            threading.Thread(target=end_amid_message).start()
+            threading.Thread(target=end_amid_results).start()
         return bytes(100_000_000) if payload == 3 else payload
 
     ends = list(run_batches(large, named(range(6)), Workers(1, memory=4 * 10**9)))
@@ -361,9 +355,10 @@ def test_no_memory_file_and_no_proc_cost_nothing_else(monkeypatch):
     assert len(results(run_batches(work, named(range(20)), Workers(1)))) == 20
     monkeypatch.undo()
     monkeypatch.setattr(os.path, "exists", lambda path: False)
-    number, path = execution.shared_file(8)
-    os.close(number)
-    Path(path).unlink()  # a file on disk
+    file = execution.SharedFile()
+    assert Path(file.path).is_file()  # on disk
+    file.close()
+    assert not Path(file.path).is_file()
 
 
 def test_no_room_for_workers_ends_the_call(monkeypatch):
@@ -436,8 +431,8 @@ def test_results_that_came_before_the_caller_failed_are_kept():
     ends = [next(running)]
     time.sleep(0.5)
     with pytest.raises(LookupError, match="no more"):
-        ends.extend(rest(running, LookupError("no more")))
-    assert len(results(ends)) >= 4
+        ends.extend(drain(running, LookupError("no more")))
+    assert len(results(ends)) >= 3
     assert list(running) == []
 
 
