@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import threading
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
@@ -23,6 +23,13 @@ THREAD_VARIABLES = (
 )  # fmt: skip
 MAX_MEANT = 3  # words that may have been meant
 LONGEST_WORD = 100  # characters of a word that others are compared with
+
+
+Progress = Callable[[int, int, str], None]  # things done, things in all, a remark or ""
+
+
+def no_progress(done: int, total: int, remark: str) -> None:
+    """Report progress to nobody."""
 
 
 class CompsimError(Exception):

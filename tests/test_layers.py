@@ -64,7 +64,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "matplotlib": {"compressor.report.figures", "compressor.studies.*.figures",
                    "compressor.studies.regimes.figures"},
     "click": {"compsim", "compressor.studies", "compressor.studies.*command"},
-    "rich": {"compsim.live"},
+    "rich": {"compsim.progress"},
     "pyarrow": {"compressor.studies.diagnosis"},
     "sklearn": set(),  # of campaigns alone
 }  # fmt: skip

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compsim.progress import ProgressReporter
 from compsim.results import jobs, of_results, results_folder
 from compsim.screen import (
     DONE,
     STORE,
-    Screen,
     plural,
     print_text,
     say,
@@ -55,11 +55,8 @@ def export(
     from compressor.store import export as write
 
     writable_folder(os.path.dirname(output) or os.curdir, make=False)
-    screen = Screen(quiet, "files")
-    try:
-        found, damaged = write(folder, names, output, ExportOptions(form, series, force), screen)
-    finally:
-        screen.end()
+    with ProgressReporter(quiet, "files") as progress:
+        found, damaged = write(folder, names, output, ExportOptions(form, series, force), progress)
     if as_json:
         print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
     else:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from compressor.studies import by_kind
+from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
-    ReadingProgress,
     caution,
     configs_argument,
     duration,
@@ -59,9 +59,9 @@ def plan(
     from compressor.cases import load_studies
     from compressor.sweep import cores
 
-    with ReadingProgress() as told:
+    with ProgressReporter(False, "cases read") as progress:
         studies = load_studies(
-            *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
+            *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
         )
     caution(studies, None)
     kinds = by_kind(studies)

@@ -10,11 +10,10 @@ import click
 
 from compressor.program import printable
 from compressor.studies import by_kind
+from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    ReadingProgress,
-    Screen,
     all_stored,
     caution,
     configs_argument,
@@ -107,9 +106,9 @@ def run(
     from compressor.cases import load_studies
     from compressor.sweep import cores
 
-    with ReadingProgress(quiet) as told:
+    with ProgressReporter(quiet, "cases read") as progress:
         studies = load_studies(
-            *configs, overrides=overrides, max_jobs=max_jobs, only=only, told=told
+            *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
         )
     if only and not quiet:
         selected = sum(len(study.selected) for study in studies)
@@ -139,27 +138,20 @@ def run_jobs(
     tell_changes(studies, output)
     from compressor.sweep import Options, sweep
 
-    screen = Screen(quiet)
     with watching(output, page, context.obj, quiet) as watch:
+        with (
+            ProgressReporter(quiet, folder=output) as progress,
+            cluster(scheduler) as elsewhere,
+        ):
 
-        def stands(now: "SweepProgress") -> None:
-            screen.stands(now)
-            if watch:
-                watch.stands(now)
+            def show(now: "SweepProgress") -> None:
+                progress.show_sweep(now)
+                if watch:
+                    watch.stands(now)
 
-        try:
-            with cluster(scheduler) as elsewhere:
-                how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
-                              backend=elsewhere, pulse=stands)  # fmt: skip
-                summary = sweep(studies, output, jobs, screen, how)
-        except BaseException:
-            screen.end()
-            if screen.total:
-                verb = "is" if screen.total == 1 else "are"
-                say(f"{screen.done} of {plural(screen.total)} {verb} stored in {output}; "
-                    "the same command goes on from there")  # fmt: skip
-            raise
-        screen.end()
+            how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
+                          backend=elsewhere, pulse=show)  # fmt: skip
+            summary = sweep(studies, output, jobs, progress, how)
         report_run(summary, output, page, quiet)
     return SOME_FAILED if summary.failed else DONE
 

@@ -5,7 +5,6 @@ import os
 import re
 import shlex
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,15 +17,9 @@ from compsim.results import files, folders
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.store import Again
-    from compressor.sweep import SweepProgress
-    from compsim.live import ProgressLine
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 MAX_CAUTIONS = 5  # told of one case file
-# of lines of progress where stderr is no terminal: until the first, and between two others
-FIRST_SECONDS, QUIET_SECONDS, QUIET_SHARE = 1.0, 10.0, 0.05
-MANY_CASES = 20_000  # cases that take seconds to be read
-MIN_DONE_FOR_ETA = 5  # things done that a guess of the time rests on
 
 CASE_FILE = re.compile(r"^(joint|clearance_mm|load|machine|blocks|regimes)\s*:", re.MULTILINE)
 PLACES = (".", "configs")  # where case files are looked for, if none is named
@@ -95,137 +88,6 @@ def one_thread_each() -> None:
     """Keep numeric libraries that load later, here or in workers, to one thread a process."""
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
-
-
-class Screen:
-    """Progress on stderr: a line that is drawn anew on a terminal, elsewhere one now and then.
-
-    A terminal that cannot draw (TERM=dumb), or shall not (NO_COLOR), is taken for a log.
-    """
-
-    def __init__(self, quiet: bool, things: str = "jobs", alike: bool = True):
-        drawing = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-        self.quiet, self.live = quiet, sys.stderr.isatty() and drawing
-        self.things, self.alike = things, alike
-        self.done = self.total = self.failed = 0
-        self.began = self.told = time.monotonic()  # told: when a line was last written
-        self.told_done = -1
-        self.pace = Pace()
-        self.known: tuple[float, bool, float] | None = None  # s left, at least, since when
-        self.line: ProgressLine | None = None
-
-    def __call__(self, done: int, total: int, remark: str) -> None:
-        """Take note of progress (`compressor.sweep.sweep.Progress`)."""
-        self.done, self.total = done, total
-        self.pace.note(done)
-        if self.quiet:
-            return
-        if remark:
-            say(remark)
-        if self.live:
-            self.draw()
-        else:
-            self.log()
-
-    def stands(self, now: "SweepProgress") -> None:
-        """Take note of how a sweep stands, which knows best how long it will take."""
-        self.alike, self.failed = False, now.failed
-        since = time.monotonic()
-        self.known = None if now.left is None else (now.left, now.at_least, since)
-        if self.total and not self.quiet and not self.live:
-            self.log()
-
-    def words(self) -> tuple[str, str, str]:
-        """Return how many are done, how many failed, and how long it will take, as far as it is
-        known.
-        """
-        things = self.things if self.total != 1 else self.things.removesuffix("s")
-        share = f", {100 * self.done // self.total} %" if self.total else ""
-        failed = f", {self.failed} failed" if self.failed else ""
-        return f"{self.done} of {self.total} {things}{share}", failed, self.time_left()
-
-    def time_left(self) -> str:
-        """Return a guess from what has been done in this run; nothing as long as there is none."""
-        if self.done == self.total:
-            return ""
-        if self.known:
-            seconds, at_least, since = self.known
-            rest = max(0.0, seconds - (time.monotonic() - since))
-            return f", {'over ' * at_least}{format_guess(rest)} left"
-        left = self.pace.left(self.total) if self.alike else None
-        return "" if left is None else f", {format_guess(left)} left"
-
-    def draw(self) -> None:
-        """Show the line of progress on a terminal."""
-        if self.line is None:
-            from compsim.live import ProgressLine  # loads rich: a tenth of a second
-
-            self.line = ProgressLine(self.words)
-        self.line.show(self.done, self.total)
-
-    def log(self) -> None:
-        """Write a line where the last one was long ago: the longer, the longer this has lasted."""
-        now = time.monotonic()
-        wait = FIRST_SECONDS
-        if self.told_done >= 0:
-            wait = max(QUIET_SECONDS, QUIET_SHARE * (now - self.began))
-        if self.done < self.total and now - self.told >= wait:
-            self.told, self.told_done = now, self.done
-            say("".join(self.words()))
-
-    def end(self) -> None:
-        """Take the line of progress away; in a log, end with how far it came."""
-        if self.line:
-            self.line.stop()
-            self.line = None
-        elif 0 <= self.told_done != self.done and not self.quiet:
-            self.told_done = -1
-            say("".join(self.words()))
-
-
-class ReadingProgress:
-    """Progress of reading case files, of those that have many jobs; a context manager."""
-
-    def __init__(self, quiet: bool = False):
-        self.screen = Screen(quiet, "cases read")
-
-    def __enter__(self) -> "ReadingProgress":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.screen.end()
-
-    def __call__(self, study: str, done: int, total: int) -> None:
-        """Take note of how many cases of a study have been read; its first word is their number."""
-        if total >= MANY_CASES:
-            self.screen(done, total, f"{study}: {plural(total)}" if done == 0 else "")
-
-
-class Pace:
-    """How fast things get done, from the first on: it had to wait for all to start."""
-
-    def __init__(self) -> None:
-        self.before: int | None = None  # done when this run began
-        self.first: tuple[int, float] | None = None  # done, and when
-        self.last: tuple[int, float] | None = None
-
-    def note(self, done: int) -> None:
-        """So many are done now."""
-        if self.before is None or done < self.before:
-            self.before, self.first = done, None
-        if done > self.before:
-            self.last = done, time.monotonic()
-            self.first = self.first or self.last
-
-    def left(self, total: int) -> float | None:
-        """Return the seconds until all are done; None as long as too few are done to say."""
-        if not self.first or not self.last:
-            return None
-        things, seconds = self.last[0] - self.first[0], self.last[1] - self.first[1]
-        if things < MIN_DONE_FOR_ETA or seconds < FIRST_SECONDS:
-            return None
-        since = time.monotonic() - self.last[1]
-        return max(0.0, seconds / things * (total - self.last[0]) - since)
 
 
 def harmless(text: str) -> str:
@@ -351,11 +213,6 @@ def all_stored(count: int, folder: str, thing: str = "job") -> str:
 def stored_before(count: int) -> str:
     """Return that some of what was asked for was there already; "" for none."""
     return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
-
-
-def format_guess(seconds: float) -> str:
-    """Return the seconds that are a guess."""
-    return duration(seconds) if seconds >= 1 else "under 1 s"
 
 
 as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON.")

@@ -30,7 +30,7 @@ from compressor.cases.keys import (
 )
 from compressor.cases.parameter import CaseError, Problem, Reader, quote_value
 from compressor.cases.regimes import GROUP, Regimes
-from compressor.cases.study import Axis, Cases, Study, Told, unheard
+from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
 from compressor.cases.table import WORDS, table
 from compressor.cases.yaml_reader import (
@@ -41,6 +41,7 @@ from compressor.cases.yaml_reader import (
     read_file,
     shorten,
 )
+from compressor.program import Progress, no_progress
 
 if TYPE_CHECKING:
     from compressor.cases.sheet import CaseBatch
@@ -153,7 +154,7 @@ def load_studies(
     max_jobs: int = MAX_JOBS,
     only: str = "",
     follow: bool = True,
-    told: Told = unheard,
+    progress: Progress = no_progress,
     variants: Variants = itself,
 ) -> list[Study]:
     """Return the studies of YAML case files.
@@ -162,9 +163,9 @@ def load_studies(
 
     A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
     comparison, selects the jobs to be run. A file with `regimes` is refused where the caller cannot
-    `follow` one. `told` hears how many cases have been read. `variants` gives the cases that the
-    caller runs for one; a key that none of them reads is refused. Raises CaseFileError with
-    everything that is wrong in all files, overrides and the comparison.
+    `follow` one. `progress` is told how many of many cases are read. `variants` gives the cases
+    that the caller runs for one; a key that none of them reads is refused. Raises CaseFileError
+    with everything that is wrong in all files, overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
@@ -174,7 +175,7 @@ def load_studies(
     if not follow:
         _refuse_regimes(drafts)
     keys = KeysRead(variants)
-    studies = [_study(draft, max_jobs, test, told, keys) for draft in drafts]
+    studies = [_study(draft, max_jobs, test, progress, keys) for draft in drafts]
     problems += _unread(drafts, keys)
     problems += [problem for draft in drafts for problem in draft.problems]
     if not problems and not any(study.selected for study in studies):
@@ -292,7 +293,9 @@ def _cases(draft: _Draft, max_jobs: int) -> tuple[list[blocks.Draft], Cases | No
     return drafts, Cases(draft.name, [one.block() for one in drafts])
 
 
-def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told, read: KeysRead) -> Study:
+def _study(
+    draft: _Draft, max_jobs: int, only: Test | None, progress: Progress, read: KeysRead
+) -> Study:
     """Return the study of a draft; without cases if the draft has problems, its own among them."""
     drafts, cases = _cases(draft, max_jobs)
     if cases is None:
@@ -305,7 +308,7 @@ def _study(draft: _Draft, max_jobs: int, only: Test | None, told: Told, read: Ke
     if draft.problems:
         return Study(draft.name, draft.path, (), ())
     is_grid = len(found) == 1 and found[0].is_grid
-    keys = cases.keys(told)
+    keys = cases.keys(progress)
     if is_grid:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:

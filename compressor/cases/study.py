@@ -14,17 +14,14 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.regimes import Regimes
 from compressor.cases.swept import Test
 from compressor.cases.yaml_reader import Node
+from compressor.program import Progress, no_progress
 
 if TYPE_CHECKING:
     import numpy as np
 
     from compressor.cases.sheet import CaseBatch
 
-Told = Callable[[str, int, int], object]  # of a study: its name, cases read, cases in all
-
-
-def unheard(name: str, done: int, total: int) -> None:
-    """Progress that nobody hears of."""
+MANY_CASES = 20_000  # cases of a study that take seconds to be read
 
 
 @dataclass(frozen=True)
@@ -143,26 +140,29 @@ class Cases(Sequence[Case]):
         """Return the block that a case is of."""
         return self.parts[bisect.bisect_right(self.ends, number)]
 
-    def keys(self, told: Told = unheard) -> list[str]:
-        """Return the key of each case; `told` hears how many of how many have been made."""
+    def keys(self, progress: Progress = no_progress) -> list[str]:
+        """Return the key of each case; `progress` is told how many of many are made."""
         if not self._keys:
-            self._keys = self._each(lambda sheet: sheet.keys(), told)
+            self._keys = self._each(lambda sheet: sheet.keys(), progress)
         return self._keys
 
     def values(self, key: str) -> list[Any]:
         """Return the value of a dotted key in each case, as `value_of` gives it."""
         return self._each(lambda sheet: sheet.values(key))
 
-    def _each(self, of: "Callable[[CaseBatch], Sequence[Any]]", told: Told = unheard) -> list[Any]:
+    def _each(
+        self, of: "Callable[[CaseBatch], Sequence[Any]]", progress: Progress = no_progress
+    ) -> list[Any]:
         """Return what a function gives for the jobs of each sheet, of all cases in their order."""
         found: list[Any] = [None] * len(self)
-        done = 0
+        done, total = 0, len(self)
+        progress = progress if total >= MANY_CASES else no_progress
         for sheet in self.sheets:
-            told(self.name, done, len(self))
+            progress(done, total, "" if done else f"{self.name}: {total} jobs")
             for number, one in zip(sheet.numbers.tolist(), of(sheet), strict=True):
                 found[number] = one
             done += len(sheet.numbers)
-        told(self.name, done, len(self))
+        progress(done, total, "")
         return found
 
     def doubtful(self) -> Iterator[tuple[Block, dict[str, Node]]]:

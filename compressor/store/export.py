@@ -12,14 +12,14 @@ import itertools
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compressor.program import PROGRAM, CompsimError
+from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store.files import Folder, WrongName, publish, publishing
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import Stored, read_store
@@ -33,8 +33,6 @@ SUFFIXES = {"netcdf": ".nc", "csv": ".csv"}
 RECORD_HEADER = ("time_s", "acceleration_m_per_s2", "tacho")  # of a sensor's record in CSV
 BLOCK = 4096  # rows of a CSV file that are text at the same time
 HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
-
-Progress = Callable[[int, int, str], None]  # files written, files in all, a remark or ""
 
 
 class ExportError(CompsimError):
@@ -82,7 +80,7 @@ def export(
     names: Sequence[str],
     output: Folder,
     options: ExportOptions | None = None,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> tuple[list[Exported], list[DamagedJob]]:
     """Write what `names` name, studies and jobs by the beginning of their keys, else all studies.
 

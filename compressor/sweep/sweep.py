@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
+from compressor.program import Progress, no_progress
 from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.execution import Input, drain, require_posix, run_batches
 from compressor.sweep.run_job import run_ahead, run_job
@@ -28,8 +29,6 @@ from compressor.sweep.wanted import (
 )
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.worker import JobLost, JobResult, Workers
-
-Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
 MANY_JOBS = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
@@ -109,15 +108,11 @@ class Summary:
     gaining: int
 
 
-def silent(done: int, total: int, remark: str) -> None:
-    """Progress that nobody watches."""
-
-
 def sweep(
     studies: Sequence[Study],
     folder: Folder,
     workers: int = 2,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     options: Options | None = None,
 ) -> Summary:
     """Run what is missing of some studies and store it in a folder; failed jobs only on request.

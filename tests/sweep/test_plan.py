@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from compsim import cli, screen
+from compsim import cli, progress
 
+from compressor.cases import study as cases
 from compressor.cases.load import load_studies
 from compressor.sweep import plan, warm_up
 from compressor.sweep.plan import ROW_BYTES, forecast
@@ -197,8 +198,8 @@ def test_nothing_ahead_costs_nothing(studies):
 @pytest.mark.parametrize("command", ["plan", "run"])
 def test_large_files_are_counted_before_they_are_read(command, studies, monkeypatch, capsys):
     studies(one=NINE)
-    monkeypatch.setattr(screen, "MANY_CASES", 9)
-    monkeypatch.setattr(screen, "FIRST_SECONDS", 0)
+    monkeypatch.setattr(cases, "MANY_CASES", 9)
+    monkeypatch.setattr(progress, "FIRST_SECONDS", 0)
     assert cli.main([command, "one.yaml", "-j", "1"]) == 0
     assert capsys.readouterr().err.startswith("one: 9 jobs\n0 of 9 cases read, 0 %\n")
 

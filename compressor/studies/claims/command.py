@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.results import files, folders
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    Screen,
     as_json,
     jobs_option,
     limit,
@@ -77,19 +77,15 @@ def claims(
             "--search needs a CONFIG whose keys are drawn from ranges, such as {saltelli: [2, 9]}"
         )
     writable_folder(output)
-    screen = Screen(quiet, "machines", alike=False)
-    found = []
-    try:
-        for study in studies:
-            say_unless(quiet, f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
-            found.append(judge_machines(study, output, jobs or cores(), screen))
-            screen.end()
-        for study in drawn if generations else ():
-            say_unless(quiet, f"{study.name}: {plural(generations, 'generation')} of a search")
-            found.append(least_change(study, output, jobs or cores(), generations, screen))
-            screen.end()
-    finally:
-        screen.end()
+    found, workers = [], jobs or cores()
+    for study in studies:
+        say_unless(quiet, f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
+        with ProgressReporter(quiet, "machines", alike=False) as progress:
+            found.append(judge_machines(study, output, workers, progress))
+    for study in drawn if generations else ():
+        say_unless(quiet, f"{study.name}: {plural(generations, 'generation')} of a search")
+        with ProgressReporter(quiet, "machines", alike=False) as progress:
+            found.append(least_change(study, output, workers, generations, progress))
     report_machines(found, as_json)
     beside = "" if output == "claims" else f" --claims {shlex.quote(output)}"
     say_unless(quiet, f"next: compsim report{beside}")

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import Axis, Case, Study, design, value_in
+from compressor.program import Progress, no_progress
 from compressor.store import Folder, StoreError, write_dataset
 from compressor.studies.claims.study import (
     ELSEWHERE,
@@ -28,7 +29,6 @@ from compressor.studies.claims.study import (
     read_machines,
     rows_of,
 )
-from compressor.sweep import Progress
 
 SEED = 1
 POPULATION = 48  # machines of a generation
@@ -197,7 +197,7 @@ def least_change(
     folder: Folder,
     workers: int,
     generations: int,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> xr.Dataset:
     """Return the machine nearest to the defaults at which all claims hold, or the one that lacks
     least.

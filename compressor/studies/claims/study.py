@@ -15,7 +15,7 @@ import xarray as xr
 
 from compressor.analysis import RULES, cases_of, claim_margins
 from compressor.cases import Case, Study
-from compressor.program import PROGRAM, CompsimError, ignore_warnings
+from compressor.program import PROGRAM, CompsimError, Progress, ignore_warnings, no_progress
 from compressor.store import (
     Folder,
     StoreError,
@@ -24,7 +24,7 @@ from compressor.store import (
     swept_column,
     write_dataset,
 )
-from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
+from compressor.sweep import JobLost, JobResult, Needs, run_here
 
 CLAIMS = tuple(range(1, 9))
 SHARES = ("apart", "hit", "energy_angle", "active")  # by which claim 7 is measured
@@ -147,7 +147,7 @@ def judge_machines(
     study: Study,
     folder: Folder,
     workers: int,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> xr.Dataset:
     """Judge the machines of a study that FOLDER/NAME.nc does not hold yet; gives all of them.
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.results import files, of_results, one_word, results_folder, studies
 from compsim.screen import (
     DONE,
-    Screen,
     as_json,
     one_thread_each,
     plural,
@@ -72,11 +72,8 @@ def dataset(
     from compressor.studies.diagnosis.record_files import build_data_set
 
     options = DataSetOptions(revolutions, hop, noise, test_share, seed, not no_signals)
-    screen = Screen(quiet)
-    try:
-        made, written = build_data_set(folder, study, output, options, screen)
-    finally:
-        screen.end()
+    with ProgressReporter(quiet) as progress:
+        made, written = build_data_set(folder, study, output, options, progress)
     for line in describe_dataset(made):
         print_text(line)
     for name, count in written.files.items():
@@ -141,11 +138,8 @@ def identify(
         raise click.UsageError("--rpm and --tdc belong together")
     steady = None if rpm is None or tdc is None else SteadySpeed(rpm, tdc)
     key, found = find_record(record, folder, steady)
-    screen = Screen(quiet)
-    try:
-        fitted, answer = explain_record(found, folder, study, key, screen)
-    finally:
-        screen.end()
+    with ProgressReporter(quiet) as progress:
+        fitted, answer = explain_record(found, folder, study, key, progress)
     if as_json:
         print_text(json.dumps(jsonable_record(record, fitted, answer), indent=1))
         return DONE

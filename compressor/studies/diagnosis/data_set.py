@@ -9,7 +9,7 @@ split at random would tell how well a machine is known again.
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from compressor.cases import Case, Sensor
 from compressor.outcome import Regime, regime_words
-from compressor.program import PROGRAM, CompsimError
+from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, find_study, read_store
 from compressor.studies.diagnosis.features import FEATURES, MIN_REVOLUTIONS, RecordError, features
 
@@ -52,8 +52,6 @@ MODELS = {  # parts of the model whose kind a study chooses: in words
     "crank": "crank's speed",
 }
 RECORD_NEEDED = "`body: true` and `sensor: {length_rev: 11}`"
-
-Progress = Callable[[int, int, str], None]  # jobs done, jobs in all, a remark or ""
 
 
 class DataSetError(CompsimError):
@@ -173,7 +171,7 @@ def make_data_set(
     folder: Folder,
     study: str | None = None,
     options: DataSetOptions | None = None,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> "xr.Dataset":
     """Return the labelled windows of a stored study; None: the store's only one.
 

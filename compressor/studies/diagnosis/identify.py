@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compressor.program import CompsimError
+from compressor.program import CompsimError, Progress
 from compressor.store import Folder
 from compressor.studies.diagnosis.approximate import (
     Distance,
@@ -27,7 +27,6 @@ from compressor.studies.diagnosis.features import FEATURES, RecordError
 from compressor.studies.diagnosis.library import (
     SIDES,
     Library,
-    Progress,
     open_library,
     stored_record,
     vector,

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import Case, points
+from compressor.program import Progress, no_progress
 from compressor.store import (
     Folder,
     Stored,
@@ -25,7 +26,6 @@ from compressor.store import (
     write_dataset,
 )
 from compressor.studies.diagnosis import features as table
-from compressor.studies.diagnosis.data_set import Progress
 from compressor.studies.diagnosis.features import FEATURES, RecordError, features
 from compressor.vibration import Record
 
@@ -63,9 +63,7 @@ class Library:
         return replace(self, swept=swept, **own)
 
 
-def open_library(
-    folder: Folder, name: str, progress: Progress = lambda done, total, remark: None
-) -> Library:
+def open_library(folder: Folder, name: str, progress: Progress = no_progress) -> Library:
     """Return the library of a stored study.
 
     Features are kept in `<folder>/features/<study>.nc` and made again when jobs, or how features

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compressor.program import PROGRAM
+from compressor.program import PROGRAM, Progress
 from compressor.store import RECORD_HEADER, Folder, publish, writable_folder, write_dataset
 from compressor.studies.diagnosis.data_card import data_card
 from compressor.studies.diagnosis.data_set import (
@@ -21,7 +21,6 @@ from compressor.studies.diagnosis.data_set import (
     WORDS,
     DataSetError,
     DataSetOptions,
-    Progress,
     make_data_set,
 )
 from compressor.studies.diagnosis.features import MIN_REVOLUTIONS, RecordError

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    Screen,
     all_stored,
     duration,
     plural,
@@ -32,14 +32,8 @@ def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, 
     """Follow the chains of studies; return the exit code."""
     from compressor.studies.regimes.run import run_regimes
 
-    screen = Screen(quiet, "values", alike=False)
-    try:
-        summary = run_regimes(studies, folder, workers, screen, rerun)
-    except BaseException:
-        screen.end()
-        say(f"what is finished is stored in {folder}; the same command goes on from there")
-        raise
-    screen.end()
+    with ProgressReporter(quiet, "values", alike=False, folder=folder) as progress:
+        summary = run_regimes(studies, folder, workers, progress, rerun)
     report_chains(summary, folder, quiet)
     return SOME_FAILED if summary.failed else DONE
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compressor.cases import MODEL, Study, points
-from compressor.program import PROGRAM
+from compressor.program import PROGRAM, Progress
 from compressor.store import Folder, StoreError, publish
 from compressor.studies.regimes.chains import (
     FOLDER,
@@ -29,7 +29,7 @@ from compressor.studies.regimes.chains import (
     run_chain,
 )
 from compressor.studies.regimes.confirm import ChainPair, Verdict, VerdictBook, confirm
-from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
+from compressor.sweep import JobLost, JobResult, Needs, run_here
 
 LEGS = 4  # runs of a value, each with the case's own wall time at most, and some more
 LOOK = 1.0  # s between two looks at how far chains have come

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.results import files
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    Screen,
     as_json,
     caution,
     jobs_option,
@@ -80,11 +80,8 @@ def find(
     from compressor.studies.search.find import find as search
     from compressor.sweep import cores
 
-    screen = Screen(quiet, "points")
-    try:
-        answer = search(question, output, jobs or cores(), screen)
-    finally:
-        screen.end()
+    with ProgressReporter(quiet, "points") as progress:
+        answer = search(question, output, jobs or cores(), progress)
     if as_json:
         print_text(json.dumps(jsonable_answer(question, answer), indent=1))
     else:

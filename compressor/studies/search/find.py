@@ -15,9 +15,10 @@ from itertools import pairwise
 
 from scipy.optimize import minimize_scalar
 
+from compressor.program import Progress, no_progress
 from compressor.store import Folder, StoreError, read_store, read_studies
 from compressor.studies.search.question import JobReading, Question
-from compressor.sweep import Options, Progress, sweep
+from compressor.sweep import Options, sweep
 
 MAX_POINTS = 200  # that one search may ask for beyond its scan
 
@@ -184,7 +185,7 @@ def find(
     question: Question,
     folder: Folder,
     workers: int = 2,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> SearchResult:
     """Answer a question by jobs in a folder's store; those that it holds are not run again.
 

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    Screen,
     duration,
     jobs_option,
     one_thread_each,
@@ -73,11 +73,8 @@ def stress(
     from compressor.studies.stress.stress import campaign
 
     writable_folder(output)
-    screen = Screen(quiet, "scenes")
-    try:
-        study = campaign(output, scenes, seed, jobs or cores(), screen, Budget(drawn or ""))
-    finally:
-        screen.end()
+    with ProgressReporter(quiet, "scenes") as progress:
+        study = campaign(output, scenes, seed, jobs or cores(), progress, Budget(drawn or ""))
     drawing = draw_outcomes(study)
     for kind in ("png", "svg"):
         publish(Path(output, f"stress.{kind}"), render(drawing, kind))

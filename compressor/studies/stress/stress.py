@@ -17,12 +17,12 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import MODEL, Case, CaseError
-from compressor.program import PROGRAM
+from compressor.program import PROGRAM, Progress, no_progress
 from compressor.reasons import Reason
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 from compressor.studies.stress import extremes
 from compressor.studies.stress.extremes import Budget
-from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
+from compressor.sweep import JobLost, JobResult, Needs, run_here
 
 FILE = "stress.nc"
 FULL_BUDGET = Budget()
@@ -125,7 +125,7 @@ def campaign(
     count: int,
     seed: int,
     workers: int,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
     budget: Budget = FULL_BUDGET,
 ) -> xr.Dataset:
     """Return the first `count` scenes of a seed, of which those are run that the folder does not

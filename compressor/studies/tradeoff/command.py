@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.results import files, folders
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    Screen,
     caution,
     configs_argument,
     limit,
@@ -107,15 +107,11 @@ def tradeoff(
 
     folder = Path(output)
     writable_folder(folder)  # minutes before it is needed
-    screen = Screen(quiet, "points", alike=False)
-    try:
-        study = work_precision(cases, repeats=repeats, budget=budget, progress=screen)
+    with ProgressReporter(quiet, "points", alike=False) as progress:
+        study = work_precision(cases, repeats=repeats, budget=budget, progress=progress)
         write_study(folder, study)
-        screen.end()
-        screen = Screen(quiet, "changes of the model", alike=False)
-        trade = feature_trade(cases, repeats=repeats, progress=screen)
-    finally:
-        screen.end()
+    with ProgressReporter(quiet, "changes of the model", alike=False) as progress:
+        trade = feature_trade(cases, repeats=repeats, progress=progress)
     write_dataset(folder / "modelling.nc", trade)
     print_text("\n".join([*fastest_lines(study), "", *trade_lines(trade)]))
     if not quiet:
@@ -249,11 +245,8 @@ def explain(
     for study in studies:
         first = "the job" if study.jobs == 1 else f"the first of {plural(study.jobs)}"
         say(f"running {first} of {study.name}, with and without each of its features")
-        screen = Screen(False, "features", alike=False)
-        try:
-            found.append(explained(study, jobs, progress=screen))
-        finally:
-            screen.end()
+        with ProgressReporter(False, "features", alike=False) as progress:
+            found.append(explained(study, jobs, progress=progress))
         if not as_json:
             print_text("\n".join(lines(found[-1])))
     if as_json:
@@ -271,11 +264,8 @@ def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
     writable_folder(folder)
     failed, found = False, []
     for study in studies:
-        screen = Screen(False, "choices of the model", alike=False)
-        try:
-            data = run_models(study, progress=screen)
-        finally:
-            screen.end()
+        with ProgressReporter(False, "choices of the model", alike=False) as progress:
+            data = run_models(study, progress=progress)
         if data["status"].values[0] != "ok":
             failed = True
             say(f"{study.name}: the job failed, {data['reason'].values[0]}: {data.attrs['detail']}")

@@ -23,6 +23,7 @@ from compressor.cases import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import state_names
+from compressor.program import Progress, no_progress
 from compressor.solve import (
     JointScales,
     expected_cost,
@@ -33,7 +34,7 @@ from compressor.solve import (
 )
 from compressor.studies.tradeoff.features import FEATURES, Effect, ModelFeature, comparable, compare
 from compressor.studies.tradeoff.model_choices import shown_words
-from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, Progress, complete, faulty
+from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, complete, faulty
 
 SCENES = {  # by the joints with clearance
     (): "ideal joints",
@@ -93,7 +94,7 @@ def explain(
     study: Study,
     workers: int = 2,
     repeats: int = 5,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> Explanation:
     """Explain the first job of a study by running it, and it again without each of its features.
 

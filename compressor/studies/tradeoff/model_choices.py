@@ -24,7 +24,7 @@ from compressor.cases import (
     paper_stiffness_note,
 )
 from compressor.metrics import METRICS
-from compressor.program import PROGRAM
+from compressor.program import PROGRAM, Progress, no_progress
 from compressor.solve import simulate
 from compressor.studies.tradeoff.features import (
     FEATURES,
@@ -34,7 +34,7 @@ from compressor.studies.tradeoff.features import (
     series_errors,
     with_values,
 )
-from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, Progress, complete, faulty
+from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, complete, faulty
 from compressor.sweep import Needs, compile_once
 
 ITSELF = "the case itself"
@@ -186,9 +186,7 @@ def bare(case: Case, limit: float = math.inf) -> Case:
     return replace(case, body=None, sensor=None, wear=None, output=Output("metrics"), solve=solve)
 
 
-def explain_models(
-    study: Study, progress: Progress = lambda done, total, remark: None
-) -> xr.Dataset:
+def explain_models(study: Study, progress: Progress = no_progress) -> xr.Dataset:
     """Run the first job of a study, and every other model of its machine.
 
     Returns the Dataset of `tabulate` with the attributes `study` and `key` (of the job). If the job
@@ -270,7 +268,7 @@ def tell_part(progress: Progress, before: int, total: int, done: int, of: int, r
 def trade(
     cases: Mapping[str, Case],
     repeats: int = 3,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> xr.Dataset:
     """Return what every change of the model makes of cases; dims (scene, choice), as `tabulate`.
 

@@ -6,7 +6,7 @@ references of different families lie apart says below which error nothing can be
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,7 @@ import xarray as xr
 from compressor.analysis import FAULTS, label, paper_cases, settled_part
 from compressor.cases import ACCURACY, METHODS, Case, Output
 from compressor.metrics import JOINTS
-from compressor.program import PROGRAM, CompsimError
+from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.reasons import Reason
 from compressor.solve import LOCAL, simulate
 
@@ -40,7 +40,6 @@ ERRORS = {
 }
 COUNTS = ("steps", "evaluations", "rejected")
 
-Progress = Callable[[int, int, str], None]
 Point = tuple[int, int, int]  # scene, method, tolerance
 
 
@@ -129,7 +128,7 @@ def work_precision(
     tolerances: Sequence[float] = TOLERANCES,
     repeats: int = 3,
     budget: float = POINT_SECONDS,
-    progress: Progress = lambda done, total, remark: None,
+    progress: Progress = no_progress,
 ) -> xr.Dataset:
     """Run every case by every method at every tolerance; dims (scene, method, tolerance).
 

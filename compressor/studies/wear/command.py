@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    ReadingProgress,
-    Screen,
     all_stored,
     as_json,
     configs_argument,
@@ -66,17 +65,11 @@ def wear(
     from compressor.studies.wear.run import run_wear
     from compressor.sweep import cores
 
-    with ReadingProgress(quiet) as told:
-        studies = load_studies(*configs, overrides=overrides, follow=False, told=told)
+    with ProgressReporter(quiet, "cases read") as progress:
+        studies = load_studies(*configs, overrides=overrides, follow=False, progress=progress)
     check(studies)
-    screen = Screen(quiet, "machines", alike=False)
-    try:
-        summary = run_wear(studies, output, jobs or cores(), screen, rerun)
-    except BaseException:
-        screen.end()
-        say(f"what is finished is stored in {output}; the same command goes on from there")
-        raise
-    screen.end()
+    with ProgressReporter(quiet, "machines", alike=False, folder=output) as progress:
+        summary = run_wear(studies, output, jobs or cores(), progress, rerun)
     if as_json:
         print_text(json.dumps([jsonable_wear(one, output) for one in summary.machines], indent=1))
     else:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from compressor.cases import Case, Study, points
+from compressor.program import Progress
 from compressor.store import Folder, StoreError, writable_folder
 from compressor.studies.wear.stages import (
     Life,
@@ -19,7 +20,7 @@ from compressor.studies.wear.stages import (
     stages_dataset,
     write,
 )
-from compressor.sweep import JobLost, JobResult, Needs, Progress, run_here
+from compressor.sweep import JobLost, JobResult, Needs, run_here
 
 AT_MOST = 100_000  # motions, the wall time of which a machine may take
 

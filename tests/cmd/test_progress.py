@@ -6,8 +6,8 @@ import sys
 import types
 
 import pytest
-from compsim import screen as module
-from compsim.screen import Screen
+from compsim import progress as module
+from compsim.progress import ProgressReporter
 
 from compressor.sweep.wanted import SweepProgress
 
@@ -41,11 +41,11 @@ def plain(text):
 
 def test_a_terminal_gets_one_line_that_is_drawn_anew(terminal, capsys):
     terminal()
-    screen = Screen(quiet=False)
+    progress = ProgressReporter(quiet=False)
     for event in [(2, 11, ""), (3, 11, ""), (11, 11, "")]:
-        screen(*event)
-        screen.line.progress.refresh()
-    screen.end()
+        progress(*event)
+        progress.line.refresh()
+    progress.end()
     err = plain(capsys.readouterr().err)
     assert " 2 of 11 jobs, 18 %\r\x1b[2K" in err
     assert "\r\x1b[2K 3 of 11 jobs, 27 %" in err
@@ -57,11 +57,11 @@ def test_a_terminal_gets_one_line_that_is_drawn_anew(terminal, capsys):
 
 def test_failed_jobs_and_the_time_left_stand_in_the_line(terminal, capsys):
     terminal()
-    screen = Screen(quiet=False)
-    screen(40, 100, "")
-    screen.stands(SweepProgress(40, 3, 100, 75.0, True))
-    screen.line.progress.refresh()
-    screen.end()
+    progress = ProgressReporter(quiet=False)
+    progress(40, 100, "")
+    progress.show_sweep(SweepProgress(40, 3, 100, 75.0, True))
+    progress.line.refresh()
+    progress.end()
     err = capsys.readouterr().err
     assert "\x1b[31m, 3 failed\x1b[0m" in err  # in red
     assert re.search(r" 40 of 100 jobs, 40 %, 3 failed, over 7[45] s left", plain(err))
@@ -70,11 +70,11 @@ def test_failed_jobs_and_the_time_left_stand_in_the_line(terminal, capsys):
 @pytest.mark.parametrize("columns", [20, 40, 60])
 def test_a_narrow_terminal_gets_one_line_as_well(columns, terminal, capsys):
     terminal(columns)
-    screen = Screen(quiet=False)
-    screen(123456, 1000000, "")
-    screen.stands(SweepProgress(123456, 3456, 1000000, 7500.0))
-    screen.line.progress.refresh()
-    screen.end()
+    progress = ProgressReporter(quiet=False)
+    progress(123456, 1000000, "")
+    progress.show_sweep(SweepProgress(123456, 3456, 1000000, 7500.0))
+    progress.line.refresh()
+    progress.end()
     drawn = re.split(r"\r|\x1b\[\d?[AK]|\n", re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().err))
     assert max(map(len, drawn)) <= columns
     assert any("123456 of 100" in line for line in drawn)
@@ -82,10 +82,10 @@ def test_a_narrow_terminal_gets_one_line_as_well(columns, terminal, capsys):
 
 def test_a_remark_stays_above_the_line(terminal, capsys):
     terminal()
-    screen = Screen(quiet=False)
+    progress = ProgressReporter(quiet=False)
     for event in [(0, 11, ""), (0, 11, "compiled in 43 s"), (1, 11, "")]:
-        screen(*event)
-    screen.end()
+        progress(*event)
+    progress.end()
     assert "\r\x1b[2Kcompiled in 43 s\n 0 of 11 jobs, 0 %" in plain(capsys.readouterr().err)
 
 
@@ -93,20 +93,20 @@ def test_a_remark_stays_above_the_line(terminal, capsys):
 def test_a_terminal_that_shall_not_draw_is_a_log(name, value, terminal, capsys, monkeypatch):
     terminal()
     monkeypatch.setenv(name, value)
-    screen = Screen(quiet=False)
-    screen(0, 11, "a remark")
-    screen.end()
-    assert (screen.line, capsys.readouterr().err) == (None, "a remark\n")
+    progress = ProgressReporter(quiet=False)
+    progress(0, 11, "a remark")
+    progress.end()
+    assert (progress.line, capsys.readouterr().err) == (None, "a remark\n")
 
 
 def test_a_log_gets_a_line_at_the_start_some_between_and_one_at_the_end(clock, capsys):
-    screen, lines = Screen(quiet=False), []
+    progress, lines = ProgressReporter(quiet=False), []
     for second in range(3600):
         clock[0] = 100.0 + second
-        screen(second // 4, 900, "")
+        progress(second // 4, 900, "")
         if line := capsys.readouterr().err:
             lines.append((second, line))
-    screen.end()
+    progress.end()
     seconds = [second for second, _ in lines]
     assert seconds[:4] == [1, 11, 21, 31]
     gaps = [after - before for before, after in itertools.pairwise(seconds)]
@@ -115,66 +115,66 @@ def test_a_log_gets_a_line_at_the_start_some_between_and_one_at_the_end(clock, c
     assert max(gaps) <= 3600 / 19
     assert lines[0][1] == "0 of 900 jobs, 0 %\n"
     assert re.fullmatch(r"\d+ of 900 jobs, \d+ %, \d+ min left\n", lines[10][1])
-    assert capsys.readouterr().err == "899 of 900 jobs, 99 %, 4.0 s left\n"
+    assert capsys.readouterr().err == "899 of 900 jobs, 99 %, 1.0 s left\n"
 
 
 def test_what_is_over_soon_writes_nothing(clock, capsys):
-    screen = Screen(quiet=False, things="files")
+    progress = ProgressReporter(quiet=False, things="files")
     for done in range(10):
         clock[0] += 0.09
-        screen(done, 9, "")
-    screen.end()
+        progress(done, 9, "")
+    progress.end()
     assert capsys.readouterr().err == ""
 
 
 def test_one_thing_is_not_several(clock, capsys):
-    screen = Screen(quiet=False, things="points")
+    progress = ProgressReporter(quiet=False, things="points")
     clock[0] += 1
-    screen(0, 1, "")
-    screen.end()
+    progress(0, 1, "")
+    progress.end()
     assert capsys.readouterr().err == "0 of 1 point, 0 %\n"
 
 
 def test_no_guess_is_made_of_what_waited_for_the_start(clock):
     """40 s of compiling, a first batch of 8 at once, then 4 a second."""
-    screen = Screen(quiet=True)
-    screen(0, 100, "")
+    progress = ProgressReporter(quiet=True)
+    progress(0, 100, "")
     clock[0] += 40
-    screen(8, 100, "")
+    progress(8, 100, "")
     for done in (12, 16):
-        assert screen.time_left() == ""
+        assert progress.time_left() == ""
         clock[0] += 1
-        screen(done, 100, "")
-    assert screen.time_left() == ", 21 s left"
+        progress(done, 100, "")
+    assert progress.time_left() == ", 21 s left"
     clock[0] += 2
-    assert screen.time_left() == ", 19 s left"
+    assert progress.time_left() == ", 19 s left"
     clock[0] += 30
-    assert screen.time_left() == ", under 1 s left"
-    screen(100, 100, "")
-    assert screen.time_left() == ""
+    assert progress.time_left() == ", under 1 s left"
+    progress(100, 100, "")
+    assert progress.time_left() == ""
 
 
 def test_unequal_things_are_not_guessed(clock):
-    screen = Screen(quiet=True, alike=False)
+    progress = ProgressReporter(quiet=True, alike=False)
     for done in range(20):
         clock[0] += 1
-        screen(done, 100, "")
-    assert screen.time_left() == ""
+        progress(done, 100, "")
+    assert progress.time_left() == ""
 
 
 def test_what_was_stored_before_is_no_pace(clock):
-    screen = Screen(quiet=True)
+    progress = ProgressReporter(quiet=True)
     for done in (500, 501, 502, 503, 504, 505, 506):
-        screen(done, 1000, "")
+        progress(done, 1000, "")
         clock[0] += 1
-    assert screen.time_left() == ", 8 min left"
+    assert progress.time_left() == ", 8 min left"
 
 
 def test_quiet_is_quiet(clock, capsys):
-    screen = Screen(quiet=True)
+    progress = ProgressReporter(quiet=True)
     for done in range(100):
         clock[0] += 1
-        screen(done, 100, "a remark")
-        screen.stands(SweepProgress(done, 0, 100))
-    screen.end()
+        progress(done, 100, "a remark")
+        progress.show_sweep(SweepProgress(done, 0, 100))
+    progress.end()
     assert capsys.readouterr().err == ""
