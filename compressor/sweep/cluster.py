@@ -59,7 +59,7 @@ def sees(token: Path, text: str) -> bool:
 
 @contextlib.contextmanager
 def visible(place: Path) -> Iterator[tuple[Path, str]]:
-    """A file, and its text, by which a worker knows a place for ours, not one of the same name."""
+    """Put a file into a place: by its text a worker knows the place for ours; a context manager."""
     text = uuid.uuid4().hex
     token = place / "jobs" / f".{text}.tmp"
     publish(token, text.encode())
@@ -166,7 +166,7 @@ class Remote(Batches):
         self.patience = time.monotonic() + SECONDS_TO_REMARK
 
     def next_batch(self) -> list[Job]:
-        """As ever, but while large results are on their way no more are asked for."""
+        """Return the jobs of a batch; none while large results are on their way."""
         on_way = self.size * sum(map(len, [*self.out.values()]))
         return [] if on_way > MAX_BYTES else super().next_batch()
 
@@ -212,10 +212,10 @@ class Remote(Batches):
             self.suspects.extend([[job] for job in batch] if self.alone else [batch])
 
     def discard(self) -> None:
-        """Nothing is shared with a suspect: no other batch is at work."""
+        """Do nothing: a suspect shares nothing, since no other batch is at work."""
 
     def end_pool(self) -> None:
-        """Have what has not begun never begin."""
+        """Cancel what has not begun; what runs ends by itself."""
         self.executor.shutdown(wait=False)
 
 

@@ -17,6 +17,7 @@ import signal
 import tempfile
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
@@ -151,10 +152,7 @@ class Batches:
         ended.add_done_callback(lambda ended: self.arrived.put((number, ended)))
 
     def next_batch(self) -> list[Job]:
-        """Return the jobs for about `target_seconds`: few at first, and towards the end.
-
-        None: that is all.
-        """
+        """Return jobs for about `target_seconds`: few at first and towards the end; [] for none."""
         size = self.target_seconds / max(self.mean, 1e-9) if self.weight else 1.0
         if self.left:
             size = min(size, (self.left + len(self.waiting)) / (2 * self.width))
@@ -175,8 +173,8 @@ class Batches:
         return None
 
     def finish(self, number: int, ended: "Future[Any]") -> Iterator[End]:
-        """Yield how the jobs of a batch ended; a rest that was given back waits again."""
-        if number in self.out:  # else its pool was given up, and it waits again
+        """Yield how the jobs of a batch ended, if its pool was not given up before."""
+        if number in self.out:
             if error := error_of(ended):
                 wait([self.sending])
                 yield from () if self.stopped else self.fail(number, error)
@@ -188,7 +186,7 @@ class Batches:
             self.discard()
 
     def settle(self, batch: list[Job], found: list[End]) -> Iterator[End]:
-        """Yield how the jobs of a batch ended, from what it gave: in order, but for a rest."""
+        """Yield how jobs of a batch ended, by what it gave; the rest, given back, waits again."""
         self.waiting.extendleft(reversed(batch[len(found) :]))
         for job, end in zip(batch, found, strict=False):
             if isinstance(end, JobLost):
@@ -309,8 +307,9 @@ class Local(Batches):
         """Return a new pool, of one process for a suspect."""
         import resource  # not on Windows, where nothing is run
 
-        # helper processes remove what a SIGKILL of ours leaves: in silence
+        # helper processes remove what a SIGKILL of ours leaves, and are replaced: in silence
         os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
+        warnings.filterwarnings("ignore", "resource_tracker")
         resource_tracker.ensure_running()  # before: Python 3.11 lets signals in as it starts this
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in new workers, too, until they settle
         if self.width > 100:  # whose files may be more than the usual 1024
@@ -457,7 +456,7 @@ def children() -> list[Any]:
 
 
 def kill(pids: Iterable[int]) -> None:
-    """SIGKILL."""
+    """Send SIGKILL to processes, some of which may be gone."""
     for pid in pids:
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)

@@ -336,7 +336,7 @@ def test_what_keeps_workers_from_beginning_is_told(monkeypatch):
         list(run_batches(work, named(range(10)), Workers(1, prepare)))
 
 
-def test_a_killed_helper_of_loky_s_is_not_heard_of():
+def test_a_killed_helper_of_loky_s_is_not_heard_of(recwarn):
     ends, killed = [], 0
     for end in run_batches(sleep, named([0.02 + n / 1e6 for n in range(100)]), Workers(2)):
         ends.append(end)
@@ -345,6 +345,7 @@ def test_a_killed_helper_of_loky_s_is_not_heard_of():
             killed += 1
     assert killed == 2
     assert len(results(ends)) == 100
+    assert not recwarn.list
 
 
 def test_no_memory_file_and_no_proc_cost_nothing_else(monkeypatch):
