@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
+from typing import NamedTuple
 
 VERSION = "0.1.0"
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
@@ -60,6 +61,23 @@ class CompsimWarning(UserWarning):
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("error", compressor.CompsimWarning)
     """
+
+
+class StudyFiles(NamedTuple):
+    """What a kind of study keeps in a folder of results, beside jobs: patterns in that folder.
+
+    checked: netCDF files that `compsim verify` reads. result: files that are a result each, with
+    the study's name for the `*`; "" where there are none. A folder that has no others is said to
+    hold `told`, with these names for its `{}`; remedy: the command that reads them.
+    """
+
+    checked: str
+    result: str = ""
+    told: str = ""
+    remedy: str = ""
+
+
+STUDY_FILES: list[StudyFiles] = []  # those of the table in `compressor.studies`, which adds them
 
 
 _FILTERS = threading.RLock()

@@ -3,7 +3,7 @@
 import click
 
 from compressor.program import did_you_mean
-from compressor.studies import STUDIES, kind_of_stored
+from compressor.studies import STUDIES, find_drawn
 from compsim.results import ONE_JOB, folders, jobs, of_results, results_folder, some_words
 from compsim.screen import (
     DONE,
@@ -78,7 +78,7 @@ def plot(
     from compressor.report import PlotChoice, write_plots
 
     choice = PlotChoice(what, over, at, KINDS[form])
-    kind = kind_of_stored(folder, name)
+    kind = find_drawn(folder).get(name)
     if kind:
         if values:
             listed = " ".join(f"--at {value}" for value in values)

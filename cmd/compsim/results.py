@@ -14,10 +14,11 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from compressor.studies import find_drawn
+
 MAX_BYTES = 5_000_000  # of the files of studies that are read for keys and axes
 HEXADECIMAL = re.compile("[0-9a-f]{2,20}")
 ONE_JOB = "JOB | STUDY [AXIS=VALUE]..."  # what `show` and `plot` take
-STUDY_FILES = ("studies/{}.json", "former/{}.json", "regimes/{}/study.json")
 
 Items = list["CompletionItem[Any]"]  # a generic class from click 8.4.2 on
 Complete = Callable[[click.Context, click.Parameter, str], Items]
@@ -53,8 +54,9 @@ def results_folder(
 
 
 def is_study(name: str, folder: str) -> bool:
-    """Return whether a folder of results has a study of this name, a former one or of regimes."""
-    return any(Path(folder, path.format(name)).exists() for path in STUDY_FILES)
+    """Return whether a folder of results has a study of this name, a former one or one drawn."""
+    paths = (Path(folder, part, f"{name}.json") for part in ("studies", "former"))
+    return name in find_drawn(folder) or any(path.exists() for path in paths)
 
 
 def one_word(words: Sequence[str], name: str, context: Any = None) -> str:
@@ -95,7 +97,7 @@ def jobs(context: click.Context, _: click.Parameter, word: str) -> Items:
     known = study_files(folder)
     if words and words[0] in known:
         return [CompletionItem(text) for text in values(known[words[0]]) if text.startswith(word)]
-    names = [*known, *(path.name for path in Path(folder).glob("regimes/*"))]
+    names = [*known, *find_drawn(folder)]
     found = [CompletionItem(name) for name in sorted(names) if name.startswith(word)]
     if not (
         context.params.get("given") or context.params.get("folder")

@@ -5,7 +5,6 @@ from compressor.store.files import (
     Folder,
     StoreError,
     StoreWarning,
-    models_file,
     publish,
     writable_folder,
 )

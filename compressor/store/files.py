@@ -14,7 +14,7 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
-from compressor.program import CompsimError, CompsimWarning, did_you_mean
+from compressor.program import STUDY_FILES, CompsimError, CompsimWarning, did_you_mean
 
 Folder = str | os.PathLike[str]
 
@@ -255,19 +255,16 @@ def discard_leftovers(folder: Folder) -> None:
                 path.unlink()
 
 
-# folders in a store
-PARTS = ("rows", "jobs", "studies", "shards", "regimes", "features", "wear", "models")
-RESULT_FILES = ("studies/*.json", "regimes/*/*.json", "wear/*.nc")  # of which each is a result
 MAX_LOOKED_AT = 1000  # entries of a folder in which results are sought
 MAX_NAMES = 5  # that are listed
 MAKE = "make one: compsim run CONFIG..."
 
 
 def holds_results(folder: Folder) -> bool:
-    """Return whether a folder holds a study, of jobs or of regimes, or a machine's wear."""
-    place = Path(folder)
+    """Return whether a folder holds a study, of jobs or of another kind."""
+    patterns = ["studies/*.json", *(files.result for files in STUDY_FILES if files.result)]
     try:
-        return any(any(place.glob(one)) for one in RESULT_FILES)
+        return any(any(Path(folder).glob(pattern)) for pattern in patterns)
     except OSError:
         return False
 
@@ -284,13 +281,10 @@ def no_results(folder: Folder) -> WrongName:
         )
     if not place.exists():
         return WrongName(folder, "there is no such folder of results", remedy_for(place))
-    followed = list_few(sorted(path.parent.name for path in place.glob("regimes/*/*.json")))
-    if followed:
-        problem = f"holds no study of jobs, only machines that were followed: {followed}"
-        return WrongName(folder, problem, "compsim plot STUDY draws one")
-    if any(place.glob(RESULT_FILES[-1])):
-        problem = "holds no study of jobs, only how machines have worn"
-        return WrongName(folder, problem, "compsim wear CONFIG... tells of them")
+    for files in STUDY_FILES:
+        if files.result and (found := sorted(place.glob(files.result))):
+            told = files.told.format(list_few([path.parent.name for path in found]))
+            return WrongName(folder, f"holds no study of jobs, only {told}", files.remedy)
     return WrongName(folder, "holds no study", remedy_for(place))
 
 
@@ -299,8 +293,6 @@ def remedy_for(place: Path) -> str:
     run.
     """
     above = place.absolute().parent
-    if place.name in PARTS and holds_results(above):
-        return f"did you mean {place.parent}?"
     inside = [*found_in(place)]
     if inside:
         return f"did you mean {' or '.join(str(one) for one in inside[:MAX_NAMES])}?"
@@ -310,6 +302,8 @@ def remedy_for(place: Path) -> str:
     near = did_you_mean(place.name, beside, beside)
     if near:
         return near
+    if holds_results(above):
+        return f"did you mean {place.parent}?"
     if beside:
         return f"there are results in {list_few([*map(str, beside.values())])}; or {MAKE}"
     return f"choose the folder of a sweep, or {MAKE}"
@@ -322,11 +316,6 @@ def found_in(folder: Path) -> Iterator[Path]:
     except OSError:
         return
     yield from (one for one in entries if one.is_dir() and holds_results(one))
-
-
-def models_file(folder: Folder, study: str) -> Path:
-    """Return where the choices of the model of a study's job are stored, or would be."""
-    return Path(folder) / "models" / f"{study}.nc"
 
 
 def list_few(names: list[str]) -> str:

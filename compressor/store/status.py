@@ -38,6 +38,7 @@ from compressor.cases import (
 )
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
+from compressor.program import STUDY_FILES
 from compressor.store.files import Folder, StoreError, final_path, is_locked, no_results
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import places, read_store, unowned_series
@@ -203,11 +204,9 @@ def _outside_of_study(study: StoredStudy) -> dict[str, str]:
 
 
 FORMER_REMEDY = "delete it: its jobs stay stored"
-# machines over values and over hours, and by choices of the model
-FOLLOWED = ("regimes/*/*.nc", "wear/*.nc", "models/*.nc")
 ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
 STUDY_REMEDY = "run its case file again, which computes nothing anew"
-FOLLOWED_REMEDY = "delete it: the command that made it makes it again"
+STUDY_FILE_REMEDY = "delete it: the command that made it makes it again"
 
 
 @dataclass(frozen=True)
@@ -236,8 +235,7 @@ class Damage:
 def verify(
     folder: Folder, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Damage]:
-    """Return all damage to a store: to segments, files of time series, studies, chains, wear and
-    choices of the model.
+    """Return all damage to a store: to segments, files of time series, studies and their files.
 
     Jobs that a study has and no row knows are damage, too, unless a run is at work there: they have
     not run, or their row is gone. `progress` is told how many files of time series were read, of
@@ -245,13 +243,13 @@ def verify(
     """
     busy = {place for place in places(folder) if is_locked(place)}
     stored = read_store(folder, DamagedJob)
-    followed = [path for pattern in FOLLOWED for path in sorted(Path(folder).glob(pattern))]
-    if not (stored.segments or stored.damaged or study_paths(folder) or followed):
+    others = [path for files in STUDY_FILES for path in sorted(Path(folder).glob(files.checked))]
+    if not (stored.segments or stored.damaged or study_paths(folder) or others):
         raise no_results(folder)
     found: list[Damage] = []
-    for path in followed:
+    for path in others:
         try:
-            read_dataset(path, FOLLOWED_REMEDY)
+            read_dataset(path, STUDY_FILE_REMEDY)
         except StoreError as error:
             found.append(Damage(path, error.problem, (), error.remedy))
     studies: list[StoredStudy] = []

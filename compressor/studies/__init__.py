@@ -8,7 +8,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from compressor.program import STUDY_FILES, StudyFiles
 
 if TYPE_CHECKING:
     import click
@@ -25,7 +28,8 @@ class StudyKind:
     `verbs`: of the command line, which its module `command` has.
     `group`: the group of keys by which a case file asks `compsim run` for it; its module `command`
     then has `check_options`, `run_studies`, `ahead` and `ahead_lines`.
-    `figures`: what `compsim plot` draws of it; its module `plots` has `is_stored` and `write`.
+    `figures`: what `compsim plot` draws of it; its module `plots` has `write`.
+    `files`: what it keeps beside the jobs; of a kind with figures, a `result` has a study's folder.
     `has_page`: whether its module `page` has `add`, what it adds to the page of a report.
     `page_folder`: the option of `compsim report`, and the default folder, of what the page is made
     from beside the results.
@@ -35,6 +39,7 @@ class StudyKind:
     verbs: tuple[str, ...] = ()
     group: str = ""
     figures: tuple[str, ...] = ()
+    files: StudyFiles | None = None
     has_page: bool = False
     page_folder: str = ""
 
@@ -45,13 +50,22 @@ class StudyKind:
 
 STUDIES = (
     StudyKind("claims", ("claims",), has_page=True, page_folder="claims"),
-    StudyKind("regimes", group="regimes", figures=("bifurcation", "sections", "periods")),
-    StudyKind("wear", ("wear",)),
+    StudyKind(
+        "regimes", group="regimes", figures=("bifurcation", "sections", "periods"),
+        files=StudyFiles("regimes/*/*.nc", "regimes/*/study.json",
+                         "machines that were followed: {}", "compsim plot STUDY draws one"),
+    ),
+    StudyKind(
+        "wear", ("wear",),
+        files=StudyFiles("wear/*.nc", "wear/*.nc",
+                         "how machines have worn", "compsim wear CONFIG... tells of them"),
+    ),
     StudyKind("diagnosis", ("dataset", "identify")),
-    StudyKind("tradeoff", ("tradeoff", "explain"), has_page=True),
+    StudyKind("tradeoff", ("tradeoff", "explain"), has_page=True, files=StudyFiles("models/*.nc")),
     StudyKind("stress", ("stress",)),
     StudyKind("search", ("find",)),
-)
+)  # fmt: skip
+STUDY_FILES[:] = [kind.files for kind in STUDIES if kind.files]
 
 
 def verbs() -> "list[click.Command]":
@@ -73,10 +87,12 @@ def by_kind(studies: "Iterable[Study]") -> "dict[StudyKind | None, list[Study]]"
     return found
 
 
-def kind_of_stored(results: "Folder", name: str) -> StudyKind | None:
-    """Return the kind of a stored study that `compsim plot` draws; None of jobs, or where none."""
-    drawn = (kind for kind in STUDIES if kind.figures)
-    return next((kind for kind in drawn if kind.module("plots").is_stored(results, name)), None)
+def find_drawn(results: "Folder") -> dict[str, StudyKind]:
+    """Return the kinds of the stored studies that `compsim plot` draws, without those of jobs."""
+    drawn = ((kind, kind.files) for kind in STUDIES if kind.figures and kind.files)
+    return {
+        path.parent.name: kind for kind, files in drawn for path in Path(results).glob(files.result)
+    }
 
 
 def page_additions(folders: "Mapping[str, Folder]") -> "list[Add]":

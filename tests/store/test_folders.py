@@ -3,6 +3,7 @@
 import pytest
 
 from compressor.store.files import WrongName, holds_results, no_results, writable_folder
+from compressor.studies import find_drawn
 
 
 @pytest.fixture
@@ -13,7 +14,7 @@ def place(tmp_path, monkeypatch):
         (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).write_text("{}")
     (tmp_path / "chains/regimes/rise").mkdir(parents=True)
-    (tmp_path / "chains/regimes/rise/manifest.json").write_text("{}")
+    (tmp_path / "chains/regimes/rise/study.json").write_text("{}")
     (tmp_path / "plots").mkdir()
     (tmp_path / "case.yaml").touch()
     (tmp_path / "notes.txt").touch()
@@ -52,6 +53,7 @@ def test_which_folders_hold_results(place):
     assert [p.name for p in sorted(place.iterdir()) if holds_results(p)] == [
         "chains", "results", "wear"
     ]  # fmt: skip
+    assert [*find_drawn("chains")] == ["rise"]
 
 
 def test_a_folder_that_may_not_be_written_is_found_before(tmp_path, monkeypatch):

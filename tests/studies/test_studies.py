@@ -1,6 +1,7 @@
 """The table of studies: what each gives the program, and that the program does without each."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import click
 import pytest
 import test_layers
 
-from compressor.studies import STUDIES, by_kind, kind_of_stored, verbs
+from compressor.studies import STUDIES, by_kind, find_drawn, verbs
 
 ROOT = Path(__file__).parent.parent.parent
 FOLDERS = sorted(path.parent.name for path in (ROOT / "compressor/studies").glob("*/__init__.py"))
@@ -31,9 +32,8 @@ def test_a_study_has_the_parts_that_its_line_names(kind):
         for name in ("check_options", "run_studies", "ahead", "ahead_lines"):
             assert callable(getattr(command, name))
     if kind.figures:
-        plots = kind.module("plots")
-        assert callable(plots.is_stored)
-        assert callable(plots.write)
+        assert callable(kind.module("plots").write)
+        assert kind.files.result.endswith("*/study.json")
     assert hasattr(kind.module("page"), "add") if kind.has_page else not kind.page_folder
 
 
@@ -44,7 +44,7 @@ def test_a_verb_belongs_to_one_study():
 
 
 def test_of_a_folder_without_studies_nothing_is_drawn_by_one(tmp_path):
-    assert kind_of_stored(tmp_path, "wear") is None
+    assert find_drawn(tmp_path) == {}
     assert by_kind([]) == {}
 
 
@@ -54,12 +54,13 @@ def copy_without(folder, names):
     shutil.copytree(ROOT / "compressor", folder / "compressor", ignore=ignore)
     shutil.copytree(ROOT / "cmd", folder / "cmd", ignore=ignore)
     table = folder / "compressor/studies/__init__.py"
-    lines = table.read_text().split("\n")
+    text = table.read_text()
     for name in names:
         shutil.rmtree(folder / "compressor/studies" / name)
-        (line,) = [line for line in lines if line.startswith(f'    StudyKind("{name}"')]
-        lines.remove(line)
-    table.write_text("\n".join(lines))
+        text, count = re.subn(rf'^    StudyKind\(\s*"{name}".*?\),\n(?=\)|    StudyKind)', "", text,
+                              flags=re.DOTALL | re.MULTILINE)  # fmt: skip
+        assert count == 1
+    table.write_text(text)
     for name in {*names} & {*OLD_PLACES}:
         (folder / f"compressor/{name}.py").unlink()
     return folder

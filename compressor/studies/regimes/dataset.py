@@ -77,11 +77,6 @@ def of_joint(over: str, chains: Sequence[Sequence[xr.Dataset | None]]) -> str:
     return f" of {'' if joint == 'both' else 'the '}{SPOKEN[joint]}" if joint in SPOKEN else ""
 
 
-def followed_studies(results: Folder) -> list[str]:
-    """Return the names of the regimes studies in a folder of results."""
-    return sorted(path.parent.name for path in (Path(results) / FOLDER).glob(f"*/{FILE}"))
-
-
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Return which chains a study has. Raises StoreError."""
     path = folder / FILE

@@ -18,15 +18,10 @@ from compressor.report import (
 )
 from compressor.store import Folder
 from compressor.studies.regimes.captions import CAPTIONS
-from compressor.studies.regimes.dataset import followed_studies, open_regimes
+from compressor.studies.regimes.dataset import open_regimes
 from compressor.studies.regimes.figures import draw_bifurcation, draw_periods, draw_sections
 
 MAX_SECTIONS = 6
-
-
-def is_stored(results: Folder, name: str) -> bool:
-    """Return whether a folder of results has a regimes study of this name."""
-    return name in followed_studies(results)
 
 
 def write(results: Folder, name: str, output: Folder, choice: PlotChoice) -> Iterator[Plotted]:

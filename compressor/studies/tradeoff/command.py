@@ -257,9 +257,9 @@ def explain(
 
 def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
     """Print and store how far choices of the model move the metrics of each study's first job."""
-    from compressor.store import models_file, writable_folder, write_dataset
+    from compressor.store import writable_folder, write_dataset
     from compressor.studies.tradeoff.model_choices import explain_models as run_models
-    from compressor.studies.tradeoff.page import model_table, place_text
+    from compressor.studies.tradeoff.page import model_table, models_file, place_text
 
     writable_folder(folder)
     failed, found = False, []

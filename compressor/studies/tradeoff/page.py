@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -36,7 +37,6 @@ from compressor.store import (
     StoredStudy,
     StoreError,
     StoreWarning,
-    models_file,
     read_dataset,
 )
 
@@ -228,6 +228,11 @@ class ModelsContent:
     headline: str
     unknown: str
     table: PageTable
+
+
+def models_file(folder: Folder, study: str) -> Path:
+    """Return where the choices of the model of a study's job are stored, or would be."""
+    return Path(folder) / "models" / f"{study}.nc"
 
 
 def read_models(folder: Folder, study: StoredStudy) -> xr.Dataset | None:

@@ -15,7 +15,6 @@ from compressor.cases.materials import contact_stiffness
 from compressor.metrics import JOINTS, METRICS
 from compressor.solve.si_record import stiffness_of
 from compressor.solve.simulate import simulate
-from compressor.store.files import models_file
 from compressor.store.series_file import write_dataset
 from compressor.store.status import verify
 from compressor.studies.tradeoff import model_choices as module
@@ -30,6 +29,7 @@ from compressor.studies.tradeoff.model_choices import (
     tabulate,
     trade,
 )
+from compressor.studies.tradeoff.page import models_file
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 THREE = ("contact stiffness × 2", "friction law: Threlfall", "contact law: Flores")

@@ -9,12 +9,13 @@ import xarray as xr
 
 from compressor.metrics import JOINTS, METRICS
 from compressor.report.page import document
-from compressor.store.files import StoreWarning, models_file
+from compressor.store.files import StoreWarning
 from compressor.store.series_file import write_dataset
 from compressor.store.studies import StoredAxis, StoredStudy
 from compressor.studies.tradeoff.page import (
     headline,
     model_table,
+    models_file,
     models_section,
     page_table,
     percent,
