@@ -103,32 +103,37 @@ def refusals(path: Folder) -> Iterator[None]:
         raise system_error(named, error) from error
 
 
-def publish(path: Path, data: bytes) -> None:
-    """Put a whole file under its name, durably, or leave what was there."""
-    with publishing(path) as file:
+def publish(path: Path, data: bytes, pending: bool = False) -> None:
+    """Put a whole file under its name, durably, or leave what was there; see `publishing`."""
+    with publishing(path, pending) as file:
         file.write(data)
 
 
 @contextlib.contextmanager
-def publishing(path: Path) -> Iterator[BinaryIO]:
+def publishing(path: Path, pending: bool = False) -> Iterator[BinaryIO]:
     """A file to write: it has its name, durably, once the block has ended well, or never.
 
-    What stood under the name is left until then. Raises StoreError where the disk refuses.
+    What stood under the name is left until then. A `pending` file is left under `pending_path` for
+    `name_pending`, and is durable once its folder has been synced. Raises StoreError where the disk
+    refuses.
     """
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+    own = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+    temporary = pending_path(path) if pending else own
     make_folder(path.parent)
     try:
         try:
-            with open(temporary, "xb") as file:
+            with open(temporary, "wb") as file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(temporary, path)
+            if not pending:
+                os.replace(temporary, path)
         except BaseException:
             with contextlib.suppress(OSError):
                 temporary.unlink()
             raise
-        sync_folder(path.parent)
+        if not pending:
+            sync_folder(path.parent)
     except OSError as error:
         raise system_error(path, error) from error
 
@@ -141,26 +146,6 @@ def pending_path(path: Path) -> Path:
 def final_path(path: Path) -> Path:
     """Return what a file that waits will be called; one with its name keeps it."""
     return path.with_name(path.name.removeprefix(".").removesuffix(".tmp"))
-
-
-def write_pending(path: Path, data: bytes) -> None:
-    """Write a whole file that waits for its name. Raises StoreError.
-
-    It is durable once its folder has been synced (`sync_folder`).
-    """
-    make_folder(path.parent)
-    try:
-        try:
-            with open(pending_path(path), "wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-        except BaseException:
-            with contextlib.suppress(OSError):
-                pending_path(path).unlink()
-            raise
-    except OSError as error:
-        raise system_error(path, error) from error
 
 
 def name_pending(paths: Iterable[Path]) -> None:
@@ -195,7 +180,13 @@ def is_locked(place: Path) -> bool:
 def make_folder(folder: Path) -> None:
     """Make a folder and those above it, durably; raises StoreError."""
     try:
-        _make_folder(folder)
+        if not folder.is_dir():
+            make_folder(folder.parent)
+            folder.mkdir(exist_ok=True)
+            sync_folder(folder.parent)
+    except FileExistsError as error:
+        problem = "is a link that leads nowhere" if folder.is_symlink() else IS_FILE
+        raise WrongName(folder, problem, ELSEWHERE) from error
     except OSError as error:
         raise system_error(folder, error) from error
 
@@ -213,17 +204,6 @@ def writable_folder(folder: Folder, make: bool = True) -> None:
         raise WrongName(path, f"nothing may be written to {above}", FORBIDDEN)
     if make:
         make_folder(path)
-
-
-def _make_folder(folder: Path) -> None:
-    if not folder.is_dir():
-        make_folder(folder.parent)
-        try:
-            folder.mkdir(exist_ok=True)
-        except FileExistsError as error:
-            problem = "is a link that leads nowhere" if folder.is_symlink() else IS_FILE
-            raise WrongName(folder, problem, ELSEWHERE) from error
-        sync_folder(folder.parent)
 
 
 def sync_folder(folder: Path) -> None:

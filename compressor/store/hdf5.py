@@ -13,7 +13,6 @@ import contextlib
 import hashlib
 import math
 import os
-import struct
 import threading
 import uuid
 from collections.abc import Collection, Iterator, Mapping
@@ -21,7 +20,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5f, h5l, h5o, h5p, h5z
+from h5py import h5d, h5f, h5l, h5o, h5p, h5t, h5z
 
 from compressor.store.files import Folder, StoreError, system_error
 
@@ -34,8 +33,6 @@ FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
 GZIP_LEVEL = 4
 MAX_EXPANSION = 1100  # deflate's limit is 1032: what claims to hold more is no honest file
 HEAP = b"GCOL\1\0\0\0"  # begins a global heap (version 1), where HDF5 keeps texts of any length
-HEAP_HEAD = struct.Struct("<8sQ")  # signature and version, size with this head
-HEAP_ITEM = struct.Struct("<H6xQ")  # number, size without this head; but of the free rest with it
 TEXT_PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("item", "<u4")])
 MAX_TEXT = 60_000  # bytes in an attribute, which HDF5 limits to 64 KiB
 BARE = "This is a netCDF dimension but not a netCDF variable."  # what netCDF calls such a scale
@@ -149,38 +146,6 @@ def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.
         raise DamagedJob(path, problem, remedy) from error
 
 
-def _texts_are_there(entry: h5d.DatasetID, data: bytes) -> bool:
-    """Return whether texts of any length are where a dataset says.
-
-    HDF5 believes it whatever it says.
-    """
-    offset, count = entry.get_offset(), math.prod(entry.shape)
-    if offset is None or offset + count * TEXT_PLACE.itemsize > len(data):
-        return False
-    places = np.frombuffer(data, TEXT_PLACE, count, offset)
-    heaps = {heap: _items(data, heap) for heap in set(places["heap"].tolist())}
-    return all(heaps[heap].get(item) == length for length, heap, item in places.tolist() if length)
-
-
-def _items(data: bytes, heap: int) -> dict[int, int]:
-    """Return the sizes of a global heap's items by number.
-
-    None where they do not fill it exactly.
-    """
-    if heap + HEAP_HEAD.size > len(data):
-        return {}
-    signature, size = HEAP_HEAD.unpack_from(data, heap)
-    at, end = heap + HEAP_HEAD.size, heap + size
-    found: dict[int, int] = {}
-    while signature == HEAP and at + HEAP_ITEM.size <= end <= len(data):
-        number, length = HEAP_ITEM.unpack_from(data, at)
-        if number == 0:  # the free rest
-            return found if at + length == end else {}
-        found[number] = length
-        at += HEAP_ITEM.size + (length + 7) // 8 * 8
-    return found if at == end or end - HEAP_ITEM.size < at < end else {}
-
-
 def _objection(file: h5py.File, name: str, data: bytes) -> str:
     """Return what is wrong with an entry of the file that `data` is, or ""."""
     encoded = name.encode(errors="surrogateescape")
@@ -199,8 +164,6 @@ def _objection(file: h5py.File, name: str, data: bytes) -> str:
         return f"holds {dtype}, neither numbers nor text"
     if math.prod(entry.shape) * dtype.itemsize > len(data) * MAX_EXPANSION:
         return "claims more data than the file can hold"
-    if dtype.kind == "O" and not _texts_are_there(entry, data):
-        return "holds texts that are not where it says"
     return ""
 
 
@@ -224,17 +187,46 @@ def _attribute(stored: Any, name: str) -> Any:
     return value.decode() if isinstance(value, bytes) else value
 
 
-def variables(file: h5py.File) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
-    """Return all variables of a file, as `image` takes them."""
+def variables(
+    file: h5py.File, data: bytes
+) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+    """Return all variables of the file that `data` is, as `image` takes them."""
     found, dims = {}, _dimensions(file)
     for name, stored in file.items():
         if "NAME" in stored.attrs and str(_attribute(stored, "NAME")).startswith(BARE):
             continue
-        is_text = h5py.check_string_dtype(stored.dtype) and stored.dtype.kind == "O"
-        values = np.asarray(stored.asstr()[()] if is_text else stored[()])
-        if is_text:
-            values = values.astype(object)
-        found[name] = dims[name], values, attributes(stored)
+        found[name] = dims[name], read_variable(stored, data), attributes(stored)
+    return found
+
+
+def read_variable(stored: h5py.Dataset, data: bytes) -> np.ndarray:
+    """Return the numbers or texts (object) of a dataset. Raises one of FOREIGN where it has none.
+
+    Texts of any length are taken from the bytes of the file, `data`: HDF5 would follow what a
+    hostile file says of their places, and crash or never end.
+    """
+    kind = stored.id.get_type()  # quicker than `dtype`
+    if not (isinstance(kind, h5t.TypeStringID) and kind.is_variable_str()):
+        return np.asarray(stored[()])
+    count = math.prod(stored.shape)
+    places = np.frombuffer(data, TEXT_PLACE, count, stored.id.get_offset()).tolist()
+    heaps = {at: _heap_items(data, at) for at in {heap for length, heap, _ in places if length}}
+    texts = [heaps[heap][item][:length].decode() if length else "" for length, heap, item in places]
+    return np.array(texts, object).reshape(stored.shape)
+
+
+def _heap_items(data: bytes, heap: int) -> dict[int, bytes]:
+    """Return the texts of a global heap, which begins at an offset of a file, by number."""
+    if data[heap : heap + len(HEAP)] != HEAP:
+        raise ValueError("no heap")
+    size = int.from_bytes(data[heap + 8 : heap + 16], "little")
+    found: dict[int, bytes] = {}
+    at, end = heap + 16, min(heap + size, len(data))
+    while at < end:  # number (0: the free rest), length, the text up to a multiple of 8
+        number = int.from_bytes(data[at : at + 2], "little")
+        length = int.from_bytes(data[at + 8 : at + 16], "little")
+        found[number] = data[at + 16 : at + 16 + length]
+        at += 16 + (length + 7) // 8 * 8
     return found
 
 

@@ -1,13 +1,11 @@
-"""Segments, files that each hold the outcomes of many jobs, and the rows of them that count.
+"""Segments, files that hold the outcomes of many jobs as columns, and those rows that count.
 
-Segments: files that each hold the outcomes of many jobs as columns, a row a job. A segment is
-written once, as `<folder>/rows/<number>-<digest>.h5`, netCDF-4 like a job's file. The digest of its
-bytes is in its name, and compared whenever it is read.
+A segment is written once, as `<folder>/rows/<number>-<digest>.h5`, netCDF-4 like a job's file. The
+digest of its bytes is in its name, and compared whenever it is read.
 
 Of several rows of one job the most complete one counts (`completeness`): runs that write at the
 same time, each its own shard, take nothing from each other. Among equals it is the one with the
-greatest
-`serial`: the number of the segment that it was first written to.
+greatest `serial`: the number of the segment that it was first written to.
 """
 
 import json
@@ -26,43 +24,34 @@ from compressor.metrics import HORIZON, METRICS, NUMBERS, ROD_LOAD, SOMETIMES
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
 from compressor.program import PROGRAM
 from compressor.store.files import HEX20, pending_path
-from compressor.store.hdf5 import DamagedJob, digest, image, open_file, storable
+from compressor.store.hdf5 import DamagedJob, digest, image, open_file, read_variable, storable
 from compressor.store.series_file import intact, series_path
 
 NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
 GIVEN = digest(" ".join([PROGRAM, MODEL, *METRICS, *ROD_LOAD]).encode())[:8]  # by this version
-DIGITS = re.compile(rb"[0-9a-f]{20,}")  # in which keys may stand
+ANY_KEY = re.compile(rb"(?=([0-9a-f]{20}))")  # every 20 hexadecimal digits in a row
 REMEDY = "move it away, then run its studies again"
-WORDS = {  # columns -> what their texts look like
-    "key": re.compile(HEX20.encode()),
-    "status": re.compile(rb"ok|failed"),
-    "reason": re.compile(rb"[a-z_]*"),
-    "precision": re.compile(rb"(single|double)?"),
-    "promise": re.compile(rb"(kept|none)?"),
-    "regime": re.compile("|".join(["", *Regime]).encode()),
-    "signals": re.compile(rb"(yes)?"),
-    "digest": re.compile(f"({HEX20})?".encode()),
-    "given": re.compile(rb"([0-9a-f]{8})?"),
-}
 FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
 MAX_LINE = 1 << 20  # bytes that are known of one job, on average over a segment
 
-# columns that are no numbers of ROW: (type, phrase)
+# columns that are no numbers of ROW: (type, phrase, pattern of its texts)
 COLUMNS = {
-    "key": ("S20", "a job's identity"),
-    "physics_key": ("S20", "hash of what a job simulates, not how"),
-    "status": ("S", "ok or failed"),
-    "reason": ("S", "why a run failed, by a stable name"),
-    "serial": ("i8", "order of writing; of a job's equally good rows the greatest counts"),
-    "samples": ("i8", "length of the time series; 0: none is kept"),
-    "end": ("f8", "last time of the series, s"),
-    "precision": ("S", "of the series: double or single"),
-    "digest": ("S20", "of the file with the series"),
-    "promise": ("S", "kept, or none given; empty in files of before 2026-11-22"),
-    "regime": ("S", "how far the motion can be foretold; empty where that is not known"),
-    "signals": ("S", "yes where signals are kept beside the time series"),
-    "given": ("S8", "hash of the program, its model and the names of its metrics"),
-}
+    "key": ("S20", "a job's identity", HEX20),
+    "physics_key": ("S20", "hash of what a job simulates, not how", ""),
+    "status": ("S", "ok or failed", "ok|failed"),
+    "reason": ("S", "why a run failed, by a stable name", "[a-z_]*"),
+    "serial": ("i8", "order of writing; of a job's equally good rows the greatest counts", ""),
+    "samples": ("i8", "length of the time series; 0: none is kept", ""),
+    "end": ("f8", "last time of the series, s", ""),
+    "precision": ("S", "of the series: double or single", "(single|double)?"),
+    "digest": ("S20", "of the file with the series", f"({HEX20})?"),
+    "promise": ("S", "kept, or none given; empty in files of before 2026-11-22", "(kept|none)?"),
+    "regime": ("S", "how far the motion can be foretold; empty where that is not known",
+               "|".join(["", *Regime])),
+    "signals": ("S", "yes where signals are kept beside the time series", "(yes)?"),
+    "given": ("S8", "hash of the program, its model and the names of its metrics",
+              "([0-9a-f]{8})?"),
+}  # fmt: skip
 LATER_COLUMNS = ("promise", "regime", "signals", "given")  # columns that older files do not have
 
 
@@ -91,7 +80,7 @@ class Segment:
         with open_file(self.held, self.path, REMEDY) as file:
             for name in kind.names or ():
                 if name in file:
-                    found[name] = file[name][()]
+                    found[name] = read_variable(file[name], self.held)
         return found
 
     @property
@@ -186,7 +175,7 @@ def encode(segment: Segment) -> bytes:
     for name, (dims, values, attrs) in coordinates().items():
         kind = object if isinstance(values[0], str) else float
         variables[name] = (dims, np.array(values, kind), attrs)
-    for name, (_, phrase) in COLUMNS.items():
+    for name, (_, phrase, _) in COLUMNS.items():
         variables[name] = (("row",), columns[name], {"long_name": phrase})
     for name, (dims, unit, phrase) in NUMBERS.items():
         values = numbers[name]
@@ -207,23 +196,22 @@ def decode(data: bytes, path: Path) -> Segment:
     """
     with open_file(data, path, REMEDY) as file:
         rows = len(file["key"])
-        absent = np.full(rows, b"", "S1")
-        columns = {
-            name: absent if name in LATER_COLUMNS and name not in file else file[name][()]
-            for name in COLUMNS
-        }
-        for name, (kind, _) in COLUMNS.items():
-            if columns[name].dtype.kind != kind[0] or columns[name].shape != (rows,):
+        columns = {}
+        for name, (kind, _, pattern) in COLUMNS.items():
+            absent = name in LATER_COLUMNS and name not in file
+            values = np.full(rows, b"", "S1") if absent else read_variable(file[name], data)
+            if values.dtype.kind != kind[0] or values.shape != (rows,):
                 raise ValueError(name)
-        for name, pattern in WORDS.items():
-            if not all(pattern.fullmatch(word) for word in np.unique(columns[name]).tolist()):
+            like = re.compile(pattern.encode())
+            if pattern and not all(map(like.fullmatch, np.unique(values).tolist())):
                 raise ValueError(name)
+            columns[name] = values
         for name in NUMBERS:
             if name in file:
-                values = file[name][()]  # not kept: what cannot be read is told now
+                values = read_variable(file[name], data)  # not kept: tells what cannot be read
                 if values.shape != (rows, *ROW[name].shape) or values.dtype.kind != "f":
                     raise ValueError(name)
-        blobs = (file[name][()].tobytes() for name in ("attributes", "details"))
+        blobs = (read_variable(file[name], data).tobytes() for name in ("attributes", "details"))
         return Segment(path, columns, data, *blobs)
 
 
@@ -246,12 +234,8 @@ class Cut(DamagedJob):
         self.data = data
 
     def possible_keys(self) -> set[bytes]:
-        """Return what may have been the keys of its jobs: every 20 hexadecimal digits in a row."""
-        return {
-            run[0][start : start + 20]
-            for run in DIGITS.finditer(self.data)
-            for start in range(len(run[0]) - 19)
-        }
+        """Return what may have been the keys of its jobs."""
+        return {*ANY_KEY.findall(self.data)}
 
 
 def merge(segments: Sequence[Segment]) -> Segment:
@@ -305,7 +289,7 @@ class Rows:
                 [s.columns[name][mask] for s, mask in zip(segments, masks, strict=True)]
                 or [np.zeros(0, kind if kind != "S" else "S1")]
             )
-            for name, (kind, _) in COLUMNS.items()
+            for name, (kind, *_) in COLUMNS.items()
         }
         order = np.lexsort((columns["serial"], completeness(columns), columns["key"]))
         keys = columns["key"][order]

@@ -28,7 +28,6 @@ from compressor.store.files import (
     final_path,
     publish,
     system_error,
-    write_pending,
 )
 from compressor.store.hdf5 import REMEDY, DamagedJob, digest, open_file, seal, unseal
 
@@ -61,7 +60,7 @@ def series_file(dataset: "DatasetParts | xr.Dataset", output: Output) -> tuple[S
 
 def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
     """Write the bytes of a job's file; a `Writer` gives it its name."""
-    write_pending(series_path(place, key, file.digest), data)
+    publish(series_path(place, key, file.digest), data, pending=True)
 
 
 def series_image(dataset: "DatasetParts | xr.Dataset", output: Output) -> bytes:
@@ -83,8 +82,9 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
     """
     import xarray as xr
 
-    with open_file(unseal(path.read_bytes(), path, remedy), path, remedy) as file:
-        return xr.Dataset(hdf5.variables(file), attrs=hdf5.attributes(file))
+    data = unseal(path.read_bytes(), path, remedy)
+    with open_file(data, path, remedy) as file:
+        return xr.Dataset(hdf5.variables(file, data), attrs=hdf5.attributes(file))
 
 
 def image_of(
@@ -145,11 +145,12 @@ def read_series(path: Path) -> "xr.Dataset":
     """Return a job's Dataset, from a file. Raises DamagedJob."""
     import xarray as xr
 
-    with open_file(read_bytes(path), path) as file:
+    data = read_bytes(path)
+    with open_file(data, path) as file:
         attributes = hdf5.attributes(file)
         if attributes["key"] != final_path(path).name[:20]:
             raise ValueError
-        dataset = xr.Dataset(hdf5.variables(file), attrs=attributes)
+        dataset = xr.Dataset(hdf5.variables(file, data), attrs=attributes)
         for name, (dims, _, _) in NUMBERS.items():
             if name in dataset and (dataset[name].dims, dataset[name].dtype.kind) != (dims, "f"):
                 raise ValueError
@@ -162,5 +163,6 @@ def read_series(path: Path) -> "xr.Dataset":
 
 def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Return some variables of a job's file by name, without those that it does not have."""
-    with open_file(read_bytes(path), path) as file:
-        return {name: file[name][()] for name in names if name in file}
+    data = read_bytes(path)
+    with open_file(data, path) as file:
+        return {name: hdf5.read_variable(file[name], data) for name in names if name in file}

@@ -126,8 +126,8 @@ def test_the_data_card_says_it(folder):
 
 
 def without(name, variables):
-    def read(file):
-        return {n: value for n, value in variables(file).items() if n != name}
+    def read(file, data):
+        return {n: value for n, value in variables(file, data).items() if n != name}
 
     return read
 

@@ -49,8 +49,9 @@ def contents(folder, foreign=()):
         parts += [columns[name][position].tobytes() for name in ("samples", "end")]
         attributes = stored.rows.attributes(position)
         if path := stored.rows.path(position):
-            with open_file(path.read_bytes(), path) as file:
-                held = hdf5.variables(file)
+            data = path.read_bytes()
+            with open_file(data, path) as file:
+                held = hdf5.variables(file, data)
                 attributes |= hdf5.attributes(file)
             for name in sorted(set(held) - {TIMED}):
                 values = np.asarray(held[name][1])
