@@ -24,7 +24,7 @@ from compressor.metrics import NUMBERS
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
 from compressor.store.files import name_pending
-from compressor.store.reader import finished_keys, read_store
+from compressor.store.reader import read_store
 from compressor.store.series_file import series_path, write_series
 from compressor.store.studies import write_study
 from compressor.store.writer import Writer
@@ -166,7 +166,8 @@ def store(folder, *paths, overrides=()):
     studies = load_studies(*paths, overrides=overrides)
     for study in studies:
         write_study(folder, study, "compsim run")
-        new = [case for case in study.cases if case.key not in finished_keys(folder)]
+        stored = read_store(folder).keys()
+        new = [case for case in study.cases if case.key not in stored]
         keep(folder, *map(simulate, new))
     return studies
 

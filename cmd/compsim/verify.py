@@ -37,9 +37,9 @@ def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
         print_text(json.dumps([jsonable_damage(damage) for damage in damages], indent=1))
     for damage in () if as_json else damages:
         print_text(f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy))
-        for job in damage.jobs:
-            print_text(f"  job {job.key}")
-            for study, point in job.studies.items():
+        for job, points in damage.studies.items():
+            print_text(f"  job {job}")
+            for study, point in points.items():
                 values = "".join(f" {key}={value}" for key, value in point.items())
                 print_text(f"    in {study}{values}")
     if not damages:
@@ -58,7 +58,7 @@ def jsonable_damage(damage: "Damage") -> dict[str, Any]:
         "path": str(damage.path),
         "problem": damage.problem,
         "jobs": damage.keys,
-        "studies": {job.key: job.studies for job in damage.jobs},
+        "studies": damage.studies,
         "case_files": [study.case_file for study in damage.again],
         "remedy": damage.remedy,
     }

@@ -1,7 +1,7 @@
 """The store: a folder of finished jobs and of the studies they belong to.
 
-    <folder>/rows/<number>-<digest>.h5   how many jobs ended, and their numbers: `segments`
-    <folder>/jobs/<key>-<digest>.h5      one job with its time series, where kept: `jobfiles`
+    <folder>/rows/<number>-<digest>.h5   how many jobs ended, and their numbers: `rows`
+    <folder>/jobs/<key>-<digest>.h5      one job with its time series, where kept: `series_file`
     <folder>/studies/<name>.json         one study: axes, keys of its jobs in C order: `studies`
     <folder>/former/<name>~<n>.json      the same of a study that another of its name has replaced
     <folder>/shards/<shard>/{rows,jobs}  the same of a run that is one of several
@@ -10,9 +10,9 @@ A job is stored when it has a row and, if the row tells of time series, their fi
 appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
 no index: what is stored is read from the rows. `compressor.store.writer` writes them.
 
-Stored jobs of which this version of the program would tell more, or other numbers. A key holds the
-version of the model, and results of one version agree within their error bars but for what a
-revision has mended (`compressor.cases.case`): a job that another version of the program has
+A stored job is stale where this version of the program would tell more of it, or other numbers. A
+key holds the version of the model, and results of one version agree within their error bars but for
+what a revision has mended (`compressor.cases.case`): a job that another version of the program has
 made is not stale for that alone.
 """
 
@@ -50,27 +50,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
-
-
-def stale(rows: Rows, keys: Iterable[str]) -> dict[str, set[str]]:
-    """Return the stored jobs, of those with some keys, by what a run of this version would give.
-
-    A job may stand under several metrics. Jobs that this version has made are none of them,
-    whatever metric has no value there.
-    """
-    found: dict[str, set[str]] = {}
-    positions = rows.find(list(keys))
-    positions = positions[positions >= 0]
-    old = positions[rows.columns["given"][positions] != GIVEN.encode()]
-    for name, lack in _lacking(rows, old).items() if len(old) else ():
-        if lack.any():
-            found[name] = {key.decode() for key in rows.columns["key"][old[lack]]}
-    for position in old.tolist():
-        for what in _changed_by_revision(rows, position):
-            found.setdefault(f"this version's {what}", set()).add(
-                rows.columns["key"][position].decode()
-            )
-    return found
 
 
 def _changed_by_revision(rows: Rows, position: int) -> list[str]:
@@ -182,8 +161,23 @@ class Stored:
         return self
 
     def stale(self, keys: Iterable[str]) -> dict[str, set[str]]:
-        """Of jobs with some keys those that another version has made, by what they lack."""
-        return stale(self.rows, keys)
+        """Return which jobs of some keys are stale, by what a run of this version would give.
+
+        A job may stand under several metrics. Jobs that this version has made are none of them,
+        whatever metric has no value there.
+        """
+        found: dict[str, set[str]] = {}
+        rows, positions = self.rows, self.rows.find(list(keys))
+        old = positions[positions >= 0]
+        old = old[rows.columns["given"][old] != GIVEN.encode()]
+        names = rows.columns["key"][old].astype(str)
+        for what, lack in _lacking(rows, old).items() if len(old) else ():
+            if lack.any():
+                found[what] = {*names[lack].tolist()}
+        for key, position in zip(names.tolist(), old.tolist(), strict=True):
+            for what in _changed_by_revision(rows, position):
+                found.setdefault(f"this version's {what}", set()).add(key)
+        return found
 
     def keys(self) -> set[str]:
         """Return the keys of all stored jobs, failed ones included."""
@@ -233,13 +227,14 @@ class Stored:
     @cached_property
     def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
         """The position of the first job of each kind, and the kind of each job, (jobs,)."""
-        rows = self.rows
-        read = [rows.columns[name] for name in ("status", "reason", "precision", "signals")]
-        read += [rows.columns["samples"] > 0, rows.barred, rows.foretold]
-        code = np.zeros(len(rows), dtype=np.int64)
-        for values in read:
-            _, which = np.unique(values, return_inverse=True)
-            _, code = np.unique(code * (len(rows) + 1) + which, return_inverse=True)
+        rows, columns = self.rows, self.rows.columns
+        _, code = np.unique(columns["reason"], return_inverse=True)
+        code = 3 * code + np.unique(columns["precision"], return_inverse=True)[1]
+        for flag in (
+            columns["status"] == b"ok", columns["signals"] == b"yes", columns["samples"] > 0,
+            rows.barred, rows.foretold,
+        ):  # fmt: skip
+            code = 2 * code + flag
         _, first, kinds = np.unique(code, return_index=True, return_inverse=True)
         return first, kinds
 
@@ -362,16 +357,6 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     (('time',), 'big_end')
     """
     return read_store(folder).job(key)
-
-
-def job_status(folder: Folder, key: str) -> JobStatus | None:
-    """Return how a stored job ended (`Stored.status`); None where it is not stored."""
-    return read_store(folder).status(key)
-
-
-def finished_keys(folder: Folder) -> set[str]:
-    """Return the keys of all stored jobs, failed ones included."""
-    return read_store(folder).keys()
 
 
 def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":

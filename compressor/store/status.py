@@ -1,15 +1,13 @@
-"""Status and verification of a store, and how far its numbers can be trusted.
+"""How the jobs of a store stand, how far to trust their numbers, and what is damaged.
 
-What stored numbers cannot say of themselves: how far to trust them, in sentences. Of motions that
-were not seen to repeat, or settled after metrics began to count; of clipped sensor records; of
-cases outside the range that the program was judged on. From stored values alone, so that older
-stores answer as far as they have them.
+Caveats are what stored numbers cannot say of themselves: motions that were not seen to repeat, or
+settled after metrics began to count, clipped sensor records, cases outside the range that the
+program was judged on. They come from stored values alone, so that older stores answer as far as
+they have them. Studies and rows are read only, so that 100,000 jobs answer at once; of one job that
+an older version has stored perhaps its file. Jobs whose row is damaged count as missing, with a
+StoreWarning.
 
-Reads studies and rows only, so that 100,000 jobs answer at once; of one job that an older version
-has stored perhaps its file.
-Jobs whose row is damaged count as missing, with a StoreWarning.
-
-Compare every file of a store with its digest, and name the jobs that damage costs. There is no
+`verify` compares every file with its digest, and names the jobs that damage costs. There is no
 index, so that a file that is gone is known by those that speak of it: rows of their files of time
 series and of their study, studies and files of time series of their rows.
 """
@@ -20,7 +18,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -210,25 +208,18 @@ STUDY_FILE_REMEDY = "delete it: the command that made it makes it again"
 
 
 @dataclass(frozen=True)
-class LostJob:
-    """A job whose result is damaged, and the studies that it belongs to, with its swept values."""
-
-    key: str
-    studies: dict[str, dict[str, Any]]
-
-
-@dataclass(frozen=True)
 class Damage:
     """A file of a store that is gone or not what was written, and the jobs that are lost with it.
 
-    A run of `again` computes the jobs anew; `remedy` is what else is to be done, or "".
+    keys: of the lost jobs; studies: for each of them its swept values by study. A run of `again`
+    computes them anew; `remedy` is what else is to be done, or "".
     """
 
     path: Path
     problem: str
     keys: tuple[str, ...]
     remedy: str = ""
-    jobs: tuple[LostJob, ...] = ()
+    studies: dict[str, dict[str, dict[str, Any]]] = field(default_factory=dict)
     again: tuple[Again, ...] = ()
 
 
@@ -318,15 +309,15 @@ def _name_owners(found: list[Damage], studies: list[StoredStudy]) -> list[Damage
     belong = owners(studies, (key for damage in found for key in damage.keys))
     owned = []
     for damage in found:
-        jobs = tuple(LostJob(key, belong[key]) for key in damage.keys)
-        names = {name for job in jobs for name in job.studies}
+        mine = {key: belong[key] for key in damage.keys}
+        names = {name for points in mine.values() for name in points}
         present = (study for study in studies if not study.former_of)
         again = tuple(study.again for study in present if study.name in names)
-        owned.append(replace(damage, jobs=jobs, again=again))
+        owned.append(replace(damage, studies=mine, again=again))
     return owned
 
 
-FORMER = "clipped_share"  # name of `clipped_fraction` in files of series
+CLIPPED_SHARE = "clipped_share"  # older name of `clipped_fraction` in files of series
 
 
 @dataclass(frozen=True)
@@ -426,7 +417,9 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     }
     if path is not None and _hides_clipping(numbers, attributes):
         with contextlib.suppress(DamagedJob):
-            numbers["clipped_fraction"] = float(store.values(key, [FORMER]).get(FORMER, np.nan))
+            numbers["clipped_fraction"] = float(
+                store.values(key, [CLIPPED_SHARE]).get(CLIPPED_SHARE, np.nan)
+            )
     file = "" if path is None else os.fspath(final_path(path))
     caveats = job_caveats(numbers, attributes) if end.status == "ok" else []
     return JobReport(

@@ -145,7 +145,7 @@ def test_set_changes_every_case_file(case_file):
     case_file("b.yaml", load="spring")
     assert cli.main(["run", "a.yaml", "b.yaml", "-j", "1", "--set", "load=[none, gas]"]) == 0
     assert [study.axes[0].values for study in read_studies("results")] == [("none", "gas")] * 2
-    assert len(store.finished_keys("results")) == 2
+    assert len(store.read_store("results").keys()) == 2
 
 
 @pytest.mark.parametrize("quiet", [[], ["--quiet"]])
@@ -158,7 +158,7 @@ def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, capsys):
         assert "1 job failed:\n  mix solve.max_steps=5: budget_steps: more than 5 steps\n" in err
         assert "budget_steps (1): raise solve.max_steps" in err
         (key,) = re.findall(r"^    job ([0-9a-f]{20})$", err, re.MULTILINE)
-        assert store.job_status("results", key).reason == "budget_steps"
+        assert store.read_store("results").status(key).reason == "budget_steps"
         assert "--rerun failed runs failed ones again unchanged." in err
 
 
@@ -643,7 +643,7 @@ def started(tmp_path, answering):
     )  # fmt: skip
     try:
         deadline = time.monotonic() + PATIENCE
-        while not store.finished_keys(tmp_path / "results"):
+        while not store.read_store(tmp_path / "results").keys():
             assert process.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.05)
@@ -709,9 +709,9 @@ def test_a_run_that_is_told_to_end(send, number, code, started, tmp_path):
     err = started.communicate(timeout=PATIENCE)[1]
     assert started.returncode == code
     assert group_is_gone(started.pid)
-    kept = store.finished_keys(tmp_path / "results")
+    kept = store.read_store(tmp_path / "results").keys()
     assert 0 < len(kept) < JOBS
-    assert {store.job_status(tmp_path / "results", key).status for key in kept} == {"ok"}
+    assert {store.read_store(tmp_path / "results").status(key).status for key in kept} == {"ok"}
     if code > 0:
         goes_on = f"of {JOBS} jobs are stored in results; the same command goes on from there"
         slow = rf"(compil.+\n|\d+ of {JOBS} jobs, .+\n)*"  # told where it takes long

@@ -23,7 +23,7 @@ from compressor.solve.attempts import integrate
 from compressor.solve.request import Request
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure
-from compressor.store.reader import finished_keys, read_job
+from compressor.store.reader import read_job, read_store
 from compressor.sweep.sweep import sweep
 
 pytestmark = pytest.mark.compiled
@@ -248,7 +248,7 @@ def swept(folder, workers, backwards=False, interrupted=False):
     if interrupted:
         with pytest.raises(KeyboardInterrupt):
             sweep(studies, folder / "out", workers, stop)
-        assert 0 < len(finished_keys(folder / "out")) < len(studies[0].cases)
+        assert 0 < len(read_store(folder / "out").keys()) < len(studies[0].cases)
     sweep(studies, folder / "out", workers)
     jobs = {case.key: read_job(folder / "out", case.key) for case in studies[0].cases}
     return {key: job.drop_vars("seconds") for key, job in jobs.items()}

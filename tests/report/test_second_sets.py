@@ -31,7 +31,7 @@ from compressor.report.paper_sections import (
     second_drawings,
 )
 from compressor.report.report import write_report
-from compressor.store.reader import finished_keys, read_store
+from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 
 HEAVY = {"rod_mass_kg": 3, "reciprocating_mass_kg": 20}
@@ -88,7 +88,7 @@ def undrawn(monkeypatch):
 def test_the_runs_are_those_of_the_study(heavy_store):
     found = sets(heavy_store)["heavy"]
     assert {*found.drawn} == {"design", *FAULT_LABELS}
-    assert found.keys == finished_keys(heavy_store)
+    assert found.keys == read_store(heavy_store).keys()
     for name in FAULT_LABELS:
         values = json.loads(found.drawn[name].attrs["case"])
         sizes = [size for size in values["clearance_mm"].values() if size]

@@ -24,7 +24,7 @@ from compressor.solve.error_bars import (
 from compressor.solve.si_record import record
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import solve
-from compressor.store.reader import job_status, open_study
+from compressor.store.reader import open_study, read_store
 from compressor.store.studies import read_studies, write_study
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
@@ -297,15 +297,15 @@ def test_a_stored_job_without_bars_does_not_serve_a_case_that_wants_them(tmp_pat
         for more in ({"error_bars": False}, {}, {"accuracy": {"rms_acceleration": 0.1}})
     )
     keep(tmp_path, simulate(plain))
-    stored = job_status(tmp_path, plain.key)
+    stored = read_store(tmp_path).status(plain.key)
     assert stored.serves(plain)
     assert not stored.serves(barred)
     keep(tmp_path, simulate(barred))
-    stored = job_status(tmp_path, plain.key)
+    stored = read_store(tmp_path).status(plain.key)
     assert stored.serves(plain)
     assert stored.serves(barred)
     keep(tmp_path, simulate(by_number))
-    assert job_status(tmp_path, by_number.key).serves(by_number)
+    assert read_store(tmp_path).status(by_number.key).serves(by_number)
 
 
 # Accuracy as it is asked for

@@ -12,7 +12,7 @@ from compsim import cli
 from compressor.cases.load import load_studies
 from compressor.program import PROGRAM
 from compressor.store import rows as segments
-from compressor.store.reader import open_study, read_store, stale
+from compressor.store.reader import open_study, read_store
 from compressor.store.rows import GIVEN, encode, merge, read_segment, segment_name
 from compressor.store.status import verify
 from compressor.sweep.sweep import Options, sweep
@@ -53,8 +53,8 @@ def made_older(monkeypatch, without=(), words=()):
 
 
 def found():
-    rows = read_store("results").rows
-    return {what: len(keys) for what, keys in stale(rows, read_store("results").keys()).items()}
+    store = read_store("results")
+    return {what: len(keys) for what, keys in store.stale(store.keys()).items()}
 
 
 def test_what_this_version_has_stored_is_not_stale(wear):

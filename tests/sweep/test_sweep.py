@@ -46,7 +46,7 @@ def stamps(folder):
 
 
 def statuses(folder, study):
-    return [store.job_status(folder, case.key).status for case in study.cases]
+    return [store.read_store(folder).status(case.key).status for case in study.cases]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -82,7 +82,7 @@ def test_studies_share_jobs(studies, tmp_path):
         one={"machine": {"rod_mass_kg": [4, 5]}}, two={"machine": {"rod_mass_kg": [5, 6]}}
     )
     summary = sweep(made, tmp_path / "out", 1)
-    assert summary.total == summary.run_now == len(store.finished_keys(tmp_path / "out")) == 3
+    assert summary.total == summary.run_now == len(store.read_store(tmp_path / "out").keys()) == 3
     assert [count.jobs for count in summary.counts] == [2, 2]
     assert store.open_study(tmp_path / "out").sizes["job"] == 4
 
@@ -154,7 +154,7 @@ def test_shards_are_one_study_together(studies, tmp_path, in_process):
     assert sum(part.run_now for part in parts) == len(RequestedJobs(made)) == 9
     assert sweep(made, tmp_path / "out", 1).run_now == 0
     whole = {key for study in made for key in study.keys}
-    assert store.finished_keys(tmp_path / "out") == whole
+    assert store.read_store(tmp_path / "out").keys() == whole
     shards = {path.name for path in (tmp_path / "out" / "shards").iterdir()}
     assert shards == {"1-of-3", "2-of-3", "3-of-3"}
     assert verify(tmp_path / "out") == []
@@ -439,7 +439,7 @@ def test_an_interrupted_sweep_keeps_its_jobs_and_goes_on(studies, tmp_path):
     made = studies(one={**BOTH, "machine": {"rod_mass_kg": [4, 5, 6, 7]}})
     with pytest.raises(KeyboardInterrupt):
         sweep(made, tmp_path / "out", 1, stop)
-    finished = store.finished_keys(tmp_path / "out")
+    finished = store.read_store(tmp_path / "out").keys()
     kept = {name: at for name, at in stamps(tmp_path / "out").items() if name[:20] in finished}
     done = len(finished)
     assert 0 < done < 4
@@ -452,4 +452,4 @@ def test_a_relative_folder_is_the_one_of_the_start(studies, tmp_path, monkeypatc
     made = studies(one={})
     monkeypatch.chdir(tmp_path)
     sweep(made, "out", 1, lambda *event: os.chdir("/"))
-    assert store.finished_keys(tmp_path / "out") == {made[0].cases[0].key}
+    assert store.read_store(tmp_path / "out").keys() == {made[0].cases[0].key}

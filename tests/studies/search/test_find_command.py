@@ -12,7 +12,7 @@ from compsim import cli
 
 from compressor.cases.load import load_cases, load_studies
 from compressor.solve.simulate import simulate
-from compressor.store.reader import finished_keys
+from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 
 LIMIT = 0.006
@@ -68,7 +68,7 @@ def test_direct_runs_on_both_sides_confirm_the_interval(accuracy, found, folder)
 
 
 def test_a_second_search_computes_nothing(found, folder, capsys):
-    keys = finished_keys("results")
+    keys = read_store("results").keys()
     assert found[1]["run_now"] == len(found[1]["points"]) == len(keys)
     assert cli.main([*ASKED, "--quiet"]) == 0
     out, err = capsys.readouterr()
@@ -82,7 +82,7 @@ def test_a_second_search_computes_nothing(found, folder, capsys):
     assert (
         last == f"{len(keys)} jobs, 0 of them run now, in study worn-find-clearance_mm of results"
     )
-    assert finished_keys("results") == keys
+    assert read_store("results").keys() == keys
     assert err == ""
 
 
