@@ -36,7 +36,9 @@ from compressor.store import (
     Folder,
     Stored,
     StoredStudy,
+    find_axis,
     find_job,
+    find_value,
     publish,
     read_store,
     read_studies,
@@ -171,8 +173,8 @@ def study_figures(
             f"{study.name} is a study: for {choice.what[0]} name a job, such as {first}"
         )
     wanted = choose_figures(choice.what, [*STUDY], f"study {study.name}")
-    over = axis_of(study, choice.over)
-    jobs, where = select_jobs(study, over, choice.at)
+    over = choose_axis(stored.folder, study, choice.over)
+    jobs, where = select_jobs(stored.folder, study, over, choice.at)
     if len(jobs) > MAX_ROWS:
         where += f" {MAX_ROWS} of {len(jobs)} jobs, evenly chosen."
         jobs = [jobs[n * len(jobs) // MAX_ROWS] for n in range(MAX_ROWS)]
@@ -201,33 +203,25 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
     return f"no job of {study.name} can be drawn: {told}"
 
 
-def axis_of(study: StoredStudy, wanted: str) -> str:
-    """Return the key of the axis that is meant.
-
-    By default a clearance, then the speed, then the first.
-    """
+def choose_axis(folder: Folder, study: StoredStudy, wanted: str) -> str:
+    """Return the key of the axis that is meant: by default a clearance, the speed, or the first."""
+    if wanted:
+        return find_axis(folder, study, wanted).key
     keys = [axis.key for axis in study.axes]
-    if not wanted:
-        ranked = [key for word in ("clearance", "speed") for key in keys if word in key]
-        return (ranked or keys or ["job"])[0]
-    found = [key for key in keys if key == wanted or key.endswith(f".{wanted}")]
-    if len(found) != 1:
-        problem = f"{study.name} has no axis {wanted!r}" if not found else f"{wanted!r} is several"
-        raise PlotError(f"{problem}: its axes are {', '.join(keys) or 'none'}")
-    return found[0]
+    ranked = [key for word in ("clearance", "speed") for key in keys if word in key]
+    return (ranked or keys or ["job"])[0]
 
 
 def select_jobs(
-    study: StoredStudy, over: str, at: Sequence[str]
+    folder: Folder, study: StoredStudy, over: str, at: Sequence[str]
 ) -> tuple[list[tuple[Any, str]], str]:
     """(value, key) of the jobs along an axis in its order, and what of the others is told."""
     fixed = {}
     for text in at:
-        name, _, value = text.partition("=")
-        key = axis_of(study, name)
-        if not value or key == over:
+        key, value = find_value(folder, study, text)
+        if key == over:
             raise PlotError(f"--at {text}: needs key=value of an axis other than {over}")
-        fixed[key] = value_of(study, key, value)
+        fixed[key] = value
     if study.is_grid:
         first = {axis.key: axis.values[0] for axis in study.axes if axis.key != over}
         fixed = first | fixed
@@ -244,16 +238,6 @@ def select_jobs(
     where = f" Here {told}." if told else ""
     varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
     return jobs, where + (f" Along with it vary {', '.join(varied)}." if varied else "")
-
-
-def value_of(study: StoredStudy, key: str, text: str) -> Any:
-    """Return the value of an axis that a text means; PlotError lists them."""
-    (values,) = (axis.values for axis in study.axes if axis.key == key)
-    for value in values:
-        if text in (str(value), format_swept_value(value)):
-            return value
-    listed = ", ".join(format_swept_value(value) for value in dict.fromkeys(values))
-    raise PlotError(f"--at {key}={text}: the axis has {listed}")
 
 
 def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:

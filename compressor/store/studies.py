@@ -440,14 +440,14 @@ def _near_keys(beginning: str, known: Sequence[str]) -> str:
 
 
 def _in_common(one: str, other: str) -> int:
-    """With how many equal characters two texts begin."""
+    """Return with how many equal characters two texts begin."""
     pairs = zip(one, other, strict=False)
     return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
     """Return the one job of a study at some values of its axes."""
-    wanted = dict(_value_at(folder, study, word) for word in words)
+    wanted = dict(find_value(folder, study, word) for word in words)
     jobs = [
         (key, point)
         for key, point in zip(study.keys, points(study), strict=True)
@@ -469,11 +469,8 @@ def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
     raise WrongName(folder, problem, f"choose one by {more}" if more else "give a job's key")
 
 
-def _value_at(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
-    """Return the axis and the value that `axis=value` means."""
-    name, equals, text = word.partition("=")
-    if not equals or not text:
-        raise WrongName(folder, f"{word!r} is no AXIS=VALUE of {study.name}", _axes(study))
+def find_axis(folder: Folder, study: StoredStudy, name: str) -> StoredAxis:
+    """Return the axis of a study by its key, or the end of it. Raises WrongName."""
     short = coordinate_names([axis.key for axis in study.axes])
     found = [
         axis
@@ -484,7 +481,15 @@ def _value_at(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
         problem = f"has no axis {name!r}" if not found else f"has {len(found)} axes {name!r}"
         near = did_you_mean(name, [*short, *short.values()])
         raise WrongName(folder, f"{study.name} {problem}", near or _axes(study))
-    (axis,) = found
+    return found[0]
+
+
+def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
+    """Return the key and the value of an axis that `axis=value` means. Raises WrongName."""
+    name, equals, text = word.partition("=")
+    if not equals or not text:
+        raise WrongName(folder, f"{word!r} is no AXIS=VALUE of {study.name}", _axes(study))
+    axis = find_axis(folder, study, name)
     row = row_of(axis.key)
     text = row.choice_of(text) if row else text
     for value in axis.values:
@@ -495,12 +500,12 @@ def _value_at(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
 
 
 def _equal(text: str, value: Any) -> bool:
-    """Return whether a text is the number of an axis."""
+    """Return whether a text is the number of an axis, perhaps as captions round it."""
     number = _number(text)
     return (
         not isinstance(value, str | tuple | bool | None)
         and number is not None
-        and math.isclose(number, value, rel_tol=SAME_VALUE)
+        and (math.isclose(number, value, rel_tol=SAME_VALUE) or text == f"{value:g}")
     )
 
 

@@ -107,7 +107,7 @@ MISTAKES = [
     ("export wear -o x.csv --format netcdf", "x.csv is no name for netcdf: end it in .nc"),
     ("plot waer", "and no study is called so", "did you mean wear?"),
     ("plot wear --what orbit", "there is no figure 'orbit'; did you mean orbits?"),
-    ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm': its axes are clearance_mm, "),
+    ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm'; its axes are clearance_mm, "),
     ("dataset waer -o faults", "holds no study 'waer'; did you mean wear?"),
     ("identify good.csv --study wear", "good.csv: cannot be read", "time_s,acceleration_m_per_s2"),
     # questions

@@ -214,8 +214,11 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder):
         ([], "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
         (["worn", "--what", "orbits"], "worn is a study: for orbits name a job, such as"),
         (["worn", "--what", "noise"], "there is no figure 'noise'; there are signals"),
-        (["worn", "--over", "mass"], "worn has no axis 'mass': its axes are clearance_mm,"),
-        (["worn", "--at", "speed_rpm=450"], "--at machine.speed_rpm=450: the axis has 400, 500"),
+        (["worn", "--over", "mass"], "worn has no axis 'mass'; its axes are clearance_mm,"),
+        (
+            ["worn", "--at", "speed_rpm=450"],
+            "no job of worn has machine.speed_rpm=450; there are 400",
+        ),
         (["worn", "--at", "clearance_mm=0.1"], "needs key=value of an axis other than"),
         (["bare"], "no job of bare can be drawn: no series: run it again with --set output.keep"),
         (["short"], "too short: run it with a longer solve.duration_rev"),
