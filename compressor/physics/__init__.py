@@ -19,6 +19,7 @@ from compressor.physics.observe import (
     COLUMNS,
     WIDE,
     Column,
+    frame_of_series,
 )
 from compressor.physics.onset import meeting
 from compressor.physics.record import (

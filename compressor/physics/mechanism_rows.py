@@ -46,12 +46,12 @@ from compressor.physics.observe import (
     WIDE,
     Column,
     damping_power,
+    write_frame_forces,
 )
 from compressor.physics.worn_bore import at_the_wall, wear_off
 
-GUIDE_FORCE, GUIDE_FRICTION = int(Column.GUIDE_FORCE), int(Column.GUIDE_FRICTION)
 GUIDE_GAP, CRANK_SPEED = int(Column.GUIDE_GAP), int(Column.CRANK_SPEED)
-MOTOR_TORQUE, UNBALANCE = int(Column.MOTOR_TORQUE), int(Column.UNBALANCE)
+MOTOR_TORQUE = int(Column.MOTOR_TORQUE)
 
 STALLED = 0.01  # of the steady speed: a crank that is slower has all but stopped
 IMPLAUSIBLE = 0.1  # of half the crosshead, or of the rod: more than any contact or bar bears
@@ -241,7 +241,7 @@ def observe_with_energy(motion, y, phase, p, row):
 
 @jit
 def observe(t, y, phase, p, row):
-    """`observe.observe` of the mechanism; row: (COLUMNS,), or (WIDE,) for the guide's as well."""
+    """`observe.observe` of the mechanism; row: (COLUMNS,), or (WIDE,) for what series have."""
     now = solve(ideal(t, p), y, phase, p)
     pose, guide, forces = now.pose, now.joints.guide, now.reactions
     row[DISPLACEMENT], row[VELOCITY] = pose.x, now.velocity[8]
@@ -251,14 +251,12 @@ def observe(t, y, phase, p, row):
         row[ECCENTRICITY + i] = now.w[1 + i]
     write_row(now, p, row)
     if row.size == WIDE:
-        row[GUIDE_FORCE] = -forces.guide
-        row[GUIDE_FRICTION], row[CRANK_SPEED] = -(guide.fx + forces.rubbing), pose.speed
-        row[GUIDE_GAP] = -guide.deepest
+        row[GUIDE_GAP], row[CRANK_SPEED] = -guide.deepest, pose.speed
         row[MOTOR_TORQUE] = motor_torque(pose, p)
         inward, along = pose.speed * pose.speed, now.accelerations[0]
         c, s = pose.cos_theta, pose.sin_theta
-        row[UNBALANCE] = p.unbalance * (inward * c + along * s)
-        row[UNBALANCE + 1] = p.unbalance * (inward * s - along * c)
+        turning = -p.unbalance * (inward * c + along * s), -p.unbalance * (inward * s - along * c)
+        write_frame_forces((-(guide.fx + forces.rubbing), -forces.guide), turning, row)
 
 
 @jit

@@ -50,17 +50,17 @@ class Column(IntEnum):
     FRICTION_POWER = 27  # lost to friction
     KINETIC = 28
     POTENTIAL = 29  # contacts' springs and gravity
-    PACE = 30  # time that passes over that of a steady crank; from here on: of features alone
-    GUIDE_FORCE = 31  # on the guide, upwards; from here on: not in a march
-    GUIDE_FRICTION = 32  # on the guide, along x
-    GUIDE_GAP = 33  # least gap of the crosshead's corners, negative where one presses
-    CRANK_SPEED = 34  # rad/s
-    MOTOR_TORQUE = 35
-    UNBALANCE = 36  # two: the crank's own force on its bearing, x and y
+    PACE = 30  # time that passes over that of a steady crank
+    SHAKING_FORCE = 31  # two: of the machine on its frame; from here on: not in a march
+    BEARING_FORCE = 33  # two: on the main bearing
+    GUIDE_FORCE = 35  # of the crosshead on its guide, upwards
+    GUIDE_GAP = 36  # least one of its corners, negative where one presses; from here on: features
+    CRANK_SPEED = 37  # rad/s
+    MOTOR_TORQUE = 38
 
 
 COLUMNS = int(Column.PACE) + 1  # that a march reads
-WIDE = int(Column.UNBALANCE) + 2  # that a mechanism with features has
+WIDE = int(Column.MOTOR_TORQUE) + 1  # that series are made of
 # numba wants plain integers
 DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, int(Column.ACCELERATION)
 ROD_ANGLE, PISTON_FORCE = int(Column.ROD_ANGLE), int(Column.PISTON_FORCE)
@@ -72,7 +72,8 @@ CRANK_TORQUE, GUIDE_MOMENT = int(Column.CRANK_TORQUE), int(Column.GUIDE_MOMENT)
 CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
 DAMPING_POWER, FRICTION_POWER = int(Column.DAMPING_POWER), int(Column.FRICTION_POWER)
 KINETIC, POTENTIAL = int(Column.KINETIC), int(Column.POTENTIAL)
-PACE = int(Column.PACE)
+PACE, GUIDE_FORCE = int(Column.PACE), int(Column.GUIDE_FORCE)
+SHAKING_FORCE, BEARING_FORCE = int(Column.SHAKING_FORCE), int(Column.BEARING_FORCE)
 
 
 @jit
@@ -174,20 +175,58 @@ def damping_power(contact):
 
 
 @inline_numba
-def torque_and_moment(now, y, forces, p):
+def torque_and_moment(crank, x, forces, friction, penetration, p):
     """Return the torque (N m) that drives the crank, and moment of the crosshead on its guide.
 
     The guide bears the crosshead's force at its lever and, since the crosshead cannot tilt, the
     couple that the small end's friction puts on the pin.
+
+    crank: cosine and sine of its angle; x: of the crosshead, m; forces: `joint_forces`, N;
+    friction, penetration: of both contacts, N and m.
     """
-    motion, big, small = now.motion, now.big, now.small
-    torque = p.crank_radius * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
+    torque = p.crank_radius * (crank[0] * forces[1] - crank[1] * forces[0])
     if p.clearance[0] > 0.0:
-        torque -= (p.pin_radius[0] - big.penetration) * big.friction
-    moment = -(motion.x + y[0]) * (forces[3] + p.reciprocating_mass * p.gravity)
+        torque -= (p.pin_radius[0] - penetration[0]) * friction[0]
+    moment = -x * (forces[3] + p.reciprocating_mass * p.gravity)
     if p.clearance[1] > 0.0:
-        moment += (p.pin_radius[1] - small.penetration) * small.friction
+        moment += (p.pin_radius[1] - penetration[1]) * friction[1]
     return torque, moment
+
+
+@jit
+def write_frame_forces(guide, turning, row):
+    """Write what the machine does to its frame into a row that has the forces on its parts.
+
+    guide: of the crosshead on its guide, x and y, N; turning: on the crank, for its mass out of
+    balance to stay on its circle, x and y, N.
+    """
+    row[BEARING_FORCE] = -row[FORCE] - turning[0]
+    row[BEARING_FORCE + 1] = -row[FORCE + 1] - turning[1]
+    row[GUIDE_FORCE] = guide[1]
+    row[SHAKING_FORCE] = row[BEARING_FORCE] + (row[PISTON_FORCE] + guide[0])
+    row[SHAKING_FORCE + 1] = row[BEARING_FORCE + 1] + guide[1]
+
+
+@jit
+def write_scene_frame(p, row):
+    """`write_frame_forces` of a scene, whose crosshead keeps its height and crank is balanced."""
+    guide = 0.0, -row[FORCE + 3] - p.reciprocating_mass * p.gravity
+    write_frame_forces(guide, (0.0, 0.0), row)
+
+
+@jit
+def frame_of_series(crank, friction, p, rows):
+    """Write a scene's torque, moment and forces on the frame into rows, (m, WIDE), by its series.
+
+    crank: cosine and sine of its angle, (2, m); friction: of both contacts, (m, 2), N.
+    """
+    for i in range(len(rows)):
+        row = rows[i]
+        forces, penetration = row[FORCE:FORCE_SIZE], row[PENETRATION:NORMAL]
+        row[CRANK_TORQUE], row[GUIDE_MOMENT] = torque_and_moment(
+            crank[:, i], row[DISPLACEMENT], forces, friction[i], penetration, p
+        )
+        write_scene_frame(p, row)
 
 
 @inline_numba
@@ -227,7 +266,11 @@ def energies(now, y, p):
 def observed_columns(now, y, forces, p):
     """Return the columns from ACCELERATION to GUIDE_MOMENT."""
     big, small = now.big, now.small
-    torque, moment = torque_and_moment(now, y, forces, p)
+    motion, friction = now.motion, (big.friction, small.friction)
+    torque, moment = torque_and_moment(
+        (motion.cos_theta, motion.sin_theta), motion.x + y[0], forces, friction,
+        (big.penetration, small.penetration), p,
+    )  # fmt: skip
     return (
         now.a, forces[0], forces[1], forces[2], forces[3],
         square_root(forces[0] * forces[0] + forces[1] * forces[1]),
@@ -256,9 +299,10 @@ def write_gauged(now, y, forces, p, row):
 
 @jit
 def observe(t, y, phase, p, row):
-    """Write all quantities of `Column` at time t (s) and state y into row, shape (COLUMNS,).
+    """Write all quantities of `Column` at time t (s) and state y into row.
 
-    In the ideal scene y is four zeros.
+    row: (COLUMNS,), or (WIDE,) for the forces on the frame as well. In the ideal scene y is four
+    zeros.
     """
     motion = ideal(t, p)
     now = evaluate(motion, y, phase, p)
@@ -270,6 +314,8 @@ def observe(t, y, phase, p, row):
     eccentricity_row(y, turn, p, row)
     write_gauged(now, y, joint_forces(now, y, p), p, row)
     row[PACE] = 1.0
+    if row.size == WIDE:
+        write_scene_frame(p, row)
 
 
 @inline_llvm
@@ -288,7 +334,7 @@ def observe_with_energy(motion, y, phase, p, row):
 
 @jit
 def observe_all(times, states, phases, p, rows):
-    """`observe` at each of m times: states (m, k), phases (m,) integers, rows (m, COLUMNS)."""
+    """`observe` at each of m times: states (m, k), phases (m,) integers, rows (m, ...)."""
     for i in range(times.size):
         observe(times[i], states[i], phases[i], p, rows[i])
 

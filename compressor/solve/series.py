@@ -4,7 +4,7 @@ Two runs are compared at the same times, whatever is stored of either: `A_TURN` 
 Their distance is a relative L2 norm over the settled part, sqrt(sum |a - b|^2 / sum |a|^2); of a
 vector its length counts.
 
-Forces that the machine puts on its frame, recomputed from observed rows or time series. With F_b
+Forces that the machine puts on its frame, of `physics.observe.write_frame_forces`. With F_b
 and F_s the joint forces on the rod at the big and the small end, F_load the piston force, positive
 towards the crank, and g gravity against y:
 
@@ -31,8 +31,8 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import Case
-from compressor.metrics import JOINTS, SERIES, SIZES
-from compressor.physics import COLUMNS, WIDE, Column, Coordinate, is_featured, observe_all
+from compressor.metrics import SERIES, SIZES
+from compressor.physics import COLUMNS, WIDE, Column, Coordinate, frame_of_series, observe_all
 from compressor.solve.request import Trajectory
 
 COLUMN = {
@@ -44,18 +44,21 @@ COLUMN = {
     "contact_force": Column.FORCE,
     "eccentricity": Column.ECCENTRICITY,
     "penetration": Column.PENETRATION,
+    "shaking_force": Column.SHAKING_FORCE,
+    "bearing_force": Column.BEARING_FORCE,
+    "guide_force": Column.GUIDE_FORCE,
+    "guide_moment": Column.GUIDE_MOMENT,
+    "crank_torque": Column.CRANK_TORQUE,
+    "rod_load": Column.FORCE + 2,
 }
 A_TURN = 150  # times a revolution at which two runs are compared
 OF_A_PERIOD = 24  # samples of the forces in one of the body's fastest motion
 FEWEST, MOST = 64, 20_000  # of these times over a settled part
 
 
-def rows_of(p: np.record, run: Trajectory) -> np.ndarray:
-    """Return the observed rows of a run at its times, (m, COLUMNS); nan from where it stopped.
-
-    Of a mechanism with features (m, WIDE), with what its guide bears.
-    """
-    rows = np.empty((run.times.size, WIDE if is_featured(p) else COLUMNS))
+def rows_of(p: np.record, run: Trajectory, columns: int = WIDE) -> np.ndarray:
+    """Return the observed rows of a run at its times, (m, columns); nan from where it stopped."""
+    rows = np.empty((run.times.size, columns))
     observe_all(run.times, run.states, run.phases, p, rows)
     rows[np.isnan(run.states).any(axis=1)] = math.nan
     return rows
@@ -79,7 +82,7 @@ def finer(case: Case) -> int:
 
 def block(name: str, rows: np.ndarray) -> np.ndarray:
     """Return a time series from observed rows, shape (m,), (m, joint) or (m, joint, axis)."""
-    shape = tuple(SIZES[dim] for dim in SERIES[name][0])
+    shape = tuple(SIZES[dim] for dim in (SERIES | SIGNALS)[name][0])
     column = COLUMN[name]
     return rows[:, column : column + math.prod(shape)].reshape(-1, *shape)
 
@@ -115,7 +118,7 @@ def take_samples(p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndar
     if times.size:
         at = np.searchsorted(run.times, times)
         run.times, run.states, run.phases = (array[at] for array in whole)
-        rows = rows_of(p, run)
+        rows = rows_of(p, run, COLUMNS)
     if kept.size < whole[0].size:
         stay = np.searchsorted(whole[0], kept)
         whole = whole[0][stay], whole[1][stay], whole[2][stay]
@@ -212,44 +215,9 @@ def features(
     return found
 
 
-def ideal_guide_force(p: np.record, force: np.ndarray) -> np.ndarray:
-    """Return the force on a guide without play along y, N, (m,), by the joints' on the rod."""
-    return -force[:, 1, 1] - p["reciprocating_mass"] * p["gravity"]
-
-
-def frame_signals(
-    p: np.record,
-    force: np.ndarray,
-    load: np.ndarray,
-    torque: np.ndarray,
-    moment: np.ndarray,
-    rows: np.ndarray | None = None,
-) -> dict[str, np.ndarray]:
-    """Return the `SIGNALS` by name, each over time; the one place with their formulas and signs.
-
-    force: of the joints on the rod, N, (m, joint, axis); load: the piston force, N; torque, moment:
-    on the crank and on the guide, N m; rows: observed ones of a mechanism with features, (m, WIDE).
-    """
-    bearing, along = -force[:, 0], load
-    guide = ideal_guide_force(p, force)
-    if rows is not None:  # its guide may rub and have play, its crank may be out of balance
-        guide = rows[:, Column.GUIDE_FORCE]
-        bearing = bearing + rows[:, Column.UNBALANCE : Column.UNBALANCE + 2]
-        along = load + rows[:, Column.GUIDE_FRICTION]
-    return {
-        "shaking_force": bearing + np.stack((along, guide), axis=1), "bearing_force": bearing,
-        "guide_force": guide.copy(), "guide_moment": moment.copy(), "crank_torque": torque.copy(),
-        "rod_load": force[:, 1, 0].copy(),
-    }  # fmt: skip
-
-
-def signals(p: np.record, rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the `SIGNALS` by name from observed rows, (m, WIDE) of a mechanism with features."""
-    return frame_signals(
-        p, block("contact_force", rows), block("piston_force", rows),
-        rows[:, Column.CRANK_TORQUE], rows[:, Column.GUIDE_MOMENT],
-        rows if is_featured(p) else None,
-    )  # fmt: skip
+def signals(rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the `SIGNALS` by name from observed rows, (m, WIDE)."""
+    return {name: block(name, rows).copy() for name in SIGNALS}
 
 
 def signals_of_scene(p: np.record, run: xr.Dataset) -> dict[str, np.ndarray]:
@@ -258,18 +226,13 @@ def signals_of_scene(p: np.record, run: xr.Dataset) -> dict[str, np.ndarray]:
     The force on the rod is F_N n - F_t t with n along the eccentricity, and t a quarter turn from
     it, counter-clockwise.
     """
-    force = run["contact_force"].transpose("time", "joint", "axis").values
-    place = run["eccentricity"].transpose("time", "joint", "axis").values
+    rows = np.empty((run.sizes["time"], WIDE))
+    for name, (dims, _, _) in SERIES.items():
+        block(name, rows)[...] = run[name].transpose("time", *dims).values
+    force, place = block("contact_force", rows), block("eccentricity", rows)
     size = np.linalg.norm(place, axis=2)
     across = place[..., 0] * force[..., 1] - place[..., 1] * force[..., 0]
     friction = -np.divide(across, size, out=np.zeros_like(size), where=size > 0)
-    friction[:, p["clearance"] == 0.0] = 0.0
-    couple = (p["pin_radius"] - run["penetration"].transpose("time", "joint").values) * friction
-    angle, x = run["crank_angle"].values, run["displacement"].values
-    bx, by = force[:, 0].T
-    torque = p["crank_radius"] * (np.cos(angle) * by - np.sin(angle) * bx)
-    guide = ideal_guide_force(p, force)
-    return frame_signals(
-        p, force, run["piston_force"].values, torque - couple[:, JOINTS.index("big_end")],
-        guide * x + couple[:, JOINTS.index("small_end")],
-    )  # fmt: skip
+    angle = run["crank_angle"].values
+    frame_of_series(np.stack((np.cos(angle), np.sin(angle))), friction, p, rows)
+    return signals(rows)

@@ -36,7 +36,7 @@ BODY = {  # over time and these dimensions: (dimensions, unit, long name)
 def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
     """Return the body's motion on the output grid, and the sensor's record in time of its own.
 
-    rows: observed at the grid that is `finer`, (m, COLUMNS). A steady body is nan before the
+    rows: observed at the grid that is `finer`, (m, WIDE). A steady body is nan before the
     machine has settled; all is nan, and there is no record, of a run that did not reach its end.
     `one_way_error`: bound of the relative L2 error of the body's velocity by leaving out what its
     motion does to the machine: of the order m / M away from resonances. A journal's chatter may
@@ -49,7 +49,7 @@ def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
     step = solution.trajectory.times[1]
     steady, whole = body.start == "steady", not solution.trajectory.reason
     begin = round(solution.settle / step) if steady else 0
-    known = {name: one[begin:] for name, one in signals(solution.p, rows).items()}
+    known = {name: one[begin:] for name, one in signals(rows).items()}
     forces = Forces(
         step, known["shaking_force"], known["guide_moment"],
         np.stack([np.zeros(len(rows) - begin), known["guide_force"]], axis=1),
@@ -235,7 +235,7 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     for name, (dims, unit, phrase) in SERIES.items():
         attrs = {"units": unit, "long_name": phrase}
         variables[name] = (("time", *dims), np.ascontiguousarray(block(name, rows)), attrs)
-    for name, values in (signals(p, rows) if case.output.signals else {}).items():
+    for name, values in (signals(rows) if case.output.signals else {}).items():
         dims, unit, phrase = SIGNALS[name]
         variables[name] = (("time", *dims), values, {"units": unit, "long_name": phrase})
     if is_featured(p):

@@ -18,7 +18,7 @@ from compressor.physics.motion import (
     eccentricity_small_end,
     rod_turn,
 )
-from compressor.physics.observe import COLUMNS, Column
+from compressor.physics.observe import COLUMNS, WIDE, Column
 from compressor.physics.observe import observe as scene_observe
 from compressor.physics.record import (
     Coordinate,
@@ -88,6 +88,8 @@ def random_motion(p, rng):
 def lagrange():
     """Mass matrix and the other side of Lagrange's equations, from the two energies.
 
+    And A and b of the momentum of rod and crosshead, which changes by A w'' + b.
+
     The kinetic one is W_ij r_i' r_j' / 2 over positions r of the coordinates w, with SymPy's exact
     integrals over the rod in W. With J = dr/dw, two of Lagrange's terms are equal, second
     derivatives being symmetric, so that J^T W (J w'' + d(J w')/dw w') = -dV/dw.
@@ -131,9 +133,21 @@ def lagrange():
             np.array(part, float) for part in evaluate(w, v, numbers)
         )
         carried = jacobian.T @ inertia
-        return carried @ jacobian, pushed - carried @ bias
+        parts = inertia[:2] + inertia[12:14]  # of the rod, whose first shape is 1, and crosshead
+        return (
+            carried @ jacobian, pushed - carried @ bias, parts @ jacobian, parts @ bias
+        )  # fmt: skip
 
     return equations
+
+
+def numbers_of(p):
+    """What `lagrange` asks of a record."""
+    return (
+        p["crank_radius"], p["rod_length"], p["rod_mass"], p["rod_inertia"],
+        p["reciprocating_mass"], p["crank_inertia"], p["unbalance"], p["crosshead_inertia"],
+        p["gravity"], p["axial_stiffness"], p["bending_stiffness"],
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(("joint", "features"), COMBINATIONS)
@@ -147,16 +161,11 @@ def test_accelerations_are_lagranges(lagrange, joint, features):
     far = {"clearance": [1.0 * (p["clearance"][i] > 0) for i in range(2)], "guide_clearance": 1.0}
     for name, value in far.items():
         p[name] = value
-    numbers = (
-        p["crank_radius"], p["rod_length"], p["rod_mass"], p["rod_inertia"],
-        p["reciprocating_mass"], p["crank_inertia"], p["unbalance"], p["crosshead_inertia"],
-        p["gravity"], p["axial_stiffness"], p["bending_stiffness"],
-    )  # fmt: skip
     moving = [int(one) for one in Coordinate if p["at"][one] >= 0]
     for _ in range(5):
         w, rates = random_motion(p, rng)
         t = w[0] / p["omega"]
-        mass, other = lagrange(w, rates, numbers)
+        mass, other, _, _ = lagrange(w, rates, numbers_of(p))
         torque = p["torque"] + p["torque_slope"] * (p["omega"] - rates[0])
         force = other + np.eye(11)[0] * torque
         expected = np.linalg.solve(mass[np.ix_(moving, moving)], force[moving])
@@ -167,6 +176,29 @@ def test_accelerations_are_lagranges(lagrange, joint, features):
         row = np.empty(COLUMNS)
         mechanism_rows.observe(t, y, 1, p, row)
         assert row[Column.KINETIC] == pytest.approx(kinetic, rel=1e-12)
+
+
+@pytest.mark.parametrize(("joint", "features"), COMBINATIONS)
+def test_the_frame_takes_the_momentum_that_the_parts_lose(lagrange, joint, features):
+    """Less their weight; with load, contacts, all friction and a crank out of balance."""
+    values = {"load": "gas", "machine": {"gravity_m_per_s2": 9.81}}
+    p = featured(joint, features, values, rubbing=1)
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        w, rates = random_motion(p, rng)
+        t, y = w[0] / p["omega"], state_of(p, w, rates) if state_names(p) else np.zeros(4)
+        gained = solve(ideal(t, p), y, 1, p).accelerations
+        _, _, slope, bias = lagrange(w, rates, numbers_of(p))
+        along = np.array([math.cos(w[0]), math.sin(w[0])])
+        across = np.array([-along[1], along[0]])
+        unbalance = p["unbalance"] * (gained[0] * across - rates[0] ** 2 * along)
+        weight = np.array([0.0, p["gravity"] * (p["rod_mass"] + p["reciprocating_mass"])])
+        lost = -(slope @ gained + bias + unbalance + weight)
+        row = np.empty(WIDE)
+        mechanism_rows.observe(t, y, 1, p, row)
+        found = row[Column.SHAKING_FORCE : Column.SHAKING_FORCE + 2]
+        size = np.abs(lost).max() + row[Column.FORCE_SIZE : Column.FORCE_SIZE + 2].max()
+        assert found == pytest.approx(lost, abs=1e-11 * size)
 
 
 @pytest.mark.parametrize("gravity", [0, 9.81])
@@ -188,9 +220,10 @@ def test_a_scene_is_the_mechanism_without_features(joint, gravity):
         z, m = np.zeros(len(state_names(q))), int(q["freedoms"])
         z[:m] = np.array([one[:2] for one in off]).ravel()
         z[m : 2 * m] = np.array([one[2:] for one in off]).ravel()
-        expected, found = np.empty(COLUMNS), np.empty(COLUMNS)
+        expected, found = np.empty(WIDE), np.empty(WIDE)
         scene_observe(t, y, 1, p, expected)
         mechanism_rows.observe(t, z, 1, q, found)
+        expected, found = expected[: Column.GUIDE_GAP], found[: Column.GUIDE_GAP]
         floor = 1e-12 * np.abs(expected).max()
         assert found == pytest.approx(expected, rel=1e-11, abs=floor)
 

@@ -62,7 +62,7 @@ def test_samples_are_those_of_a_run_at_these_times():
     of = case(duration_rev=0.25, settle_rev=0.1)
     run = run_at_tolerance(of, 1e-5, 60.0, True)
     whole, states = run.trajectory.times, run.trajectory.states.copy()
-    rows = rows_of(run.p, run.trajectory)
+    rows = rows_of(run.p, run.trajectory, COLUMNS)
     taken = take_samples(run.p, run.trajectory, whole[5:9], whole[::30])
     np.testing.assert_array_equal(taken, rows[5:9])
     np.testing.assert_array_equal(run.trajectory.times, whole[::30])
