@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SIZES, SOMETIMES
+from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SIZES
 from compressor.program import PROGRAM
 
 # a job's numbers as one structured scalar: what workers send home and segments hold
 ROW = np.dtype(
-    [(name, "f8", tuple(SIZES[dim] for dim in dims)) for name, (dims, _, _) in NUMBERS.items()]
+    [(name, "f8", tuple(SIZES[dim] for dim in row.dims)) for name, row in NUMBERS.items()]
 )
 NOTHING = np.full(1, math.nan, ROW).tobytes()
 
@@ -106,16 +106,16 @@ class Outcome:
     def variables(self) -> dict[str, tuple]:
         """Return the status, reason and numbers as xarray variables: (dims, values, attributes).
 
-        Statistics of a chaotic motion are absent from any other, rod-load numbers without signals.
+        What only some jobs have is absent where it is nan, as statistics of a motion that is not
+        chaotic.
         """
         named: dict[str, tuple] = {
             "status": ((), self.status, {"long_name": "ok or failed"}),
             "reason": ((), self.reason, {"long_name": "why a run failed, by a stable name"}),
         }
-        for name, (dims, unit, phrase) in NUMBERS.items():
-            if name in SOMETIMES and np.isnan(self.numbers[name]).all():
-                continue
-            named[name] = (dims, self.numbers[name], {"units": unit, "long_name": phrase})
+        for name, metric in NUMBERS.items():
+            if not metric.when or not np.isnan(self.numbers[name]).all():
+                named[name] = (metric.dims, self.numbers[name], metric.attributes)
         return named
 
 

@@ -21,7 +21,6 @@ UNITS = {
     "m/s2": ("m/s²", 1.0), "N": ("kN", 1e-3), "m": ("mm", 1e3), "rad": ("deg", math.degrees(1.0)),
     "1": ("", 1.0),
 }  # fmt: skip
-OF_CONTACT = ("eccentricity_error", "penetration_error")  # whose joint has clearance
 LABELS = {"contact_loss_fraction": "time without dry contact"}  # of others than their names
 FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
@@ -32,16 +31,14 @@ def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[
     limits: of the rod load's reversal, degrees and percent.
     """
     yield "", align_lines(stop(found))
-    # a count grows with the run: the number per revolution is shown in its place
-    shown = [name for name, row in metrics.METRICS.items() if row.kind != "count"]
-    known = numbers(found, [*shown, *metrics.STATISTICS, *metrics.ROD_LOAD])
+    known = numbers(found, "tally", "statistics", "samples")
     told = align_lines([*known, *reversal_verdict(found, *limits)])
     yield "metrics, with their error bars", [*told, *cautions(found), *found.caveats]
     yield (
         "relative errors of the time series",
-        align_lines(series_errors(found, [*metrics.SERIES_ERRORS])),
+        align_lines(series_errors(found)),
     )
-    yield "the run", align_lines([*numbers(found, [*metrics.LEDGER]), *facts(found)])
+    yield "the run", align_lines([*numbers(found, "run"), *facts(found)])
 
 
 def align_lines(lines: list[Line]) -> list[str]:
@@ -78,19 +75,21 @@ def stop(found: "JobReport") -> list[Line]:
     return lines
 
 
-def numbers(found: "JobReport", names: list[str]) -> list[Line]:
-    """Return some of a job's numbers, a line for each joint and axis, to the digits that errors
-    allow.
+def numbers(found: "JobReport", *sources: str) -> list[Line]:
+    """Return a job's numbers of some sources, a line for each joint and axis, to the digits that
+    errors allow.
     """
     lines = []
-    for name in names:
-        if name.endswith(SPREAD) or name not in found.numbers:
+    for name, row in metrics.NUMBERS.items():
+        if row.source not in sources or name.endswith(SPREAD) or name not in found.numbers:
+            continue
+        if row.kind == "count":  # it grows with the run: the number per revolution is shown
             continue
         values, (errors, relative, said) = found.numbers[name], bar_of(found, name)
-        unit, factor = unit_of(name)
-        for place, label in places(name, metrics.NUMBERS[name][0]):
+        unit, factor = unit_of(row)
+        for place, label in places(row):
             value = pick_value(values, place)
-            if math.isnan(value) or tells_nothing(found, name, place):
+            if math.isnan(value) or tells_nothing(found, row, place):
                 continue
             error = math.nan if errors is None else pick_value(errors, place)
             text = format_measured(value * factor, error * factor, relative)
@@ -104,13 +103,13 @@ def numbers(found: "JobReport", names: list[str]) -> list[Line]:
     return lines
 
 
-def series_errors(found: "JobReport", names: list[str]) -> list[Line]:
+def series_errors(found: "JobReport") -> list[Line]:
     """Return how far time series may be from the exact ones, a line for each joint."""
     lines = []
-    for name in names:
-        for place, label in places(name, metrics.NUMBERS[name][0]):
-            error = pick_value(found.numbers[name], place)
-            if not (math.isnan(error) or tells_nothing(found, name, place)):
+    for row in map(metrics.series_error, metrics.SERIES):
+        for place, label in places(row):
+            error = pick_value(found.numbers[row.name], place)
+            if not (math.isnan(error) or tells_nothing(found, row, place)):
                 lines.append((label, UNKNOWN if math.isinf(error) else f"{error:.2g}"))
     return lines
 
@@ -120,27 +119,21 @@ def bar_of(found: "JobReport", name: str) -> tuple[Any, bool, str]:
 
     None in place of errors where there are none.
     """
-    barred = metrics.METRICS | metrics.ROD_LOAD
-    if name in barred:
-        return found.numbers.get(f"{name}_error"), barred[name].bar.relative, ""
+    if name in metrics.BARRED:
+        return found.numbers.get(f"{name}_error"), metrics.BARRED[name].bar.relative, ""
     return found.numbers.get(name + SPREAD), True, "(standard error)"
 
 
-def unit_of(name: str) -> tuple[str, float]:
+def unit_of(row: metrics.Metric) -> tuple[str, float]:
     """Return the unit in which a number is shown, as the report does, and its factor from SI."""
-    row = metrics.METRICS.get(name)
-    if row and row.shown and row.unit != "1":
+    if row.shown and row.unit != "1":
         return row.shown.unit, row.shown.factor
-    if name.endswith(("_fraction", "_share")):
+    if row.name.endswith(("_fraction", "_share")):
         return "%", 100.0
-    unit = metrics.NUMBERS[name][1]
-    for other in metrics.METRICS:  # a statistic has its metric's unit
-        if name.startswith(f"{other}_") and unit == metrics.METRICS[other].unit:
-            return unit_of(other)
-    return UNITS.get(unit, (unit, 1.0))
+    return UNITS.get(row.unit, (row.unit, 1.0))
 
 
-def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], str]]:
+def places(row: metrics.Metric) -> Iterator[tuple[tuple[int, ...], str]]:
     """Yield where each of a number's values stands, and what it is called: `peak contact force, big
     end`.
 
@@ -151,9 +144,9 @@ def places(name: str, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], 
         "axis": metrics.AXES,
         "quantile": metrics.QUANTILES,
     }
-    first = name.removesuffix("_error")
+    first = row.name.removesuffix("_error")
     first = LABELS.get(first, first.removesuffix("_rev").removesuffix("_per").replace("_", " "))
-    for choice in itertools.product(*(enumerate(words[dim]) for dim in dims)):
+    for choice in itertools.product(*(enumerate(words[dim]) for dim in row.dims)):
         told = [first, *(str(word).replace("_", " ") for _, word in choice)]
         yield tuple(number for number, _ in choice), ", ".join(told)
 
@@ -165,12 +158,9 @@ def pick_value(values: Any, place: tuple[int, ...]) -> float:
     return float(values)
 
 
-def tells_nothing(found: "JobReport", name: str, place: tuple[int, ...]) -> bool:
+def tells_nothing(found: "JobReport", row: metrics.Metric, place: tuple[int, ...]) -> bool:
     """Return whether a number is that of the contact in a joint that has no clearance."""
-    if not place or metrics.JOINTS[place[0]] in joints_with_clearance(found):
-        return False
-    rows = (row for row in metrics.METRICS.values() if name.startswith(row.name))
-    return any(row.contact for row in rows) or name in OF_CONTACT
+    return row.contact and metrics.JOINTS[place[0]] not in joints_with_clearance(found)
 
 
 def joints_with_clearance(found: "JobReport") -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from compressor.cases import TIGHTEST, Case
 from compressor.physics import (
     COLUMNS,
     FLOWS,
+    WIDE,
     add_flows,
     lobatto,
     new_tally,
@@ -40,7 +41,7 @@ from compressor.solve.error_bars import (
 )
 from compressor.solve.march_driver import COMPILED, march_through
 from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merge_turns, overdue
-from compressor.solve.run_metrics import metrics, reversal, reversal_bars, reversal_times
+from compressor.solve.run_metrics import metrics, sampled_bars, sampled_metrics, sampled_times
 from compressor.solve.scipy_driver import step_through
 from compressor.solve.series import (
     compared_times,
@@ -156,8 +157,8 @@ class Solution:
     accuracy promises was `kept`, or `none` was given; `horizon` (s): nan where none was looked for;
     `settle` (s): from where metrics count; `turns`: tallies of the settled revolutions, where they
     were asked for; `statistics`: of a chaotic motion; `regime`: of `Regime`, or "" where nothing is
-    known; `period`, `settled` (rev): of a periodic motion, nan of others; `loads`: observed rows
-    for the `reversal` of the rod load, none without signals, with its `reversal_bars`.
+    known; `period`, `settled` (rev): of a periodic motion, nan of others; `rows`: observed at
+    `sampled_times`, none without signals.
     """
 
     p: np.record
@@ -177,9 +178,7 @@ class Solution:
     regime: str = ""
     period: float = math.nan
     settled: float = math.nan
-    loads: np.ndarray = field(default_factory=lambda: np.empty((0, COLUMNS)))
-    reversal: Metrics = field(default_factory=dict)
-    reversal_bars: Metrics = field(default_factory=dict)
+    rows: np.ndarray = field(default_factory=lambda: np.empty((0, WIDE)))
 
     def journals_apart(self, other: "Solution") -> float:
         """Return the greatest distance of the journals of two runs of a case, over their room."""
@@ -218,12 +217,12 @@ def run_at_tolerance(
 
 
 class Times(NamedTuple):
-    """Times (s) of a run: settled; its output, its comparison, its rod load; all of them."""
+    """Times (s) of a run: settled; its output, its comparison, its metrics; all of them."""
 
     settle: float
     output: np.ndarray
     compared: np.ndarray
-    loaded: np.ndarray
+    sampled: np.ndarray
     all: np.ndarray
 
 
@@ -232,12 +231,12 @@ def times_of(case: Case, sampled: bool) -> Times:
     samples = finer(case) * round(case.steps) if sampled else 1
     output = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else output[:0]
-    loaded = reversal_times(case)
+    metered = sampled_times(case)
     every = output
-    for more in (compared, loaded):
+    for more in (compared, metered):
         if more.size:
             every = np.union1d(every, more)
-    return Times(case.settle, output, compared, loaded, every)
+    return Times(case.settle, output, compared, metered, every)
 
 
 def request(
@@ -257,17 +256,16 @@ def solution_of_trajectory(
     rtol: float, p: np.record, times: Times, trajectory: Trajectory
 ) -> Solution:
     """Return what an attempt's trajectory tells."""
-    loads = np.empty((0, COLUMNS))
-    if times.loaded.size:
+    rows = np.empty((0, WIDE))
+    if times.sampled.size:
         stay = np.union1d(times.output, times.compared)
-        loads = take_samples(p, trajectory, times.loaded, stay)
+        rows = take_samples(p, trajectory, times.sampled, stay, WIDE)
     taken = take_samples(p, trajectory, times.compared, times.output)
     reason, detail = trajectory.reason, trajectory.detail
-    found = {} if reason else metrics(p, trajectory.tally)
-    made = Solution(p, trajectory, rtol, times.settle, found, taken, reason, detail)
-    made.loads = loads
-    made.reversal = {} if reason else reversal(loads)
-    return made
+    found = {} if reason else metrics(p, trajectory.tally) | sampled_metrics(rows)
+    return Solution(
+        p, trajectory, rtol, times.settle, found, taken, reason, detail, rows=rows
+    )  # fmt: skip
 
 
 def companion_rtol(p: np.record, rtol: float) -> float | None:
@@ -327,11 +325,12 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
     The longest by any of them; inf without one that reached its end.
     """
     residual = energy_residual(solution.trajectory.tally)
-    known = [(compare_with_run(solution, one), one.loads) for one in others if not one.reason]
-    by: list[tuple[Companion | None, np.ndarray]] = [*known] or [(None, solution.loads[:0])]
-    solution.bars = longest([bars(solution.metrics, one, residual) for one, _ in by])
-    solution.series_errors = longest([series_errors(one) for one, _ in by])
-    solution.reversal_bars = longest([reversal_bars(solution.loads, *one) for one in by])
+    known = [compare_with_run(solution, one) for one in others if not one.reason]
+    by: list[Companion | None] = [*known] or [None]
+    solution.bars = longest(
+        [bars(solution.metrics, one, residual) | sampled_bars(solution.rows, one) for one in by]
+    )
+    solution.series_errors = longest([series_errors(one) for one in by])
 
 
 def compare_with_run(solution: Solution, other: Solution) -> Companion:

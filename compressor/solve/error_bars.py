@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compressor.cases import TIGHTEST
-from compressor.metrics import METRICS, SERIES
+from compressor.metrics import NUMBERS, SERIES
 from compressor.reasons import Reason
 
 PER_TURN = 10.0  # of rtol: the residual that a revolution may leave
@@ -117,9 +117,9 @@ def ratio_of(share: float) -> float:
 
 
 def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -> Metrics:
-    """Return the error bar of each metric of a run, in its unit and shape.
+    """Return the error bar of each metric of a run's tally, in its unit and shape.
 
-    residual: energy imbalance relative to what the contacts lose. Bars are inf without another run,
+    residual: energy imbalance relative to what the contacts lose. All are inf without another run,
     and those of metrics with a unit also where their series, or the acceleration, may be wrong by
     all of itself.
     """
@@ -127,7 +127,9 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
         return {name: np.full(np.shape(value), np.inf) for name, value in metrics.items()}
     found = {}
     for name, value in metrics.items():
-        row = METRICS[name]
+        row = NUMBERS[name]
+        if row.source != "tally":
+            continue
         bar, size = row.bar, np.ones(np.shape(value)) if row.is_pure_number else np.abs(value)
         # a metric's own difference may be small by chance, that of its series is not
         own = bar.own * np.abs(np.asarray(value) - other.metrics[name])

@@ -1,4 +1,4 @@
-"""The metrics of a run: from its tally, of its rod load, and averages where it is chaotic.
+"""The metrics of a run: from its tally, from samples, and averages where it is chaotic.
 
 How the rod load at the crosshead pin changes its side, which keeps the pin's bearing oiled. API 618
 (5th edition) judges the combined rod load there: for how many degrees of a revolution it lies on
@@ -12,12 +12,12 @@ Glynn, Stochastic Simulation, 2007, III.5).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from compressor.cases import Case
-from compressor.metrics import METRICS, QUANTILES, ROD_LOAD
+from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.physics import Column, is_featured
 from compressor.solve.error_bars import Companion, Metrics, energy_residual
 from compressor.solve.request import Trajectory, last_state, merge_turns
@@ -34,7 +34,7 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
     name = "steady_seconds" if is_featured(p) else "seconds"
     steady = tally[name] or math.nan
     revolutions = round(float(steady * p["omega"]) / math.tau, 9)
-    return {
+    found = {
         "peak_acceleration": tally["peak"][0],
         "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
         "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
@@ -49,6 +49,12 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
         "impacts_per_rev": np.where(ideal, 0.0, tally["impacts"] / revolutions),
         "releases_per_rev": np.where(ideal, 0.0, tally["releases"] / revolutions),
     }
+    return {name: value for name, value in found.items() if has_metric(p, NUMBERS[name].when)}
+
+
+def has_metric(p: np.record, flag: str) -> bool:
+    """Return whether a machine has what a metric needs: a flag of the record, or nothing."""
+    return not flag or (is_featured(p) and bool(p[flag]))
 
 
 def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
@@ -72,13 +78,13 @@ def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
     }
 
 
-A_TURN = 1440  # samples of the rod load a revolution
+A_TURN = 1440  # samples a revolution
 FEWEST, MOST = 64, 200_000  # of them over a settled part
 SMALL_END = Column.FORCE + 2  # of the pin's force along x, positive in tension
 
 
-def reversal_times(case: Case) -> np.ndarray:
-    """Return the times (s) after settling at which the rod load is sampled.
+def sampled_times(case: Case) -> np.ndarray:
+    """Return the times (s) after settling at which a run is sampled for `SAMPLED` metrics.
 
     None without signals.
     """
@@ -87,15 +93,9 @@ def reversal_times(case: Case) -> np.ndarray:
     return case.settle + span / max(count, 1) * (np.arange(count) + 0.5)
 
 
-def reversal(rows: np.ndarray) -> Metrics:
-    """Return the `ROD_LOAD` numbers of observed rows, (m, COLUMNS); none without rows.
-
-    Each row stands in the middle of one of m equal steps. Between samples the load is a straight
-    line, its peaks those of the samples.
-    """
+def reversal_angle(rows: np.ndarray) -> float:
+    """Return the crank angle (rad) of the rod load's smaller side, straight between samples."""
     load = rows[:, SMALL_END]
-    if not load.size:
-        return {}
     before, after = load[:-1], load[1:]
     width = np.abs(after - before)
     above = np.maximum(before, 0.0) + np.maximum(after, 0.0)
@@ -104,29 +104,43 @@ def reversal(rows: np.ndarray) -> Metrics:
     part = np.divide(above, width, out=np.zeros_like(width), where=crossing)
     inside = np.where(crossing, part, before + after > 0.0).sum()
     tension = (inside + 0.5 * (load[0] > 0.0) + 0.5 * (load[-1] > 0.0)) / load.size
+    return 2.0 * math.pi * min(tension, 1.0 - tension)
+
+
+def reversal_share(rows: np.ndarray) -> float:
+    """Return the peak of the rod load's smaller side over that of the greater one, by samples."""
+    load = rows[:, SMALL_END]
     pull, push = max(load.max(), 0.0), max(-load.min(), 0.0)
     greater = max(pull, push)
-    return {
-        "rod_load_reversal_angle": 2.0 * math.pi * min(tension, 1.0 - tension),
-        "rod_load_reversal_share": min(pull, push) / greater if greater else 0.0,
-    }
+    return min(pull, push) / greater if greater else 0.0
 
 
-def reversal_bars(rows: np.ndarray, other: Companion | None, others: np.ndarray) -> Metrics:
-    """Return the error bar of each number, by another run at the same times; inf without one.
+# metrics of samples: from observed rows, (m, WIDE), each in the middle of one of m equal steps
+SAMPLED: dict[str, Callable[[np.ndarray], float]] = {
+    "rod_load_reversal_angle": reversal_angle,
+    "rod_load_reversal_share": reversal_share,
+}
+
+
+def sampled_metrics(rows: np.ndarray) -> Metrics:
+    """Return the `SAMPLED` metrics by name; none without rows."""
+    return {name: measure(rows) for name, measure in SAMPLED.items()} if len(rows) else {}
+
+
+def sampled_bars(rows: np.ndarray, other: Companion | None) -> Metrics:
+    """Return the error bar of each `SAMPLED` metric, by another run; none without one.
 
     What half as many samples would change stands for what is lost between samples. The bars are as
     careful as those of the metrics that were calibrated (`compressor.metrics.Bar`).
     """
-    ours = reversal(rows)
-    if other is None or others.shape != rows.shape:
-        return dict.fromkeys(ours, math.inf)
-    theirs, coarse = reversal(others), reversal(rows[::2])
-    found = {}
-    for name, value in ours.items():
-        bar = ROD_LOAD[name].bar
-        path = bar.path * float(other.apart["contact_force"][1]) * abs(value)
-        by_run = other.closeness * math.hypot(bar.own * (value - theirs[name]), path)
+    if other is None:
+        return {}
+    coarse, found = sampled_metrics(rows[::2]), {}
+    for name, value in sampled_metrics(rows).items():
+        row = NUMBERS[name]
+        apart = float(np.ravel(other.apart[row.series])[row.joint])
+        path = row.bar.path * apart * abs(value)
+        by_run = other.closeness * math.hypot(row.bar.own * (value - other.metrics[name]), path)
         found[name] = by_run + abs(value - coarse[name])
     return found
 
@@ -138,7 +152,7 @@ RMS_ERROR_AIM = 0.01  # of rms_acceleration: its standard error that revolutions
 
 
 def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
-    """Return statistics by name (`compressor.metrics.STATISTICS`) from the tallies of revolutions.
+    """Return `compressor.metrics.statistics_of` all metrics by name, from the revolutions' tallies.
 
     A standard error is inf where there are too few revolutions to tell.
     """

@@ -109,16 +109,18 @@ def a_turn(case: Case) -> int:
     return round(min(A_TURN, max(1.0, MOST / revolutions))) if revolutions >= 1.0 else 0
 
 
-def take_samples(p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndarray) -> np.ndarray:
+def take_samples(
+    p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndarray, columns: int = COLUMNS
+) -> np.ndarray:
     """Return the observed rows at some of a run's times; the run keeps its samples at others.
 
-    times, kept: subsets of `run.times`, s.
+    times, kept: subsets of `run.times`, s. Rows: (m, columns).
     """
-    whole, rows = (run.times, run.states, run.phases), np.empty((0, COLUMNS))
+    whole, rows = (run.times, run.states, run.phases), np.empty((0, columns))
     if times.size:
         at = np.searchsorted(run.times, times)
         run.times, run.states, run.phases = (array[at] for array in whole)
-        rows = rows_of(p, run, COLUMNS)
+        rows = rows_of(p, run, columns)
     if kept.size < whole[0].size:
         stay = np.searchsorted(whole[0], kept)
         whole = whole[0][stay], whole[1][stay], whole[2][stay]

@@ -247,8 +247,8 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
 def outcome(case: Case, solution: Solution) -> Outcome:
     """Return what is kept of a solution without its series."""
     numbers = row()
-    known = solution.metrics | solution.reversal | ledger(solution.p, solution.trajectory)
-    errors = solution.bars | solution.series_errors | solution.reversal_bars
+    known = solution.metrics | ledger(solution.p, solution.trajectory)
+    errors = solution.bars | solution.series_errors
     known |= {f"{name}_error": error for name, error in errors.items()}
     known |= solution.statistics
     known |= {

@@ -296,7 +296,6 @@ def fail_energy_audit(case: Case, best: Solution, detail: str, reason: str = "")
     residual = energy_residual(best.trajectory.tally)
     most = allowed_residual(case.rtol, case.duration / case.turn)
     best.metrics, best.bars, best.series_errors = {}, {}, {}
-    best.reversal, best.reversal_bars = {}, {}
     timed_out = reason == Reason.BUDGET_SECONDS
     best.reason = reason if timed_out else Reason.ENERGY_AUDIT_FAILED
     best.detail = f"energy residual {residual:.2g}, more than {most:.2g}; {detail}"
@@ -407,7 +406,7 @@ def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> S
         estimate_errors(now)
         if now.turns:
             now.statistics = statistics(now.p, now.turns)
-            now.bars = chaotic_bars(now.statistics, now.metrics)
+            now.bars |= chaotic_bars(now.statistics, now.metrics)
         if excess_over_promise(case, now) > 1.0 and case.targets:
             what = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
             return fail_accuracy(case, now, what)

@@ -15,7 +15,7 @@ from xarray.core import indexing
 
 from compressor.cases import points, table, value_in
 from compressor.digits import is_known
-from compressor.metrics import METRICS, NUMBERS, SOMETIMES
+from compressor.metrics import METRICS, NUMBERS
 from compressor.outcome import Regime, coordinates, regime_words
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
@@ -164,13 +164,11 @@ def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.
     Nan where a job has none. Statistics where a job is chaotic.
     """
     found = {}
-    for name, (dims, unit, phrase) in NUMBERS.items():
+    for name, metric in NUMBERS.items():
         values = np.array(rows.numbers[name][positions])
         values[positions < 0] = np.nan
-        if name in SOMETIMES and np.isnan(values).all():
-            continue
-        attrs = {"units": unit, "long_name": phrase}
-        found[name] = xr.Variable((*layout.dims, *dims), values, attrs)
+        if not metric.when or not np.isnan(values).all():
+            found[name] = xr.Variable((*layout.dims, *metric.dims), values, metric.attributes)
     return found
 
 

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compressor.cases import SUSPECT, Case, changes_since
-from compressor.metrics import METRICS, ROD_LOAD
+from compressor.metrics import BARRED
 from compressor.outcome import Outcome
 from compressor.reasons import Reason
 from compressor.store.files import (
@@ -69,10 +69,11 @@ def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
     good = rows.words["status"][positions] == "ok"
     signals = rows.words["signals"][positions] == "yes"
     found = {}
-    for name in (*METRICS, *ROD_LOAD):
+    present = {"": good, "signals": good & signals}  # whether another job has one is not known
+    for name, metric in BARRED.items():
         absent = np.isnan(rows.numbers[name][positions])
-        asked = good & signals if name in ROD_LOAD else good
-        found[name] = asked & absent.all(axis=tuple(range(1, absent.ndim)))
+        missed = absent.all(axis=tuple(range(1, absent.ndim)))
+        found[name] = missed & present.get(metric.when, False)
     return found | {name: good & (rows.words[name][positions] == "") for name in WORDS}
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from compressor.cases import MODEL
-from compressor.metrics import HORIZON, METRICS, NUMBERS, ROD_LOAD, SOMETIMES
+from compressor.metrics import BARRED, HORIZON, NUMBERS
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
 from compressor.program import PROGRAM
 from compressor.store.files import HEX20, pending_path
@@ -28,7 +28,7 @@ from compressor.store.hdf5 import DamagedJob, digest, image, open_file, read_var
 from compressor.store.series_file import intact, series_path
 
 NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
-GIVEN = digest(" ".join([PROGRAM, MODEL, *METRICS, *ROD_LOAD]).encode())[:8]  # by this version
+GIVEN = digest(" ".join([PROGRAM, MODEL, *BARRED]).encode())[:8]  # by this version
 ANY_KEY = re.compile(rb"(?=([0-9a-f]{20}))")  # every 20 hexadecimal digits in a row
 REMEDY = "move it away, then run its studies again"
 FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
@@ -177,10 +177,10 @@ def encode(segment: Segment) -> bytes:
         variables[name] = (dims, np.array(values, kind), attrs)
     for name, (_, phrase, _) in COLUMNS.items():
         variables[name] = (("row",), columns[name], {"long_name": phrase})
-    for name, (dims, unit, phrase) in NUMBERS.items():
+    for name, metric in NUMBERS.items():
         values = numbers[name]
-        if name not in SOMETIMES or not np.isnan(values).all():
-            variables[name] = (("row", *dims), values, {"units": unit, "long_name": phrase})
+        if not metric.when or not np.isnan(values).all():
+            variables[name] = (("row", *metric.dims), values, metric.attributes)
     for name, packed in (("attributes", segment.texts), ("details", segment.notes)):
         data = np.frombuffer(packed, np.uint8)
         attrs = {"long_name": "zlib of JSON, a line a row"}

@@ -151,8 +151,9 @@ def read_series(path: Path) -> "xr.Dataset":
         if attributes["key"] != final_path(path).name[:20]:
             raise ValueError
         dataset = xr.Dataset(hdf5.variables(file, data), attrs=attributes)
-        for name, (dims, _, _) in NUMBERS.items():
-            if name in dataset and (dataset[name].dims, dataset[name].dtype.kind) != (dims, "f"):
+        for name, metric in NUMBERS.items():
+            found = dataset.get(name)
+            if found is not None and (found.dims, found.dtype.kind) != (metric.dims, "f"):
                 raise ValueError
         if not {"status", "reason", "time"} <= set(dataset.variables):
             raise ValueError

@@ -8,7 +8,7 @@ from random_cases import random_cases
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.parameter import ACCURACY, first_rung
-from compressor.metrics import ERRORS, METRICS, SERIES, SERIES_ERRORS, Bar, Metric
+from compressor.metrics import METRICS, NUMBERS, SERIES, Bar, Metric
 from compressor.solve import attempts
 from compressor.solve.error_bars import (
     FLOOR,
@@ -30,6 +30,7 @@ from compressor.store.studies import read_studies, write_study
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
 EIGHT = random_cases(8)
+ERRORS = [f"{name}_error" for name in (*METRICS, *SERIES)]
 APART = {name: np.zeros(2) if "joint" in dims else 0.0 for name, (dims, _, _) in SERIES.items()}
 
 
@@ -146,7 +147,7 @@ def test_metrics_are_bit_equal_with_and_without_bars(method):
     plain, barred = (run(BOTH, error_bars=bars, method=method) for bars in (False, True))
     for name in METRICS:
         np.testing.assert_array_equal(plain[name], barred[name])
-    for name in (*ERRORS, *SERIES_ERRORS):
+    for name in ERRORS:
         assert np.isnan(plain[name]).all()
         assert np.isfinite(barred[name]).all()
     assert barred["peak_acceleration_error"] > 0
@@ -236,7 +237,7 @@ def test_friction_is_overrun_by_a_tolerance_of_speeds_or_a_loose_one():
 def test_a_metric_added_to_the_table_has_error_bars(monkeypatch):
     """Without shares of its own it gets the default ones."""
     given = attempts.metrics
-    monkeypatch.setitem(METRICS, "loss", Metric("loss", (), "J", "a toy metric", "velocity"))
+    monkeypatch.setitem(NUMBERS, "loss", Metric("loss", (), "J", "a toy metric", "velocity"))
     monkeypatch.setattr(
         attempts, "metrics", lambda p, tally: given(p, tally) | {"loss": tally["damping_loss"]}
     )
@@ -254,13 +255,13 @@ def test_errors_do_not_depend_on_the_output_grid():
         for given, keep in (({}, "series"), ({"output_step_deg": 7.2}, "series"), ({}, "metrics"))
     ]
     for other in found[1:]:
-        for name in (*ERRORS, *SERIES_ERRORS):
+        for name in ERRORS:
             np.testing.assert_array_equal(found[0].numbers[name], other.numbers[name])
 
 
 def test_a_failed_run_has_no_bars():
     found = run(BOTH, max_steps=50)
-    for name in (*ERRORS, *SERIES_ERRORS):
+    for name in ERRORS:
         assert np.isnan(found[name]).all()
 
 

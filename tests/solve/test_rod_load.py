@@ -11,8 +11,8 @@ from compsim.job_text import reversal_verdict
 from conftest import store
 
 from compressor.cases.case import Case
-from compressor.physics import COLUMNS
-from compressor.solve.run_metrics import SMALL_END, reversal
+from compressor.physics import WIDE
+from compressor.solve.run_metrics import SMALL_END, sampled_metrics
 from compressor.solve.simulate import measure
 
 SIGNALLED = {"output": {"signals": True}}
@@ -20,7 +20,7 @@ TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.9}
 
 
 def loads(values):
-    rows = np.zeros((len(values), COLUMNS))
+    rows = np.zeros((len(values), WIDE))
     rows[:, SMALL_END] = values
     return rows
 
@@ -29,7 +29,7 @@ def loads(values):
 def test_of_a_shifted_sine(shift):
     """sin + s is negative for pi - 2 arcsin(s) of 2 pi; its peaks are 1 + s and 1 - s."""
     angle = 2 * math.pi * (np.arange(3600) + 0.5) / 3600
-    found = reversal(loads(800 * (np.sin(angle) + shift)))
+    found = sampled_metrics(loads(800 * (np.sin(angle) + shift)))
     expected = math.pi - 2 * math.asin(abs(shift))
     assert found["rod_load_reversal_angle"] == pytest.approx(expected, rel=1e-3)
     share = (1 - abs(shift)) / (1 + abs(shift))
@@ -38,9 +38,9 @@ def test_of_a_shifted_sine(shift):
 
 def test_of_a_load_that_keeps_its_side():
     for load in (np.full(100, 3.0), np.full(100, -3.0), np.zeros(100)):
-        found = reversal(loads(load))
+        found = sampled_metrics(loads(load))
         assert set(found.values()) == {0.0}
-    assert reversal(loads([])) == {}
+    assert sampled_metrics(loads([])) == {}
 
 
 @pytest.mark.parametrize(

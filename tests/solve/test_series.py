@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.metrics import SERIES, SERIES_ERRORS
+from compressor.metrics import NUMBERS, SERIES
 from compressor.physics import COLUMNS, Column
 from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.series import (
@@ -82,7 +82,7 @@ def test_distances_are_relative_and_by_joint():
     assert found["contact_force"].tolist() == pytest.approx([0.0, 0.25])
     assert found["velocity"] == 0.0
     for name, value in found.items():
-        joint = (2,) if "joint" in SERIES_ERRORS[f"{name}_error"][0] else ()
+        joint = (2,) if "joint" in NUMBERS[f"{name}_error"].dims else ()
         assert np.shape(value) == joint, name
 
 

@@ -10,14 +10,14 @@ import xarray as xr
 
 from compressor.cases.case import Case
 from compressor.cases.groups import Machine, Output, PerJoint, Solve
-from compressor.metrics import NUMBERS, SOMETIMES
+from compressor.metrics import NUMBERS
 from compressor.program import library_versions
 from compressor.solve.simulate import SERIES, as_dataset, measure, observe, simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 
 
-USUAL = NUMBERS.keys() - SOMETIMES  # numbers of a motion that is not chaotic, without signals
+USUAL = {name for name, row in NUMBERS.items() if not row.when}  # that every job has
 
 
 def run(**values):

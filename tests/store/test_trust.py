@@ -11,7 +11,7 @@ from conftest import keep
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.metrics import METRICS, NUMBERS, QUANTILES, SOMETIMES, STATISTICS
+from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime
 from compressor.solve.simulate import measure, simulate
 from compressor.store.export import export
@@ -88,13 +88,14 @@ def test_numbers_that_cannot_be_read_are_told_when_the_file_is(plain, tmp_path):
 
 
 def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring):
+    always = {name for name, row in NUMBERS.items() if not row.when}
     with h5py.File(io.BytesIO(encode(of_outcomes([plain], 1)))) as file:
-        assert not SOMETIMES.keys() & file.keys()
-        assert NUMBERS.keys() - SOMETIMES.keys() <= file.keys()
-    assert not SOMETIMES.keys() & {*plain.table({}).variables}
+        assert NUMBERS.keys() & file.keys() == always
+    assert NUMBERS.keys() & plain.table({}).variables.keys() == always
     assert "quantile" not in plain.table({}).variables
     study = open_study(ring)
-    assert STATISTICS.keys() <= {*study.variables}
+    statistics = {name for name, row in NUMBERS.items() if row.when == "chaotic"}
+    assert statistics <= {*study.variables}
     assert study["quantile"].values.tolist() == list(QUANTILES)
     chaotic = study["regime"] == "chaotic"
     assert (study["revolutions"].notnull() == chaotic).all()

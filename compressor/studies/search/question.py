@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from compressor.cases import Study, load_studies, row_of
-from compressor.metrics import AXES, JOINTS, METRICS, NUMBERS, ROD_LOAD
+from compressor.metrics import AXES, BARRED, JOINTS
 from compressor.program import CompsimError, did_you_mean
 from compressor.solve import sure
 
@@ -67,7 +67,7 @@ class Goal:
     @property
     def unit(self) -> str:
         """The SI unit, "" for a share or a count."""
-        return "" if NUMBERS[self.metric][1] == "1" else NUMBERS[self.metric][1]
+        return "" if BARRED[self.metric].unit == "1" else BARRED[self.metric].unit
 
     def holds(self, told: JobReading) -> bool | None:
         """Return whether the comparison holds.
@@ -85,7 +85,7 @@ class Goal:
         counts, with the 95 % interval that its standard error and Student's t give. The bars of
         other metrics of a chaotic motion are such intervals already.
         """
-        metric = (METRICS | ROD_LOAD)[self.metric]
+        metric = BARRED[self.metric]
         averaged = regime == "chaotic" and metric.kind == "greatest"
         if averaged:
             mean = f"{self.metric}_mean"
@@ -106,7 +106,7 @@ class Goal:
         return JobReading(value, bar, averaged=averaged)
 
     def _at(self, numbers: np.void, name: str) -> float:
-        dims = (METRICS | ROD_LOAD)[self.metric].dims
+        dims = BARRED[self.metric].dims
         place = tuple(WORDS[dim].index(word) for dim, word in zip(dims, self.place, strict=True))
         return float(np.asarray(numbers[name])[place])
 
@@ -124,12 +124,11 @@ def comparison(text: str) -> Goal:
 
 def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:
     """Return the goal of a metric's name, METRIC or METRIC.JOINT. Raises QuestionError."""
-    known = METRICS | ROD_LOAD
     metric, *place = text.strip().split(".")
-    if metric not in known:
-        hint = did_you_mean(metric, known) or f"there are {', '.join(known)}"
+    if metric not in BARRED:
+        hint = did_you_mean(metric, BARRED) or f"there are {', '.join(BARRED)}"
         raise QuestionError(f"unknown metric {metric!r}; {hint}")
-    dims = known[metric].dims
+    dims = BARRED[metric].dims
     good = len(place) == len(dims) and all(w in WORDS[d] for w, d in zip(place, dims, strict=True))
     if not good:
         words = "".join(f".{'|'.join(WORDS[dim])}" for dim in dims)
