@@ -5,6 +5,7 @@ sampling design. Counts are known first (`draft`); values are made when the coun
 (`Draft.block`), and a combination of them when it is asked for (`Block.chosen`).
 """
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -63,8 +64,8 @@ class Draft:
             self.sweeps[key].kind, self.samples, len(together)
         )
 
-    def block(self) -> Block:
-        """Return the block, its values made.
+    def block(self, name: str) -> Block:
+        """Return the block of a study of some name, its values made.
 
         Wrong ones join `problems`, and leave it without jobs.
         """
@@ -73,13 +74,13 @@ class Draft:
         if self.problems:
             count = 0
         is_grid = not self.exclusions and not self.is_sampled and len(factors) == len(self.sweeps)
-        found = Block(self.leaves, self.fixed, factors, range(count), is_grid)
+        found = Block(name, self.leaves, self.fixed, factors, range(count), is_grid)
         if not self.exclusions:
             return found
         kept = found.where(lambda value: not any(test(value) for test in self.exclusions))
-        if count and not kept.any():
+        if count and not any(kept):
             self.refuse(self.leaves.values["exclude"], "exclude", "leaves no job")
-        return replace(found, kept=kept.nonzero()[0].tolist())
+        return replace(found, kept=[*itertools.compress(range(count), kept)])
 
     def rows(self, keys: tuple[str, ...]) -> list[Row]:
         """Return the values of keys that advance together.

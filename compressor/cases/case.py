@@ -16,6 +16,7 @@ from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 from compressor.cases.checks import (
+    PER_JOINT,
     SHORTHANDS,
     SWEEP,
     checked_part,
@@ -26,8 +27,9 @@ from compressor.cases.checks import (
     written_out,
 )
 from compressor.cases.conflicts import conflicts, values_read
-from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, with_law
-from compressor.cases.optional_groups import filled_body, filled_guide, filled_wear
+from compressor.cases.groups import Solve
+from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
+from compressor.cases.optional_groups import filled_guide, filled_wear
 from compressor.cases.parameter import (
     ACCURACY,
     CaseError,
@@ -113,6 +115,7 @@ def model_of(values: Mapping[str, Any]) -> str:
 # version of program and libraries on one kind of processor
 LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
+KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 NO_SWEEP = (
     "would be swept, and a case has one value of each key: build a case for each, or write a case "
     "file for load_cases"
@@ -203,44 +206,18 @@ class Case(Settings):
         return ()
 
     def __post_init__(self) -> None:
-        """Fill in the defaults that depend on other values; what needs a clearance goes without."""
-        machine, solve, contact = self.machine, self.solve, self.contact
-        object.__setattr__(self, "load", table()["load"].choice_of(self.load))
-        if machine.rod_centre_mm is None or machine.rod_inertia_kg_m2 is None:
-            given = (machine.rod_centre_mm, machine.rod_inertia_kg_m2)
-            length, mass = machine.rod_length_mm, machine.rod_mass_kg
-            usual = (length / 2, mass * (length / 1000) ** 2 / 12)
-            centre, inertia = (u if g is None else g for g, u in zip(given, usual, strict=True))
-            machine = replace(machine, rod_centre_mm=centre, rod_inertia_kg_m2=inertia)
-        if machine.small_end_pin_radius_mm == machine.pin_radius_mm:  # as without the key
-            machine = replace(machine, small_end_pin_radius_mm=None)
-        if solve.duration_s is not None:
-            solve = replace(solve, duration_rev=None)
-        if solve.output_step_s is not None:
-            solve = replace(solve, output_step_deg=None)
-        if contact.materials is not None or contact.law in CYLINDRICAL:
-            contact = replace(contact, stiffness_N_per_mm15=None)
-        if contact.geometry == "external":  # as without the key
-            contact = replace(contact, geometry=None)
-        friction = with_law("friction", self.friction) if self.friction else self.friction
-        contact = with_law("contact", contact)
-        if friction and not friction.ideal_joints:  # as without the key
-            friction = replace(friction, ideal_joints=None)
-        resolved: dict[str, Any] = {"machine": machine, "solve": solve, "contact": contact}
-        resolved["friction"] = friction
-        resolved["guide"] = self.guide and filled_guide(self.guide, machine.reciprocating_mass_kg)
-        resolved["body"] = self.body and filled_body(self.body)
+        """Fill in the defaults that depend on other groups; what needs a clearance goes without."""
+        values = vars(self)  # which alone can be written to: a case is frozen
+        values["load"] = table()["load"].choice_of(self.load)
+        if self.guide:
+            values["guide"] = filled_guide(self.guide, self.machine.reciprocating_mass_kg)
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
-            resolved["clearance_mm"] = replace(self.clearance_mm, **unused)
+            values["clearance_mm"] = replace(self.clearance_mm, **unused)
         if self.joint == "none":  # which has no bore that oil fills, or that wears
-            resolved |= {"lubricant": None, "wear": None}
-        elif self.wear:
-            resolved["wear"] = filled_wear(
-                self.wear, resolved.get("clearance_mm", self.clearance_mm)
-            )
-        for name, value in resolved.items():
-            object.__setattr__(self, name, value)
+            values["lubricant"] = values["wear"] = None
+        if self.wear:
+            values["wear"] = filled_wear(self.wear, self.clearance_mm)
 
     @classmethod
     def from_attribute(cls, text: str) -> "Case":
@@ -346,7 +323,7 @@ class Case(Settings):
     @cached_property
     def physics_key(self) -> str:
         """Hash of what is simulated, 20 hexadecimal digits: physics and span, not the solver."""
-        return digest(canonical(identity(self, with_solver=False)))
+        return digest(identity(self, with_solver=False))
 
     @cached_property
     def key(self) -> str:
@@ -355,7 +332,7 @@ class Case(Settings):
         Equal keys have equal results, within error bars, and a store holds each once. Name, output,
         time limit and error bars are no part of it.
         """
-        return digest(canonical(identity(self, with_solver=True)))
+        return digest(identity(self, with_solver=True))
 
     def attributes(self) -> dict[str, Any]:
         """Return what an outcome stores of its case: `name`, `case` (JSON), `key`, `physics_key`.
@@ -390,40 +367,58 @@ def parts_of(
     if not isinstance(values, Mapping):
         message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
         raise CaseError([Problem("", message)])
-    whole = expand_shorthands(written_out(values, problems))
+    whole = plain_values(values, problems)
     parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
     if problems:
         wrong = _everything_wrong(whole, parts, problems, {} if lenient else values_given(values))
         raise CaseError(_as_written(values, wrong))
-    given = frozenset(values_given(whole))
-    contact, pins = parts.get("contact"), {key for key in given if key.endswith("pin_radius_mm")}
-    if contact and contact.materials and pins and "contact.geometry" not in given:
-        parts["contact"] = replace(contact, geometry="internal")
-    return parts, given
+    return parts, frozenset(values_given(whole))
 
 
-def identity(case: Case, with_solver: bool) -> dict[str, Any]:
-    """Return what makes a case's results: nested values whose text a key is the hash of."""
-    values, solve = case.values(), case.solve
-    if values["contact"].get("geometry") == "external":  # as no key was, once
-        del values["contact"]["geometry"]
-    values["load"] = LOADS_IN_KEYS[values["load"]]
-    for unread in (*_groups_outside_identity(), "solve"):
-        values.pop(unread, None)
-    values["model"] = MODEL_VERSION
+def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
+    """Return nested values without shorthands and synonyms, and with the geometry of materials."""
+    whole = expand_shorthands(written_out(values, problems))
+    given = values_given(whole)
+    pins = given.keys() & {*PER_JOINT["machine.pin_radius_mm"].values()}
+    if pins and "contact.materials" in given and "contact.geometry" not in given:
+        whole["contact"] = {**whole["contact"], "geometry": "internal"}
+    return whole
+
+
+def part_text(part: Any) -> str:
+    """Return the text of a part of an identity: a group, of `solve` the solver, or numbers."""
+    if isinstance(part, Solve):
+        targets = {} if isinstance(part.accuracy, str) else dict(part.accuracy)
+        part = (part.rtol or targets or part.accuracy, part.method, part.max_steps)
+    elif not isinstance(part, tuple):
+        part = {key: value for key, value in vars(part).items() if value is not None}
+    return KEY_TEXT.encode(part)
+
+
+def identity(case: Case, with_solver: bool, part_text: Callable[[Any], str] = part_text) -> str:
+    """Return what makes a case's results: the text, in JSON, that a key is the hash of."""
+    solve = case.solve
     # what is integrated and from where on it counts, however it is written
     duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
     settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
-    values["span"] = [duration, settle, round(case.steps)]
+    texts = {
+        "joint": f'"{case.joint}"',
+        "load": f'"{LOADS_IN_KEYS[case.load]}"',
+        "model": f'"{MODEL_VERSION}"',
+        "span": part_text((duration, settle, round(case.steps))),
+    }
     if with_solver:
-        accuracy = solve.rtol or dict(case.targets) or solve.accuracy
-        values["solver"] = [accuracy, solve.method, solve.max_steps]
-    return values
-
-
-def canonical(values: Mapping[str, Any], held: Callable[[Any], str] | None = None) -> str:
-    """Return the one text of some values; `held`: what stands for those that JSON does not know."""
-    return json.dumps(values, sort_keys=True, separators=(",", ":"), default=held)
+        texts["solver"] = part_text(solve)
+    for name in _groups_in_identity():
+        group = getattr(case, name)
+        if group is not None:
+            texts[name] = part_text(group)
+        elif not WORDS[name]:
+            texts[name] = "false"
+    if case.joint == "none":
+        for name in OF_JOINTS:
+            del texts[name]
+    return "{" + ",".join([f'"{name}":{texts[name]}' for name in sorted(texts)]) + "}"
 
 
 def digest(text: str) -> str:
@@ -488,10 +483,10 @@ def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[
 
 
 @cache
-def _groups_outside_identity() -> tuple[str, ...]:
-    """Return the keys at the top of a case file of which nothing is part of a job's identity."""
+def _groups_in_identity() -> tuple[str, ...]:
+    """Return the groups that are part of a job's identity; of `solve`, what its numbers mean is."""
     inside = {key.partition(".")[0] for key in table().keys() - outside_identity()}
-    return tuple(sorted({key.partition(".")[0] for key in outside_identity()} - inside))
+    return tuple(name for name in GROUPS if name in inside and name != "solve")
 
 
 def with_ideal_joints(case: Case) -> Case:

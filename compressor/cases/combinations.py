@@ -1,58 +1,49 @@
 """The jobs of a block: every combination of its factors' values, but for those left out."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
 
-from compressor.cases.checks import single, stands_for
+from compressor.cases.case import Case, plain_values
+from compressor.cases.checks import single, stands_for, values_given
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.keys import Leaves, covers
+from compressor.cases.keys import Leaves, covers, nest_values
 from compressor.cases.swept import Test
-from compressor.cases.table import OF_JOINTS, outside_identity, table
+from compressor.cases.table import GROUPS, OF_JOINTS, outside_identity, table
 from compressor.cases.yaml_reader import Node
 
-if TYPE_CHECKING:
-    import numpy as np
-
-    from compressor.cases.columns import ArrayValue
-
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
+MAX_PARTS = 4096  # groups of cases that a block holds at a time
 Row = tuple[Node, ...]
-
-
-class Alike(NamedTuple):
-    """Jobs of a block that differ in numbers alone: `places` among its jobs, (m,).
-
-    chosen: the values of the first by dotted key; columns: those that differ, of all.
-    """
-
-    places: "np.ndarray"
-    chosen: dict[str, Node]
-    columns: "dict[str, ArrayValue]"
-
-    def some(self, places: "np.ndarray") -> dict[str, Node]:
-        """Return the values of some of them by dotted key, columns where they may differ."""
-        from compressor.cases.columns import ArrayValue
-
-        some = {key: ArrayValue(column.numbers[places]) for key, column in self.columns.items()}
-        return self.chosen | {key: replace(self.chosen[key], value=c) for key, c in some.items()}
 
 
 @dataclass(frozen=True)
 class Block:
-    """The combinations of a block; `kept` holds the numbers, in C order, of those not excluded."""
+    """The combinations of a block; `kept` holds the numbers, in C order, of those not excluded.
 
+    name: of the study.
+    """
+
+    name: str
     leaves: Leaves
     fixed: dict[str, Node]
     factors: tuple[tuple[tuple[str, ...], list[Row]], ...]  # keys, and their values together
     kept: Sequence[int]
     is_grid: bool  # whether every key is an axis of its own, and no combination is left out
 
+    def places(self, number: int) -> list[int]:
+        """Return which of its rows each factor has in one combination."""
+        found = []
+        for _, rows in reversed(self.factors):
+            number, place = divmod(number, len(rows))
+            found.append(place)
+        return found[::-1]
+
     def chosen(self, number: int) -> dict[str, Node]:
         """Return the values of one combination by dotted key."""
         found = dict(self.fixed)
-        for keys, rows in reversed(self.factors):
-            number, place = divmod(number, len(rows))
+        for (keys, rows), place in zip(self.factors, self.places(number), strict=True):
             found.update(zip(keys, rows[place], strict=True))
         if "joint" in self.swept and found["joint"].value == "none":
             gone = [key for key in found if any(covers(group, key) for group in OF_JOINTS)]
@@ -60,54 +51,88 @@ class Block:
                 del found[key]
         return found
 
-    @property
+    @cached_property
     def swept(self) -> list[str]:
         """The keys of all factors."""
         return [key for keys, _ in self.factors for key in keys]
 
-    def alike(self) -> list[Alike]:
-        """Return all jobs, those together that differ in numbers alone."""
-        import numpy as np
+    def case(self, number: int) -> Case:
+        """Return the case of one combination; whether its values fit each other is not checked.
 
-        from compressor.cases.columns import ArrayValue, alike, is_numeric
+        Cases share the groups that are equal, so that one takes some microseconds.
+        """
+        places = self.places(number)
+        parts = dict(self._shared)
+        for part, sources in self._sources.items():
+            parts[part] = self._part(part, *[places[factor] for factor, _, _ in sources])
+        return Case(**parts)
 
-        if not len(self.kept):
-            return []
-        left, axes = np.fromiter(self.kept, np.int64, len(self.kept)), {}
-        for keys, rows in reversed(self.factors):
-            left, which = np.divmod(left, len(rows))
-            for key, nodes in zip(keys, zip(*rows, strict=True), strict=True):
-                axes[key] = [node.value for node in nodes], which
-        numeric = {key: np.array(axis[0]) for key, axis in axes.items() if is_numeric(axis[0])}
-        found = []
-        for places in alike(axes.values(), len(self.kept)):
-            chosen = self.chosen(self.kept[int(places[0])])
-            columns = {
-                key: ArrayValue(values[axes[key][1][places]])
-                for key, values in numeric.items()
-                if key in chosen
+    def resolve_case(self, chosen: Mapping[str, Node]) -> Case:
+        """Return the case of some values. Raises CaseError where they do not fit each other."""
+        return Case.resolve(nest_values(chosen) | {"name": self.name})
+
+    @cached_property
+    def given(self) -> frozenset[str]:
+        """The dotted keys that a case is given."""
+        return frozenset(values_given(self._first))
+
+    @cached_property
+    def _first(self) -> dict[str, Any]:
+        """The nested values of a case with the first value of each factor."""
+        first = dict(self.fixed)
+        for keys, rows in self.factors:
+            first |= zip(keys, rows[0], strict=True)
+        return plain_values(nest_values(first) | {"name": self.name}, [])
+
+    @cached_property
+    def _sources(self) -> dict[str, list[tuple[int, int, str]]]:
+        """Where swept values of each field of a case are: the factor, the place in its rows, and
+        the key.
+        """
+        found: dict[str, list[tuple[int, int, str]]] = {}
+        for factor, (keys, _) in enumerate(self.factors):
+            for place, key in enumerate(keys):
+                for part in stands_for(key) or (key,):
+                    found.setdefault(part.partition(".")[0], []).append((factor, place, part))
+        return found
+
+    @cached_property
+    def _shared(self) -> dict[str, Any]:
+        """The fields that are the same in all cases."""
+        same = self._first.keys() - self._sources.keys()
+        return {name: _field(name, self._first[name]) for name in same}
+
+    @cached_property
+    def _part(self) -> Callable[..., Any]:
+        """The function that gives a field of a case by the rows of its sources."""
+
+        def part(name: str, *rows: int) -> Any:
+            chosen = {
+                key: self.factors[factor][1][row][place]
+                for (factor, place, key), row in zip(self._sources[name], rows, strict=True)
             }
-            found.append(Alike(places, chosen, columns))
-        return found
+            value = nest_values(chosen)[name]
+            if isinstance(value, dict):
+                value = {**self._first[name], **value}
+            return _field(name, value)
 
-    def where(self, test: Test) -> "np.ndarray":
-        """For which jobs a comparison holds, boolean, (jobs,)."""
-        import numpy as np
+        return lru_cache(MAX_PARTS)(part)
 
-        from compressor.cases.columns import places_where
+    def rows_of(self, number: int, part: str) -> tuple[int, ...]:
+        """Return the rows of factors by which combinations differ in a field of a case."""
+        places = self.places(number)
+        return tuple(places[factor] for factor, _, _ in self._sources.get(part, ()))
 
-        found = np.zeros(len(self.kept), dtype=bool)
-        for part in self.alike():
+    def where(self, test: Test) -> list[bool]:
+        """Return whether a comparison holds, of each job."""
+        return [test(reader(self.chosen(number))) for number in self.kept]
 
-            def holds(places: np.ndarray, part: Alike = part) -> bool:
-                return test(reader(part.some(places)))
 
-            try:
-                found[part.places] = places_where(holds, len(part.places))
-            except TypeError:  # of what is no column's to do, such as the one value of two keys
-                numbers = (self.kept[place] for place in part.places.tolist())
-                found[part.places] = [test(reader(self.chosen(number))) for number in numbers]
-        return found
+def _field(name: str, value: Any) -> Any:
+    """Return the field of a case of a checked value: of a group, its mapping or its word."""
+    if isinstance(value, dict):
+        return GROUPS[name](**value)
+    return GROUPS[name]() if name in GROUPS and value else value or None
 
 
 def reader(chosen: Mapping[str, Node]) -> Callable[[str], Any]:

@@ -299,6 +299,11 @@ FILLED_IN = {
 }
 
 
+def find_misfits(case: Settings, given: frozenset[str]) -> list[Problem]:
+    """Return the values of a case that do not fit each other; given: dotted keys set by hand."""
+    return [problem for rule in RULES for problem in rule(case, given)]
+
+
 def conflicts(
     case: Settings,
     given: frozenset[str],
@@ -312,8 +317,7 @@ def conflicts(
     the others alone.
     """
     if not wrong:
-        for rule in RULES:
-            yield from rule(case, given)
+        yield from find_misfits(case, given)
         yield from unread_values(case, values)
         return
     undecided = _undecided_keys(wrong)
@@ -430,25 +434,23 @@ def _geometry_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
 
 
 def _clearance_conflicts(case: Settings, given: frozenset[str], joint: str) -> Iterator[Problem]:
-    clearance, pin = getattr(case.clearance_mm, joint), case.machine.pin_radius(joint)
-    key = f"clearance_mm.{joint}"
+    """Find a clearance that is missing, or does not fit the pin or where its journal starts."""
+    key, clearance = f"clearance_mm.{joint}", getattr(case.clearance_mm, joint)
+    if not clearance:
+        if case.joint in (joint, "both") and key not in given:
+            yield Problem(key, f"is needed with joint: {case.joint}; give it in mm, such as 0.2")
+        return
+    pin = case.machine.pin_radius(joint)
     if clearance > pin:
         yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it")
     x, y = (getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy")
     shift = (x * x + y * y) ** 0.5
-    if 0 < clearance < shift - IMPLAUSIBLE * pin:
+    if clearance < shift - IMPLAUSIBLE * pin:
         yield Problem(
             f"initial_offset_mm.{joint}_x",
             f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
             f"more than a tenth of the pin radius; lower it, or raise {key}",
         )
-
-
-def _missing_clearance(case: Settings, given: frozenset[str], joint: str) -> Iterator[Problem]:
-    key = f"clearance_mm.{joint}"
-    worn = case.joint in (joint, "both")
-    if worn and not getattr(case.clearance_mm, joint) and key not in given:
-        yield Problem(key, f"is needed with joint: {case.joint}; give it in mm, such as 0.2")
 
 
 def _choice_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
@@ -518,26 +520,27 @@ def _time_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     solve = case.solve
     span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
     step_key = "solve.output_step_s" if solve.output_step_s is not None else "solve.output_step_deg"
-    if not case.steps <= 1e8:  # which may be inf, or nan
-        yield Problem(step_key, f"makes {case.steps:.3g} samples; at most 1e8: lengthen it")
-    elif round(case.steps) < 1:
-        yield Problem(step_key, f"is longer than the duration, {case.duration:g} s: shorten it")
-    elif abs(case.steps - round(case.steps)) > 1e-6 * max(1.0, 1e-3 * case.steps):
+    steps, duration = case.steps, case.duration
+    if not steps <= 1e8:  # which may be inf, or nan
+        yield Problem(step_key, f"makes {steps:.3g} samples; at most 1e8: lengthen it")
+    elif round(steps) < 1:
+        yield Problem(step_key, f"is longer than the duration, {duration:g} s: shorten it")
+    elif abs(steps - round(steps)) > 1e-6 * max(1.0, 1e-3 * steps):
         yield Problem(
             step_key,
-            f"the duration is {case.steps:.6g} output steps, not a whole number of them: "
+            f"the duration is {steps:.6g} output steps, not a whole number of them: "
             "choose a step that divides it",
         )
-    if solve.settle_rev == "auto" and case.duration < SETTLING_REV * case.turn * (1 - 1e-12):
+    if solve.settle_rev == "auto" and duration < SETTLING_REV * case.turn * (1 - 1e-12):
         text = f"auto compares {SETTLING_REV:g} revolutions; lengthen {span_key}"
         yield Problem("solve.settle_rev", text)
     if solve.duration_rev == "auto" or (solve.settle_rev == "auto" and solve.duration_s is None):
-        each = case.steps * case.turn / case.duration
+        each = steps * case.turn / duration
         if abs(each - round(each)) > 1e-6:
             text = f"a revolution is {each:.6g} output steps; auto needs a whole number of them"
             yield Problem(step_key, text)
-    if case.settle >= case.duration * (1 - 1e-12):
-        revolutions = case.duration / case.turn
+    if case.settle >= duration * (1 - 1e-12):
+        revolutions = duration / case.turn
         yield Problem(
             "solve.settle_rev",
             f"{solve.settle_rev:g} revolutions leave nothing of a run of {revolutions:g}; "
@@ -548,8 +551,7 @@ def _time_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
 Rule = Callable[[Settings, frozenset[str]], Iterator[Problem]]
 RULES: tuple[Rule, ...] = (
     _inertia_conflicts, _geometry_conflicts,
-    *(partial(rule, joint=joint) for joint in JOINTS
-      for rule in (_missing_clearance, _clearance_conflicts)),
+    *(partial(_clearance_conflicts, joint=joint) for joint in JOINTS),
     _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts,
     law_conflicts, contact_conflicts, friction_conflicts, lubricant_conflicts, wear_conflicts,
     mechanism_conflicts,

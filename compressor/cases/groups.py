@@ -4,9 +4,10 @@
 units, which stand in the field's name; `compressor.solve.si_record` turns them into SI.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
+from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, fill_by_law
 from compressor.cases.parameter import (
     ACCURACY,
     BIG_CLEARANCE,
@@ -152,6 +153,17 @@ class Machine:
         above=True, optional=True, read=SMALL_RUBBING,
     )  # fmt: skip
 
+    def __post_init__(self) -> None:
+        """Fill in a uniform rod, as far as the rod is not given."""
+        values = vars(self)  # which can be written to, though the group is frozen
+        length, mass = self.rod_length_mm, self.rod_mass_kg
+        if self.rod_centre_mm is None:
+            values["rod_centre_mm"] = length / 2
+        if self.rod_inertia_kg_m2 is None:
+            values["rod_inertia_kg_m2"] = mass * (length / 1000) ** 2 / 12
+        if self.small_end_pin_radius_mm == self.pin_radius_mm:  # as without the key
+            values["small_end_pin_radius_mm"] = None
+
     def pin_radius(self, joint: str) -> float:
         """Return the journal radius of a joint, mm."""
         own = self.small_end_pin_radius_mm if joint == "small_end" else None
@@ -293,6 +305,14 @@ class Contact:
         judged=(10.0, 250.0),
     )  # fmt: skip
 
+    def __post_init__(self) -> None:
+        """Fill in what the law reads, and leave out a stiffness where others make it."""
+        if self.materials is not None or self.law in CYLINDRICAL:
+            vars(self)["stiffness_N_per_mm15"] = None
+        if self.geometry == "external":  # as without the key
+            vars(self)["geometry"] = None
+        fill_by_law("contact", self)
+
 
 @document_fields
 @dataclass(frozen=True)
@@ -357,6 +377,14 @@ class Friction:
         None, (), "ours", "whether joints without clearance rub as well", kind="boolean",
         optional=True, read=IDEAL_JOINT,
     )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Fill in what the law reads."""
+        fill_by_law("friction", self)
+        if self.law == FRICTION_LAWS[0]:  # as without the key
+            vars(self)["law"] = None
+        if not self.ideal_joints:  # as without the key
+            vars(self)["ideal_joints"] = None
 
 
 @document_fields
@@ -425,6 +453,15 @@ class Solve:
         600.0, "s", (0, 1e7), "ours", "budget of wall time; not part of a job's identity",
         above=True, identity=False,
     )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Leave out the durations and steps in whose place others are given; sort the targets."""
+        if isinstance(self.accuracy, Mapping):
+            vars(self)["accuracy"] = tuple(sorted(self.accuracy.items()))
+        if self.duration_s is not None:
+            vars(self)["duration_rev"] = None
+        if self.output_step_s is not None:
+            vars(self)["output_step_deg"] = None
 
 
 @document_fields

@@ -1,6 +1,5 @@
 """The laws of contact and friction that a case chooses from, and the keys that each reads."""
 
-from dataclasses import fields, replace
 from typing import Any
 
 RESTITUTING = ("hunt_crossley", "lankarani_nikravesh", "flores", "gonthier", "hu_guo")
@@ -41,17 +40,11 @@ def law_of(group: Any) -> str:
     return str(group.law or FRICTION_LAWS[0])
 
 
-def with_law(name: str, group: Any) -> Any:
-    """Return contact or friction with what its law reads filled in, and the rest at its default."""
-    law, changes = law_of(group), {}
-    for field in fields(group):
-        readers = READ_BY[name].get(field.name)
-        value = getattr(group, field.name)
-        if readers and law not in readers:
-            if value is not field.default:
-                changes[field.name] = field.default
-        elif readers and value is None and field.name in USUAL:
-            changes[field.name] = USUAL[field.name]
-    if name == "friction" and group.law == FRICTION_LAWS[0]:  # as without the key
-        changes["law"] = None
-    return replace(group, **changes) if changes else group
+def fill_by_law(name: str, group: Any) -> None:
+    """Fill in what the law of contact or friction reads; the rest has its default."""
+    law, values = law_of(group), vars(group)
+    for key, readers in READ_BY[name].items():
+        if law not in readers:
+            values[key] = type(group).__dataclass_fields__[key].default
+        elif values[key] is None and key in USUAL:
+            values[key] = USUAL[key]

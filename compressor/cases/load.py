@@ -2,8 +2,8 @@
 
 A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
 and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
-before any is made. Those that differ in numbers alone are then made and checked at once (`sheet`),
-which finds the values that do not fit each other; a job's own case is built when it is asked for.
+before any is made. Each job's case is then built, checked for values that do not fit each other,
+and forgotten: it is built again when it is asked for.
 """
 
 import contextlib
@@ -12,14 +12,15 @@ import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from compressor.cases import blocks, regimes
-from compressor.cases.case import Case
-from compressor.cases.checks import SHORTHANDS, row_of
+from compressor.cases.case import Case, digest, identity, part_text
+from compressor.cases.checks import SHORTHANDS, row_of, value_of
 from compressor.cases.combinations import Block, columns
-from compressor.cases.conflicts import conditions, is_off, problem_of
+from compressor.cases.conflicts import conditions, find_misfits, is_off, problem_of
 from compressor.cases.keys import (
     Leaves,
     leaves,
@@ -28,9 +29,9 @@ from compressor.cases.keys import (
     overridden,
     read_overrides,
 )
-from compressor.cases.parameter import CaseError, Problem, Reader, quote_value
+from compressor.cases.parameter import CaseError, Problem, quote_value
 from compressor.cases.regimes import GROUP, Regimes
-from compressor.cases.study import Axis, Cases, Study
+from compressor.cases.study import MANY_CASES, Axis, Cases, Study
 from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
 from compressor.cases.table import WORDS, table
 from compressor.cases.yaml_reader import (
@@ -42,9 +43,6 @@ from compressor.cases.yaml_reader import (
     shorten,
 )
 from compressor.program import Progress, no_progress
-
-if TYPE_CHECKING:
-    from compressor.cases.sheet import CaseBatch
 
 Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it
 
@@ -69,38 +67,46 @@ class KeysRead:
     def note(self, cases: Cases) -> None:
         """Note which keys of its blocks the cases of a study read, unless they cannot be built."""
         with contextlib.suppress(CaseError):  # which is told elsewhere
-            for sheet in cases.sheets:
-                self._note(cases.block_of(int(sheet.numbers[0])).leaves, sheet)
+            for block in cases.parts:
+                self._note(block)
 
-    def _note(self, leaves: Leaves, sheet: "CaseBatch") -> None:
-        for key, node in leaves.values.items():
+    def _note(self, block: Block) -> None:
+        unread = []
+        for key, node in block.leaves.values.items():
             group = key.partition(".")[0]
             where = node.key_place, group if group in SHORTHANDS else key
-            if where in self.read or not (row_of(key) or key in WORDS) or is_off(key, node.value):
-                continue
-            missing = self._missing(key, sheet)
-            if missing is None:
-                self.read.add(where)
-                self.unread.pop(where, None)
-            elif where not in self.unread:
-                unread = problem_of(*missing)
-                place = _place_of(unread.key, node, leaves)
-                self.unread[where] = FileProblem(place, unread.key, unread.message)
+            known = row_of(key) or key in WORDS
+            if where not in self.read and known and not is_off(key, node.value):
+                unread.append(UnreadKey(where, key, node))
+        for number in block.kept:
+            if not unread:
+                break
+            for case in self.variants(block.case(number)):
+                self.read |= {one.where for one in unread if one.is_read(case)}
+            unread = [one for one in unread if one.where not in self.read]
+        for one in unread:
+            self.unread.setdefault(one.where, one.problem(block.leaves))
+        for where in self.read & self.unread.keys():
+            del self.unread[where]
 
-    def _missing(self, key: str, sheet: "CaseBatch") -> tuple[str, Reader] | None:
-        """Return the condition that keeps a sheet's jobs from reading a key; None if one reads."""
-        needed = conditions(key)
 
-        def holds(several: Iterable[tuple[str, Reader]]) -> bool:
-            return sheet.has(
-                lambda case: any(
-                    all(r.reads(one) for _, r in several) for one in self.variants(case)
-                )
-            )
+class UnreadKey:
+    """A key that no case is known to read, and which of its conditions no case fulfils."""
 
-        if holds(needed):
-            return None
-        return next((one for one in needed if not holds([one])), needed[-1])
+    def __init__(self, where: tuple[Place, str], key: str, node: Node):
+        self.where, self.node, self.needed = where, node, conditions(key)
+        self.lacking = [*self.needed]
+
+    def is_read(self, case: Case) -> bool:
+        """Return whether a case reads the key, and note which of its conditions it fulfils."""
+        unmet = [one for one in self.needed if not one[1].reads(case)]
+        self.lacking = [one for one in self.lacking if one in unmet]
+        return not unmet
+
+    def problem(self, leaves: Leaves) -> FileProblem:
+        """Return the problem of the key, or of its group where no case reads any of that."""
+        missing = problem_of(*[*self.lacking, self.needed[-1]][0])
+        return FileProblem(_place_of(missing.key, self.node, leaves), missing.key, missing.message)
 
 
 def _place_of(key: str, node: Node, leaves: Leaves) -> Place:
@@ -111,6 +117,7 @@ def _place_of(key: str, node: Node, leaves: Leaves) -> Place:
 
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
+MAX_TEXTS = 4096  # of groups, which jobs share
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 
@@ -290,7 +297,7 @@ def _cases(draft: _Draft, max_jobs: int) -> tuple[list[blocks.Draft], Cases | No
     drafts = [blocks.draft(leaves, draft.problems) for leaves in every]
     if not _bearable(drafts, draft, max_jobs):
         return drafts, None
-    return drafts, Cases(draft.name, [one.block() for one in drafts])
+    return drafts, Cases([one.block(draft.name) for one in drafts])
 
 
 def _study(
@@ -304,22 +311,23 @@ def _study(
     _note_read(draft, cases, read)
     if not draft.problems and not draft.changes:
         _refuse_idle_sample(drafts, draft)
-    _refuse_conflicts(draft, cases)
+    is_grid = len(found) == 1 and found[0].is_grid
+    swept = [] if is_grid else columns(found)
+    keys, values = _check_cases(draft, cases, swept, progress)
     if draft.problems:
         return Study(draft.name, draft.path, (), ())
-    is_grid = len(found) == 1 and found[0].is_grid
-    keys = cases.keys(progress)
+    cases.keys = keys
     if is_grid:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
         spreads = {k: s.spread for d in drafts for k, s in d.sweeps.items() if s.kind in SAMPLED}
-        axes = [Axis(key, tuple(cases.values(key)), spreads.get(key)) for key in columns(found)]
+        axes = [Axis(key, tuple(values[key]), spreads.get(key)) for key in swept]
     chains = _chains(draft, cases, max_jobs) if draft.regimes else ()
     if draft.problems:
         return Study(draft.name, draft.path, (), ())
     selected = range(len(cases)) if only is None else cases.where(only)
     return Study(
-        draft.name, draft.path, tuple(axes), cases, tuple(keys), is_grid, selected,
+        draft.name, draft.path, tuple(axes), cases, keys, is_grid, selected,
         draft.regimes, chains, tuple(nest_values(block.fixed) for block in found),
     )  # fmt: skip
 
@@ -385,19 +393,40 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
     return False
 
 
-def _refuse_conflicts(draft: _Draft, cases: Cases) -> None:
-    """Values that are good alone and do not fit each other, in any combination, are problems."""
+def _check_cases(
+    draft: _Draft, cases: Cases, swept: Sequence[str], progress: Progress
+) -> tuple[tuple[str, ...], dict[str, list[Any]]]:
+    """Return the key of each case, and its value of each swept key.
+
+    Values that are good alone and do not fit each other are problems, each once.
+    """
     found: dict[Problem, FileProblem] = {}
-    for block, chosen in cases.doubtful():
-        try:
-            cases.case(chosen)
-        except CaseError as error:
-            for problem in error.problems:
-                found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
+    keys: list[str] = []
+    values: dict[str, list[Any]] = {key: [] for key in swept}
+    shared_text = lru_cache(MAX_TEXTS)(part_text)
+    total = len(cases)
+    progress = progress if total >= MANY_CASES else no_progress
+    for number, (block, place) in enumerate(cases.combinations()):
+        if number % 1000 == 0:
+            progress(number, total, "" if number else f"{draft.name}: {total} jobs")
+        case = block.case(place)
+        if find_misfits(case, block.given):
+            chosen = block.chosen(place)
+            try:
+                block.resolve_case(chosen)
+            except CaseError as error:
+                for problem in error.problems:
+                    found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
+        elif not found:
+            keys.append(digest(identity(case, True, shared_text)))
+            for key in swept:
+                values[key].append(value_of(case, key))
+    progress(total, total, "")
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         draft.problems.append(FileProblem(Place(draft.path), "", message))
+    return tuple(keys), values
 
 
 def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
@@ -416,9 +445,10 @@ def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...
         draft.problems.append(FileProblem(places.get(f"{GROUP}.n", place), f"{GROUP}.n", message))
         return ()
     found = []
-    for block, chosen in cases.combinations():
+    for block, number in cases.combinations():
+        chosen = block.chosen(number)
         try:
-            chain = tuple(map(cases.case, regimes.follow_key(asked, chosen)))
+            chain = tuple(map(block.resolve_case, regimes.follow_key(asked, chosen)))
         except CaseError as error:
             wrong = (
                 _locate_problem(problem, chosen, block, draft.path) for problem in error.problems

@@ -281,6 +281,11 @@ class Body:
         "steady: as if the settled revolutions had always repeated; rest: at rest at time 0",
     )  # fmt: skip
 
+    def __post_init__(self) -> None:
+        """Fill in the modal mass of a casing mode."""
+        if self.casing_mass_kg is None:
+            vars(self)["casing_mass_kg"] = self.mass_kg / BODIES_PER_CASING
+
 
 @document_fields
 @dataclass(frozen=True)
@@ -342,13 +347,6 @@ class Sensor:
             f"{self.range_m_per_s2:g} m/s²: levels and spectra are those of the clipped record; "
             "raise sensor.range_m_per_s2"
         )
-
-
-def filled_body(body: Body) -> Body:
-    """Return a body with the modal mass of its casing, by default a 25th of the body's mass."""
-    if body.casing_mass_kg is not None:
-        return body
-    return replace(body, casing_mass_kg=body.mass_kg / BODIES_PER_CASING)
 
 
 value = partial(parameter, identity=False)  # of no single run

@@ -29,11 +29,7 @@ from compressor.program import CompsimError, did_you_mean
 
 @dataclass(frozen=True)
 class Reader:
-    """A condition under which a case reads a key; `words`: what a case file sets for it.
-
-    `reads` takes the case. Where numbers of the case are columns (`compressor.cases.columns`), its
-    comparisons raise `Mixed` as theirs do.
-    """
+    """A condition under which a case reads a key; `words`: what a case file sets for it."""
 
     words: str
     reads: Callable[[Any], Any]

@@ -2,24 +2,14 @@
 
 import bisect
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import Any, Protocol, overload
 
 from compressor.cases.case import Case
 from compressor.cases.combinations import Block
-from compressor.cases.keys import nest_values
-from compressor.cases.parameter import CaseError
 from compressor.cases.regimes import Regimes
 from compressor.cases.swept import Test
-from compressor.cases.yaml_reader import Node
-from compressor.program import Progress, no_progress
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from compressor.cases.sheet import CaseBatch
 
 MANY_CASES = 20_000  # cases of a study that take seconds to be read
 
@@ -62,11 +52,9 @@ class Study:
     def jobs(self) -> int:
         return len(self.keys)
 
-    def sheet_of(self, number: int) -> int:
-        """Return a number that jobs share only if their cases differ in nothing but swept
-        numbers.
-        """
-        return self.cases.sheet_of(number) if isinstance(self.cases, Cases) else number
+    def solver_of(self, number: int) -> Hashable:
+        """Return what jobs share only if their cases have equal groups `solve` and `output`."""
+        return self.cases.solver_of(number) if isinstance(self.cases, Cases) else number
 
     def shard(self, number: int, of: int) -> "Study":
         """Return the study with the jobs of one shard selected, 1 <= number <= of.
@@ -81,13 +69,13 @@ class Study:
 class Cases(Sequence[Case]):
     """The cases of blocks one after the other, each built when it is asked for.
 
-    Jobs that differ in numbers alone are one `CaseBatch`, which is made and checked at once.
+    `keys`: of all of them, as soon as they are known.
     """
 
-    def __init__(self, name: str, parts: Sequence[Block]):
-        self.name, self.parts = name, parts
+    def __init__(self, parts: Sequence[Block]):
+        self.parts = parts
         self.ends = list(itertools.accumulate(len(part.kept) for part in parts))
-        self._keys: list[str] = []
+        self.keys: Sequence[str] = ()
 
     def __len__(self) -> int:
         return self.ends[-1] if self.ends else 0
@@ -100,99 +88,32 @@ class Cases(Sequence[Case]):
         numbers = range(len(self))[index]
         if isinstance(numbers, range):
             return tuple(self[number] for number in numbers)
-        sheet, place = self._places
-        made = self.sheets[sheet[numbers]].at(int(place[numbers]))
-        if self._keys:
-            vars(made)["key"] = self._keys[numbers]  # which would take longer than the case
-        return made
+        block, place = self._locate(numbers)
+        case = self.parts[block].case(place)
+        if self.keys:  # of cases whose values fit each other
+            vars(case).update(key=self.keys[numbers], problems=())
+        return case
 
-    @cached_property
-    def sheets(self) -> "list[CaseBatch]":
-        """All cases. Raises CaseError where fixed values of a block do not fit."""
-        from compressor.cases.sheet import CaseBatch
-
-        found, before = [], 0
-        for part in self.parts:
-            found += [CaseBatch.of(self.name, jobs, before) for jobs in part.alike()]
-            before += len(part.kept)
-        return found
-
-    def sheet_of(self, number: int) -> int:
-        """Return the number of a case's sheet."""
-        return self._sheet_of[number]
-
-    @cached_property
-    def _sheet_of(self) -> list[int]:
-        return self._places[0].tolist()
-
-    @cached_property
-    def _places(self) -> "tuple[np.ndarray, np.ndarray]":
-        """Of each case its sheet, and its place there, both (cases,)."""
-        import numpy as np
-
-        sheet, place = np.zeros((2, len(self)), dtype=np.int64)
-        for number, one in enumerate(self.sheets):
-            sheet[one.numbers] = number
-            place[one.numbers] = np.arange(len(one.numbers))
-        return sheet, place
-
-    def block_of(self, number: int) -> Block:
-        """Return the block that a case is of."""
-        return self.parts[bisect.bisect_right(self.ends, number)]
-
-    def keys(self, progress: Progress = no_progress) -> list[str]:
-        """Return the key of each case; `progress` is told how many of many are made."""
-        if not self._keys:
-            self._keys = self._each(lambda sheet: sheet.keys(), progress)
-        return self._keys
-
-    def values(self, key: str) -> list[Any]:
-        """Return the value of a dotted key in each case, as `value_of` gives it."""
-        return self._each(lambda sheet: sheet.values(key))
-
-    def _each(
-        self, of: "Callable[[CaseBatch], Sequence[Any]]", progress: Progress = no_progress
-    ) -> list[Any]:
-        """Return what a function gives for the jobs of each sheet, of all cases in their order."""
-        found: list[Any] = [None] * len(self)
-        done, total = 0, len(self)
-        progress = progress if total >= MANY_CASES else no_progress
-        for sheet in self.sheets:
-            progress(done, total, "" if done else f"{self.name}: {total} jobs")
-            for number, one in zip(sheet.numbers.tolist(), of(sheet), strict=True):
-                found[number] = one
-            done += len(sheet.numbers)
-        progress(done, total, "")
-        return found
-
-    def doubtful(self) -> Iterator[tuple[Block, dict[str, Node]]]:
-        """Yield the combinations in which a rule may find values that do not fit each other, in
-        order.
-        """
-        try:
-            sheets = self.sheets
-        except CaseError:  # told of each combination
-            yield from self.combinations()
-            return
-        numbers = (sheet.numbers[sheet.doubtful()] for sheet in sheets)
-        for number in sorted(itertools.chain.from_iterable(one.tolist() for one in numbers)):
-            part = self.block_of(number)
-            before = self.ends[bisect.bisect_right(self.ends, number)] - len(part.kept)
-            yield part, part.chosen(part.kept[number - before])
-
-    def case(self, chosen: Mapping[str, Node]) -> Case:
-        """Return the case of one combination. Raises CaseError where its values do not fit."""
-        return Case.resolve(nest_values(chosen) | {"name": self.name})
-
-    def combinations(self) -> Iterator[tuple[Block, dict[str, Node]]]:
-        """Yield the values of every case by dotted key, and the block that they are of."""
+    def combinations(self) -> Iterator[tuple[Block, int]]:
+        """Yield the block of each case, and the number of its combination there."""
         for part in self.parts:
             for number in part.kept:
-                yield part, part.chosen(number)
+                yield part, number
+
+    def _locate(self, number: int) -> tuple[int, int]:
+        """Return the number of a case's block, and of its combination there."""
+        block = bisect.bisect_right(self.ends, number)
+        kept = self.parts[block].kept
+        return block, kept[number - self.ends[block] + len(kept)]
+
+    def solver_of(self, number: int) -> Hashable:
+        """Return what cases share only if their groups `solve` and `output` are equal."""
+        block, place = self._locate(number)
+        return block, self.parts[block].rows_of(place, "solve")
 
     def where(self, test: Test) -> list[int]:
         """Return the numbers of the cases for which a comparison holds."""
-        holds = itertools.chain.from_iterable(part.where(test).tolist() for part in self.parts)
+        holds = itertools.chain.from_iterable(part.where(test) for part in self.parts)
         return [number for number, held in enumerate(holds) if held]
 
 

@@ -71,7 +71,7 @@ class RequestedJobs(Mapping[str, Case]):
         """
         found: dict[Hashable, list[str]] = {}
         for key, (study, number) in self.places.items():
-            kind = key if key in self.own else (study.name, study.sheet_of(number))
+            kind = key if key in self.own else (study.name, study.solver_of(number))
             found.setdefault(kind, []).append(key)
         for keys in found.values():
             yield self[keys[0]], keys

@@ -1,20 +1,14 @@
-"""Sheets: what is made of all jobs of a sweep at once is what is made of each job alone."""
+"""The cases of a sweep share what is equal, and are what each is by itself."""
 
 import itertools
 import json
-import math
-import operator
 import random
 from pathlib import Path
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from compressor.cases.case import Case, parts_of
 from compressor.cases.checks import value_of, values_given
-from compressor.cases.columns import ArrayValue, Mixed, alike, places_where
 from compressor.cases.conflicts import reads
 from compressor.cases.load import MAX_CONFLICTS, CaseFileError, itself, load_studies
 from compressor.cases.parameter import CaseError
@@ -24,13 +18,11 @@ from compressor.studies.claims.study import cases_judged
 
 ROOT = Path(__file__).parents[2]
 FILES = [*(ROOT / "configs").glob("*.yaml"), *(ROOT / "compressor/cases/examples").glob("*.yaml")]
-NUMBERS = st.floats(-1e6, 1e6).filter(lambda x: x == 0 or abs(x) > 1e-6)
-MANY = st.lists(NUMBERS, min_size=1, max_size=8)
 
 
 def alone(study):
     """The cases of a study, each made by itself."""
-    return [study.cases.case(chosen) for _, chosen in study.cases.combinations()]
+    return [block.resolve_case(block.chosen(place)) for block, place in study.cases.combinations()]
 
 
 def assert_same(study):
@@ -52,9 +44,10 @@ def test_jobs_of_our_files_are_those_made_one_by_one(path):
     (study,) = load_studies(path, variants=cases_judged if claims else itself)
     if len(study.cases) > 300:  # making them one by one takes a tenth of a millisecond each
         numbers = random.Random(1).sample(range(len(study.cases)), 300)
-        every = list(study.cases.combinations())
+        places = list(study.cases.combinations())
         for number in numbers:
-            same = study.cases.case(every[number][1])
+            block, place = places[number]
+            same = block.resolve_case(block.chosen(place))
             assert study.cases[number] == same
             assert study.keys[number] == same.key
     else:
@@ -225,82 +218,3 @@ def test_a_comparison_selects_as_job_by_job(tmp_path):
         or case.clearance_mm.small_end > 0.35
     ]
     assert not excluded
-
-
-def test_what_no_column_can_do_is_told_job_by_job(tmp_path, monkeypatch):
-    """A rule that cannot take columns leaves every job in doubt, and each is asked."""
-    path = tmp_path / "case.yaml"
-    path.write_text("{joint: big_end, clearance_mm: [0.1, 11], machine: {rod_mass_kg: [3, 4]}}")
-
-    def alone_only(case, given):
-        math.sqrt(case.machine.rod_mass_kg)
-        yield from ()
-
-    monkeypatch.setattr("compressor.cases.sheet.RULES", (alone_only,))
-    with pytest.raises(CaseFileError, match="11 mm exceeds the pin radius"):
-        load_studies(path)
-
-
-# ---- columns ------------------------------------------------------------------------------------
-
-OPERATORS = [operator.add, operator.sub, operator.mul, operator.lt, operator.le, operator.gt,
-             operator.ge, operator.eq, operator.ne]  # fmt: skip
-
-
-@pytest.mark.parametrize("operation", OPERATORS)
-@given(many=MANY, other=NUMBERS)
-def test_columns_calculate_as_numbers_do(operation, many, other):
-    column = ArrayValue(np.array(many))
-    assert operation(column, other).numbers.tolist() == [operation(a, other) for a in many]
-    assert operation(other, column).numbers.tolist() == [operation(other, a) for a in many]
-    assert operation(column, column).numbers.tolist() == [operation(a, a) for a in many]
-
-
-@given(many=st.lists(st.floats(1e-3, 1e3), min_size=1, max_size=8), other=st.floats(0.5, 2))
-def test_columns_divide_and_take_powers_as_numbers_do(many, other):
-    column = ArrayValue(np.array(many))
-    assert (column / other).numbers.tolist() == [a / other for a in many]
-    assert (other / column).numbers.tolist() == [other / a for a in many]
-    assert (column**other).numbers.tolist() == [a**other for a in many]
-    assert (other**column).numbers.tolist() == [other**a for a in many]
-    assert round(column).numbers.tolist() == [round(a) for a in many]
-    assert abs(0.0 - column).numbers.tolist() == many
-
-
-def test_a_condition_that_holds_for_some_alone_is_mixed():
-    column = ArrayValue(np.array([1.0, 2.0, 3.0]))
-    assert column > 0
-    assert not column > 3
-    with pytest.raises(Mixed) as caught:
-        bool(column > 1)
-    assert caught.value.holds.tolist() == [False, True, True]
-    assert max(0.5, column) is column
-
-
-def test_what_is_no_number_is_not_compared_by_size():
-    column = ArrayValue(np.array([1.0, 2.0]))
-    assert not column == "auto"  # noqa: SIM201
-    assert column != "auto"
-    for wrong in (lambda: {column}, lambda: float(column), lambda: column + "1"):
-        with pytest.raises(TypeError):
-            wrong()
-
-
-def test_places_are_cut_where_conditions_are_mixed():
-    numbers, asked = np.arange(10.0), []
-
-    def test(places):
-        asked.append(len(places))
-        x = ArrayValue(numbers[places])
-        return bool(x > 2 and x < 7)
-
-    assert places_where(test, 10).nonzero()[0].tolist() == [3, 4, 5, 6]
-    assert len(asked) == 5  # all, both sides of 2, and both sides of 7
-
-
-def test_jobs_are_alike_that_differ_in_numbers_alone():
-    which = np.array([0, 1, 0, 1])
-    axes = [([1.0, 2.0], which), (["a", 1], np.array([0, 0, 1, 1])), ([True, False], which)]
-    assert sorted(places.tolist() for places in alike(axes, 4)) == [[0], [1], [2], [3]]
-    assert [places.tolist() for places in alike(axes[:1], 4)] == [[0, 1, 2, 3]]
-    assert sorted(places.tolist() for places in alike(axes[:2], 4)) == [[0, 1], [2, 3]]
