@@ -120,8 +120,9 @@ class Block:
 
     def rows_of(self, number: int, part: str) -> tuple[int, ...]:
         """Return the rows of factors by which combinations differ in a field of a case."""
-        places = self.places(number)
-        return tuple(places[factor] for factor, _, _ in self._sources.get(part, ()))
+        sources = self._sources.get(part, ())
+        places = self.places(number) if sources else ()
+        return tuple(places[factor] for factor, _, _ in sources)
 
     def where(self, test: Test) -> list[bool]:
         """Return whether a comparison holds, of each job."""
