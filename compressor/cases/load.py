@@ -31,7 +31,7 @@ from compressor.cases.keys import (
 )
 from compressor.cases.parameter import CaseError, Problem, quote_value
 from compressor.cases.regimes import GROUP, Regimes
-from compressor.cases.study import MANY_CASES, Axis, Cases, Study
+from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
 from compressor.cases.table import WORDS, table
 from compressor.cases.yaml_reader import (
@@ -118,6 +118,7 @@ def _place_of(key: str, node: Node, leaves: Leaves) -> Place:
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
 MAX_TEXTS = 4096  # of groups, which jobs share
+MANY_CASES = 20_000  # cases of a study that take seconds to be read
 MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 

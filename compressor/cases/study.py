@@ -11,8 +11,6 @@ from compressor.cases.combinations import Block
 from compressor.cases.regimes import Regimes
 from compressor.cases.swept import Test
 
-MANY_CASES = 20_000  # cases of a study that take seconds to be read
-
 
 @dataclass(frozen=True)
 class Axis:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from compsim import cli, progress
 
-from compressor.cases import study as cases
+from compressor.cases import load as cases
 from compressor.cases.load import load_studies
 from compressor.sweep import plan, warm_up
 from compressor.sweep.plan import ROW_BYTES, forecast
