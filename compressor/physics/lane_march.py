@@ -71,7 +71,7 @@ from compressor.physics.march import DONE, RUNNING, WALKER, WorkArrays, march, n
 from compressor.physics.observe import ACCELERATION, CRANK_POWER
 from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import FLOWS, STAGES, weights_at
-from compressor.physics.step_control import AUTO, STIFF_STEPS
+from compressor.physics.step_control import AUTO, begin_stiff_steps, is_last_step
 from compressor.physics.tally import TALLY
 
 NO_TEST = 1e300  # steps without a test for stiffness, where another method is not wanted
@@ -109,7 +109,7 @@ def end_of(runs, job):
 def plain_ahead(w, omega, end):
     """Return whether the next step is an explicit one in which nothing is known to begin or end."""
     ready = not w.fresh and w.observed and not w.stiff and w.landing == 0.0 and w.h > 0.0
-    return ready and w.t + 1.01 * w.h < end and omega * w.h <= SMALL
+    return ready and not is_last_step(w.t, w.h, end) and omega * w.h <= SMALL
 
 
 @jit
@@ -194,8 +194,7 @@ def unload(W, j, runs, job, work):
     w.t, w.h, w.error, w.steps = W[T + j], W[H + j], W[REMEMBERED + j], steps
     w.rejected += refused
     w.stability_limited = np.int64(W[HELD + j])
-    if w.stability_limited >= STIFF_STEPS:
-        w.stiff, w.stability_limited, w.explicit_would_do, w.steps_saved = 1, 0, 0, 0.0
+    begin_stiff_steps(w)
     if w.mode == AUTO:
         w.steps_to_test = np.int64(W[REST + j])
     w.has_dense = 0

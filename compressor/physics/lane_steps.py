@@ -19,7 +19,7 @@ from compressor.physics.march import NODES
 from compressor.physics.motion import deviating, evaluate
 from compressor.physics.observe import energies, joint_forces, observed_columns, powers
 from compressor.physics.record import RECORD, Load
-from compressor.physics.runge_kutta import STAGES, A, C, E, RungeKuttaPair
+from compressor.physics.runge_kutta import STAGES, A, C, E, RungeKuttaPair, error_share
 
 LANES = 16
 MAX_STATES = 8  # numbers of a motion
@@ -142,112 +142,49 @@ def state_of(scene, W, j, w):
 
 
 @inline_numba
+def four_of(W, row):
+    """Return four numbers of a lane, of rows that follow each other."""
+    return W[row], W[row + LANES], W[row + 2 * LANES], W[row + 3 * LANES]
+
+
+@inline_numba
+def put_four(W, row, x):
+    """Write four numbers of a lane into rows that follow each other."""
+    W[row], W[row + LANES], W[row + 2 * LANES], W[row + 3 * LANES] = x
+
+
+@inline_numba
 def put_rates(scene, W, j, y, d, q):
     """Write dz/dt into OUT: rates, accelerations, powers."""
+    o = OUT + j
     if len(scene) == 3:
-        W[OUT + j], W[OUT + 1 * LANES + j], W[OUT + 2 * LANES + j], W[OUT + 3 * LANES + j] = (
-            y[4],
-            y[5],
-            y[6],
-            y[7],
-        )
-        (
-            W[OUT + 4 * LANES + j],
-            W[OUT + 5 * LANES + j],
-            W[OUT + 6 * LANES + j],
-            W[OUT + 7 * LANES + j],
-        ) = d
-        (
-            W[OUT + 8 * LANES + j],
-            W[OUT + 9 * LANES + j],
-            W[OUT + 10 * LANES + j],
-            W[OUT + 11 * LANES + j],
-        ) = q
+        put_four(W, o, (y[4], y[5], y[6], y[7]))
+        put_four(W, o + 4 * LANES, d)
+        put_four(W, o + 8 * LANES, q)
     else:
-        W[OUT + j], W[OUT + 1 * LANES + j] = y[2], y[3]
-        W[OUT + 2 * LANES + j], W[OUT + 3 * LANES + j] = d[0], d[3]
-        (
-            W[OUT + 4 * LANES + j],
-            W[OUT + 5 * LANES + j],
-            W[OUT + 6 * LANES + j],
-            W[OUT + 7 * LANES + j],
-        ) = q
+        put_four(W, o, (y[2], y[3], d[0], d[3]))
+        put_four(W, o + 4 * LANES, q)
 
 
 @inline_numba
 def put_seen(W, j, g, energy):
+    """Write what is observed at a node into SEEN; energy: kinetic and potential."""
     s = SEEN + j
-    W[s], W[s + 1 * LANES], W[s + 2 * LANES], W[s + 3 * LANES] = g[0], g[1], g[2], g[3]
-    W[s + 4 * LANES], W[s + 5 * LANES], W[s + 6 * LANES], W[s + 7 * LANES] = g[4], g[5], g[6], g[7]
-    W[s + 8 * LANES], W[s + 9 * LANES], W[s + 10 * LANES], W[s + 11 * LANES] = (
-        g[8],
-        g[9],
-        g[10],
-        g[11],
-    )
-    W[s + 12 * LANES], W[s + 13 * LANES] = g[12], g[13]
-    W[s + 14 * LANES], W[s + 15 * LANES] = g[14], g[15]
+    put_four(W, s, (g[0], g[1], g[2], g[3]))
+    put_four(W, s + 4 * LANES, (g[4], g[5], g[6], g[7]))
+    put_four(W, s + 8 * LANES, (g[8], g[9], g[10], g[11]))
+    put_four(W, s + 12 * LANES, (g[12], g[13], g[14], g[15]))
     W[s + 16 * LANES], W[s + 17 * LANES] = energy
 
 
-@inline_numba
-def move(W, k, a, o):
-    """Copy eight rows from o to a: constants, or LLVM takes one number at a time."""
-    for j in range(k):
-        W[a + j] = W[o + j]
-        W[a + LANES + j] = W[o + LANES + j]
-        W[a + 2 * LANES + j] = W[o + 2 * LANES + j]
-        W[a + 3 * LANES + j] = W[o + 3 * LANES + j]
-        W[a + 4 * LANES + j] = W[o + 4 * LANES + j]
-        W[a + 5 * LANES + j] = W[o + 5 * LANES + j]
-        W[a + 6 * LANES + j] = W[o + 6 * LANES + j]
-        W[a + 7 * LANES + j] = W[o + 7 * LANES + j]
-
-
-@inline_numba
-def keep(scene, W, k, a):
-    move(W, k, a, OUT)
-    if len(scene) == 3:
-        move(W, k, a + 4 * LANES, OUT + 4 * LANES)
-
-
 @jit
-def keep_stage(scene, W, k, s):
+def copy_rows(W, target, source, count):
+    """Copy rows of all lanes: what a loop over lanes writes to a row that is no constant, LLVM
+    takes one number at a time.
+    """
     W = without_refcount(W)
-    if s == 1:
-        keep(scene, W, k, K + STATE * LANES)
-    elif s == 2:
-        keep(scene, W, k, K + 2 * STATE * LANES)
-    elif s == 3:
-        keep(scene, W, k, K + 3 * STATE * LANES)
-    elif s == 4:
-        keep(scene, W, k, K + 4 * STATE * LANES)
-    elif s == 5:
-        keep(scene, W, k, K + 5 * STATE * LANES)
-    else:
-        keep(scene, W, k, K + 6 * STATE * LANES)
-
-
-@inline_numba
-def keep_glance(W, k, a):
-    move(W, k, a, SEEN)
-    move(W, k, a + 8 * LANES, SEEN + 8 * LANES)
-    for j in range(k):
-        W[a + 16 * LANES + j] = W[SEEN + 16 * LANES + j]
-        W[a + 17 * LANES + j] = W[SEEN + 17 * LANES + j]
-
-
-@jit
-def keep_seen(W, k, i):
-    W = without_refcount(W)
-    if i == 1:
-        keep_glance(W, k, R1)
-    elif i == 2:
-        keep_glance(W, k, R2)
-    elif i == 3:
-        keep_glance(W, k, R3)
-    else:
-        keep_glance(W, k, R4)
+    for i in range(count * LANES):
+        W[target + i] = W[source + i]
 
 
 @jit
@@ -260,7 +197,7 @@ def stage_rates(scene, W, k, fraction, w, s):
         y = state_of(scene, W, j, w)
         now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
         put_rates(scene, W, j, y, deviating(now, p), powers(now, y, joint_forces(now, y, p), p))
-    keep_stage(scene, W, k, s)
+    copy_rows(W, K + s * STATE * LANES, OUT, STATE if len(scene) == 3 else MAX_STATES)
 
 
 @jit
@@ -273,7 +210,7 @@ def look_at_node(scene, W, k, fraction, w, i):
         y = state_of(scene, W, j, w)
         now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
         put_seen(W, j, observed_columns(now, y, joint_forces(now, y, p), p), energies(now, y, p))
-    keep_seen(W, k, i)
+    copy_rows(W, NODE_ROWS + i * ROW, SEEN, SEEN_COUNT)
 
 
 @jit
@@ -313,7 +250,7 @@ def part_of_error(W, i, j, total):
     e = fma(w[3], W[K + 36 * LANES + u], fma(w[2], W[K + 24 * LANES + u], e))
     e = fma(w[5], W[K + 60 * LANES + u], fma(w[4], W[K + 48 * LANES + u], e))
     e = fma(w[6], W[K + 72 * LANES + u], e)
-    e /= fma(W[RTOL + j], max(abs(W[Z + u]), abs(W[NEW + u])), W[ATOL + u])
+    e = error_share(e, W[Z + u], W[NEW + u], W[RTOL + j], W[ATOL + u])
     return fma(e, e, total)
 
 

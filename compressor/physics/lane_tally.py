@@ -1,10 +1,8 @@
 """Whether steps of lanes are taken, what is tallied of them, and how long the next ones are.
 
-The rules of `march` and `tally` for a step in which nothing begins or ends. A lane in which
-something may is left as it was before the step.
-
-How long the next steps of lanes are, and how lanes go on: the rules of `step_control`. A lane whose
-next step is no plain one calls for `march` itself.
+The rules are functions of numbers in `step_control`, `onset` and `tally`, which `march` calls, too.
+They are applied here to a step in which nothing begins or ends. A lane in which something may is
+left as it was before the step, and one whose next step is no plain one calls for `march` itself.
 """
 
 import math
@@ -12,8 +10,7 @@ import math
 import numpy as np
 
 from compressor.physics._jit import inline_numba, jit, square_root, without_refcount
-from compressor.physics.contact_laws import in_contact
-from compressor.physics.elementary import direction, exponential, logarithm
+from compressor.physics.elementary import direction
 from compressor.physics.kinematics import SMALL
 from compressor.physics.lane_steps import (
     ALIVE,
@@ -65,24 +62,32 @@ from compressor.physics.lane_steps import (
     K,
     T,
     Z,
-)  # fmt: skip  # fmt: skip
+    four_of,
+    put_four,
+)
 from compressor.physics.march import COARSE_WEIGHTS, NODES, WEIGHTS
+from compressor.physics.onset import may_change_in, may_touch_in
 from compressor.physics.step_control import (
     EVERY,
     EXPLICIT_ORDER,
-    GROW,
-    INTEGRAL,
     MIN_ERROR,
-    MIN_STEP,
-    PROPORTIONAL,
-    SAFETY,
-    SHRINK,
     STABILITY_LIMIT,
     STIFF_STEPS,
-    SUSPECT,
-)  # fmt: skip
-from compressor.physics.tally import PEAK_NEARNESS as NEAR_SHARE
-from compressor.physics.tally import vertex
+    count_limited,
+    growth,
+    is_accepted,
+    is_last_step,
+    log_error,
+    shortest_step,
+    shrinkage,
+)
+from compressor.physics.tally import (
+    larger_imbalance,
+    may_beat,
+    may_exceed,
+    observe_node,
+    vertex,
+)
 
 
 @inline_numba
@@ -138,45 +143,39 @@ def control(scene, W, k):
         steps = W[STEPS + j]
         asked = plain & (not rests) & (steps - EVERY * math.floor(steps / EVERY) == 0.0)
         held = W[HELD + j]
-        longer = held + EVERY if stiffness(scene, W, j) > SUSPECT else max(0.0, held - EVERY)
-        W[HELD + j] = longer if asked else held
+        counted = count_limited(held, stiffness(scene, W, j))
+        W[HELD + j] = counted if asked else held
         W[REST + j] = W[REST + j] - 1.0 if plain & rests else W[REST + j]
         W[STEPS + j] = steps + 1.0 if plain else steps
     for j in range(k):
         plain, alive = W[PLAIN + j] > 0.0, W[ALIVE + j] > 0.0
         error, h, t = W[ERROR + j], W[H + j], W[T + j]
         refused = alive & (error > 1.0) & (error < math.inf)
-        now = logarithm(max(error, 1e-10))
-        remembered = W[REMEMBERED + j]
-        factor = SAFETY * exponential(
-            (INTEGRAL * remembered - PROPORTIONAL * now) / EXPLICIT_ORDER if plain else 0.0
-        )
-        shorter = SAFETY * exponential(-now / EXPLICIT_ORDER if refused else 0.0)
-        longer = h * min(GROW, max(SHRINK, factor)) if plain else h
-        longer = h * max(SHRINK, shorter) if refused else longer
+        now, remembered = log_error(error), W[REMEMBERED + j]
+        now = now if plain | refused else 0.0  # any other lane's error may be no number
+        longer, shorter = growth(now, remembered, EXPLICIT_ORDER), shrinkage(now, EXPLICIT_ORDER)
+        longer = h * longer if plain else h
+        longer = h * shorter if refused else longer
         reached = t + h if plain else t
         W[REMEMBERED + j] = max(now, MIN_ERROR) if plain else remembered
         W[REFUSED + j] += 1.0 if refused else 0.0
         W[H + j] = longer
         W[T + j] = reached
         turning = W[FIRST_FIELD + j] * longer
-        call = (reached + 1.01 * longer >= W[END + j]) | (turning > SMALL)
+        call = is_last_step(reached, longer, W[END + j]) | (turning > SMALL)
         call = call | (W[HELD + j] >= STIFF_STEPS) | (W[DEEPEST + j] > W[TOO_DEEP + j])
         call = call | (not (plain | refused)) | (W[STEPS + j] + W[REFUSED + j] >= W[BUDGET + j])
-        call = call | (longer < MIN_STEP * (reached + 1.0 / W[FIRST_FIELD + j]))
+        call = call | (longer < shortest_step(reached, W[FIRST_FIELD + j]))
         W[CALL + j] = 1.0 if call & alive else 0.0
 
 
 @inline_numba
 def pass_on(W, j, plain, target, source):
-    """Four rows from source to target in a plain lane; both are read, or no vector code comes."""
-    t, s = target + j, source + j
-    a, b = W[s], W[s + LANES]
-    c, d = W[s + 2 * LANES], W[s + 3 * LANES]
-    e, f = W[t], W[t + LANES]
-    g, h = W[t + 2 * LANES], W[t + 3 * LANES]
-    W[t], W[t + LANES] = a if plain else e, b if plain else f
-    W[t + 2 * LANES], W[t + 3 * LANES] = c if plain else g, d if plain else h
+    """Copy four rows to others in a plain lane; both are read, or no vector code comes."""
+    a, b, c, d = four_of(W, source + j)
+    e, f, g, h = four_of(W, target + j)
+    put_four(W, target + j, (a if plain else e, b if plain else f,
+                             c if plain else g, d if plain else h))  # fmt: skip
 
 
 @jit
@@ -223,7 +222,7 @@ def nears(W, j, column):
     """Return whether the greatest size of a column may be beaten within the step."""
     c = column * LANES + j
     top = max(abs(W[R0 + c]), abs(W[R2 + c]), abs(W[R4 + c]))
-    return (top >= NEAR_SHARE * W[PEAK + c]) & (top > 0.0)
+    return may_beat(top, W[PEAK + c])
 
 
 @inline_numba
@@ -231,17 +230,15 @@ def deepens(W, j, joint):
     """Return whether the greatest penetration of a joint may be beaten within the step."""
     c = joint * LANES + j
     top = max(W[R0 + PENETRATION + c], W[R2 + PENETRATION + c], W[R4 + PENETRATION + c])
-    return (top > 0.0) & (top >= NEAR_SHARE * W[MAX_PENETRATION + c])
+    return may_beat(top, W[MAX_PENETRATION + c])
 
 
 @inline_numba
 def changes(W, j, joint):
     """Return whether contact may begin or end at a joint within the step, as `march.may_change`."""
     c = NEARNESS + joint * LANES + j
-    low = min(W[R0 + c], W[R2 + c], W[R4 + c])
-    high = max(W[R0 + c], W[R2 + c], W[R4 + c])
-    beyond = 2.0 * (high - low)
-    return (low - beyond <= 0.0) & (high + beyond > 0.0)
+    a, b, c = W[R0 + c], W[R2 + c], W[R4 + c]
+    return may_change_in(min(a, b, c), max(a, b, c))
 
 
 @jit
@@ -262,7 +259,7 @@ def judge(scene, W, k):
         if touches(scene, 1):
             change = change | changes(W, j, 1)
         measured = W[T + j] >= W[SETTLE + j]
-        plain = (W[ERROR + j] <= 1.0) & (not change) & (W[ALIVE + j] > 0.0)
+        plain = is_accepted(W[ERROR + j]) & (not change) & (W[ALIVE + j] > 0.0)
         W[MEASURED + j] = 1.0 if measured else 0.0
         W[PLAIN + j] = 1.0 if plain else 0.0
         W[NEAR + j] = 1.0 if near & measured & plain else 0.0
@@ -275,10 +272,8 @@ def judge(scene, W, k):
 @inline_numba
 def may_touch(W, j, joint):
     """Return `march.may_touch` at a joint, by all nodes."""
-    c = NEARNESS + joint * LANES + j
-    low = min(min(min(W[R0 + c], W[R1 + c]), min(W[R2 + c], W[R3 + c])), W[R4 + c])
-    high = max(max(max(W[R0 + c], W[R1 + c]), max(W[R2 + c], W[R3 + c])), W[R4 + c])
-    return (low <= 0.0) & (high + (high - low) > 0.0)
+    a, b, c, d, e = at_nodes(W, NEARNESS + joint * LANES + j)
+    return may_touch_in(min(a, b, c, d, e), max(a, b, c, d, e))
 
 
 @jit
@@ -298,8 +293,19 @@ def judge_closer(scene, W, k):
 
 
 @inline_numba
-def rises(a, b, c, d, e, fine):
-    """As `tally.peak_of`: the top of the nodes' values and of the parabola through the best."""
+def at_nodes(W, column):
+    """Return an observed column of a lane at the five nodes of its step."""
+    return W[R0 + column], W[R1 + column], W[R2 + column], W[R3 + column], W[R4 + column]
+
+
+@inline_numba
+def top_and_vertex(values, fine):
+    """Return the greatest of a step's values at its nodes, and of the parabola through the best.
+
+    fine: whether all nodes count, or every second one. `tally.peak_of` is the same by indices,
+    which lanes cannot have.
+    """
+    a, b, c, d, e = values
     top = max(max(a, e), c)
     top = max(top, max(b, d)) if fine else top
     # the best is the first one of the greatest; the parabola stands on an inner node
@@ -317,76 +323,48 @@ def rises(a, b, c, d, e, fine):
 
 
 @inline_numba
-def count_events(touching, flown, impacts, releases, normal, depth, counts, measured):
-    """Return the touching, flown, impacts and releases after a node, if it counts."""
-    now = in_contact(normal)
-    off = flown | (depth < 0.0)
-    begins = counts & measured & now & (not touching)
-    impacts += 1.0 if begins & off else 0.0
-    releases += 1.0 if begins & (not off) else 0.0
-    touching = now if counts else touching
-    flown = (off & (not now)) if counts else flown
-    return touching, flown, impacts, releases
+def events_after(W, row, c, events, use, counts):
+    """Return `tally.observe_node` after a node whose rows begin at `row`, if it is one to use."""
+    a, b, m, n = events
+    normal, depth = W[row + NORMAL + c], W[row + PENETRATION + c]
+    e, f, g, h = observe_node(a, b, m, n, normal, depth, counts)
+    return e if use else a, f if use else b, g if use else m, h if use else n
 
 
 @inline_numba
 def tally_joint(W, j, joint, plain, fine, measured):
-    """Contact loss, impacts, releases and penetration of a step at one joint."""
+    """Add a step's contact loss, impacts, releases and penetration at one joint."""
     c = joint * LANES + j
-    d, n, x = PENETRATION + c, NORMAL + c, NEARNESS + c
-    touching, flown = W[TOUCHING + c] > 0.0, W[FLOWN + c] > 0.0
-    hits, leaves = W[IMPACTS + c], W[RELEASES + c]
-    touching, flown, hits, leaves = count_events(
-        touching, flown, hits, leaves, W[R0 + n], W[R0 + d], True, measured
-    )
-    touching, flown, hits, leaves = count_events(
-        touching, flown, hits, leaves, W[R1 + n], W[R1 + d], fine, measured
-    )
-    touching, flown, hits, leaves = count_events(
-        touching, flown, hits, leaves, W[R2 + n], W[R2 + d], True, measured
-    )
-    touching, flown, hits, leaves = count_events(
-        touching, flown, hits, leaves, W[R3 + n], W[R3 + d], fine, measured
-    )
-    touching, flown, hits, leaves = count_events(
-        touching, flown, hits, leaves, W[R4 + n], W[R4 + d], True, measured
-    )
+    events = W[TOUCHING + c] > 0.0, W[FLOWN + c] > 0.0, W[IMPACTS + c], W[RELEASES + c]
+    events = events_after(W, R0, c, events, True, measured)
+    events = events_after(W, R1, c, events, fine, measured)
+    events = events_after(W, R2, c, events, True, measured)
+    events = events_after(W, R3, c, events, fine, measured)
+    touching, flown, hits, leaves = events_after(W, R4, c, events, True, measured)
     W[TOUCHING + c] = (1.0 if touching else 0.0) if plain else W[TOUCHING + c]
     W[FLOWN + c] = (1.0 if flown else 0.0) if plain else W[FLOWN + c]
     W[IMPACTS + c] = hits if plain else W[IMPACTS + c]
     W[RELEASES + c] = leaves if plain else W[RELEASES + c]
-    top, rise = rises(W[R0 + d], W[R1 + d], W[R2 + d], W[R3 + d], W[R4 + d], fine)
+    top, rise = top_and_vertex(at_nodes(W, PENETRATION + c), fine)
     known = W[MAX_PENETRATION + c]
-    best = max(top, known)
-    best = best if 2.0 * top < known else max(best, rise)
+    best = max(top, known, rise if may_exceed(top, known) else top)
     W[MAX_PENETRATION + c] = best if plain & measured else known
     W[DEEPEST + j] = max(W[DEEPEST + j], top) if plain else W[DEEPEST + j]
     # contact does not change within the step
     whole = FINE_WHOLE if fine else COARSE_WHOLE
-    more = whole * W[H + j] if W[R2 + x] <= 0.0 else 0.0
+    more = whole * W[H + j] if W[R2 + NEARNESS + c] <= 0.0 else 0.0
     W[LOSS_SECONDS + c] += more if plain & measured else 0.0
 
 
 @inline_numba
-def add_squares(W, c, total, h, fine):
-    """Return the square of a column added to a total at the nodes, by their weights."""
-    b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
-    total += h * (F0 if fine else G0) * W[R0 + c] ** 2
-    total += h * F1 * b**2
-    total += h * (F2 if fine else G2) * W[R2 + c] ** 2
-    total += h * F3 * d**2
-    return total + h * (F4 if fine else G4) * W[R4 + c] ** 2
-
-
-@inline_numba
-def add_integral(W, c, total, h, fine):
-    """Return a column added to a total at the nodes, by their weights."""
-    b, d = (W[R1 + c] if fine else 0.0), (W[R3 + c] if fine else 0.0)
-    total += h * (F0 if fine else G0) * W[R0 + c]
-    total += h * F1 * b
-    total += h * (F2 if fine else G2) * W[R2 + c]
-    total += h * F3 * d
-    return total + h * (F4 if fine else G4) * W[R4 + c]
+def add_integral(total, values, h, fine):
+    """Return a total and the quadrature of a step's values at its nodes; fine: as above."""
+    a, b, c, d, e = values
+    total += h * (F0 if fine else G0) * a
+    total += h * F1 * (b if fine else 0.0)
+    total += h * (F2 if fine else G2) * c
+    total += h * F3 * (d if fine else 0.0)
+    return total + h * (F4 if fine else G4) * e
 
 
 @jit
@@ -397,11 +375,11 @@ def tally_lanes(scene, W, k):
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
         kinetic = W[R4 + KINETIC + j]
-        put_in = kinetic + W[R4 + POTENTIAL + j] - W[ENERGY + j]
-        put_in = put_in - W[NEW + f + j] - W[NEW + f + LANES + j]
-        imbalance = abs(put_in + W[NEW + f + 2 * LANES + j] + W[NEW + f + 3 * LANES + j])
+        gain = kinetic + W[R4 + POTENTIAL + j] - W[ENERGY + j]
+        crank, load, damping, friction = four_of(W, NEW + f + j)
         worst = W[IMBALANCE + j]
-        W[IMBALANCE + j] = imbalance if plain & (not (imbalance <= worst)) else worst
+        larger = larger_imbalance(worst, gain, crank, load, damping, friction)
+        W[IMBALANCE + j] = larger if plain else worst
         most = W[PEAK_KINETIC + j]
         W[PEAK_KINETIC + j] = max(most, kinetic) if plain else most
     for j in range(k):
@@ -416,20 +394,21 @@ def tally_lanes(scene, W, k):
         fine = W[NEAR + j] > 0.0
         h = W[H + j] if counts else 0.0
         W[SECONDS + j] += h
-        W[SQUARE_ACCELERATION + j] = add_squares(W, j, W[SQUARE_ACCELERATION + j], h, fine)
-        W[SQUARE_DEVIATION + j] = add_squares(W, DEVIATION + j, W[SQUARE_DEVIATION + j], h, fine)
-        W[TORQUE_SUM + j] = add_integral(W, TORQUE + j, W[TORQUE_SUM + j], h, fine)
-        W[MOMENT_SUM + j] = add_integral(W, MOMENT + j, W[MOMENT_SUM + j], h, fine)
+        a, b, c, d, e = at_nodes(W, j)
+        squares = a**2, b**2, c**2, d**2, e**2
+        W[SQUARE_ACCELERATION + j] = add_integral(W[SQUARE_ACCELERATION + j], squares, h, fine)
+        a, b, c, d, e = at_nodes(W, DEVIATION + j)
+        squares = a**2, b**2, c**2, d**2, e**2
+        W[SQUARE_DEVIATION + j] = add_integral(W[SQUARE_DEVIATION + j], squares, h, fine)
+        W[TORQUE_SUM + j] = add_integral(W[TORQUE_SUM + j], at_nodes(W, TORQUE + j), h, fine)
+        W[MOMENT_SUM + j] = add_integral(W[MOMENT_SUM + j], at_nodes(W, MOMENT + j), h, fine)
     for column in range(PEAKED):
         o = column * LANES
         for j in range(k):
             counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
             fine = W[NEAR + j] > 0.0
-            c = o + j
-            top, rise = rises(
-                abs(W[R0 + c]), abs(W[R1 + c]), abs(W[R2 + c]), abs(W[R3 + c]), abs(W[R4 + c]),
-                fine,
-            )  # fmt: skip
-            known = W[PEAK + c]
-            best = max(known, max(top, rise)) if 2.0 * top >= known else known
-            W[PEAK + c] = best if counts else known
+            a, b, c, d, e = at_nodes(W, o + j)
+            top, rise = top_and_vertex((abs(a), abs(b), abs(c), abs(d), abs(e)), fine)
+            known = W[PEAK + o + j]
+            best = max(known, top, rise if may_exceed(top, known) else top)
+            W[PEAK + o + j] = best if counts else known

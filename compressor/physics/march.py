@@ -35,7 +35,15 @@ from compressor.physics.observe import (
     ECCENTRICITY,
     NEARNESS,
 )
-from compressor.physics.onset import LANDED_SHARE, change, first_onset, meeting, remember
+from compressor.physics.onset import (
+    LANDED_SHARE,
+    change,
+    first_onset,
+    may_change,
+    may_touch,
+    meeting,
+    remember,
+)
 from compressor.physics.record import MECHANISM, zero
 from compressor.physics.runge_kutta import (
     FLOWS,
@@ -52,13 +60,15 @@ from compressor.physics.runge_kutta import (
 )
 from compressor.physics.step_control import (
     MIN_ERROR,
-    MIN_STEP,
     REST,
     Mode,
     choose_method,
     first_step,
+    is_accepted,
+    is_last_step,
     next_step_length,
     refuse,
+    shortest_step,
 )
 from compressor.physics.systems import (
     beyond_model,
@@ -217,42 +227,6 @@ def try_step(w, base, h, z, work, atol, size, phase, p):
     take_step(w.pair, base, h, z, work.k, phase, p, work.new, work.rows[NODES.size - 1])
     w.evaluations += STAGES - 1
     return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
-
-
-@inline_llvm
-def may_change(rows, p):
-    """Return whether contact may begin or end within a step, by the nearness at its ends and
-    middle.
-
-    Twice their range is allowed for beyond them.
-    """
-    for joint in range(2):
-        if p.clearance[joint] > 0.0:
-            begin, middle = rows[0, NEARNESS + joint], rows[MIDDLE, NEARNESS + joint]
-            end = rows[rows.shape[0] - 1, NEARNESS + joint]
-            low, high = min(begin, middle, end), max(begin, middle, end)
-            beyond = 2.0 * (high - low)
-            if low - beyond <= 0.0 < high + beyond:
-                return True
-    return False
-
-
-@inline_llvm
-def may_touch(rows, p):
-    """Return whether contact may begin within a step, by the nearness at its nodes.
-
-    A quartic, as the step's interpolant is, rises above its greatest value at five Lobatto nodes
-    by less than a third of their range; a whole range is allowed for here.
-    """
-    for joint in range(2):
-        if p.clearance[joint] > 0.0:
-            low, high = math.inf, -math.inf
-            for i in range(rows.shape[0]):
-                low = min(low, rows[i, NEARNESS + joint])
-                high = max(high, rows[i, NEARNESS + joint])
-            if low <= 0.0 < high + (high - low):
-                return True
-    return False
 
 
 @inline_llvm
@@ -451,7 +425,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         if w.h == 0.0:
             w.h = first_step(w, z, work, atol, phase, p, end)
         h = min(w.h, end - w.t)
-        if w.t + 1.01 * h >= end:
+        if is_last_step(w.t, h, end):
             h = end - w.t
         landing = w.landing > 0.0
         if landing:
@@ -459,9 +433,9 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         base = crank_direction(w.t, p)
         error = try_step(w, base, h, z, work, atol, size, phase, p)
         if not landing:
-            if not error <= 1.0:
+            if not is_accepted(error):
                 refuse(w, h, error)
-                if w.h < MIN_STEP * (w.t + 1.0 / p.omega):
+                if w.h < shortest_step(w.t, p.omega):
                     w.status = STEP_UNDERFLOW if is_finite(work.k[0]) else NON_FINITE
                 continue
             longer = next_step_length(w, h, error)

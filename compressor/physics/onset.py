@@ -6,9 +6,11 @@ turns positive. Both are watched on the step's interpolant while F_N = 0. Where 
 step goes on; how much of it was without contact is told to the metrics.
 """
 
+import math
+
 from compressor.physics._jit import inline_llvm, jit
 from compressor.physics.contact import nearness
-from compressor.physics.observe import PENETRATION
+from compressor.physics.observe import NEARNESS, PENETRATION
 from compressor.physics.runge_kutta import interpolate
 from compressor.physics.systems import contact_at, derivative
 
@@ -19,6 +21,54 @@ HALVINGS = 40
 PLACED = 1e-5  # of a step: as well as a change of contact is placed for the metrics
 LANDED_SHARE = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NEVER = 2.0  # a fraction of the step beyond its end
+
+
+@inline_llvm
+def may_change_in(low, high):
+    """Return whether contact may begin or end where a step's ends and middle have a nearness from
+    low to high.
+
+    Twice their range is allowed for beyond them.
+    """
+    beyond = 2.0 * (high - low)
+    return (low - beyond <= 0.0) & (high + beyond > 0.0)
+
+
+@inline_llvm
+def may_touch_in(low, high):
+    """Return whether contact may begin where a step's nodes have a nearness from low to high.
+
+    A quartic, as the step's interpolant is, rises above its greatest value at five Lobatto nodes
+    by less than a third of their range; a whole range is allowed for here.
+    """
+    return (low <= 0.0) & (high + (high - low) > 0.0)
+
+
+@inline_llvm
+def may_change(rows, p):
+    """Return whether contact may begin or end within a step, by its first, middle and last row."""
+    middle, last = rows.shape[0] // 2, rows.shape[0] - 1
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            column = NEARNESS + joint
+            a, b, c = rows[0, column], rows[middle, column], rows[last, column]
+            if may_change_in(min(a, b, c), max(a, b, c)):
+                return True
+    return False
+
+
+@inline_llvm
+def may_touch(rows, p):
+    """Return whether contact may begin within a step, by the rows at all its nodes."""
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            low, high = math.inf, -math.inf
+            for i in range(rows.shape[0]):
+                low = min(low, rows[i, NEARNESS + joint])
+                high = max(high, rows[i, NEARNESS + joint])
+            if may_touch_in(low, high):
+                return True
+    return False
 
 
 @jit

@@ -132,6 +132,12 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
 
 
 @inline_llvm
+def error_share(error, before, after, rtol, atol):
+    """Return a number's estimated error over its tolerance, which its larger end of a step sets."""
+    return error / fma(rtol, max(abs(before), abs(after)), atol)
+
+
+@inline_llvm
 def error_norm(pair, h, z, new, k, rtol, atol):
     """Return the root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
@@ -144,10 +150,10 @@ def error_norm(pair, h, z, new, k, rtol, atol):
             b = fma(weight, k[j, i + 1], b)
             c = fma(weight, k[j, i + 2], c)
             d = fma(weight, k[j, i + 3], d)
-        a /= fma(rtol, max(abs(z[i]), abs(new[i])), atol[i])
-        b /= fma(rtol, max(abs(z[i + 1]), abs(new[i + 1])), atol[i + 1])
-        c /= fma(rtol, max(abs(z[i + 2]), abs(new[i + 2])), atol[i + 2])
-        d /= fma(rtol, max(abs(z[i + 3]), abs(new[i + 3])), atol[i + 3])
+        a = error_share(a, z[i], new[i], rtol, atol[i])
+        b = error_share(b, z[i + 1], new[i + 1], rtol, atol[i + 1])
+        c = error_share(c, z[i + 2], new[i + 2], rtol, atol[i + 2])
+        d = error_share(d, z[i + 3], new[i + 3], rtol, atol[i + 3])
         total = fma(d, d, fma(c, c, fma(b, b, fma(a, a, total))))
     return h * square_root(total / n)
 

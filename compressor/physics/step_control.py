@@ -1,7 +1,8 @@
-"""How long the next step is, and which method takes it.
+"""Whether a step is taken, how long the next one is, and which method takes it.
 
 PI control of the error, a first step from the rates, and the measured test for stiffness by which
-a walker turns to the stiff partner and back.
+a walker turns to the stiff partner and back. Functions of numbers alone are the rules that `march`
+and its lanes (`lane_tally`) both call.
 """
 
 import math
@@ -18,7 +19,9 @@ from compressor.physics.systems import derivative_with_flows
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wanner II, IV.2)
 MIN_ERROR = math.log(1e-4)  # that the control remembers
+LAST_STRETCH = 1.01  # steps: a segment that is shorter is taken as one step
 MIN_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
+UNFINISHED = 0.1  # of a step without a finite error: the next attempt's length
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 # stiffness: an explicit step is held by stability where h |lambda| exceeds the limit
 STABILITY_LIMIT = 3.25  # of both pairs on the negative real axis, about
@@ -83,23 +86,60 @@ def first_step(w, z, work, atol, phase, p, end):
 
 
 @inline_llvm
-def next_step_length(w, h, error):
-    """Return the next step's length after an accepted step (PI control)."""
-    order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
+def is_accepted(error):
+    """Return whether a step with an error norm is taken; one that is not a number is not."""
+    return error <= 1.0
+
+
+@inline_llvm
+def is_last_step(t, h, end):
+    """Return whether a step of length h from t is to reach the segment's end."""
+    return t + LAST_STRETCH * h >= end
+
+
+@inline_llvm
+def shortest_step(t, omega):
+    """Return the length (s) below which a step at t makes no way."""
+    return MIN_STEP * (t + 1.0 / omega)
+
+
+@inline_llvm
+def log_error(error):
+    """Return the logarithm of an error norm, as the control reads it."""
+    return logarithm(max(error, 1e-10))
+
+
+@inline_llvm
+def growth(now, last, order):
+    """Return the next step's length over that of an accepted one, by `log_error` of both and the
+    one before (PI control).
+    """
     # the last error damps steps that stability holds, which I control lets swing about the limit
-    now = logarithm(max(error, 1e-10))
-    factor = SAFETY * exponential((INTEGRAL * w.error - PROPORTIONAL * now) / order)
+    factor = SAFETY * exponential((INTEGRAL * last - PROPORTIONAL * now) / order)
+    return min(GROW, max(SHRINK, factor))
+
+
+@inline_llvm
+def shrinkage(now, order):
+    """Return the next attempt's length over that of a refused one, by `log_error`."""
+    return max(SHRINK, SAFETY * exponential(-now / order))
+
+
+@inline_llvm
+def next_step_length(w, h, error):
+    """Return the next step's length after an accepted step, and remember its error."""
+    now = log_error(error)
+    longer = h * growth(now, w.error, STIFF_ORDER if w.stiff else EXPLICIT_ORDER)
     w.error = max(now, MIN_ERROR)
-    return h * min(GROW, max(SHRINK, factor))
+    return longer
 
 
 @inline_llvm
 def refuse(w, h, error):
-    """Shorten the step after a refused attempt; a step that makes no way ends the walk."""
+    """Shorten the step after a refused attempt."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
     w.rejected += 1
-    shorter = SAFETY * exponential(-logarithm(error) / order) if error < math.inf else 0.1
-    w.h = h * max(SHRINK if error < math.inf else 0.1, shorter)
+    w.h = h * (shrinkage(log_error(error), order) if error < math.inf else UNFINISHED)
 
 
 @jit
@@ -124,6 +164,22 @@ def stiff_rate(w, h, z, work, size):
         above += ((work.k[STAGES - 1, i] - work.k[STAGES - 2, i]) / size[i]) ** 2
         below += (change / size[i]) ** 2
     return square_root(above / below) if below > 0.0 else 0.0
+
+
+@inline_llvm
+def count_limited(limited, reach):
+    """Return the explicit steps that stability has held, after a test; reach: of `STABILITY_LIMIT`.
+
+    One test alone decides nothing: under PI control such steps swing around the limit.
+    """
+    return limited + EVERY if reach > SUSPECT else max(0, limited - EVERY)
+
+
+@inline_llvm
+def begin_stiff_steps(w):
+    """Change to the stiff partner where stability has held the explicit steps for a while."""
+    if w.stability_limited >= STIFF_STEPS:
+        w.stiff, w.stability_limited, w.explicit_would_do, w.steps_saved = 1, 0, 0, 0.0
 
 
 @inline_llvm
@@ -153,8 +209,5 @@ def choose_method(w, h, z, work, size):
             w.steps_to_test = w.test_pause
             w.h = min(w.h, h / max(reach, 1.0))
     else:
-        w.stability_limited = (
-            w.stability_limited + EVERY if reach > SUSPECT else max(0, w.stability_limited - EVERY)
-        )
-        if w.stability_limited >= STIFF_STEPS:
-            w.stiff, w.stability_limited, w.explicit_would_do, w.steps_saved = 1, 0, 0, 0.0
+        w.stability_limited = count_limited(w.stability_limited, reach)
+        begin_stiff_steps(w)

@@ -112,41 +112,45 @@ def vertex(left, right, before, here, after):
     return here
 
 
+@inline_llvm
+def may_exceed(top, known):
+    """Return whether a parabola through nodes whose greatest is `top` may rise above a known peak:
+    to less than twice as much.
+    """
+    return 2.0 * top >= known
+
+
 @jit
-def peak_of(nodes, rows, every, column, known):
-    """Return the greater of `known` and the largest |value| of a column over a step.
+def peak_of(nodes, rows, every, column, known, size):
+    """Return the greater of `known` and the largest value of a column over a step, or |value|.
 
     The step's nodes count, `every` first, second, ... of them, and the parabola through the best.
+    size: whether |value| is meant. `lane_tally.top_and_vertex` is the same without a branch.
     """
     last = nodes.size - 1
-    best = 0
-    for i in range(every, last + 1, every):
-        if abs(rows[i, column]) > abs(rows[best, column]):
-            best = i
-    top = abs(rows[best, column])
-    i = min(max(best, every), last - every)
-    before, here, after = rows[i - every, column], rows[i, column], rows[i + every, column]
-    left, right = nodes[i - every] - nodes[i], nodes[i + every] - nodes[i]
-    return max(top, known, vertex(left, right, abs(before), abs(here), abs(after)))
-
-
-@jit
-def deepest_of(nodes, rows, every, column, known):
-    """Return the greater of `known` and a column's largest value over a step, as `peak_of` finds
-    it.
-    """
-    last = nodes.size - 1
-    best = 0
-    for i in range(every, last + 1, every):
-        if rows[i, column] > rows[best, column]:
-            best = i
-    top = rows[best, column]
-    if 2.0 * top < known:
+    best, top = 0, -math.inf
+    for i in range(0, last + 1, every):
+        value = abs(rows[i, column]) if size else rows[i, column]
+        if value > top:
+            best, top = i, value
+    if not may_exceed(top, known):
         return max(top, known)
     i = min(max(best, every), last - every)
     before, here, after = rows[i - every, column], rows[i, column], rows[i + every, column]
+    if size:
+        before, here, after = abs(before), abs(here), abs(after)
     left, right = nodes[i - every] - nodes[i], nodes[i + every] - nodes[i]
     return max(top, known, vertex(left, right, before, here, after))
+
+
+@inline_llvm
+def larger_imbalance(known, gain, crank, load, damping, friction):
+    """Return the larger of a known imbalance (J) and that of a gain of energy and its flows.
+
+    A nan is kept: a comparison with it is false.
+    """
+    imbalance = abs(gain - crank - load + damping + friction)
+    return known if imbalance <= known else imbalance
 
 
 @inline_llvm
@@ -162,10 +166,9 @@ def tally_energy(row, flows, tally):
     tally.crank_work, tally.load_work = flows[0], flows[1]
     tally.damping_loss, tally.friction_loss = flows[2], flows[3]
     tally.peak_kinetic = max(tally.peak_kinetic, row[KINETIC])
-    imbalance = abs(energy - tally.energy - flows[0] - flows[1] + flows[2] + flows[3])
-    # a comparison with nan is false: keep the nan
-    if not imbalance <= tally.worst_imbalance:
-        tally.worst_imbalance = imbalance
+    tally.worst_imbalance = larger_imbalance(
+        tally.worst_imbalance, energy - tally.energy, flows[0], flows[1], flows[2], flows[3]
+    )
 
 
 @jit
@@ -177,6 +180,12 @@ def add_flows(rows, weights, span, flows):
 
 
 @inline_llvm
+def may_beat(top, known):
+    """Return whether a known peak may be beaten between nodes whose greatest is `top`."""
+    return (top > 0.0) & (top >= PEAK_NEARNESS * known)
+
+
+@inline_llvm
 def near_record(rows, middle, tally):
     """Return whether a peak may be beaten within a step, by the rows at its ends and in its
     middle.
@@ -185,12 +194,12 @@ def near_record(rows, middle, tally):
     for k in range(PEAKED):
         column = ACCELERATION + k
         top = max(abs(rows[0, column]), abs(rows[middle, column]), abs(rows[last, column]))
-        if top >= PEAK_NEARNESS * tally.peak[k] and top > 0.0:
+        if may_beat(top, tally.peak[k]):
             return True
     for joint in range(2):
         column = PENETRATION + joint
         top = max(rows[0, column], rows[middle, column], rows[last, column])
-        if top > 0.0 and top >= PEAK_NEARNESS * tally.max_penetration[joint]:
+        if may_beat(top, tally.max_penetration[joint]):
             return True
     return False
 
@@ -228,23 +237,35 @@ def contact_within(rows, joint):
 
 
 @inline_llvm
+def observe_node(touching, flown, impacts, releases, normal, depth, counts):
+    """Return the same four after a node of a step: whether a joint touches, whether its journal was
+    off its bore since the last contact, and how many contacts began after flight or without it.
+
+    normal, depth: contact force and penetration at the node; counts: whether contacts count.
+    """
+    now = in_contact(normal)
+    flown = flown | (depth < 0.0)
+    begins = counts & now & (not touching)
+    return now, flown & (not now), impacts + (begins & flown), releases + (begins & (not flown))
+
+
+@inline_llvm
 def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
     """Add a step's contact loss, impacts, releases and penetration at one joint."""
+    touching, flown = tally.touching[joint] > 0, tally.flown[joint] > 0
+    impacts, releases = tally.impacts[joint], tally.releases[joint]
     for i in range(0, nodes.size, every):
-        touching = in_contact(rows[i, NORMAL + joint])
-        if rows[i, PENETRATION + joint] < 0.0:
-            tally.flown[joint] = 1
-        if measured and touching and not tally.touching[joint]:
-            tally.impacts[joint] += tally.flown[joint]
-            tally.releases[joint] += 1 - tally.flown[joint]
-        tally.touching[joint] = touching
-        if touching:
-            tally.flown[joint] = 0
-        tally.deepest = max(tally.deepest, rows[i, PENETRATION + joint])
+        depth = rows[i, PENETRATION + joint]
+        touching, flown, impacts, releases = observe_node(
+            touching, flown, impacts, releases, rows[i, NORMAL + joint], depth, measured
+        )
+        tally.deepest = max(tally.deepest, depth)
+    tally.touching[joint], tally.flown[joint] = touching, flown
+    tally.impacts[joint], tally.releases[joint] = impacts, releases
     if measured:
         known = tally.max_penetration[joint]
         column = PENETRATION + joint
-        tally.max_penetration[joint] = deepest_of(nodes, rows, every, column, known)
+        tally.max_penetration[joint] = peak_of(nodes, rows, every, column, known, False)
         tally.loss_seconds[joint] += apart[joint] * span
 
 
@@ -329,5 +350,5 @@ def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
         for k in range(PEAKED):
             tally.top[k] = max(tally.top[k], abs(rows[i, ACCELERATION + k]))
     for k in range(PEAKED):
-        if 2.0 * tally.top[k] >= tally.peak[k]:  # a parabola rises to less than twice its nodes
-            tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k])
+        if may_exceed(tally.top[k], tally.peak[k]):
+            tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k], True)
