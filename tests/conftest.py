@@ -74,7 +74,7 @@ TOGETHER = {
     "tests/campaigns/test_chaotic.py": "twins",
     "tests/studies/stress/test_stress.py": "twins",
     "tests/solve/test_horizon.py": "twins",
-    "tests/solve/test_lyapunov.py": "twins",
+    "tests/studies/regimes/test_lyapunov.py": "twins",
 }
 # modules that take long; the others, in small pieces, then even out the two processes
 LONG = (

@@ -8,7 +8,7 @@ Gauss-Lobatto nodes for the metrics, and sample it on the output grid.
 import itertools
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -33,10 +33,12 @@ from compressor.reasons import Reason
 from compressor.solve.error_bars import (
     Companion,
     Metrics,
+    allowed_residual,
     bars,
     energy_residual,
     is_amplified,
     longest,
+    rung_below,
     series_errors,
 )
 from compressor.solve.march_driver import COMPILED, march_through
@@ -191,15 +193,16 @@ NOTHING_AHEAD: Ahead = {}
 
 def run_at_tolerance(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
-    state: np.ndarray | None = None,
+    state: np.ndarray | None = None, worn: np.ndarray | None = None,
 ) -> Solution:  # fmt: skip
     """Return one run of a case at a tolerance, without errors, within a wall time (s).
 
     `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
     without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
     top dead centre (`physics.state_names`), in place of the case's own; no ideal scene has one.
+    `worn`: what is worn off the bores, as `si_record.record` takes it.
     """
-    p, times = record(case), times_of(case, sampled)
+    p, times = record(case, worn), times_of(case, sampled)
     if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER_POWER)
         return solution_of_trajectory(
@@ -214,6 +217,29 @@ def run_at_tolerance(
     made = solution_of_trajectory(rtol, p, times, trajectory)
     made.turns = turns
     return made
+
+
+def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, float]]) -> Solution:
+    """Return the first run whose energy balances, or that stops, at a tolerance or at tenths of it.
+
+    run_at: takes a tolerance, gives a run and how many revolutions it went through. If no run
+    balances, the last one has `energy_audit_failed` as its reason.
+    """
+    failures, rung = 0, rtol
+    while True:
+        run, revolutions = run_at(rung)
+        residual = energy_residual(run.trajectory.tally)
+        most = allowed_residual(rtol, revolutions)
+        if run.reason or residual <= most:
+            return run
+        failures += 1
+        below = rung_below(rung, failures)
+        if below is None:
+            break
+        rung = below
+    run.reason = Reason.ENERGY_AUDIT_FAILED
+    run.detail = f"energy residual {residual:.2g}, more than {most:.2g}, at rtol {rung:.2g}"
+    return run
 
 
 class Times(NamedTuple):

@@ -16,14 +16,13 @@ Shares stand in `compressor.metrics`; those and the ones below were chosen on ra
 judge nothing (tests/results/README.md, "Calibration").
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from compressor.cases import TIGHTEST
 from compressor.metrics import NUMBERS, SERIES
-from compressor.reasons import Reason
 
 PER_TURN = 10.0  # of rtol: the residual that a revolution may leave
 ROUNDING = 1e-9  # a residual below it says nothing of a run
@@ -60,19 +59,12 @@ ORDER = 0.8  # power of the tolerance with which errors fall
 AMPLIFIED_FACTOR = 50.0
 
 
-def audit_rungs(rtol: float) -> Iterator[float]:
-    """Yield the tolerances at which a run is tried until its energy balances, tightest last."""
-    for _ in range(RUNGS + 1):
-        yield rtol
-        if rtol < 9.9 * TIGHTEST:
-            return
-        rtol /= 10.0
+def rung_below(rtol: float, failures: int) -> float | None:
+    """Return the tolerance at which a run is tried again whose energy does not balance.
 
-
-def audit_failure(residual: float, most: float, rtol: float) -> tuple[str, str]:
-    """Return the reason and detail of a run whose energy does not balance on any rung."""
-    detail = f"energy residual {residual:.2g}, more than {most:.2g}, at rtol {rtol:.2g}"
-    return Reason.ENERGY_AUDIT_FAILED, detail
+    failures: runs of the case that did not, this one included. None where no more are tried.
+    """
+    return None if failures > RUNGS or rtol < 9.9 * TIGHTEST else rtol / 10.0
 
 
 class Companion(NamedTuple):

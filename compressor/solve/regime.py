@@ -11,7 +11,7 @@ each with the one before, or with the one a period earlier.
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -170,6 +170,21 @@ def doubtful(metrics: Metrics, bars: Metrics) -> bool:
     )
 
 
+def find_repetition(
+    count: int, most: int, is_same: Callable[[int, int], bool], least: int = 1, more: int = 0
+) -> tuple[int, int] | None:
+    """Return from which revolution on a motion of `count` repeats itself, and its shortest period.
+
+    As many revolutions as a period and `more`, and at least so many, must be the same as one period
+    later: is_same takes the number of a revolution and a period. None up to a period of `most`.
+    """
+    for period in range(1, most + 1):
+        first = count - period - max(least, period + more)
+        if first >= 0 and all(is_same(k, period) for k in range(first, count - period)):
+            return first, period
+    return None
+
+
 def repeats(
     case: Case, samples: np.ndarray, errors: Metrics
 ) -> tuple[int, float] | tuple[None, float]:
@@ -182,18 +197,20 @@ def repeats(
     per = a_turn(case)
     count = len(samples) // per if per else 0
     turns = [samples[k * per : (k + 1) * per] for k in range(count)]
-    for period in range(1, count // 2 + 1):
-        same = [
-            all(
-                (apart <= 2.0 * np.asarray(errors[name]) + SAME_REVOLUTION).all()
-                for name, apart in distances(turns[k], turns[k + period]).items()
-            )
-            for k in range(count - period)
-        ]
-        if all(same[-period:]):
-            first = count - period - next((i for i, s in enumerate(same[::-1]) if not s), len(same))
-            return period, case.settle / case.turn + first
-    return None, math.nan
+
+    def is_same(k: int, period: int) -> bool:
+        return all(
+            (apart <= 2.0 * np.asarray(errors[name]) + SAME_REVOLUTION).all()
+            for name, apart in distances(turns[k], turns[k + period]).items()
+        )
+
+    found = find_repetition(count, count // 2, is_same)
+    if found is None:
+        return None, math.nan
+    first, period = found
+    while first > 0 and is_same(first - 1, period):
+        first -= 1
+    return period, case.settle / case.turn + first
 
 
 MEASURED_REV = 3  # revolutions after settling with `duration_rev: auto`: as the default's
@@ -273,14 +290,11 @@ def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
 
     None where they do not.
     """
-    for period in range(1, MAX_PERIOD_REV + 1):
-        needed = max(AGREEMENTS, period)
-        first = len(turns) - needed - period
-        if first >= 0 and all(
-            agree(turns[k], turns[k + period], within) for k in range(first, first + needed)
-        ):
-            return first, period
-    return None
+
+    def is_same(k: int, period: int) -> bool:
+        return agree(turns[k], turns[k + period], within)
+
+    return find_repetition(len(turns), MAX_PERIOD_REV, is_same, AGREEMENTS)
 
 
 def agree(one: Metrics, other: Metrics, within: float) -> bool:

@@ -33,12 +33,12 @@ from compressor.solve.attempts import (
 )
 from compressor.solve.error_bars import (
     ORDER,
-    RUNGS,
     allowed_residual,
     beyond,
     closeness,
     energy_residual,
     ratio_of,
+    rung_below,
     unmet,
 )
 from compressor.solve.horizon import predictability_horizon
@@ -177,9 +177,10 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
         if not energy_balances(case, now):
             # error bars compare two runs: where both lack the same energy they would agree
             unsound += 1
-            if unsound > RUNGS or rtol < 9.9 * TIGHTEST:
+            tighter = rung_below(rtol, unsound)
+            if tighter is None:
                 return fail_energy_audit(case, now, f"at rtol {rtol:.2g}")
-            rtol /= 10.0
+            rtol = tighter
             continue
         if not case.wants_bars:
             return now

@@ -23,9 +23,10 @@ from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Regime
 from compressor.program import PROGRAM
-from compressor.solve import follow_revolutions, record
+from compressor.solve import record
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 from compressor.studies.regimes.chains import FOLDER, REMEDY, Chain, read_kept_rows
+from compressor.studies.regimes.revolutions import follow_revolutions
 from compressor.studies.regimes.values import (
     Clock,
     Row,
@@ -33,7 +34,7 @@ from compressor.studies.regimes.values import (
     apart,
     measure_motion,
     places,
-    stretch,
+    span_of,
     tolerance,
 )
 
@@ -99,8 +100,8 @@ def seen_in_motion(motion: SettledMotion, case: Case) -> MotionSignature:
     found = places(motion.points, record(case)["clearance"])
     if motion.reason:
         return MotionSignature("", math.nan, found, math.nan, math.nan)
-    rms = float(motion.leg.numbers(motion.count)["rms_acceleration"])
-    error = motion.leg.rms_error(motion.count)
+    rms = float(motion.run.numbers(motion.count)["rms_acceleration"])
+    error = motion.run.rms_error(motion.count)
     return MotionSignature(motion.regime, motion.period, found, rms, error)
 
 
@@ -185,10 +186,10 @@ def later(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSignature
     start.
     """
     clock = Clock(case.solve.timeout_s)
-    leg = follow_revolutions(case, state, stretch(chain.asked, FURTHER, clock))
-    if leg.reason:
-        return MotionSignature("", math.nan, leg.points[:0, :, :2], math.nan, math.nan)
-    return seen_in_motion(measure_motion(case, leg.state, chain.asked, clock), case)
+    run = follow_revolutions(case, state, span_of(chain.asked, FURTHER, clock))
+    if run.reason:
+        return MotionSignature("", math.nan, run.points[:0, :, :2], math.nan, math.nan)
+    return seen_in_motion(measure_motion(case, run.state, chain.asked, clock), case)
 
 
 def other_starts(case: Case) -> list[Case]:

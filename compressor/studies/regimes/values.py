@@ -13,14 +13,14 @@ from compressor.cases import Case, Regimes
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Regime
 from compressor.physics import state_names
-from compressor.solve import (
-    Leg,
-    Stretch,
+from compressor.solve import find_repetition, record
+from compressor.studies.regimes.lyapunov import largest_exponent
+from compressor.studies.regimes.revolutions import (
+    RevolutionRun,
+    RevolutionSpan,
     follow_revolutions,
-    largest_exponent,
-    record,
+    run_with_series,
     settle_motion,
-    with_samples,
 )
 
 COUNTED = 16  # rev of a motion that repeats itself
@@ -72,15 +72,14 @@ def period_of(found: np.ndarray, within: float) -> int | None:
     The shortest one, up to 16, of which the last two periods and four revolutions are the same,
     each to the last place of its phase.
     """
-    for period in range(1, MAX_PERIOD + 1):
-        count = 2 * period + MORE
-        if count > len(found):
-            return None
-        last = found[-count:]
-        phases = (last[phase::period] for phase in range(period))
-        if all(distances(one, one[-1:]).max() <= within for one in phases):
-            return period
-    return None
+    end = len(found) - 1
+
+    def is_same(k: int, period: int) -> bool:
+        last = end - (end - k) % period  # a slow drift does not add up to a period
+        return bool(distances(found[[k]], found[[last]]).item() <= within)
+
+    repetition = find_repetition(len(found), MAX_PERIOD, is_same, more=MORE)
+    return repetition[1] if repetition else None
 
 
 def distances(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -135,20 +134,20 @@ class SettledMotion:
     """What a motion settles to.
 
     `regime`: of `Regime`; `period` (rev): nan where it does not repeat itself; `points`: of the
-    section, (k, joint, 4), of one period or all; `leg`: the revolutions that were measured, the
+    section, (k, joint, 4), of one period or all; `run`: the revolutions that were measured, the
     last `count` of which are meant; `exponent`: the largest Lyapunov exponent and its error, 1/rev.
     """
 
     regime: str
     period: float
     points: np.ndarray
-    leg: Leg
+    run: RevolutionRun
     count: int
     exponent: tuple[float, float] = (math.nan, math.nan)
     reason: str = field(init=False)
 
     def __post_init__(self) -> None:
-        self.reason = self.leg.reason
+        self.reason = self.run.reason
 
 
 class Clock:
@@ -192,17 +191,17 @@ def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
     row, clock = empty(asked, case), Clock(case.solve.timeout_s)
     if state is not None:
         row["end_state"] = state
-    settled, since = settle_motion(case, state, stretch(asked, asked.settle_rev, clock))
+    settled, since = settle_motion(case, state, span_of(asked, asked.settle_rev, clock))
     if settled.reason:
         return failed_row(row, settled.reason, settled.detail)
     row["settled_rev"] = np.asarray(since)
     motion = measure_motion(case, settled.state, asked, clock)
     if motion.reason:
-        return failed_row(row, motion.leg.reason, motion.leg.detail)
+        return failed_row(row, motion.run.reason, motion.run.detail)
     reason, detail = contacts(case, motion, asked, clock, row)
     if reason:
         return failed_row(row, reason, detail)
-    end, found = motion.leg.state, motion.leg.numbers(motion.count)
+    end, found = motion.run.state, motion.run.numbers(motion.count)
     worn = record(case)["clearance"] > 0.0  # an ideal joint's journal does not move
     row["section"][: len(motion.points), worn] = motion.points[:, worn]
     known = {name: found[name] for name in METRICS}
@@ -211,7 +210,7 @@ def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
         "lyapunov_exponent": motion.exponent[0],
         "lyapunov_exponent_error": motion.exponent[1],
         "revolutions": motion.count,
-        "rms_acceleration_standard_error": motion.leg.rms_error(motion.count),
+        "rms_acceleration_standard_error": motion.run.rms_error(motion.count),
         "end_state": end,
     }
     row |= {name: np.asarray(value, float) for name, value in known.items()}
@@ -223,9 +222,9 @@ def failed_row(row: Row, reason: str, detail: str) -> Row:
     return row | {"status": "failed", "reason": str(reason), "detail": detail}
 
 
-def stretch(asked: Regimes, revolutions: int, clock: Clock) -> Stretch:
-    """So many revolutions, at most, within the time that is left."""
-    return Stretch(revolutions, math.radians(asked.section_deg), clock.left)
+def span_of(asked: Regimes, revolutions: int, clock: Clock) -> RevolutionSpan:
+    """Return a span of so many revolutions, at most, within the time that is left."""
+    return RevolutionSpan(revolutions, math.radians(asked.section_deg), clock.left)
 
 
 def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> SettledMotion:
@@ -237,24 +236,24 @@ def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) 
     def period(points: np.ndarray) -> int | None:
         return period_of(places(points, clearance), within)
 
-    leg = follow_revolutions(
-        case, state, stretch(asked, asked.measure_rev, clock),
+    run = follow_revolutions(
+        case, state, span_of(asked, asked.measure_rev, clock),
         lambda turns, points: period(points) is not None,
     )  # fmt: skip
-    found = None if leg.reason else period(leg.points)
-    if leg.reason:
-        return SettledMotion("", math.nan, leg.points[:0], leg, 0)
+    found = None if run.reason else period(run.points)
+    if run.reason:
+        return SettledMotion("", math.nan, run.points[:0], run, 0)
     exponents = math.nan, math.nan
     if asked.exponent:
-        exponents = exponent(case, leg.state, found is not None, asked.measure_rev, clock.left)
+        exponents = exponent(case, run.state, found is not None, asked.measure_rev, clock.left)
     parts = exponents[0] - exponents[1] > 0.0  # close motions part, as far as is known
     if found:
         count = found * ((2 * found + MORE) // found)
-        points = leg.points[-found:]
+        points = run.points[-found:]
         word = Regime.UNDECIDED if parts else Regime.PERIODIC
-        return SettledMotion(word, float(found), points, leg, count, exponents)
+        return SettledMotion(word, float(found), points, run, count, exponents)
     word = Regime.CHAOTIC if parts else Regime.UNDECIDED
-    return SettledMotion(word, math.nan, leg.points, leg, len(leg.turns), exponents)
+    return SettledMotion(word, math.nan, run.points, run, len(run.turns), exponents)
 
 
 def contacts(
@@ -266,8 +265,8 @@ def contacts(
     begun. The reason and detail of a run that stopped, empty otherwise.
     """
     count = min(motion.count, SAMPLED) if math.isnan(motion.period) else int(motion.period)
-    span = stretch(asked, count + 1, clock)
-    table, reason, detail = with_samples(case, motion.leg.state, span)
+    span = span_of(asked, count + 1, clock)
+    table, reason, detail = run_with_series(case, motion.run.state, span)
     if reason:
         return reason, detail
     run = xr.Dataset(table.variables, attrs=table.attrs)

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import time
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,18 @@ import xarray as xr
 from compressor.cases import MODEL, Case, Wear, model_of, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
-from compressor.solve import Rubbed, wear_bores
+from compressor.solve import (
+    Cuts,
+    Metrics,
+    Solution,
+    initial_state,
+    merge_turns,
+    metrics,
+    passed_time,
+    revolutions,
+    run_at_tolerance,
+    run_until_balanced,
+)
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 
 FOLDER = "wear"
@@ -97,13 +109,59 @@ class Worn:
         return bool(stage["reason"]) or late or bool((opened >= self.limit).any())
 
 
+class WearRun(NamedTuple):
+    """A motion on bores that are given.
+
+    `work`: pressing times sliding, J a revolution, by joint and node of the bore; `spread`: its
+    standard deviation over the revolutions, by joint; `turn`: time of a revolution, s; `state`: the
+    motion at the end; `reason`, `detail`: why it stopped early, empty if it did not.
+    """
+
+    work: np.ndarray
+    spread: np.ndarray
+    turn: float
+    metrics: Metrics
+    state: np.ndarray
+    reason: str = ""
+    detail: str = ""
+
+
+def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> WearRun:
+    """Follow a case over its span on worn bores, and measure what rubs after it has settled.
+
+    worn: (joint, sector), m; state: the motion to begin with, at top dead centre, or None for the
+    case's own. The span is in whole revolutions.
+    """
+    deadline = time.monotonic() + case.solve.timeout_s
+    ends = revolutions(case.settle, case.duration, case.turn)
+
+    def run_at(rtol: float) -> tuple[Solution, float]:
+        left = max(deadline - time.monotonic(), 0.0)
+        run = run_at_tolerance(case, rtol, left, False, Cuts(ends), state, worn)
+        return run, case.duration / case.turn
+
+    run = run_until_balanced(case.rtol, run_at)
+    p, turns = run.p, run.turns
+    if run.reason or not turns:
+        nothing = np.full((len(JOINTS), worn.shape[1]), np.nan)
+        start = initial_state(case, p) if state is None else state
+        return WearRun(nothing, nothing[:, 0], np.nan, {}, start, run.reason, run.detail)
+    slid = np.array([turn["slid"] for turn in turns])
+    whole = merge_turns(turns)
+    work = whole["worn"][:, : worn.shape[1]] / len(turns)
+    times, states = run.trajectory.times, run.trajectory.states
+    began, ended = passed_time(p, times, states)[[0, -1]]
+    turn = case.turn * float(ended - began) / case.duration
+    return WearRun(work, slid.std(axis=0), turn, metrics(p, whole), states[-1])
+
+
 def first(of: Worn) -> Stage:
     """Return the stage of unworn bores."""
     unworn = np.zeros((len(JOINTS), of.how.sectors))
     return new_stage(0.0, unworn, wear_bores(of.case, unworn, None))
 
 
-def new_stage(hours: float, worn: np.ndarray, motion: Rubbed) -> Stage:
+def new_stage(hours: float, worn: np.ndarray, motion: WearRun) -> Stage:
     """Return what is kept of a motion on bores that were worn in some hours."""
     found = {name: motion.metrics.get(name, math.nan) for name in SHOWN}
     shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}

@@ -9,8 +9,13 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.regimes import Regimes
 from compressor.solve.attempts import run_at_tolerance
-from compressor.solve.legs import Stretch, follow_revolutions, leg_case, settle_motion
 from compressor.solve.simulate import simulate
+from compressor.studies.regimes.revolutions import (
+    RevolutionSpan,
+    bare_case,
+    follow_revolutions,
+    settle_motion,
+)
 from compressor.studies.regimes.values import NUMBERS, TEXTS, empty, run_value
 
 ASKED = Regimes("clearance_mm", 0.1, 0.3, 2, settle_rev=12, measure_rev=12, exponent=False)
@@ -50,16 +55,16 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
 
     Measured are six revolutions of a period of one, from where the metrics agree.
     """
-    after, state, section = case(0.25), row["end_state"], Stretch(12, 0.0, 60.0)
+    after, state, section = case(0.25), row["end_state"], RevolutionSpan(12, 0.0, 60.0)
     found = run_value(after, state, ASKED)
     settled, since = settle_motion(after, state, section)
-    first = follow_revolutions(after, state, Stretch(1, 0.0, 60.0))
-    run = run_at_tolerance(leg_case(after, 1), after.rtol, 60.0, False, None, state)
+    first = follow_revolutions(after, state, RevolutionSpan(1, 0.0, 60.0))
+    run = run_at_tolerance(bare_case(after, 1), after.rtol, 60.0, False, None, state)
     np.testing.assert_array_equal(run.trajectory.states[0], state)
     np.testing.assert_allclose(first.state, run.trajectory.states[-1], rtol=1e-9)
     np.testing.assert_allclose(settled.points[0], first.points[0], rtol=1e-9)
     assert found["settled_rev"] == since == 1
-    rest = follow_revolutions(after, settled.state, Stretch(6, 0.0, 60.0))
+    rest = follow_revolutions(after, settled.state, RevolutionSpan(6, 0.0, 60.0))
     np.testing.assert_allclose(found["end_state"], rest.state, rtol=1e-9)
     np.testing.assert_allclose(found["section"][0, 0], rest.points[-1, 0], rtol=1e-9)
     assert np.isnan(found["section"][0, 1]).all()  # the small end is ideal

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.solve import wear_bores
-from compressor.studies.wear.stages import Worn, first, following, life, stages_dataset, when
+from compressor.studies.wear.stages import (
+    Worn,
+    first,
+    following,
+    life,
+    stages_dataset,
+    wear_bores,
+    when,
+)
 
 VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
 

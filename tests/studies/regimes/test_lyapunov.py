@@ -8,12 +8,17 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics.motion import start
 from compressor.physics.record import FREEDOMS
-from compressor.solve import lyapunov
 from compressor.solve.attempts import integrate
 from compressor.solve.horizon import PARTED_DISTANCE, TWIN_DISTANCE, predictability_horizon
-from compressor.solve.lyapunov import OF_STEPS, growths, largest_exponent, mean_with_error
 from compressor.solve.request import Request
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
+from compressor.studies.regimes import lyapunov
+from compressor.studies.regimes.lyapunov import (
+    OF_STEPS,
+    growths,
+    largest_exponent,
+    mean_with_error,
+)
 
 LIGHT = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0.336}}
 

@@ -1,4 +1,4 @@
-"""Legs of a motion that goes on: they join without a seam, and their points lie on the section."""
+"""Revolutions of a motion: runs join without a seam, and their points lie on the section."""
 
 import math
 
@@ -10,37 +10,37 @@ from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.physics import Column
 from compressor.solve.attempts import run_at_tolerance
-from compressor.solve.legs import (
-    Stretch,
-    eccentricities,
-    follow_revolutions,
-    leg_case,
-    settle_motion,
-    with_samples,
-)
 from compressor.solve.series import rows_of
 from compressor.solve.si_record import record
+from compressor.studies.regimes.revolutions import (
+    RevolutionSpan,
+    bare_case,
+    eccentricities,
+    follow_revolutions,
+    run_with_series,
+    settle_motion,
+)
 
 DRAFT = {"solve": {"accuracy": "draft"}}
 BIG_END = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **DRAFT})
 
 
 def span(revolutions, section=0.0):
-    return Stretch(revolutions, section, 60.0)
+    return RevolutionSpan(revolutions, section, 60.0)
 
 
 @pytest.mark.parametrize("section", [0.0, 1.0])
-def test_a_leg_from_a_state_is_a_run_from_it(section):
+def test_revolutions_from_a_state_are_a_run_from_it(section):
     first = follow_revolutions(BIG_END, None, span(2, section))
     again = follow_revolutions(BIG_END, first.state, span(1, section))
-    run = run_at_tolerance(leg_case(BIG_END, 1), BIG_END.rtol, 60.0, False, None, first.state)
+    run = run_at_tolerance(bare_case(BIG_END, 1), BIG_END.rtol, 60.0, False, None, first.state)
     np.testing.assert_array_equal(run.trajectory.states[0], first.state)
     apart = np.abs(again.state - run.trajectory.states[-1]) / np.abs(again.state)
     assert apart.max() < (1e-12 if section == 0.0 else 1e-3)
 
 
-def test_legs_join_without_a_seam():
-    """A leg of three revolutions is one of two and one, but for its steps' own errors."""
+def test_runs_join_without_a_seam():
+    """A run of three revolutions is one of two and one, but for its steps' own errors."""
     whole = follow_revolutions(BIG_END, None, span(3, 2.0))
     first = follow_revolutions(BIG_END, None, span(2, 2.0))
     second = follow_revolutions(BIG_END, first.state, span(1, 2.0))
@@ -54,7 +54,7 @@ def test_legs_join_without_a_seam():
 def test_points_are_the_eccentricities_at_the_section():
     section = math.radians(90)
     found = follow_revolutions(BIG_END, None, span(2, section))
-    of = leg_case(BIG_END, 2)
+    of = bare_case(BIG_END, 2)
     run = run_at_tolerance(of, BIG_END.rtol, 60.0, True)
     rows = rows_of(run.p, run.trajectory)
     at = [300, 1500]  # samples at 90 and 450 degrees
@@ -73,7 +73,7 @@ def test_rates_are_those_of_the_start():
     """
     offset = {"big_end_x": 0.05, "big_end_y": -0.02, "small_end_x": 0.03, "small_end_y": 0.01}
     case = Case.from_values({"joint": "both", "clearance_mm": 0.2, "initial_offset_mm": offset})
-    state = run_at_tolerance(leg_case(case, 1), case.rtol, 60.0, False).trajectory.states[0]
+    state = run_at_tolerance(bare_case(case, 1), case.rtol, 60.0, False).trajectory.states[0]
     found = eccentricities(record(case), 0.0, state)
     np.testing.assert_allclose(found[:, :2], [[5e-5, -2e-5], [3e-5, 1e-5]], rtol=1e-9)
     across = 0.3 * (3e-5 / 0.6) * case.omega * 0.12 / 0.6
@@ -81,7 +81,7 @@ def test_rates_are_those_of_the_start():
     assert np.abs(found[:, 3]).max() < 1e-4 * across
 
 
-def test_a_leg_ends_once_enough_is_known():
+def test_a_run_ends_once_enough_is_known():
     found = follow_revolutions(BIG_END, None, span(9, 1.0), lambda turns, points: len(points) == 2)
     assert (len(found.turns), len(found.points), found.reason) == (2, 2, "")
     assert found.turns[-1]["seconds"] == pytest.approx(BIG_END.turn, rel=1e-9)
@@ -98,8 +98,8 @@ def test_settling_is_told_with_the_revolution_from_which_on():
     assert (len(lost.turns), math.isnan(never)) == (6, True)
 
 
-def test_a_leg_with_series_is_measured_from_its_second_revolution_on():
-    table, reason, _ = with_samples(
+def test_a_run_with_series_is_measured_from_its_second_revolution_on():
+    table, reason, _ = run_with_series(
         BIG_END, follow_revolutions(BIG_END, None, span(1)).state, span(2)
     )
     assert not reason
@@ -107,7 +107,7 @@ def test_a_leg_with_series_is_measured_from_its_second_revolution_on():
     assert table.variables["time"].values.size == 2401
 
 
-def test_a_leg_that_fails_has_the_revolutions_before():
+def test_a_run_that_fails_has_the_revolutions_before():
     values = {"joint": "big_end", "clearance_mm": 0.2}
     short = Case.from_values({**values, "solve": {"max_steps": 1200, "accuracy": "draft"}})
     found = follow_revolutions(short, None, span(50, 1.0))

@@ -1,8 +1,8 @@
-"""Legs of a motion that goes on: whole revolutions from a state, Poincaré points, and wear.
+"""Follow a motion that goes on: whole revolutions from a state, and their Poincaré points.
 
 A state is the motion as the solver holds it (`physics.state_names`) at top dead centre, where the
 load's segments begin; the crank angle of the Poincaré section lies inside the revolutions. Steps
-end on the section and at top dead centre, so that both are the solver's own numbers, and a leg that
+end on the section and at top dead centre, so that both are the solver's own numbers, and a run that
 is cut short and begun again at a revolution's end goes on like any other.
 """
 
@@ -10,7 +10,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,19 +17,23 @@ from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import DatasetParts
 from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe_all
-from compressor.solve.attempts import Solution, integrate, request, run_at_tolerance, times_of
-from compressor.solve.error_bars import (
+from compressor.solve import (
+    Cuts,
     Metrics,
-    allowed_residual,
-    audit_failure,
-    audit_rungs,
-    energy_residual,
+    Solution,
+    Turns,
+    least_promise,
+    merge_turns,
+    metrics,
+    record,
+    revolutions,
+    run_at_tolerance,
+    run_until_balanced,
+    statistics,
+    steady,
+    with_series,
+    with_settle_rev,
 )
-from compressor.solve.regime import least_promise, steady, with_settle_rev
-from compressor.solve.request import Cuts, Turns, merge_turns, passed_time, revolutions
-from compressor.solve.run_metrics import metrics, statistics
-from compressor.solve.si_record import record
-from compressor.solve.simulate import with_series
 
 RATE_SHIFT_REV = 1e-6  # rev: half the span that the rate of an eccentricity is a difference over
 
@@ -38,7 +41,7 @@ Enough = Callable[[Turns, np.ndarray], bool]  # of revolutions so far, and their
 
 
 @dataclass
-class Leg:
+class RevolutionRun:
     """Some revolutions of a case.
 
     `turns`: a tally each; `points`: of the Poincaré section, (k, joint, 4), eccentricity x and y
@@ -67,8 +70,8 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """How long a leg is at most: revolutions, the section's crank angle (rad), wall time (s)."""
+class RevolutionSpan:
+    """How long a run is at most: revolutions, the section's crank angle (rad), wall time (s)."""
 
     revolutions: int
     section: float
@@ -78,30 +81,28 @@ class Stretch:
 def follow_revolutions(
     case: Case,
     state: np.ndarray | None,
-    span: Stretch,
+    span: RevolutionSpan,
     enough: Enough = lambda turns, points: False,
-) -> Leg:
-    """Follow a case from a state on, or from its own start, until enough is known.
-
-    A leg whose energy does not balance is run again at a tenth of the tolerance, and at a
-    hundredth, as any run (`compressor.solve.solution`).
-    """
+) -> RevolutionRun:
+    """Follow a case from a state on, or from its own start, until enough is known."""
     deadline = time.monotonic() + span.timeout
-    of = leg_case(case, span.revolutions)
-    for rtol in audit_rungs(case.rtol):
-        course = PoincareCuts(of, span.section, enough)
+    of = bare_case(case, span.revolutions)
+    recorder: PoincareRecorder
+
+    def run_at(rtol: float) -> tuple[Solution, float]:
+        nonlocal recorder
+        recorder = PoincareRecorder(of, span.section, enough)
         left = max(deadline - time.monotonic(), 0.0)
-        run = run_at_tolerance(of, rtol, left, False, course.cuts, state)
-        found = course.leg(run)
-        residual = energy_residual(run.trajectory.tally)
-        most = allowed_residual(case.rtol, len(found.turns))
-        if found.reason or residual <= most:
-            return found
-    found.reason, found.detail = audit_failure(residual, most, rtol)
-    return found
+        run = run_at_tolerance(of, rtol, left, False, recorder.cuts, state)
+        return run, len(recorder.turns)
+
+    run = run_until_balanced(case.rtol, run_at)
+    return recorder.revolution_run(run)
 
 
-def settle_motion(case: Case, state: np.ndarray | None, span: Stretch) -> tuple[Leg, float]:
+def settle_motion(
+    case: Case, state: np.ndarray | None, span: RevolutionSpan
+) -> tuple[RevolutionRun, float]:
     """Follow a case until the metrics of revolutions agree, as with `settle_rev: auto`.
 
     With the revolution from which on they do; nan where they do not within the span.
@@ -118,19 +119,21 @@ def settle_motion(case: Case, state: np.ndarray | None, span: Stretch) -> tuple[
     return found, float(agreed[0]) if agreed else math.nan
 
 
-def with_samples(case: Case, state: np.ndarray, span: Stretch) -> tuple[DatasetParts, str, str]:
-    """Return a leg as a run with time series on the case's output grid, measured from its second
-    turn on.
+def run_with_series(
+    case: Case, state: np.ndarray, span: RevolutionSpan
+) -> tuple[DatasetParts, str, str]:
+    """Return revolutions from a state on with time series, measured from the second one on.
 
-    What its Dataset is made of, and the reason and detail where it did not come to its end.
+    What the Dataset is made of, on the case's output grid, and the reason and detail of a run that
+    did not come to its end.
     """
-    of = leg_case(case, span.revolutions)
+    of = bare_case(case, span.revolutions)
     of = replace(of, solve=replace(of.solve, settle_rev=1.0))
     run = run_at_tolerance(of, case.rtol, span.timeout, True, None, state)
     return with_series(of, run)[1], run.reason, run.detail
 
 
-def leg_case(case: Case, count: int) -> Case:
+def bare_case(case: Case, count: int) -> Case:
     """Return a case over so many revolutions, all of them measured, of which nothing else is
     wanted.
     """
@@ -139,8 +142,8 @@ def leg_case(case: Case, count: int) -> Case:
     return replace(of, solve=how, output=replace(of.output, keep="series", signals=False))
 
 
-class PoincareCuts:
-    """What a run passes: cuts at the section and at the end of each revolution.
+class PoincareRecorder:
+    """Cuts of a run at the section and at the end of each revolution, and what is seen there.
 
     With a section of 0 the two are one.
     """
@@ -155,7 +158,7 @@ class PoincareCuts:
         self.points: list[np.ndarray] = []
 
     def at_cut(self, turns: Turns) -> bool:
-        """Take the point at the section, and at a revolution's end ask whether that is enough."""
+        """Record the point at the section; return whether that is enough at a revolution's end."""
         count = len(turns)
         if (count - 1) % self.step == 0:
             at = float(self.cuts.times[count - 1])
@@ -165,14 +168,14 @@ class PoincareCuts:
         self.turns.append(merge_turns(turns[-self.step :]))
         return self.enough(self.turns, np.array(self.points))
 
-    def leg(self, run: Solution) -> Leg:
-        """Return the leg that a run along it has made."""
+    def revolution_run(self, run: Solution) -> RevolutionRun:
+        """Return the revolutions of the run that it has recorded."""
         count = len(self.turns)
         shape = (count, len(JOINTS), 2 * len(AXES))
         points = np.array(self.points[:count]).reshape(shape)
         nothing = np.full(run.trajectory.states.shape[1], math.nan)
         state = self.cuts.states[self.step * count - 1] if count else nothing
-        return Leg(run.p, self.turns, points, state, run.reason, run.detail)
+        return RevolutionRun(run.p, self.turns, points, state, run.reason, run.detail)
 
 
 def eccentricities(p: np.record, at: float, state: np.ndarray) -> np.ndarray:
@@ -191,53 +194,3 @@ def eccentricities(p: np.record, at: float, state: np.ndarray) -> np.ndarray:
     places = rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(3, 2, 2)
     here, before, after = places
     return np.concatenate((here, (after - before) / (2.0 * span)), axis=1)
-
-
-class Rubbed(NamedTuple):
-    """A motion on bores that are given.
-
-    `work`: pressing times sliding, J a revolution, by joint and node of the bore; `spread`: its
-    standard deviation over the revolutions, by joint; `turn`: time of a revolution, s; `state`: the
-    motion at the end; `reason`, `detail`: why it stopped early, empty if it did not.
-    """
-
-    work: np.ndarray
-    spread: np.ndarray
-    turn: float
-    metrics: Metrics
-    state: np.ndarray
-    reason: str = ""
-    detail: str = ""
-
-
-def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> Rubbed:
-    """Follow a case over its span on worn bores, and measure what rubs after it has settled.
-
-    worn: (joint, sector), m; state: the motion to begin with, at top dead centre, or None for the
-    case's own. The span is in whole revolutions. A run whose energy does not balance is run again
-    at a tenth of the tolerance, as any other.
-    """
-    deadline = time.monotonic() + case.solve.timeout_s
-    ends = revolutions(case.settle, case.duration, case.turn)
-    for rtol in audit_rungs(case.rtol):
-        p = record(case, worn)
-        asked = request(case, rtol, p, times_of(case, False), state)
-        cuts = Cuts(ends)
-        asked.timeout, asked.cuts = max(deadline - time.monotonic(), 0.0), cuts
-        run = integrate(asked)
-        residual = energy_residual(run.tally)
-        most = allowed_residual(case.rtol, case.duration / case.turn)
-        if run.reason or residual <= most:
-            break
-    else:
-        run.reason, run.detail = audit_failure(residual, most, rtol)
-    turns = cuts.turns
-    if run.reason or not turns:
-        nothing = np.full((len(JOINTS), worn.shape[1]), np.nan)
-        return Rubbed(nothing, nothing[:, 0], np.nan, {}, asked.start, run.reason, run.detail)
-    slid = np.array([turn["slid"] for turn in turns])
-    whole = merge_turns(turns)
-    work = whole["worn"][:, : worn.shape[1]] / len(turns)
-    began, ended = passed_time(p, run.times, run.states)[[0, -1]]
-    turn = case.turn * float(ended - began) / case.duration
-    return Rubbed(work, slid.std(axis=0), turn, metrics(p, whole), run.states[-1])

@@ -7,7 +7,7 @@ along itself. It turns into the direction that grows fastest. Twins go in step
 twins of motions that draw them together. A small end with a hundred times the paper's damping was
 measured at -1.0 by stiff steps and at +17 by explicit ones of the same tolerance. On periodic
 motions the exponent is the logarithm of the largest Floquet multiplier
-(tests/solve/test_lyapunov.py).
+(tests/studies/regimes/test_lyapunov.py).
 """
 
 import math
@@ -20,10 +20,17 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.reasons import Reason
-from compressor.solve.horizon import Twins
-from compressor.solve.request import Cuts, Request, Stop
-from compressor.solve.run_metrics import parts, standard_error, sure
-from compressor.solve.si_record import is_ideal, record
+from compressor.solve import (
+    Cuts,
+    Request,
+    Stop,
+    Twins,
+    is_ideal,
+    parts,
+    record,
+    standard_error,
+    sure,
+)
 
 METHOD = "RODAS"  # of the twins, whatever the case asks for
 RTOLS = (1e-8, 1e-7, 1e-6)  # the next one where steps shrink to nothing, on a contact's edge
