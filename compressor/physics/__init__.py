@@ -13,7 +13,7 @@ from compressor.physics.loads import (
     segments,
     static_load,
 )
-from compressor.physics.march import Status, WorkArrays, march, march_twins, new_walker, new_work
+from compressor.physics.march import Status, WorkArrays, march, march_twins, new_stepper, new_work
 from compressor.physics.mechanism_rows import STALLED, wear_all
 from compressor.physics.observe import (
     COLUMNS,
@@ -21,7 +21,7 @@ from compressor.physics.observe import (
     Column,
     frame_of_series,
 )
-from compressor.physics.onset import meeting
+from compressor.physics.onset import approach_at
 from compressor.physics.record import (
     MAX_SECTORS,
     Coordinate,
@@ -32,7 +32,7 @@ from compressor.physics.record import (
     state_names,
 )
 from compressor.physics.runge_kutta import FLOWS, RungeKuttaPair
-from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
+from compressor.physics.step_control import STABILITY_LIMIT, Mode, is_last_step, step_error
 from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,
@@ -44,8 +44,8 @@ from compressor.physics.tally import (
     contact_within,
     lobatto,
     new_tally,
-    shares_apart,
     tally_energy,
     tally_step,
+    write_gap_fractions,
 )
 from compressor.physics.worn_bore import bore_fields

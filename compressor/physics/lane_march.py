@@ -1,6 +1,6 @@
 """Runs that march side by side, a lane each: `march` for all of them, to rounding.
 
-Steps in which nothing begins or ends are taken in all lanes at once (`lane_steps`, `lane_tally`).
+Steps in which nothing begins or ends are taken in all lanes at once (`lane_steps`, `lane_control`).
 For any other step a lane is given to `march` itself: at corners of the load, where contact may
 begin or end, where the stiff partner is at work. A lane whose run has ended takes the next one.
 """
@@ -13,6 +13,13 @@ import numpy as np
 
 from compressor.physics._jit import fma, inline_numba, jit
 from compressor.physics.kinematics import SMALL, crank_direction
+from compressor.physics.lane_control import (
+    advance_lanes,
+    choose_next_steps,
+    exclude_onsets,
+    select_plain_steps,
+    tally_lanes,
+)
 from compressor.physics.lane_steps import (
     ALIVE,
     ATOL,
@@ -26,11 +33,12 @@ from compressor.physics.lane_steps import (
     FIELDS,
     FIRST_FIELD,
     FLOWN,
-    HELD,
     IMBALANCE,
     IMPACTS,
     LANES,
+    LAST_ERROR,
     LOSS_SECONDS,
+    MAX_DEPTH,
     MAX_PENETRATION,
     MOMENT_SUM,
     NEXT_SAMPLE,
@@ -41,10 +49,8 @@ from compressor.physics.lane_steps import (
     PHASE,
     PLAIN,
     R0,
-    REFUSED,
+    REJECTED,
     RELEASES,
-    REMEMBERED,
-    REST,
     RTOL,
     SECONDS,
     SETTLE,
@@ -52,22 +58,22 @@ from compressor.physics.lane_steps import (
     SIZE,
     SQUARE_ACCELERATION,
     SQUARE_DEVIATION,
+    STABILITY_LIMITED,
     STAGE_COUNT,
     STATE,
     STEPS,
-    TOO_DEEP,
+    STEPS_TO_TEST,
     TORQUE_SUM,
     TOUCHING,
     H,
     K,
     T,
     Z,
-    attempt_lanes,
-    look,
     new_lanes,
+    observe_nodes,
+    try_steps,
 )  # fmt: skip
-from compressor.physics.lane_tally import control, judge, judge_closer, move_on, tally_lanes
-from compressor.physics.march import DONE, RUNNING, WALKER, WorkArrays, march, new_work
+from compressor.physics.march import DONE, RUNNING, STEPPER, WorkArrays, march, new_work
 from compressor.physics.observe import ACCELERATION, CRANK_POWER
 from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import FLOWS, STAGES, weights_at
@@ -84,7 +90,7 @@ class Runs(NamedTuple):
     the other; `places` tells where each one's begin.
     """
 
-    walkers: np.ndarray  # (m,) of WALKER
+    steppers: np.ndarray  # (m,) of STEPPER
     records: np.ndarray  # (m,) of RECORD
     tallies: np.ndarray  # (m,) of TALLY
     z: np.ndarray  # (m, n + 4)
@@ -100,9 +106,9 @@ class Runs(NamedTuple):
 
 
 @inline_numba
-def end_of(runs, job):
+def segment_end(runs, job):
     """Return when the segment ends that a run is in."""
-    return runs.edges[runs.places[job, 0] + job + runs.walkers[job].segment + 1]
+    return runs.edges[runs.places[job, 0] + job + runs.steppers[job].segment + 1]
 
 
 @jit
@@ -113,9 +119,9 @@ def plain_ahead(w, omega, end):
 
 
 @jit
-def march_alone(runs, job, work, most):
-    """Have a run marched by itself until its next step is a plain one; False where it has ended."""
-    w, p = runs.walkers[job], runs.records[job]
+def march_to_plain_step(runs, job, work, limit):
+    """March a run by itself until its next step is a plain one; False where it has ended."""
+    w, p = runs.steppers[job], runs.records[job]
     first, count = runs.places[job, 0], runs.places[job, 1]
     begin, samples = runs.places[job, 2], runs.places[job, 3]
     edges = runs.edges[first + job : first + job + count + 1]
@@ -126,35 +132,35 @@ def march_alone(runs, job, work, most):
             w, p, runs.z[job], work, runs.atol[job], runs.size[job], edges, phases, times, states,
             runs.tallies[job], np.int64(1),
         )  # fmt: skip
-        if w.status != RUNNING or w.steps + w.rejected + w.onsets >= most:
+        if w.status != RUNNING or w.steps + w.rejected + w.onsets >= limit:
             return False
         if plain_ahead(w, p.omega, edges[w.segment + 1]):
             return True
 
 
 @jit
-def next_sample(runs, job):
+def next_sample_time(runs, job):
     """Return the time of a run's next output sample."""
-    sample, samples = runs.walkers[job].sample, runs.places[job, 3]
+    sample, samples = runs.steppers[job].sample, runs.places[job, 3]
     return runs.times[runs.places[job, 2] + sample] if sample < samples else math.inf
 
 
 @jit
-def load(W, j, runs, job, work, most):
-    """Put a run as it stands into a lane."""
-    w, p, tally = runs.walkers[job], runs.records[job], runs.tallies[job]
+def load_lane(W, j, runs, job, work, limit):
+    """Write a run's present state into a lane."""
+    w, p, tally = runs.steppers[job], runs.records[job], runs.tallies[job]
     n = runs.size.shape[1]
     for i in range(runs.fields.shape[1]):
         W[FIRST_FIELD + i * LANES + j] = runs.fields[job, i]
     W[COS + j], W[SIN + j] = crank_direction(w.t, p)
-    W[T + j], W[H + j], W[END + j] = w.t, w.h, end_of(runs, job)
+    W[T + j], W[H + j], W[END + j] = w.t, w.h, segment_end(runs, job)
     W[PHASE + j] = runs.phases[runs.places[job, 0] + w.segment]
-    W[RTOL + j], W[SETTLE + j], W[TOO_DEEP + j] = w.rtol, w.settle, w.deepest
-    W[NEXT_SAMPLE + j] = next_sample(runs, job)
-    W[REMEMBERED + j], W[HELD + j] = w.error, w.stability_limited
-    W[REST + j] = w.steps_to_test if w.mode == AUTO else NO_TEST
-    W[STEPS + j], W[REFUSED + j] = w.steps, 0.0
-    W[BUDGET + j] = most - w.rejected - w.onsets
+    W[RTOL + j], W[SETTLE + j], W[MAX_DEPTH + j] = w.rtol, w.settle, w.deepest
+    W[NEXT_SAMPLE + j] = next_sample_time(runs, job)
+    W[LAST_ERROR + j], W[STABILITY_LIMITED + j] = w.error, w.stability_limited
+    W[STEPS_TO_TEST + j] = w.steps_to_test if w.mode == AUTO else NO_TEST
+    W[STEPS + j], W[REJECTED + j] = w.steps, 0.0
+    W[BUDGET + j] = limit - w.rejected - w.onsets
     W[ALIVE + j], W[CALL + j] = 1.0, 0.0
     for i in range(n):
         W[ATOL + i * LANES + j] = runs.atol[job, i]
@@ -183,20 +189,20 @@ def load(W, j, runs, job, work, most):
 
 
 @jit
-def unload(W, j, runs, job, work):
-    """Take a run as it stands from a lane."""
-    w, tally = runs.walkers[job], runs.tallies[job]
+def unload_lane(W, j, runs, job, work):
+    """Write a lane's state back into its run."""
+    w, tally = runs.steppers[job], runs.tallies[job]
     n = runs.size.shape[1]
-    steps, refused = np.int64(W[STEPS + j]), np.int64(W[REFUSED + j])
+    steps, refused = np.int64(W[STEPS + j]), np.int64(W[REJECTED + j])
     w.evaluations += (STAGES - 1) * (steps - w.steps + refused)
     if steps > w.steps:
         w.landed = 0
-    w.t, w.h, w.error, w.steps = W[T + j], W[H + j], W[REMEMBERED + j], steps
+    w.t, w.h, w.error, w.steps = W[T + j], W[H + j], W[LAST_ERROR + j], steps
     w.rejected += refused
-    w.stability_limited = np.int64(W[HELD + j])
+    w.stability_limited = np.int64(W[STABILITY_LIMITED + j])
     begin_stiff_steps(w)
     if w.mode == AUTO:
-        w.steps_to_test = np.int64(W[REST + j])
+        w.steps_to_test = np.int64(W[STEPS_TO_TEST + j])
     w.has_dense = 0
     for i in range(n + FLOWS):
         runs.z[job, i] = W[Z + i * LANES + j]
@@ -226,7 +232,7 @@ def unload(W, j, runs, job, work):
 @jit
 def sample_lane(W, j, runs, job, work):
     """Fill a run's output samples within the step that its lane has just attempted."""
-    w = runs.walkers[job]
+    w = runs.steppers[job]
     t, h = W[T + j], W[H + j]
     begin, samples = runs.places[job, 2], runs.places[job, 3]
     while w.sample < samples and runs.times[begin + w.sample] <= t + h:
@@ -238,30 +244,30 @@ def sample_lane(W, j, runs, job, work):
                 total = fma(work.weights[stage], W[K + (stage * STATE + i) * LANES + j], total)
             runs.states[begin + w.sample, i] = fma(h, total, W[Z + i * LANES + j])
         w.sample += 1
-    W[NEXT_SAMPLE + j] = next_sample(runs, job)
+    W[NEXT_SAMPLE + j] = next_sample_time(runs, job)
 
 
 @jit
-def work_of(runs, job):
-    """Return what `march` works in for a run."""
+def work_arrays(runs, job):
+    """Return the arrays that `march` works in for a run."""
     w = runs.works
     return WorkArrays(
         w.k[job], w.new[job], w.column[job], w.jacobian[job], w.dense[job], w.weights[job],
-        w.y[job], w.rows[job], w.apart[job], w.row[job],
+        w.y[job], w.rows[job], w.gap_fraction[job], w.row[job],
     )  # fmt: skip
 
 
 @jit
-def next_run(W, j, runs, lane_jobs, begun, most):
-    """Give a lane whose run has ended the next one that gets to a plain step.
+def load_next_run(W, j, runs, lane_jobs, begun, limit):
+    """Load the next run that gets to a plain step into a lane whose run has ended.
 
-    Returns how many runs have begun by then. Without one the lane is empty, of which -1 tells.
+    Returns how many runs have begun by then. Without one the lane is empty: its run is -1.
     """
     while begun < runs.size.shape[0]:
         begun += 1
-        if march_alone(runs, begun - 1, work_of(runs, begun - 1), most):
+        if march_to_plain_step(runs, begun - 1, work_arrays(runs, begun - 1), limit):
             lane_jobs[j] = begun - 1
-            load(W, j, runs, begun - 1, work_of(runs, begun - 1), most)
+            load_lane(W, j, runs, begun - 1, work_arrays(runs, begun - 1), limit)
             return begun
     lane_jobs[j] = -1
     W[ALIVE + j], W[CALL + j] = 0.0, 0.0
@@ -269,22 +275,22 @@ def next_run(W, j, runs, lane_jobs, begun, most):
 
 
 @jit
-def attend(W, j, runs, job, most):
-    """Have the run of a lane marched by itself over what is ahead; False where it has ended."""
-    work, w = work_of(runs, job), runs.walkers[job]
-    unload(W, j, runs, job, work)
-    if w.steps + w.rejected + w.onsets >= most or not march_alone(runs, job, work, most):
+def march_out_of_lane(W, j, runs, job, limit):
+    """March the run of a lane by itself over what is ahead; False where it has ended."""
+    work, w = work_arrays(runs, job), runs.steppers[job]
+    unload_lane(W, j, runs, job, work)
+    if w.steps + w.rejected + w.onsets >= limit or not march_to_plain_step(runs, job, work, limit):
         return False
-    load(W, j, runs, job, work, most)
+    load_lane(W, j, runs, job, work, limit)
     return True
 
 
 @jit
-def march_lanes(scene, W, k, runs, lane_jobs, most):
-    """March all runs, k at a time; a walker that is still RUNNING then has taken too many steps.
+def march_lanes(scene, W, k, runs, lane_jobs, limit):
+    """March all runs, k at a time; a stepper that is still RUNNING then has taken too many steps.
 
     scene: a tuple of as many zeros as the scene's number: machine code is made for each. W: of
-    `new_lanes`; lane_jobs: (k,) integers, the run in each lane, at first -1; most: attempts of a
+    `new_lanes`; lane_jobs: (k,) integers, the run in each lane, at first -1; limit: attempts of a
     step that a run may take.
     """
     begun = 0
@@ -294,31 +300,31 @@ def march_lanes(scene, W, k, runs, lane_jobs, most):
         empty = 0
         for j in range(k):
             if W[CALL + j] > 0.0 and not (
-                lane_jobs[j] >= 0 and attend(W, j, runs, lane_jobs[j], most)
+                lane_jobs[j] >= 0 and march_out_of_lane(W, j, runs, lane_jobs[j], limit)
             ):
-                begun = next_run(W, j, runs, lane_jobs, begun, most)
+                begun = load_next_run(W, j, runs, lane_jobs, begun, limit)
             empty += lane_jobs[j] < 0
         if empty == k:
             return
-        attempt_lanes(scene, W, k)
-        if judge(scene, W, k):
-            look(scene, W, k, BETWEEN)
-            judge_closer(scene, W, k)
+        try_steps(scene, W, k)
+        if select_plain_steps(scene, W, k):
+            observe_nodes(scene, W, k, BETWEEN)
+            exclude_onsets(scene, W, k)
         tally_lanes(scene, W, k)
         for j in range(k):
             if W[PLAIN + j] > 0.0 and W[NEXT_SAMPLE + j] <= W[T + j] + W[H + j]:
-                sample_lane(W, j, runs, lane_jobs[j], work_of(runs, lane_jobs[j]))
-        control(scene, W, k)
-        move_on(scene, W, k)
+                sample_lane(W, j, runs, lane_jobs[j], work_arrays(runs, lane_jobs[j]))
+        choose_next_steps(scene, W, k)
+        advance_lanes(scene, W, k)
 
 
-OF_THE_LOAD = ("preload", "spring_stiffness", "spring_damping")
+LOAD_FIELDS = ("preload", "spring_stiffness", "spring_damping")
 
 
 class Run(NamedTuple):
     """A run from its begin to its end, as `march` takes it; the names are those of `march`."""
 
-    walker: np.record
+    stepper: np.record
     p: np.record
     z: np.ndarray
     size: np.ndarray
@@ -329,30 +335,30 @@ class Run(NamedTuple):
     tally: np.record
 
 
-def fits(p: np.record) -> bool:
+def fits_lane(p: np.record) -> bool:
     """Return whether runs of a record can march in lanes: default laws and powers of 1.5."""
     default = p["laws"].size == 1
     return bool(default and p["load"] != Load.GAS and p["exponent"] == 1.5)
 
 
-def march_side_by_side(runs: Sequence[Run], most: int) -> list[Run | None]:
+def march_side_by_side(runs: Sequence[Run], limit: int) -> list[Run | None]:
     """Return the runs of one scene with clearance at their ends, to the bit as by `march`.
 
-    None for one that does not fit into a lane, that failed, or that took more than `most` attempts
+    None for one that does not fit into a lane, that failed, or that took more than `limit` attempts
     of a step. What the runs hold is left as it is.
     """
-    fitting = [i for i, run in enumerate(runs) if fits(run.p)]
+    fitting = [i for i, run in enumerate(runs) if fits_lane(run.p)]
     ended: list[Run | None] = [None] * len(runs)
     if not fitting:
         return ended
     whole = gather_runs([runs[i] for i in fitting])
     scene = (0,) * int(runs[0].p["scene"])
-    march_lanes(scene, new_lanes(), LANES, whole, np.full(LANES, -1), most)
+    march_lanes(scene, new_lanes(), LANES, whole, np.full(LANES, -1), limit)
     for k, i in enumerate(fitting):
         begin, samples = whole.places[k, 2:].tolist()
-        if whole.walkers["status"][k] == DONE:
+        if whole.steppers["status"][k] == DONE:
             ended[i] = runs[i]._replace(
-                walker=whole.walkers[k], z=whole.z[k], tally=whole.tallies[k],
+                stepper=whole.steppers[k], z=whole.z[k], tally=whole.tallies[k],
                 states=whole.states[begin : begin + samples],
             )  # fmt: skip
     return ended
@@ -362,7 +368,7 @@ def gather_runs(runs: Sequence[Run]) -> Runs:
     """Return the runs in arrays."""
     m, n = len(runs), runs[0].size.size
     records = np.array([run.p for run in runs], RECORD).view(np.recarray)
-    walkers = np.array([run.walker for run in runs], WALKER).view(np.recarray)
+    steppers = np.array([run.stepper for run in runs], STEPPER).view(np.recarray)
     size = np.array([run.size for run in runs])
     counts = np.array([(run.phases.size, run.times.size) for run in runs])
     places = np.stack([counts.cumsum(axis=0) - counts, counts], axis=2).reshape(m, 4)
@@ -370,11 +376,11 @@ def gather_runs(runs: Sequence[Run]) -> Runs:
     for row, (name, joint) in enumerate(FIELDS):
         column = records[name]
         fields[:, row] = column[:, joint] if column.ndim > 1 else column
-    for name in OF_THE_LOAD:  # no load is a spring without force
+    for name in LOAD_FIELDS:  # no load is a spring without force
         fields[records["load"] == Load.NONE, FIELDS.index((name, 0))] = 0.0
     return Runs(
-        walkers, records, np.array([run.tally for run in runs], TALLY).view(np.recarray),
-        np.array([run.z for run in runs]), walkers["rtol"][:, None] * size, size, fields, places,
+        steppers, records, np.array([run.tally for run in runs], TALLY).view(np.recarray),
+        np.array([run.z for run in runs]), steppers["rtol"][:, None] * size, size, fields, places,
         np.concatenate([run.edges for run in runs]), np.concatenate([run.phases for run in runs]),
         np.concatenate([run.times for run in runs]),
         np.full((counts[:, 1].sum(), n), math.nan),

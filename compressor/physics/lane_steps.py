@@ -25,7 +25,7 @@ LANES = 16
 MAX_STATES = 8  # numbers of a motion
 STATE = MAX_STATES + 4  # and energy flows
 STAGE_COUNT = 7
-SEEN_COUNT = 18  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potential energy
+OBSERVED_COUNT = 18  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potential energy
 PEAKED = 7  # of these the first ones, of which the greatest size is kept
 NODE_COUNT = 5
 
@@ -58,16 +58,16 @@ FIELDS = tuple(
 FIRST_FIELD = _rows(len(FIELDS))
 COS, SIN = _rows(), _rows()  # of the crank angle at t
 T, H, PHASE, RTOL, SETTLE, END, NEXT_SAMPLE = (_rows() for _ in range(7))
-ERROR, REMEMBERED = _rows(), _rows()
-STEPS, REFUSED, BUDGET, REST, HELD, TOO_DEEP = (_rows() for _ in range(6))
-ALIVE, PLAIN, NEAR, MEASURED, CALL = (_rows() for _ in range(5))
+ERROR, LAST_ERROR = _rows(), _rows()
+STEPS, REJECTED, BUDGET, STEPS_TO_TEST, STABILITY_LIMITED, MAX_DEPTH = (_rows() for _ in range(6))
+ALIVE, PLAIN, NEAR_PEAK, MEASURED, CALL = (_rows() for _ in range(5))
 ATOL, SIZE = _rows(MAX_STATES), _rows(MAX_STATES)
 Z = _rows(STATE)
 NEW = _rows(STATE)
 OUT = _rows(STATE)  # dz/dt of the stage at hand
 K = _rows(STAGE_COUNT * STATE)
-SEEN = _rows(SEEN_COUNT)
-NODE_ROWS = _rows(NODE_COUNT * SEEN_COUNT)
+OBSERVED = _rows(OBSERVED_COUNT)
+NODE_ROWS = _rows(NODE_COUNT * OBSERVED_COUNT)
 # the tally
 SECONDS, SQUARE_ACCELERATION, SQUARE_DEVIATION = _rows(), _rows(), _rows()
 TORQUE_SUM, MOMENT_SUM = _rows(), _rows()
@@ -89,12 +89,12 @@ NO_CORNERS = (0.0, 0.0, 0.0)  # of the load: a lane ends at each
 STEP_WEIGHTS, FRACTIONS, ERROR_WEIGHTS = A[PAIR], C[PAIR], E[PAIR]
 NODE_WEIGHTS = ALL_NODE_WEIGHTS[PAIR]
 OUTER, BETWEEN = np.array([2, 4]), np.array([1, 3])  # nodes: middle and end; the others
-ROW = SEEN_COUNT * LANES
+ROW = OBSERVED_COUNT * LANES
 R0, R1, R2, R3, R4 = (NODE_ROWS + i * ROW for i in range(5))
 
 
 @inline_numba
-def record_of(scene, W, j):
+def lane_record(scene, W, j):
     """Return the record of lane j, its scene being the length of the tuple.
 
     Choices that are constants leave of the equations of motion what the scene needs.
@@ -130,7 +130,7 @@ def combine_stages(W, i, j, w):
 
 
 @inline_numba
-def state_of(scene, W, j, w):
+def stage_state(scene, W, j, w):
     """Return the motion of lane j where the stages have the weights w, eight numbers."""
     y0, y1 = combine_stages(W, 0, j, w), combine_stages(W, 1, j, w)
     y2, y3 = combine_stages(W, 2, j, w), combine_stages(W, 3, j, w)
@@ -142,38 +142,38 @@ def state_of(scene, W, j, w):
 
 
 @inline_numba
-def four_of(W, row):
+def read_four(W, row):
     """Return four numbers of a lane, of rows that follow each other."""
     return W[row], W[row + LANES], W[row + 2 * LANES], W[row + 3 * LANES]
 
 
 @inline_numba
-def put_four(W, row, x):
+def write_four(W, row, x):
     """Write four numbers of a lane into rows that follow each other."""
     W[row], W[row + LANES], W[row + 2 * LANES], W[row + 3 * LANES] = x
 
 
 @inline_numba
-def put_rates(scene, W, j, y, d, q):
+def write_rates(scene, W, j, y, d, q):
     """Write dz/dt into OUT: rates, accelerations, powers."""
     o = OUT + j
     if len(scene) == 3:
-        put_four(W, o, (y[4], y[5], y[6], y[7]))
-        put_four(W, o + 4 * LANES, d)
-        put_four(W, o + 8 * LANES, q)
+        write_four(W, o, (y[4], y[5], y[6], y[7]))
+        write_four(W, o + 4 * LANES, d)
+        write_four(W, o + 8 * LANES, q)
     else:
-        put_four(W, o, (y[2], y[3], d[0], d[3]))
-        put_four(W, o + 4 * LANES, q)
+        write_four(W, o, (y[2], y[3], d[0], d[3]))
+        write_four(W, o + 4 * LANES, q)
 
 
 @inline_numba
-def put_seen(W, j, g, energy):
-    """Write what is observed at a node into SEEN; energy: kinetic and potential."""
-    s = SEEN + j
-    put_four(W, s, (g[0], g[1], g[2], g[3]))
-    put_four(W, s + 4 * LANES, (g[4], g[5], g[6], g[7]))
-    put_four(W, s + 8 * LANES, (g[8], g[9], g[10], g[11]))
-    put_four(W, s + 12 * LANES, (g[12], g[13], g[14], g[15]))
+def write_observed(W, j, g, energy):
+    """Write what is observed at a node into OBSERVED; energy: kinetic and potential."""
+    s = OBSERVED + j
+    write_four(W, s, (g[0], g[1], g[2], g[3]))
+    write_four(W, s + 4 * LANES, (g[4], g[5], g[6], g[7]))
+    write_four(W, s + 8 * LANES, (g[8], g[9], g[10], g[11]))
+    write_four(W, s + 12 * LANES, (g[12], g[13], g[14], g[15]))
     W[s + 16 * LANES], W[s + 17 * LANES] = energy
 
 
@@ -192,30 +192,31 @@ def stage_rates(scene, W, k, fraction, w, s):
     """Compute dz/dt where the stages have the weights w, at a fraction of the steps: stage s."""
     W = without_refcount(W)
     for j in range(k):
-        p = record_of(scene, W, j)
+        p = lane_record(scene, W, j)
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
-        y = state_of(scene, W, j, w)
+        y = stage_state(scene, W, j, w)
         now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
-        put_rates(scene, W, j, y, deviating(now, p), powers(now, y, joint_forces(now, y, p), p))
+        write_rates(scene, W, j, y, deviating(now, p), powers(now, y, joint_forces(now, y, p), p))
     copy_rows(W, K + s * STATE * LANES, OUT, STATE if len(scene) == 3 else MAX_STATES)
 
 
 @jit
-def look_at_node(scene, W, k, fraction, w, i):
-    """Return what is seen at node i of the steps."""
+def observe_node(scene, W, k, fraction, w, i):
+    """Write what is observed at node i of the steps."""
     W = without_refcount(W)
     for j in range(k):
-        p = record_of(scene, W, j)
+        p = lane_record(scene, W, j)
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
-        y = state_of(scene, W, j, w)
+        y = stage_state(scene, W, j, w)
         now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
-        put_seen(W, j, observed_columns(now, y, joint_forces(now, y, p), p), energies(now, y, p))
-    copy_rows(W, NODE_ROWS + i * ROW, SEEN, SEEN_COUNT)
+        columns = observed_columns(now, y, joint_forces(now, y, p), p)
+        write_observed(W, j, columns, energies(now, y, p))
+    copy_rows(W, NODE_ROWS + i * ROW, OBSERVED, OBSERVED_COUNT)
 
 
 @jit
 def finish_step(scene, W, k, w):
-    """State, flows and crank direction at the ends of the steps, and their errors."""
+    """Write state and flows at the ends of the steps, and their error norms."""
     W = without_refcount(W)
     n = 8 if len(scene) == 3 else 4
     for j in range(k):
@@ -232,16 +233,16 @@ def finish_step(scene, W, k, w):
             W[NEW + 10 * LANES + j] = combine_stages(W, 10, j, w)
             W[NEW + 11 * LANES + j] = combine_stages(W, 11, j, w)
     for j in range(k):
-        e = part_of_error(W, 1, j, part_of_error(W, 0, j, 0.0))
-        e = part_of_error(W, 3, j, part_of_error(W, 2, j, e))
+        e = add_error_square(W, 1, j, add_error_square(W, 0, j, 0.0))
+        e = add_error_square(W, 3, j, add_error_square(W, 2, j, e))
         if len(scene) == 3:
-            e = part_of_error(W, 5, j, part_of_error(W, 4, j, e))
-            e = part_of_error(W, 7, j, part_of_error(W, 6, j, e))
+            e = add_error_square(W, 5, j, add_error_square(W, 4, j, e))
+            e = add_error_square(W, 7, j, add_error_square(W, 6, j, e))
         W[ERROR + j] = W[H + j] * square_root(e / n)
 
 
 @inline_numba
-def part_of_error(W, i, j, total):
+def add_error_square(W, i, j, total):
     """Return a total and the square of number i's estimated error over its tolerance and the
     step.
     """
@@ -263,16 +264,16 @@ def weights_of(table, i):
 
 
 @jit
-def look(scene, W, k, nodes):
-    """What is seen at some nodes of the steps."""
+def observe_nodes(scene, W, k, nodes):
+    """Write what is observed at some nodes of the steps."""
     for i in nodes:
-        look_at_node(scene, W, k, NODES[i], weights_of(NODE_WEIGHTS, i), i)
+        observe_node(scene, W, k, NODES[i], weights_of(NODE_WEIGHTS, i), i)
 
 
 @jit
-def attempt_lanes(scene, W, k):
-    """A step's stages in each lane, its error, and what is seen in its middle and at its end."""
+def try_steps(scene, W, k):
+    """Try a step in each lane: stages, error, and what is observed in its middle and at its end."""
     for s in range(1, STAGES):
         stage_rates(scene, W, k, FRACTIONS[s], weights_of(STEP_WEIGHTS, s), s)
-    look(scene, W, k, OUTER)
+    observe_nodes(scene, W, k, OUTER)
     finish_step(scene, W, k, weights_of(STEP_WEIGHTS, STAGES - 1))

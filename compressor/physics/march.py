@@ -1,6 +1,6 @@
 """The whole step loop, compiled: from the first step to the last without Python in between.
 
-`march` advances a `Walker` by at most a number of steps and returns, so that Python can look at
+`march` advances a `Stepper` by at most a number of steps and returns, so that Python can look at
 the clock; called again it goes on, to the bit. Steps land on load corners and on onsets of
 contact; the dense solution feeds the output grid and the tally.
 
@@ -36,13 +36,13 @@ from compressor.physics.observe import (
     NEARNESS,
 )
 from compressor.physics.onset import (
-    LANDED_SHARE,
-    change,
+    LANDING_FRACTION,
+    approach_at,
     first_onset,
+    locate_change,
     may_change,
     may_touch,
-    meeting,
-    remember,
+    store_approach_velocity,
 )
 from compressor.physics.record import MECHANISM, zero
 from compressor.physics.runge_kutta import (
@@ -60,7 +60,7 @@ from compressor.physics.runge_kutta import (
 )
 from compressor.physics.step_control import (
     MIN_ERROR,
-    REST,
+    MIN_TEST_PAUSE,
     Mode,
     choose_method,
     first_step,
@@ -78,9 +78,9 @@ from compressor.physics.systems import (
     write_eccentricities,
 )
 from compressor.physics.tally import (
+    gap_fraction_between,
     lobatto,
     near_record,
-    share_apart,
     tally_energy,
     tally_step,
 )
@@ -96,7 +96,7 @@ NODE_WEIGHTS[:, -1] = A[:, -1]
 
 
 class Status(IntEnum):
-    """How a walker stands."""
+    """How a stepper stands."""
 
     RUNNING = 0
     DONE = 1
@@ -109,7 +109,7 @@ class Status(IntEnum):
 # numba wants plain integers
 RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE, BEYOND_MODEL = map(int, Status)
 
-WALKER = np.dtype(
+STEPPER = np.dtype(
     [
         ("pair", "i8"),
         ("status", "i8"),
@@ -132,7 +132,7 @@ WALKER = np.dtype(
         ("mode", "i8"),  # Mode
         ("stiff", "i8"),  # whether the present step is the stiff partner's
         ("stability_limited", "i8"),  # explicit steps in a row that stability has held
-        ("explicit_would_do", "i8"),  # stiff steps in a row that an explicit method could have h
+        ("explicit_ok", "i8"),  # stiff steps in a row that an explicit method could have h
         ("steps_to_test", "i8"),  # steps until stiffness is tested again
         ("test_pause", "i8"),  # the rest after the last change back
         ("steps_saved", "f8"),  # stable explicit steps that stiff ones have saved since the change
@@ -156,19 +156,19 @@ class WorkArrays(NamedTuple):
     weights: np.ndarray  # (7,): of the stages, at a fraction of the step
     y: np.ndarray  # (n,)
     rows: np.ndarray  # gauged at a step's nodes
-    apart: np.ndarray  # (2,): share of the step without contact, by joint
+    gap_fraction: np.ndarray  # (2,): share of the step without contact, by joint
     row: np.ndarray
 
 
-def new_walker(mode):
-    """Return a walker at the start of its first segment."""
-    walker = zero(WALKER)
-    walker["fresh"] = 1
-    walker["error"] = MIN_ERROR
-    walker["mode"] = mode
-    walker["test_pause"] = REST // 2
-    walker["stiff"] = mode == Mode.STIFF
-    return walker
+def new_stepper(mode):
+    """Return a stepper at the start of its first segment."""
+    stepper = zero(STEPPER)
+    stepper["fresh"] = 1
+    stepper["error"] = MIN_ERROR
+    stepper["mode"] = mode
+    stepper["test_pause"] = MIN_TEST_PAUSE // 2
+    stepper["stiff"] = mode == Mode.STIFF
+    return stepper
 
 
 def new_work(n):
@@ -215,7 +215,7 @@ rosenbrock_extend = rosenbrock.extend
 
 @inline_llvm
 def try_step(w, base, h, z, work, atol, size, phase, p):
-    """Take a step of length h by the walker's present method; returns its error norm."""
+    """Take a step of length h by the stepper's present method, and return its error norm."""
     if w.stiff:
         u = work.k[1:]
         w.evaluations += size.size + 1 + rosenbrock.STIFF_STAGES
@@ -231,11 +231,12 @@ def try_step(w, base, h, z, work, atol, size, phase, p):
 
 @inline_llvm
 def observe_step(w, base, h, z, work, phase, p, tally):
-    """Observe the step's interpolant at its nodes; returns every which one.
+    """Observe the step's interpolant at its nodes; return their stride: 1 for all, 2 for ends and
+    middle.
 
-    An explicit step is looked at in its middle and at its ends, where its last stage has gauged
-    it already; also between them if a peak may be beaten, or if contact may change, for which the
-    interpolant is laid.
+    An explicit step is observed in its middle and at its ends, where its last stage has observed it
+    already; also between them if a peak may be beaten, or if contact may change, for which the
+    interpolant is computed.
     """
     last = NODES.size - 1
     n = work.y.size
@@ -272,18 +273,16 @@ def observe_step(w, base, h, z, work, phase, p, tally):
 
 @inline_llvm
 def onset_ahead(w, h, every, work, phase, p):
-    """Return whether contact begins within the step just taken.
+    """Return whether contact begins within the step just tried, which must then end there.
 
-    It is then to be taken again, to there.
-
-    Looked for only where the nodes of the step let it be. The step after the landing is kept
-    within the pulse that begins, or to the contact's own time scale.
+    Searched only where the nodes of the step let it be. The step after the landing is kept within
+    the pulse that begins, or to the contact's own time scale.
     """
     found = False
     if w.watch and w.has_dense and may_touch(work.rows, p):
         begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
         # a step that begins on an onset finds it again at its start: to land there would never end
-        if begin < 1.0 and not (w.landed and begin < LANDED_SHARE):
+        if begin < 1.0 and not (w.landed and begin < LANDING_FRACTION):
             found = True
             w.landing = begin * h
             # the error control knows nothing of a pulse that the last step did not see
@@ -310,27 +309,27 @@ def sample_grid(w, t_end, h, z, work, times, states):
 
 
 @inline_llvm
-def measure_apart(w, h, every, work, phase, p):
+def measure_gap_fractions(w, h, every, work, phase, p):
     """Write the share of a step that each joint is without contact.
 
     Where it changes between two nodes, to where it does on the interpolant, if that is laid.
     """
     for joint in range(2):
-        apart = 0.0
+        gap_fraction = 0.0
         if p.clearance[joint] > 0.0:
             # F_N has a corner where contact changes, so that no quadrature over nodes is exact
             for i in range(every, NODES.size, every):
                 low, high = NODES[i - every], NODES[i]
                 before = work.rows[i - every, NEARNESS + joint]
                 after = work.rows[i, NEARNESS + joint]
-                share = share_apart(before, after)
+                share = gap_fraction_between(before, after)
                 if 0.0 < share < 1.0 and w.has_dense:
-                    s = change(
+                    s = locate_change(
                         joint, low, high, before, after, w.t, h, work.dense, phase, p, work.y
                     )
                     share = (s - low if after > 0.0 else high - s) / (high - low)
-                apart += share * (high - low)
-        work.apart[joint] = apart
+                gap_fraction += share * (high - low)
+        work.gap_fraction[joint] = gap_fraction
 
 
 @inline_llvm
@@ -344,18 +343,18 @@ def accumulate_metrics(w, h, every, work, phase, p, tally):
     tally_energy(work.row, work.new[n:], tally)
     measured = w.t >= w.settle
     if measured:
-        measure_apart(w, h, every, work, phase, p)
+        measure_gap_fractions(w, h, every, work, phase, p)
     weights = WEIGHTS if every == 1 else COARSE_WEIGHTS
-    tally_step(h, NODES, weights, work.rows, every, work.apart, measured, tally, p)
+    tally_step(h, NODES, weights, work.rows, every, work.gap_fraction, measured, tally, p)
 
 
 @inline_llvm
 def finish_at_event(w, h, work, phase, p, tally):
-    """Note that a step of length h has ended on an onset; whether joints carry new speeds."""
+    """Return whether joints carry new speeds after a step of length h that ends on an onset."""
     w.landing = 0.0
     w.landed = 1
     w.onsets += 1
-    return has_chosen_laws(p) and remember(w, w.t + h, work, phase, p, tally)
+    return has_chosen_laws(p) and store_approach_velocity(w, w.t + h, work, phase, p, tally)
 
 
 @jit
@@ -369,7 +368,7 @@ def is_finite(new):
 
 @inline_llvm
 def accept_step(w, z, work, reached, fresh, at_edge, segments):
-    """Move the walker to the end of the step that was taken, and into the next segment.
+    """Move the stepper to the end of the step that was taken, and into the next segment.
 
     fresh: whether its last stage is not the next step's first.
     """
@@ -388,7 +387,7 @@ def accept_step(w, z, work, reached, fresh, at_edge, segments):
 
 @inline_llvm
 def stop_beyond(w, z, tally, p):
-    """Stop a walker whose motion has left what the model describes."""
+    """Stop a stepper whose motion has left what the model describes."""
     if tally.deepest > w.deepest:
         w.status = PENETRATION_IMPLAUSIBLE
     elif not is_finite(z):
@@ -399,9 +398,9 @@ def stop_beyond(w, z, tally, p):
 
 @jit
 def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit):
-    """Advance by at most `limit` step attempts; w.status tells how the walker stands then.
+    """Advance by at most `limit` step attempts; w.status tells how the stepper stands then.
 
-    w: walker; p: record; z: motion and flows, (n + 4,); work: scratch, carried between calls;
+    w: stepper; p: record; z: motion and flows, (n + 4,); work: scratch, carried between calls;
     atol, size: absolute tolerance and natural size of each number of the motion, (n,); edges,
     phases: the load's segments; times, states: output grid (m,) and (m, n); tally: gathers
     metrics. z, w, work, states and tally are written.
@@ -410,7 +409,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         without_refcount(work.k), without_refcount(work.new), without_refcount(work.column),
         without_refcount(work.jacobian), without_refcount(work.dense),
         without_refcount(work.weights), without_refcount(work.y), without_refcount(work.rows),
-        without_refcount(work.apart), without_refcount(work.row),
+        without_refcount(work.gap_fraction), without_refcount(work.row),
     )  # fmt: skip
     z, atol, size = without_refcount(z), without_refcount(atol), without_refcount(size)
     times, states = without_refcount(times), without_refcount(states)
@@ -475,16 +474,16 @@ def separation(t, y, other, p, rows):
 
 
 @inline_llvm
-def step_twin(w, fellow, twin, work, atol, size, phase, p):
-    """Take the step that a walker took, from fellow.t on, in the twin's motion."""
-    if fellow.fresh:
-        derivative_with_flows(fellow.t, twin, phase, p, work.k[0])
-    base = crank_direction(fellow.t, p)
-    try_step(fellow, base, w.taken, twin, work, atol, size, phase, p)
+def step_twin(w, twin_stepper, twin, work, atol, size, phase, p):
+    """Take the step that a stepper took, from twin_stepper.t on, in the twin's motion."""
+    if twin_stepper.fresh:
+        derivative_with_flows(twin_stepper.t, twin, phase, p, work.k[0])
+    base = crank_direction(twin_stepper.t, p)
+    try_step(twin_stepper, base, w.taken, twin, work, atol, size, phase, p)
     for i in range(twin.size):
         twin[i] = work.new[i]
         work.k[0, i] = work.k[STAGES - 1, i]
-    fellow.fresh = w.fresh
+    twin_stepper.fresh = w.fresh
 
 
 @inline_llvm
@@ -494,34 +493,34 @@ def match_contact_speeds(w, z, twin, work, phase, p):
     for joint in range(2):
         if p.clearance[joint] > 0.0:
             place = 2 * p.freedoms + joint
-            _, speed = meeting(joint, w.t, z[:n], phase, p, work.y, work.column[:n])
+            _, speed = approach_at(joint, w.t, z[:n], phase, p, work.y, work.column[:n])
             if z[place] == max(speed, p.least_approach):  # it has met just now
-                _, speed = meeting(joint, w.t, twin[:n], phase, p, work.y, work.column[:n])
+                _, speed = approach_at(joint, w.t, twin[:n], phase, p, work.y, work.column[:n])
                 twin[place] = max(speed, p.least_approach)
 
 
 @jit
 def march_twins(
-    w, fellow, p, z, twin, work, twin_work, atol, size, edges, phases, times, states, tally,
+    w, twin_stepper, p, z, twin, work, twin_work, atol, size, edges, phases, times, states, tally,
     rows, far, limit,
 ):  # fmt: skip
-    """`march` with a twin in step, until they are `far` apart; fellow.status is then DONE.
+    """Advance a motion and a twin in step, until they are `far` apart: twin_stepper is then DONE.
 
-    fellow: the twin's walker, of the same pair; twin: its motion and flows, (n + 4,); far: as
-    share of the clearance; rows: scratch, (2, COLUMNS). The rest as for `march`.
+    twin_stepper: of the same pair; twin: its motion and flows, (n + 4,); far: as a share of the
+    clearance; rows: scratch, (2, COLUMNS). The rest as for `march`.
     """
     n = size.size
     for _ in range(limit):
         if w.status != RUNNING:
             return
         steps, phase = w.steps, phases[w.segment]
-        fellow.t, fellow.stiff = w.t, w.stiff
+        twin_stepper.t, twin_stepper.stiff = w.t, w.stiff
         # a plain 1 would be a type of its own, for which numba compiles all of march again
         march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))
         if w.steps > steps:
-            step_twin(w, fellow, twin, twin_work, atol, size, phase, p)
+            step_twin(w, twin_stepper, twin, twin_work, atol, size, phase, p)
             if has_chosen_laws(p) and w.landed:
                 match_contact_speeds(w, z, twin, twin_work, phase, p)
             if not separation(w.t, z[:n], twin[:n], p, rows) <= far:
-                fellow.status = DONE
+                twin_stepper.status = DONE
                 return

@@ -17,9 +17,9 @@ from compressor.physics.systems import contact_at, derivative
 SAMPLES = 12  # intervals of a step that are looked at
 STEP_EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
 LOOKS = SAMPLES + 2
-HALVINGS = 40
-PLACED = 1e-5  # of a step: as well as a change of contact is placed for the metrics
-LANDED_SHARE = 1e-3  # of a step: an onset nearer to its start is the one it started from
+MAX_HALVINGS = 40
+CHANGE_TOLERANCE = 1e-5  # of a step: as well as a change of contact is placed for the metrics
+LANDING_FRACTION = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NEVER = 2.0  # a fraction of the step beyond its end
 
 
@@ -83,9 +83,9 @@ def nearness_at(joint, s, t, h, dense, phase, p, y):
 
 
 @jit
-def crossing(joint, low, high, t, h, dense, phase, p, y):
+def locate_onset(joint, low, high, t, h, dense, phase, p, y):
     """Return the fraction at which contact begins, between `low` (apart) and `high` (touching)."""
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         middle = 0.5 * (low + high)
         if nearness_at(joint, middle, t, h, dense, phase, p, y) > 0.0:
             high = middle
@@ -105,7 +105,7 @@ def touching_between(joint, low, high, t, h, dense, phase, p, y):
     right = low + golden * (high - low)
     at_left = nearness_at(joint, left, t, h, dense, phase, p, y)
     at_right = nearness_at(joint, right, t, h, dense, phase, p, y)
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         if at_left > 0.0:
             return left
         if at_right > 0.0:
@@ -122,7 +122,7 @@ def touching_between(joint, low, high, t, h, dense, phase, p, y):
 
 
 @jit
-def place(i):
+def look_fraction(i):
     """Return the fraction of a step at which look i, 0 to LOOKS, is taken."""
     if i <= 1:
         return i * STEP_EDGE
@@ -142,24 +142,24 @@ def joint_onset(joint, t, h, dense, phase, p, y):
     before = earlier
     begin = NEVER
     for i in range(1, LOOKS + 1):
-        s = place(i)
+        s = look_fraction(i)
         now = nearness_at(joint, s, t, h, dense, phase, p, y)
         if begin < NEVER:
             if now <= 0.0:
                 return begin, s
         elif now > 0.0:
             if before <= 0.0:
-                begin = crossing(joint, place(i - 1), s, t, h, dense, phase, p, y)
+                begin = locate_onset(joint, look_fraction(i - 1), s, t, h, dense, phase, p, y)
         # a pulse shorter than the distance of two looks shows as a maximum between them
         elif i > 1 and before >= earlier and before >= now and before <= 0.0:
-            low, middle = place(i - 2), place(i - 1)
+            low, middle = look_fraction(i - 2), look_fraction(i - 1)
             # where the nearness is concave, its top lies below the two chords prolonged
             rise = (before - earlier) * (s - middle) / (middle - low)
             fall = (before - now) * (middle - low) / (s - middle)
             if before + rise + fall > 0.0:
                 inside = touching_between(joint, low, s, t, h, dense, phase, p, y)
                 if inside < NEVER:
-                    return crossing(joint, low, inside, t, h, dense, phase, p, y), s
+                    return locate_onset(joint, low, inside, t, h, dense, phase, p, y), s
         earlier, before = before, now
     if begin < NEVER:
         return begin, 1.0
@@ -179,20 +179,20 @@ def first_onset(t, h, dense, phase, p, y):
 
 
 @jit
-def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
-    """Return the fraction at which contact begins or ends between two others, to PLACED.
+def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
+    """Return the fraction at which contact begins or ends between two others, to CHANGE_TOLERANCE.
 
     at_low, at_high: the nearness at low and high, of different signs. Two looks where the line
     through both ends crosses zero, then one halfway: where contact ends, the nearness has a corner.
     """
     looks = 0
     # the secant alone stalls at the corner: one end of the bracket would never move
-    while high - low > PLACED:
+    while high - low > CHANGE_TOLERANCE:
         looks += 1
         s = 0.5 * (low + high)
         if looks % 3 > 0:
             s = (low * at_high - high * at_low) / (at_high - at_low)
-            s = min(max(s, low + 0.5 * PLACED), high - 0.5 * PLACED)
+            s = min(max(s, low + 0.5 * CHANGE_TOLERANCE), high - 0.5 * CHANGE_TOLERANCE)
         now = nearness_at(joint, s, t, h, dense, phase, p, y)
         if (now > 0.0) == (at_high > 0.0):
             high, at_high = s, now
@@ -202,7 +202,7 @@ def change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
 
 
 @jit
-def meeting(joint, t, y, phase, p, rates, before):
+def approach_at(joint, t, y, phase, p, rates, before):
     """Return how near a joint's contact is to its begin, at a time and a state within a hair of it.
 
     Returns its penetration (m) there, and the speed (m/s) at which its gap closes, at the moment
@@ -210,7 +210,7 @@ def meeting(joint, t, y, phase, p, rates, before):
     scratch, (n,).
     """
     now = contact_at(joint, t, y, phase, p)
-    # the landing lies within HALVINGS of the onset, not on it: go back, or on, by the difference
+    # the landing lies near the onset, not on it: go back, or on, by the difference
     since = now.penetration / now.rate if now.rate > 0.0 else 0.0
     derivative(t, y, phase, p, rates)
     for i in range(y.size):
@@ -219,11 +219,11 @@ def meeting(joint, t, y, phase, p, rates, before):
 
 
 @inline_llvm
-def remember(w, t, work, phase, p, tally):
-    """Have joints that meet again after a flight carry the speed at which they do.
+def store_approach_velocity(w, t, work, phase, p, tally):
+    """Store the speed at which joints meet again after a flight; return whether one does.
 
-    At the time of a landing: a joint meets where its gap closes within LANDED of the next step.
-    Returns whether one does.
+    At the time of a landing: a joint meets where its gap closes within `LANDING_FRACTION` of the
+    next step. Laws with restitution damp by this speed as long as the contact lasts.
     """
     met = False
     n = work.y.size
@@ -232,8 +232,8 @@ def remember(w, t, work, phase, p, tally):
         apart = min(begin[PENETRATION + joint], middle[PENETRATION + joint])
         flown = tally.flown[joint] > 0 or apart < 0.0
         if p.clearance[joint] > 0.0 and flown and not tally.touching[joint]:
-            depth, speed = meeting(joint, t, work.new[:n], phase, p, work.y, work.column[:n])
-            if depth + LANDED_SHARE * w.h * speed > 0.0:
+            depth, speed = approach_at(joint, t, work.new[:n], phase, p, work.y, work.column[:n])
+            if depth + LANDING_FRACTION * w.h * speed > 0.0:
                 work.new[2 * p.freedoms + joint] = max(speed, p.least_approach)
                 met = True
     return met

@@ -1,8 +1,8 @@
 """Whether a step is taken, how long the next one is, and which method takes it.
 
 PI control of the error, a first step from the rates, and the measured test for stiffness by which
-a walker turns to the stiff partner and back. Functions of numbers alone are the rules that `march`
-and its lanes (`lane_tally`) both call.
+a stepper turns to the stiff partner and back. Functions of numbers alone are the rules that `march`
+and its lanes (`lane_control`) both call.
 """
 
 import math
@@ -25,16 +25,16 @@ UNFINISHED = 0.1  # of a step without a finite error: the next attempt's length
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 # stiffness: an explicit step is held by stability where h |lambda| exceeds the limit
 STABILITY_LIMIT = 3.25  # of both pairs on the negative real axis, about
-SUSPECT = 0.6  # of the limit: under PI control, steps held by stability swing around it
-EVERY = 4  # explicit steps from one test to the next
-STIFF_STEPS, CALM_STEPS = 15, 10  # in a row, before a change of method
-REST, LONGEST_REST = 50, 2000  # steps without a test after a change back; doubled after each
+LIMITED_REACH = 0.6  # of the limit: under PI control, steps held by stability swing around it
+TEST_INTERVAL = 4  # explicit steps from one test to the next
+STEPS_BEFORE_STIFF, STEPS_BEFORE_EXPLICIT = 15, 10  # in a row, before a change of method
+MIN_TEST_PAUSE, MAX_TEST_PAUSE = 50, 2000  # steps without a test after a change back
 
 spectral_radius = rosenbrock.spectral_radius
 
 
 class Mode(IntEnum):
-    """Which methods a walker may use."""
+    """Which methods a stepper may use."""
 
     AUTO = 0  # explicit, and the stiff partner where stability holds the explicit steps
     EXPLICIT = 1
@@ -48,7 +48,7 @@ AUTO = int(Mode.AUTO)
 def step_error(w, before, after, step):
     """Return the estimated error of each number of an attempted step, flows included, (n + 4,).
 
-    `w`: the walker before it; `before` and `after`: `Work.k` then and now; `step` (s): its length.
+    `w`: the stepper before it; `before` and `after`: `Work.k` then and now; `step` (s): its length.
     """
     if w.stiff:
         return after[rosenbrock.STIFF_STAGES]
@@ -172,14 +172,14 @@ def count_limited(limited, reach):
 
     One test alone decides nothing: under PI control such steps swing around the limit.
     """
-    return limited + EVERY if reach > SUSPECT else max(0, limited - EVERY)
+    return limited + TEST_INTERVAL if reach > LIMITED_REACH else max(0, limited - TEST_INTERVAL)
 
 
 @inline_llvm
 def begin_stiff_steps(w):
     """Change to the stiff partner where stability has held the explicit steps for a while."""
-    if w.stability_limited >= STIFF_STEPS:
-        w.stiff, w.stability_limited, w.explicit_would_do, w.steps_saved = 1, 0, 0, 0.0
+    if w.stability_limited >= STEPS_BEFORE_STIFF:
+        w.stiff, w.stability_limited, w.explicit_ok, w.steps_saved = 1, 0, 0, 0.0
 
 
 @inline_llvm
@@ -195,17 +195,18 @@ def choose_method(w, h, z, work, size):
     if w.steps_to_test > 0:
         w.steps_to_test -= 1
         return
-    if not w.stiff and w.steps % EVERY:
+    if not w.stiff and w.steps % TEST_INTERVAL:
         return  # an estimate costs a tenth of an explicit step
     reach = h * stiff_rate(w, h, z, work, size) / STABILITY_LIMIT
     if w.stiff:
         price = (size.size + rosenbrock.STIFF_STAGES + 0.2 * size.size**2) / (STAGES - 1)
-        w.explicit_would_do = w.explicit_would_do + 1 if reach < price else 0
+        w.explicit_ok = w.explicit_ok + 1 if reach < price else 0
         w.steps_saved += reach - price
-        if w.explicit_would_do >= CALM_STEPS:
-            w.stiff, w.explicit_would_do, w.stability_limited = 0, 0, 0
+        if w.explicit_ok >= STEPS_BEFORE_EXPLICIT:
+            w.stiff, w.explicit_ok, w.stability_limited = 0, 0, 0
             # a machine that changes at every contact would pay for each change: rest longer
-            w.test_pause = REST if w.steps_saved > 0.0 else min(2 * w.test_pause, LONGEST_REST)
+            longer = min(2 * w.test_pause, MAX_TEST_PAUSE)
+            w.test_pause = MIN_TEST_PAUSE if w.steps_saved > 0.0 else longer
             w.steps_to_test = w.test_pause
             w.h = min(w.h, h / max(reach, 1.0))
     else:

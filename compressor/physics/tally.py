@@ -1,4 +1,4 @@
-"""Metrics and energy ledger of a run, gathered step by step from observed rows.
+"""The tally: an accumulator of a run's metrics and energy ledger, from rows observed at its steps.
 
 `tally_step` takes rows at the Gauss-Lobatto nodes of a step's dense solution, so that a peak
 between two output samples counts; `tally_energy` audits the energy at every step's end.
@@ -125,7 +125,7 @@ def peak_of(nodes, rows, every, column, known, size):
     """Return the greater of `known` and the largest value of a column over a step, or |value|.
 
     The step's nodes count, `every` first, second, ... of them, and the parabola through the best.
-    size: whether |value| is meant. `lane_tally.top_and_vertex` is the same without a branch.
+    size: whether |value| is meant. `lane_control.top_and_vertex` is the same without a branch.
     """
     last = nodes.size - 1
     best, top = 0, -math.inf
@@ -205,7 +205,7 @@ def near_record(rows, middle, tally):
 
 
 @inline_llvm
-def share_apart(before, after):
+def gap_fraction_between(before, after):
     """Return the share of the way from one nearness to another that is without contact, by a
     straight line.
     """
@@ -216,13 +216,13 @@ def share_apart(before, after):
 
 
 @jit
-def shares_apart(nodes, rows, apart):
+def write_gap_fractions(nodes, rows, gap_fraction):
     """Write the share of a step that each joint is without contact, by lines between its nodes."""
-    apart[:] = 0.0
+    gap_fraction[:] = 0.0
     for joint in range(2):
         for i in range(1, nodes.size):
             before, after = rows[i - 1, NEARNESS + joint], rows[i, NEARNESS + joint]
-            apart[joint] += (nodes[i] - nodes[i - 1]) * share_apart(before, after)
+            gap_fraction[joint] += (nodes[i] - nodes[i - 1]) * gap_fraction_between(before, after)
 
 
 @jit
@@ -237,7 +237,7 @@ def contact_within(rows, joint):
 
 
 @inline_llvm
-def observe_node(touching, flown, impacts, releases, normal, depth, counts):
+def count_contacts(touching, flown, impacts, releases, normal, depth, counts):
     """Return the same four after a node of a step: whether a joint touches, whether its journal was
     off its bore since the last contact, and how many contacts began after flight or without it.
 
@@ -250,13 +250,13 @@ def observe_node(touching, flown, impacts, releases, normal, depth, counts):
 
 
 @inline_llvm
-def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
+def tally_contact(joint, span, nodes, rows, every, gap_fraction, measured, tally):
     """Add a step's contact loss, impacts, releases and penetration at one joint."""
     touching, flown = tally.touching[joint] > 0, tally.flown[joint] > 0
     impacts, releases = tally.impacts[joint], tally.releases[joint]
     for i in range(0, nodes.size, every):
         depth = rows[i, PENETRATION + joint]
-        touching, flown, impacts, releases = observe_node(
+        touching, flown, impacts, releases = count_contacts(
             touching, flown, impacts, releases, rows[i, NORMAL + joint], depth, measured
         )
         tally.deepest = max(tally.deepest, depth)
@@ -266,7 +266,7 @@ def tally_contact(joint, span, nodes, rows, every, apart, measured, tally):
         known = tally.max_penetration[joint]
         column = PENETRATION + joint
         tally.max_penetration[joint] = peak_of(nodes, rows, every, column, known, False)
-        tally.loss_seconds[joint] += apart[joint] * span
+        tally.loss_seconds[joint] += gap_fraction[joint] * span
 
 
 @jit
@@ -321,21 +321,21 @@ add_time = dispatch_on_record(MECHANISM, add_both_seconds, add_seconds)
 
 
 @inline_llvm
-def tally_step(span, nodes, weights, rows, every, apart, measured, tally, p):
+def tally_step(span, nodes, weights, rows, every, gap_fraction, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
 
     nodes, weights: (m,), both ends of the step and between them; rows: (m, COLUMNS), observed at
     the nodes; every: 1, or 2 where only the first, third, ... row is filled, with `weights` zero
-    at the others; apart: (2,), share of the step without contact, by joint; measured: whether the
-    metrics count (after settling); the depth of contact over the whole run always does.
+    at the others; gap_fraction: (2,), share of the step without contact, by joint; measured:
+    whether the metrics count (after settling); the depth of contact over the whole run always does.
 
     span is that of a steady crank; what is tallied are shares and means of the time that passes.
     """
     passing = span * pace_of_step(weights, rows, every, p)
     if p.clearance[0] > 0.0:
-        tally_contact(0, passing, nodes, rows, every, apart, measured, tally)
+        tally_contact(0, passing, nodes, rows, every, gap_fraction, measured, tally)
     if p.clearance[1] > 0.0:
-        tally_contact(1, passing, nodes, rows, every, apart, measured, tally)
+        tally_contact(1, passing, nodes, rows, every, gap_fraction, measured, tally)
     if not measured:
         return
     add_time(span, passing, tally, p)

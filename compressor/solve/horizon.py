@@ -28,7 +28,7 @@ from compressor.physics import (
     segments,
 )
 from compressor.reasons import Reason
-from compressor.solve.march_driver import CHUNK, check_march, ready_walker
+from compressor.solve.march_driver import CHUNK, check_march, prepare_stepper
 from compressor.solve.request import Request, Stop, with_cuts
 from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record
 
@@ -100,7 +100,7 @@ class Twins:
         self.edges, self.phases, self.ends = with_cuts(edges, phases, request.cuts)
         self.size = natural_sizes(request.p)
         n = self.size.size
-        self.walker, self.fellow = (ready_walker(request, self.size) for _ in range(2))
+        self.stepper, self.twin_stepper = (prepare_stepper(request, self.size) for _ in range(2))
         self.z, self.twin = (np.append(y, np.zeros(FLOWS)) for y in (request.start, shifted))
         self.work, self.twin_work = new_work(n), new_work(n)
         self.rows, self.tally = np.zeros((2, COLUMNS)), new_tally(request.p)
@@ -111,22 +111,22 @@ class Twins:
 
         far: as a share of the clearance. Raises Stop.
         """
-        request, walker, fellow = self.request, self.walker, self.fellow
-        walker.status = Status.RUNNING
-        while walker.status == Status.RUNNING and fellow.status == Status.RUNNING:
-            left = request.max_steps - walker.steps - walker.rejected
+        request, stepper, twin_stepper = self.request, self.stepper, self.twin_stepper
+        stepper.status = Status.RUNNING
+        while stepper.status == Status.RUNNING and twin_stepper.status == Status.RUNNING:
+            left = request.max_steps - stepper.steps - stepper.rejected
             march_twins(
-                walker, fellow, request.p, self.z, self.twin, self.work, self.twin_work,
+                stepper, twin_stepper, request.p, self.z, self.twin, self.work, self.twin_work,
                 request.rtol * self.size, self.size, self.edges[: count + 1], self.phases[:count],
                 request.times, self.states, self.tally, self.rows, far, min(CHUNK, left),
             )  # fmt: skip
-            if Status.DONE not in (walker.status, fellow.status):
+            if Status.DONE not in (stepper.status, twin_stepper.status):
                 self.check()
-        return bool(fellow.status == Status.DONE)
+        return bool(twin_stepper.status == Status.DONE)
 
     def check(self) -> None:
         """Raise Stop where one of the two may go no further, or the time is up."""
-        check_march(self.request, self.walker, self.z, float(self.tally.deepest), self.deadline)
+        check_march(self.request, self.stepper, self.z, float(self.tally.deepest), self.deadline)
         if not np.isfinite(self.twin).all():
             raise Stop(Reason.NON_FINITE, "the twin is no longer finite")
 
@@ -137,10 +137,10 @@ def follow_twins(request: Request, shifted: np.ndarray, far: float = PARTED_DIST
     request: of a compiled method; shifted: the twin's initial state.
     """
     twins = Twins(request, shifted)
-    walker, parted, whole = twins.walker, False, False
+    stepper, parted, whole = twins.stepper, False, False
     try:
         parted = twins.advance(twins.phases.size, far)
         whole = not parted
     except Stop:
         pass
-    return Parting(float(walker.t), parted, whole, int(walker.steps + walker.rejected))
+    return Parting(float(stepper.t), parted, whole, int(stepper.steps + stepper.rejected))

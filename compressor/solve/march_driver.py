@@ -1,8 +1,7 @@
 """Integrate by the compiled march, in chunks between which budgets are checked.
 
-The last steps of a march that has stopped, taken once more and looked at one by one. A march is
-resumable to the bit, so that nothing needs to be kept of a run that ends well but how it stood
-before its last chunk.
+A march can be resumed to the bit. So a run that ends well leaves nothing behind, and one that stops
+is taken up again from its last checkpoint, to record its last steps one by one.
 """
 
 import math
@@ -19,8 +18,9 @@ from compressor.physics import (
     Status,
     WorkArrays,
     derivative_with_flows,
+    is_last_step,
     march,
-    new_walker,
+    new_stepper,
     new_work,
     step_error,
 )
@@ -52,9 +52,9 @@ CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an o
 
 
 class MarchState(NamedTuple):
-    """How a march stands: all that `march` writes but the output samples."""
+    """All that `march` writes but the output samples."""
 
-    walker: np.record
+    stepper: np.record
     z: np.ndarray  # motion and flows, (n + 4,)
     work: WorkArrays
     tally: np.record
@@ -62,22 +62,22 @@ class MarchState(NamedTuple):
     def copy(self) -> "MarchState":
         """Return a copy that a march may go on from."""
         work = WorkArrays(*(array.copy() for array in self.work))
-        return MarchState(self.walker.copy(), self.z.copy(), work, self.tally.copy())
+        return MarchState(self.stepper.copy(), self.z.copy(), work, self.tally.copy())
 
     @property
     def attempts(self) -> int:
         """Steps attempted so far: taken, refused, and those that an onset cut short."""
-        w = self.walker
+        w = self.stepper
         return int(w.steps + w.rejected + w.onsets + (w.landing > 0.0))
 
 
 class Checkpoint(NamedTuple):
-    """What is kept of a standing to go on from it: of its work, what a call of `march` reads.
+    """A `MarchState` to resume from: of its work arrays, what a call of `march` reads.
 
-    Records are kept as bytes: numpy takes five microseconds to copy one, a fiftieth for these.
+    Records are stored as bytes: numpy takes five microseconds to copy one, a fiftieth for these.
     """
 
-    walker: bytes
+    stepper: bytes
     z: np.ndarray
     rates: np.ndarray  # work.k[0]
     row: np.ndarray
@@ -86,19 +86,19 @@ class Checkpoint(NamedTuple):
 
     @classmethod
     def of(cls, now: MarchState) -> "Checkpoint":
-        """Return a snapshot, in about a microsecond."""
+        """Return a checkpoint, in about a microsecond."""
         work = now.work
         return cls(
-            now.walker.tobytes(), now.z.copy(), work.k[0].copy(), work.row.copy(),
+            now.stepper.tobytes(), now.z.copy(), work.k[0].copy(), work.row.copy(),
             now.tally.tobytes(), now.tally.dtype,
         )  # fmt: skip
 
-    def standing(self) -> MarchState:
-        """Return a march as it stood then."""
+    def restore(self) -> MarchState:
+        """Return the state at the checkpoint."""
         work = new_work(self.z.size - FLOWS)
         work.k[0], work.row[:] = self.rates, self.row
         return MarchState(
-            unpack_record(self.walker, new_walker(0).dtype),
+            unpack_record(self.stepper, new_stepper(0).dtype),
             self.z.copy(),
             work,
             unpack_record(self.tally, self.kind),
@@ -112,7 +112,7 @@ def unpack_record(data: bytes, kind: np.dtype) -> np.record:
 
 @dataclass(frozen=True)
 class March:
-    """A request as the compiled loop takes it.
+    """A request in the form that the compiled loop takes.
 
     `size`: of each number of the motion, (n,); `edges`, `phases`: the load's segments; `states`:
     the output samples, which are written.
@@ -131,24 +131,24 @@ class March:
         if segments is not None:
             edges, phases = edges[: segments + 1], phases[:segments]
         march(
-            now.walker, request.p, now.z, now.work, request.rtol * size, size, edges, phases,
+            now.stepper, request.p, now.z, now.work, request.rtol * size, size, edges, phases,
             request.times, self.states, now.tally, attempts,
         )  # fmt: skip
 
 
-def ready_walker(request: Request, size: np.ndarray) -> np.record:
-    """Return a walker at the start of a run by a compiled method; `size` as of `natural_sizes`."""
+def prepare_stepper(request: Request, size: np.ndarray) -> np.record:
+    """Return a stepper at the start of a run by a compiled method; `size` as of `natural_sizes`."""
     mode, pair = COMPILED[request.method]
-    walker = new_walker(mode)
-    walker["pair"], walker["rtol"] = pair, request.rtol
+    stepper = new_stepper(mode)
+    stepper["pair"], stepper["rtol"] = pair, request.rtol
     length, speed = contact_sizes(request.p, size)
-    walker["watch"], walker["contact_step"] = 1, CONTACT_STEP * length / speed
-    walker["deepest"] = greatest_depth(request.p)[0]
-    return walker
+    stepper["watch"], stepper["contact_step"] = 1, CONTACT_STEP * length / speed
+    stepper["deepest"] = greatest_depth(request.p)[0]
+    return stepper
 
 
 def retrace(before: MarchState, after: MarchState, march: March) -> History:
-    """Return the history of a march that stood like `before` and stopped like `after`.
+    """Return the history of a march from the state `before` to that at its stop, `after`.
 
     `before` is written.
     """
@@ -158,17 +158,17 @@ def retrace(before: MarchState, after: MarchState, march: March) -> History:
     found = History()
     for _ in range(min(made, LAST)):
         now = before.copy()
-        w = now.walker
+        w = now.stepper
         if w.fresh:
             phase = int(march.phases[w.segment])
             derivative_with_flows(w.t, now.z, phase, march.request.p, now.work.k[0])
         march.advance(before, 1)
-        step = attempted_length(now.walker, before.walker, float(march.edges[w.segment + 1]))
+        step = attempted_length(now.stepper, before.stepper, float(march.edges[w.segment + 1]))
         scaled = scaled_error(now, before, step, march.request.rtol, march.size)
         error = math.sqrt(float(np.mean(scaled**2)))
         p, rates = march.request.p, now.work.k[0]
         time, pace = float(passed_time(p, w.t, now.z)), float(passed_time(p, 1.0, rates))
-        found.add(time, step * pace, error, describe_attempt(now.walker, before.walker))
+        found.add(time, step * pace, error, describe_attempt(now.stepper, before.stepper))
         found.dominant = dominant(scaled, before.work.new[: march.size.size])
     return found
 
@@ -180,7 +180,7 @@ def attempted_length(now: np.record, then: np.record, end: float) -> float:
     if now.landing > 0.0 or now.h == 0.0:
         return float(now.landing) or math.nan
     h = min(now.h, end - now.t)
-    return float(end - now.t if now.t + 1.01 * h >= end else h)
+    return float(end - now.t if is_last_step(now.t, h, end) else h)
 
 
 def scaled_error(
@@ -188,7 +188,7 @@ def scaled_error(
 ) -> np.ndarray:
     """Return the estimated error of each number of the motion over its tolerance, (n,)."""
     n = now.z.size - FLOWS
-    error = step_error(now.walker, now.work.k, then.work.k, step)[:n]
+    error = step_error(now.stepper, now.work.k, then.work.k, step)[:n]
     largest = np.maximum(np.abs(now.z[:n]), np.abs(then.work.new[:n]))
     return error / (rtol * (size + largest))
 
@@ -211,52 +211,52 @@ CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or s
 
 
 def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
-    """Integrate by the compiled loop; raises Stop."""
+    """Integrate by the compiled loop into `result`. Raises Stop."""
     deadline = time.monotonic() + request.timeout
     size = natural_sizes(request.p)
-    walker = ready_walker(request, size)
-    edges, phases, walker["settle"] = with_edge(edges, phases, request.settle)
+    stepper = prepare_stepper(request, size)
+    edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
     march = March(request, size, edges, phases, result.states)
-    now = MarchState(walker, z, new_work(size.size), result.tally)
+    now = MarchState(stepper, z, new_work(size.size), result.tally)
     earlier = before = Checkpoint.of(now)
-    seen = 0  # attempts at the last snapshot
-    while walker.status == Status.RUNNING:
+    seen = 0  # attempts at the last checkpoint
+    while stepper.status == Status.RUNNING:
         if result.steps + result.rejected >= seen + LAST:
             earlier, before = before, Checkpoint.of(now)
             seen = result.steps + result.rejected
-        attempts = min(CHUNK, request.max_steps - walker.steps - walker.rejected)
+        attempts = min(CHUNK, request.max_steps - stepper.steps - stepper.rejected)
         march.advance(now, attempts, ends[0] if ends else phases.size)
-        result.steps, result.rejected = int(walker.steps), int(walker.rejected)
-        result.evaluations = int(walker.evaluations)
-        if walker.status == Status.DONE and ends and request.cuts:
+        result.steps, result.rejected = int(stepper.steps), int(stepper.rejected)
+        result.evaluations = int(stepper.evaluations)
+        if stepper.status == Status.DONE and ends and request.cuts:
             del ends[0]
-            if request.cuts.cut(result.tally, z) and walker.segment < phases.size:
-                walker.status = Status.RUNNING
-        if walker.status == Status.DONE:
+            if request.cuts.cut(result.tally, z) and stepper.segment < phases.size:
+                stepper.status = Status.RUNNING
+        if stepper.status == Status.DONE:
             return
         try:
-            check_march(request, walker, z, float(result.tally.deepest), deadline)
+            check_march(request, stepper, z, float(result.tally.deepest), deadline)
         except Stop:
-            result.stop_time, result.stop_state = float(walker.t), z[:-FLOWS].copy()
+            result.stop_time, result.stop_state = float(stepper.t), z[:-FLOWS].copy()
             enough = result.steps + result.rejected >= seen + LAST
-            result.history = retrace((before if enough else earlier).standing(), now, march)
+            result.history = retrace((before if enough else earlier).restore(), now, march)
             raise
 
 
 def check_march(
-    request: Request, walker: np.record, z: np.ndarray, deepest: float, deadline: float
+    request: Request, stepper: np.record, z: np.ndarray, deepest: float, deadline: float
 ) -> None:
     """Raise Stop where a march has stopped at z, or may go no further."""
-    status = Status(int(walker.status))
+    status = Status(int(stepper.status))
     check_state(request.p, z)
     if status == Status.PENETRATION_IMPLAUSIBLE:
         raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest, request.p))
     if status == Status.NON_FINITE:
         raise Stop(Reason.NON_FINITE, "the state or its rates are no longer finite")
     if status == Status.STEP_UNDERFLOW:
-        raise Stop(Reason.STEP_UNDERFLOW, f"the step has shrunk to {walker.h:.3g} s")
-    if walker.steps + walker.rejected >= request.max_steps:
+        raise Stop(Reason.STEP_UNDERFLOW, f"the step has shrunk to {stepper.h:.3g} s")
+    if stepper.steps + stepper.rejected >= request.max_steps:
         raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
     if time.monotonic() > deadline:
         raise Stop(Reason.BUDGET_SECONDS, overdue(request.timeout))

@@ -20,17 +20,17 @@ from compressor.physics import (
     COLUMNS,
     FLOWS,
     Column,
+    approach_at,
     contact_within,
     derivative_with_flows,
     is_featured,
     lobatto,
-    meeting,
     observe_all,
     sample_segments,
-    shares_apart,
     tally_energy,
     tally_step,
     wear_all,
+    write_gap_fractions,
 )
 from compressor.reasons import Reason
 from compressor.solve.request import (
@@ -47,8 +47,8 @@ from compressor.solve.request import (
 from compressor.solve.si_record import absolute_tolerances, length_and_speed
 
 LOOKS_IN_STEP = 17  # times in a step at which gaps are looked at, both ends included
-HALVINGS = 50
-LANDED_SHARE = 1e-3  # of a step: a gap that closes nearer to its end closes at its end
+MAX_HALVINGS = 50
+LANDING_FRACTION = 1e-3  # of a step: a gap that closes nearer to its end closes at its end
 
 
 def needs_landings(p: np.record) -> bool:
@@ -82,7 +82,7 @@ class Landings:
             closing = (seen[:-1, joint] < 0.0) & (seen[1:, joint] >= 0.0)
             for i in np.flatnonzero(closing & (times[1:] > self.deaf[joint])):
                 apart, touching = times[i], times[i + 1]
-                for _ in range(HALVINGS):
+                for _ in range(MAX_HALVINGS):
                     middle = 0.5 * (apart + touching)
                     if depths(np.array([middle]))[0, joint] >= 0.0:
                         touching = middle
@@ -91,7 +91,7 @@ class Landings:
                 if touching > self.deaf[joint]:
                     first = min(first, touching)
                     break
-        return first if end - first > LANDED_SHARE * (end - begin) else None
+        return first if end - first > LANDING_FRACTION * (end - begin) else None
 
     def land(self, begin: float, end: float, dense, z: np.ndarray) -> None:
         """At the end of a step that began apart: joints whose gaps close there carry their speed.
@@ -101,8 +101,11 @@ class Landings:
         y, rates, before = z[:-FLOWS].copy(), np.empty(z.size - FLOWS), np.empty(z.size - FLOWS)
         apart = self.depths(np.array([begin]), np.ascontiguousarray(dense([begin])[:-FLOWS].T))[0]
         for joint in self.worn:
-            depth, speed = meeting(joint, end, y, self.phase, self.p, rates, before)
-            if apart[joint] < 0.0 < speed and abs(depth) <= LANDED_SHARE * (end - begin) * speed:
+            depth, speed = approach_at(joint, end, y, self.phase, self.p, rates, before)
+            if (
+                apart[joint] < 0.0 < speed
+                and abs(depth) <= LANDING_FRACTION * (end - begin) * speed
+            ):
                 place = 2 * self.p["freedoms"] + joint
                 z[place] = max(speed, self.p["least_approach"])
                 self.deaf[joint] = end + 2.0 * max(0.0, -depth) / speed
@@ -271,7 +274,7 @@ class LoadStretch:
         observe_all(times, states, phases, self.request.p, rows)
         self.check_contact(begin, end - begin, rows)
         tally, p, apart = self.result.tally, self.request.p, np.empty(2)
-        shares_apart(NODES, rows, apart)
+        write_gap_fractions(NODES, rows, apart)
         tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, measured, tally, p)
         if measured and is_featured(p) and p["sectors"]:
             wear_all(times, states, phases, (end - begin) * WEIGHTS, p, tally)

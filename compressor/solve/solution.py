@@ -42,7 +42,7 @@ from compressor.solve.error_bars import (
     unmet,
 )
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.march_driver import LANE_METHODS, ready_walker
+from compressor.solve.march_driver import LANE_METHODS, prepare_stepper
 from compressor.solve.regime import (
     DOUBTFUL,
     HorizonSearch,
@@ -84,7 +84,7 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
             continue
         began = time.perf_counter()
         ended = march_side_by_side([one.run for one in attempts], MAX_ATTEMPTS)
-        whole = sum(int(run.walker["evaluations"]) for run in ended if run)
+        whole = sum(int(run.stepper["evaluations"]) for run in ended if run)
         each = (time.perf_counter() - began) / max(whole, 1)
         for one, run in zip(attempts, ended, strict=True):
             if run:
@@ -115,9 +115,9 @@ def attempts_of(number: int, case: Case) -> list[LaneRequest]:
 
 def with_tolerance(one: LaneRequest, rtol: float) -> LaneRequest:
     """Return the same attempt at another tolerance."""
-    walker = one.run.walker.copy()
-    walker["rtol"] = rtol
-    run, trajectory = one.run._replace(walker=walker), replace(one.trajectory)
+    stepper = one.run.stepper.copy()
+    stepper["rtol"] = rtol
+    run, trajectory = one.run._replace(stepper=stepper), replace(one.trajectory)
     return one._replace(rtol=rtol, run=run, trajectory=trajectory)
 
 
@@ -126,18 +126,18 @@ def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Time
     wanted = request(case, rtol, p, times)
     trajectory, edges, phases, z = prepare_run(wanted)
     size = natural_sizes(p)
-    walker = ready_walker(wanted, size)
-    edges, phases, walker["settle"] = with_edge(edges, phases, wanted.settle)
-    run = Run(walker, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
+    stepper = prepare_stepper(wanted, size)
+    edges, phases, stepper["settle"] = with_edge(edges, phases, wanted.settle)
+    run = Run(stepper, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
     return LaneRequest(number, rtol, times, run, trajectory)
 
 
 def lane_solution(one: LaneRequest, run: Run, each: float) -> Solution:
     """Return an attempt whose run has reached its end; each: wall time (s) of an evaluation."""
-    walker, trajectory = run.walker, one.trajectory
+    stepper, trajectory = run.stepper, one.trajectory
     trajectory.states, trajectory.tally = run.states, run.tally
-    trajectory.steps, trajectory.rejected = int(walker["steps"]), int(walker["rejected"])
-    trajectory.evaluations = int(walker["evaluations"])
+    trajectory.steps, trajectory.rejected = int(stepper["steps"]), int(stepper["rejected"])
+    trajectory.evaluations = int(stepper["evaluations"])
     trajectory.seconds = each * trajectory.evaluations
     return solution_of_trajectory(one.rtol, run.p, one.times, trajectory)
 

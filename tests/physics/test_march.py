@@ -8,7 +8,7 @@ import reference
 
 from compressor.cases.case import Case
 from compressor.physics.loads import segments
-from compressor.physics.march import Status, march, new_walker, new_work
+from compressor.physics.march import Status, march, new_stepper, new_work
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
@@ -55,23 +55,23 @@ def test_a_corner_costs_no_step_that_is_refused():
     by the damper's force, which jumps there."""
     asked = request(1e-8, joint="both", clearance_mm=9)
     edges, phases = segments(asked.p, 0.05)
-    walker, work, size = new_walker(Mode.EXPLICIT), new_work(8), natural_sizes(asked.p)
-    walker.pair, walker.rtol, walker.deepest, walker.settle = (
+    stepper, work, size = new_stepper(Mode.EXPLICIT), new_work(8), natural_sizes(asked.p)
+    stepper.pair, stepper.rtol, stepper.deepest, stepper.settle = (
         RungeKuttaPair.TSIT5,
         1e-8,
         np.inf,
         np.inf,
     )
-    walker.t = edges[1] - 1e-3
+    stepper.t = edges[1] - 1e-3
     z, states, tally = np.zeros(8 + FLOWS), np.zeros((1, 8)), new_tally()
     times = np.array([edges[1] + 1e-3])
     ends = np.array([0.0, edges[1], times[0]])
     march(
-        walker, asked.p, z, work, 1e-8 * size, size, ends, phases[:2], times, states, tally, 200
+        stepper, asked.p, z, work, 1e-8 * size, size, ends, phases[:2], times, states, tally, 200
     )  # fmt: skip
-    assert walker.status == Status.DONE
-    assert walker.t == times[0]
-    assert walker.rejected == 0
+    assert stepper.status == Status.DONE
+    assert stepper.t == times[0]
+    assert stepper.rejected == 0
 
 
 @pytest.mark.compiled

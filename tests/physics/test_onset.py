@@ -14,7 +14,14 @@ from compressor.physics.contact import ContactState, nearness
 from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
-from compressor.physics.march import NODES, Status, march, measure_apart, new_walker, new_work
+from compressor.physics.march import (
+    NODES,
+    Status,
+    march,
+    measure_gap_fractions,
+    new_stepper,
+    new_work,
+)
 from compressor.physics.motion import evaluate, start
 from compressor.physics.observe import (
     COLUMNS,
@@ -24,17 +31,17 @@ from compressor.physics.observe import (
     observe_contact,
 )
 from compressor.physics.onset import (
+    CHANGE_TOLERANCE,
     LOOKS,
     NEVER,
-    PLACED,
     SAMPLES,
     STEP_EDGE,
-    change,
-    crossing,
     first_onset,
     joint_onset,
+    locate_change,
+    locate_onset,
+    look_fraction,
     nearness_at,
-    place,
     touching_between,
 )
 from compressor.physics.record import FREEDOMS, SMALL_END
@@ -123,7 +130,7 @@ def test_first_onset_of_a_joint(coefficients, begin, end):
 
 def test_crossing_is_found_to_the_last_digits():
     dense = small_end_only(CLOSING)
-    found = crossing(SMALL_END, 0.25, 1.0, 0.0, H, dense, 0, parameters(), np.zeros(4))
+    found = locate_onset(SMALL_END, 0.25, 1.0, 0.0, H, dense, 0, parameters(), np.zeros(4))
     assert found == pytest.approx(0.5, abs=1e-11)
     assert nearness_at(SMALL_END, found, 0.0, H, dense, 0, parameters(), np.zeros(4)) > 0
 
@@ -139,8 +146,8 @@ def test_a_change_of_contact_is_placed(coefficients, low, high, at):
 
     p, dense = parameters(), small_end_only(coefficients)
     ends = at_fraction(low), at_fraction(high)
-    found = change(SMALL_END, low, high, *ends, 0.0, H, dense, 0, p, np.zeros(4))
-    assert found == pytest.approx(at, abs=PLACED)
+    found = locate_change(SMALL_END, low, high, *ends, 0.0, H, dense, 0, p, np.zeros(4))
+    assert found == pytest.approx(at, abs=CHANGE_TOLERANCE)
 
 
 @pytest.mark.parametrize(
@@ -148,13 +155,13 @@ def test_a_change_of_contact_is_placed(coefficients, low, high, at):
     [(APART, 1.0), (INSIDE, 0.0), (CLOSING, 0.5), (LEAVING, 0.95), (hump(0.5, 1e-7, 0.2), 0.6)],
 )  # fmt: skip
 def test_the_share_of_a_step_without_contact_ends_where_contact_does(coefficients, apart):
-    p, walker, work = parameters(), new_walker(1), new_work(4)
-    walker.has_dense, work.dense[:] = 1, small_end_only(coefficients)
+    p, stepper, work = parameters(), new_stepper(1), new_work(4)
+    stepper.has_dense, work.dense[:] = 1, small_end_only(coefficients)
     for s, row in zip(NODES, work.rows, strict=True):
         interpolate(s, work.dense, work.y)
         observe_contact(ideal(s * H, p), work.y, 0, p, row)
-    measure_apart(walker, H, 1, work, 0, p)
-    assert work.apart == pytest.approx([0.0, apart], abs=2 * PLACED)
+    measure_gap_fractions(stepper, H, 1, work, 0, p)
+    assert work.gap_fraction == pytest.approx([0.0, apart], abs=2 * CHANGE_TOLERANCE)
 
 
 @pytest.mark.parametrize("height", [PULSE, 1e-14, -1e-14, -PULSE])
@@ -176,7 +183,7 @@ def test_a_journal_that_rests_at_the_edge_does_not_touch():
 
 
 def test_looks_stand_evenly_and_beside_both_ends():
-    looks = [place(i) for i in range(LOOKS + 1)]
+    looks = [look_fraction(i) for i in range(LOOKS + 1)]
     inner = [i / SAMPLES for i in range(1, SAMPLES)]
     assert looks == pytest.approx([0.0, STEP_EDGE, *inner, 1.0 - STEP_EDGE, 1.0], abs=1e-15)
 
@@ -347,20 +354,20 @@ def pulses():
 
 
 def walk(p, y, begin, edges, phases, rtol, watch, times=None, method=METHODS["DOPRI5"]):
-    """March from y at `begin` to the last edge; returns walker, states at `times` and impacts."""
+    """March from y at `begin` to the last edge; returns stepper, states at `times` and impacts."""
     mode, pair = method
     times = edges[-1:] if times is None else times
-    walker, work, size = new_walker(mode), new_work(y.size), natural_sizes(p)
+    stepper, work, size = new_stepper(mode), new_work(y.size), natural_sizes(p)
     length, speed = length_and_speed(p)
-    walker.pair, walker.rtol, walker.watch, walker.t = pair, rtol, watch, begin
-    walker.contact_step, walker.deepest = CONTACT_STEP * length / speed, p.pin_radius[0]
+    stepper.pair, stepper.rtol, stepper.watch, stepper.t = pair, rtol, watch, begin
+    stepper.contact_step, stepper.deepest = CONTACT_STEP * length / speed, p.pin_radius[0]
     tally = new_tally()
     z, states = np.append(y, np.zeros(FLOWS)), np.empty((times.size, y.size))
     march(
-        walker, p, z, work, rtol * size, size, edges, phases, times, states, tally, 10**6
+        stepper, p, z, work, rtol * size, size, edges, phases, times, states, tally, 10**6
     )  # fmt: skip
-    assert walker.status == Status.DONE
-    return walker, states, int(tally.impacts.sum())
+    assert stepper.status == Status.DONE
+    return stepper, states, int(tally.impacts.sum())
 
 
 def walk_pulse(pulse, rtol, watch, times=None, method=METHODS["DOPRI5"]):
@@ -402,8 +409,8 @@ def test_pulses_are_stepped_over_unless_watched(pulses, rtol, share):
     """The constructed pulses are what they should be: short in comparison with the steps."""
     over = 0
     for pulse in pulses:
-        walker, _, impacts = walk_pulse(pulse, rtol, 0)
-        assert walker.onsets == 0
+        stepper, _, impacts = walk_pulse(pulse, rtol, 0)
+        assert stepper.onsets == 0
         over += impacts == 0
     assert over > share * len(pulses)
 
@@ -421,7 +428,7 @@ def test_watching_costs_few_evaluations(rtol):
         start(offsets(case), y, p)
         edges, phases = segments(p, case.duration)
         for watch in (0, 1):
-            walker, _, _ = walk(p, y, 0.0, edges, phases, rtol, watch)
-            evaluations[watch] += walker.evaluations
-            assert (walker.onsets > 0) == watch
+            stepper, _, _ = walk(p, y, 0.0, edges, phases, rtol, watch)
+            evaluations[watch] += stepper.evaluations
+            assert (stepper.onsets > 0) == watch
     assert evaluations[1] < 1.05 * evaluations[0]

@@ -7,18 +7,18 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics import rosenbrock
-from compressor.physics.march import new_walker, new_work
+from compressor.physics.march import new_stepper, new_work
 from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, RungeKuttaPair
 from compressor.physics.step_control import (
-    CALM_STEPS,
-    EVERY,
-    LONGEST_REST,
+    LIMITED_REACH,
+    MAX_TEST_PAUSE,
     MIN_ERROR,
-    REST,
+    MIN_TEST_PAUSE,
     STABILITY_LIMIT,
-    STIFF_STEPS,
-    SUSPECT,
+    STEPS_BEFORE_EXPLICIT,
+    STEPS_BEFORE_STIFF,
+    TEST_INTERVAL,
     Mode,
     choose_method,
     first_step,
@@ -32,8 +32,8 @@ H = 1e-3
 SIZE = np.array([1.0, 2.0, 0.5, 4.0])
 
 
-def walker(mode=Mode.AUTO, **fields):
-    made = new_walker(mode)
+def stepper(mode=Mode.AUTO, **fields):
+    made = new_stepper(mode)
     for name, value in fields.items():
         setattr(made, name, value)
     return made
@@ -44,26 +44,26 @@ def walker(mode=Mode.AUTO, **fields):
 @pytest.mark.parametrize("error", [1.0, 0.3, 0.02])
 def test_an_accepted_step_is_followed_by_pi_control(stiff, order, before, error):
     """h' / h = 0.9 error^(-0.7 / k) before^(0.4 / k)."""
-    w = walker(stiff=stiff, error=math.log(before))
+    w = stepper(stiff=stiff, error=math.log(before))
     found = next_step_length(w, H, error)
     assert found == pytest.approx(H * 0.9 * error ** (-0.7 / order) * before ** (0.4 / order))
     assert w.error == pytest.approx(math.log(error))
 
 
 def test_a_step_grows_and_shrinks_within_limits():
-    assert next_step_length(walker(), H, 0.0) == pytest.approx(5 * H)
-    assert next_step_length(walker(error=math.log(1e-4)), H, 1.0) == pytest.approx(
+    assert next_step_length(stepper(), H, 0.0) == pytest.approx(5 * H)
+    assert next_step_length(stepper(error=math.log(1e-4)), H, 1.0) == pytest.approx(
         0.9 * 10**-0.32 * H
     )
-    assert next_step_length(walker(error=math.log(1e-30)), H, 1.0) == pytest.approx(0.2 * H)
-    w = walker()
+    assert next_step_length(stepper(error=math.log(1e-30)), H, 1.0) == pytest.approx(0.2 * H)
+    w = stepper()
     next_step_length(w, H, 1e-9)
     assert w.error == MIN_ERROR == pytest.approx(math.log(1e-4))
 
 
 @pytest.mark.parametrize(("stiff", "order"), [(0, 5), (1, 4)])
 def test_a_refused_step_is_taken_again_shorter(stiff, order):
-    w = walker(stiff=stiff)
+    w = stepper(stiff=stiff)
     for error, factor in (
         (1.5, 0.9 * 1.5 ** (-1 / order)), (1e9, 0.2), (math.inf, 0.1), (math.nan, 0.1)
     ):  # fmt: skip
@@ -91,7 +91,7 @@ def test_the_first_step_is_hairer_s(rtol, clearance_mm, speed, loose):
     """Solving Ordinary Differential Equations I, II.4, at order 5 with the norm over the motion."""
     t, phase, atol = 0.09, 3, np.repeat([1e-6, loose], 4)
     p, z, work = moving(t, phase, clearance_mm, speed)
-    w = walker(t=t, rtol=rtol)
+    w = stepper(t=t, rtol=rtol)
     found = first_step(w, z, work, atol, phase, p, 1.0)
     assert w.evaluations == 1
     scale = atol + rtol * np.abs(z[:8])
@@ -112,10 +112,10 @@ def test_the_first_step_is_hairer_s(rtol, clearance_mm, speed, loose):
 def test_a_first_step_ends_before_the_corner_and_starts_from_rest():
     p, z, work = moving(0.09, 3)
     atol = np.full(8, 1e-6)
-    assert first_step(walker(t=0.09, rtol=1e-3), z, work, atol, 3, p, 0.09 + 1e-9) <= 1e-9 * 1.001
+    assert first_step(stepper(t=0.09, rtol=1e-3), z, work, atol, 3, p, 0.09 + 1e-9) <= 1e-9 * 1.001
     z[:] = 0.0
     derivative_with_flows(0.09, z, 3, p, work.k[0])
-    assert 0 < first_step(walker(t=0.09, rtol=1e-3), z, work, atol, 3, p, 1.0) <= 1e-4
+    assert 0 < first_step(stepper(t=0.09, rtol=1e-3), z, work, atol, 3, p, 1.0) <= 1e-4
 
 
 def linear_step(pair, eigenvalue):
@@ -131,13 +131,13 @@ def linear_step(pair, eigenvalue):
 @pytest.mark.parametrize("eigenvalue", [-3e3, 40.0])
 def test_an_explicit_step_tells_the_eigenvalue(pair, eigenvalue):
     work, z = linear_step(pair, eigenvalue)
-    found = stiff_rate(walker(pair=pair), H, z, work, SIZE)
+    found = stiff_rate(stepper(pair=pair), H, z, work, SIZE)
     assert found == pytest.approx(abs(eigenvalue), rel=1e-9)
 
 
 def test_a_step_that_stands_still_tells_no_eigenvalue():
     work, z = linear_step(RungeKuttaPair.TSIT5, 0.0)
-    assert stiff_rate(walker(pair=RungeKuttaPair.TSIT5), H, z, work, SIZE) == 0.0
+    assert stiff_rate(stepper(pair=RungeKuttaPair.TSIT5), H, z, work, SIZE) == 0.0
 
 
 def stiff_work(eigenvalues):
@@ -150,7 +150,7 @@ def stiff_work(eigenvalues):
 
 def test_a_stiff_step_tells_the_largest_eigenvalue():
     work = stiff_work([-5e4, -30.0, -2.0, 1.0])
-    found = stiff_rate(walker(stiff=1), H, np.zeros(4 + FLOWS), work, SIZE)
+    found = stiff_rate(stepper(stiff=1), H, np.zeros(4 + FLOWS), work, SIZE)
     assert found == pytest.approx(5e4, rel=1e-3)
 
 
@@ -171,17 +171,19 @@ def explicit_steps(w, reach, limit=1000):
 
 
 def test_stability_that_holds_the_steps_calls_the_stiff_partner():
-    looks = math.ceil(STIFF_STEPS / EVERY)
-    assert explicit_steps(walker(pair=RungeKuttaPair.TSIT5), 1.05 * SUSPECT) == looks * EVERY
-    assert explicit_steps(walker(pair=RungeKuttaPair.TSIT5), 0.95 * SUSPECT) == 1000
-    assert explicit_steps(walker(Mode.EXPLICIT), 1.05 * SUSPECT) == 1000
+    looks = math.ceil(STEPS_BEFORE_STIFF / TEST_INTERVAL)
+    tsit5 = RungeKuttaPair.TSIT5
+    steps = explicit_steps(stepper(pair=tsit5), 1.05 * LIMITED_REACH)
+    assert steps == looks * TEST_INTERVAL
+    assert explicit_steps(stepper(pair=tsit5), 0.95 * LIMITED_REACH) == 1000
+    assert explicit_steps(stepper(Mode.EXPLICIT), 1.05 * LIMITED_REACH) == 1000
 
 
 def test_a_look_without_suspicion_takes_one_back():
-    w = walker(pair=RungeKuttaPair.TSIT5)
+    w = stepper(pair=RungeKuttaPair.TSIT5)
     for reach, held in ((1.0, 4), (1.0, 8), (0.1, 4), (0.1, 0), (0.1, 0)):
         work, z = linear_step(w.pair, -reach * STABILITY_LIMIT / H)
-        w.steps = EVERY
+        w.steps = TEST_INTERVAL
         choose_method(w, H, z, work, SIZE)
         assert w.stability_limited == held
 
@@ -192,21 +194,22 @@ def test_calm_steps_bring_the_explicit_pair_back_and_rest_ever_longer():
     calm, busy = (
         stiff_work([-f * price * STABILITY_LIMIT / H, -2.0, -1.0, 1.0]) for f in (0.9, 1.1)
     )
-    w, z = walker(h=H), np.zeros(4 + FLOWS)
+    w, z = stepper(h=H), np.zeros(4 + FLOWS)
     pauses = []
-    cost = CALM_STEPS * 0.1 * price
+    cost = STEPS_BEFORE_EXPLICIT * 0.1 * price
     for saved in (0.9 * cost, 1.1 * cost, *[0.0] * 7):
         w.stiff, w.h, w.steps_to_test = 1, H, 0
         choose_method(w, H, z, calm, SIZE)
         choose_method(w, H, z, busy, SIZE)  # all over again
         w.steps_saved = saved
-        for i in range(CALM_STEPS):
+        for i in range(STEPS_BEFORE_EXPLICIT):
             assert w.stiff, i
             choose_method(w, H, z, calm, SIZE)
         assert not w.stiff
         assert w.h == pytest.approx(H / (0.9 * price), rel=1e-3)  # what stability allows
         assert w.steps_to_test == w.test_pause
         pauses.append(int(w.test_pause))
-    assert pauses == [REST, REST, 100, 200, 400, 800, 1600, LONGEST_REST, LONGEST_REST]
+    first, last = MIN_TEST_PAUSE, MAX_TEST_PAUSE
+    assert pauses == [first, first, 100, 200, 400, 800, 1600, last, last]
     explicit_steps(w, 0.1, 101)
-    assert w.steps_to_test == LONGEST_REST - 100
+    assert w.steps_to_test == MAX_TEST_PAUSE - 100

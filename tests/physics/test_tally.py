@@ -8,14 +8,14 @@ from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.tally import (
     add_flows,
     contact_within,
+    gap_fraction_between,
     lobatto,
     near_record,
     new_tally,
     peak_of,
-    share_apart,
-    shares_apart,
     tally_energy,
     tally_step,
+    write_gap_fractions,
 )
 from compressor.solve.si_record import record
 
@@ -87,14 +87,14 @@ def test_contact_begins_after_flight_or_inside_the_penetration(penetration, impa
      (-1.0, 3.0, 0.25), (0.0, 0.0, 1.0)],
 )  # fmt: skip
 def test_contact_is_a_positive_nearness(before, after, share):
-    assert share_apart(before, after) == pytest.approx(share)
+    assert gap_fraction_between(before, after) == pytest.approx(share)
 
 
 def test_time_apart_is_measured_by_lines_between_nodes():
     rows, apart = np.zeros((NODES.size, COLUMNS)), np.empty(2)
     rows[:, Column.NEARNESS] = 1e-9 * (NODES - 0.47)
     rows[:, Column.NEARNESS + 1] = 0.8 - NODES
-    shares_apart(NODES, rows, apart)
+    write_gap_fractions(NODES, rows, apart)
     assert apart == pytest.approx([0.47, 0.2])
 
 

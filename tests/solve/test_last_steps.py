@@ -75,7 +75,7 @@ def test_the_errors_are_those_that_the_control_saw():
     original = march_driver.retrace
 
     def looking(before, after, *rest):
-        now.append(float(after.walker.error))
+        now.append(float(after.stepper.error))
         return original(before, after, *rest)
 
     march_driver.retrace, kept = looking, march_driver.retrace

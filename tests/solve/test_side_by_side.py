@@ -12,8 +12,11 @@ from random_cases import strangers
 from compressor.cases.case import Case
 from compressor.physics import lane_steps
 from compressor.physics import lane_steps as rows
-from compressor.physics.lane_march import fits
+from compressor.physics.lane_control import top_and_vertex
+from compressor.physics.lane_march import fits_lane
+from compressor.physics.march import NODES
 from compressor.physics.record import RECORD
+from compressor.physics.tally import peak_of
 from compressor.solve.si_record import record
 from compressor.solve.simulate import measure, observe
 from compressor.solve.solution import MAX_ATTEMPTS, side_by_side
@@ -108,7 +111,7 @@ def test_scenes_that_are_not_named_are_left_alone():
 def test_lanes_know_every_field_of_the_record():
     """Rows are filled with their own numbers: each field of a lane's record is the row it names."""
     W = np.arange(rows.TOTAL * rows.LANES, dtype=float)
-    made = lane_steps.record_of.__wrapped__((0, 0), W, 3)
+    made = lane_steps.lane_record.__wrapped__((0, 0), W, 3)
     places = {field: rows.FIRST_FIELD + i * rows.LANES + 3 for i, field in enumerate(rows.FIELDS)}
     choices = {"scene": 2, "load": rows.SPRING, "law": 0, "friction": 1, "freedoms": 2, "wide": 0,
                "exponent": 1.5, "corners": (0.0, 0.0, 0.0), "hysteresis": 0.0,
@@ -123,13 +126,24 @@ def test_lanes_know_every_field_of_the_record():
         else:
             expected = W[places[name, 0]]
         assert getattr(made, name) == expected, name
-    assert fits(record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2})))
+    assert fits_lane(record(Case.from_values({"joint": "big_end", "clearance_mm": 0.2})))
+
+
+@pytest.mark.parametrize("every", [1, 2])
+@pytest.mark.parametrize("size", [True, False])
+def test_a_peak_in_a_lane_is_that_of_a_step_by_itself(every, size):
+    """The rule stands twice: a lane has no indices (`tally.peak_of`, `top_and_vertex`)."""
+    rng = np.random.default_rng(5)
+    for drawn in rng.normal(0.0, 1.0, (200, NODES.size, 1)):
+        values = np.abs(drawn[:, 0]) if size else drawn[:, 0]
+        found = max(top_and_vertex(tuple(values), every == 1))
+        assert found == peak_of(NODES, drawn, every, 0, -np.inf, size)
 
 
 LOOK = """
 from compressor.physics import lane_steps
 weights = (0.1,) * 7
-for function in (lane_steps.stage_rates, lane_steps.look_at_node):
+for function in (lane_steps.stage_rates, lane_steps.observe_node):
     function((0, 0, 0), lane_steps.new_lanes(), lane_steps.LANES, 0.5, weights, 1)
     print(*function.made.inspect_asm().values())
 """
@@ -147,7 +161,7 @@ def test_loops_over_lanes_are_vector_code(tmp_path):
     functions = seen.stdout.split(".Lfunc_end")
     if not re.search(r"\b[xyz]mm\d", seen.stdout):
         pytest.skip("no x86 machine code to look at")
-    for name in ("stage_rates", "look_at_node"):
+    for name in ("stage_rates", "observe_node"):
         (code,) = (f for f in functions if re.search(rf"^_ZN10compressor\S*{name}\S*:$", f, re.M))
         assert re.search(r"v?sqrtpd", code), name
         assert re.search(r"v?divpd", code), name

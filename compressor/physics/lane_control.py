@@ -23,15 +23,16 @@ from compressor.physics.lane_steps import (
     ERROR,
     FIRST_FIELD,
     FLOWN,
-    HELD,
     IMBALANCE,
     IMPACTS,
     LANES,
+    LAST_ERROR,
     LOSS_SECONDS,
+    MAX_DEPTH,
     MAX_PENETRATION,
     MEASURED,
     MOMENT_SUM,
-    NEAR,
+    NEAR_PEAK,
     NEW,
     PEAK,
     PEAK_KINETIC,
@@ -42,37 +43,36 @@ from compressor.physics.lane_steps import (
     R2,
     R3,
     R4,
-    REFUSED,
+    REJECTED,
     RELEASES,
-    REMEMBERED,
-    REST,
     SECONDS,
     SETTLE,
     SIN,
     SIZE,
     SQUARE_ACCELERATION,
     SQUARE_DEVIATION,
+    STABILITY_LIMITED,
     STATE,
     STEP_WEIGHTS,
     STEPS,
-    TOO_DEEP,
+    STEPS_TO_TEST,
     TORQUE_SUM,
     TOUCHING,
     H,
     K,
     T,
     Z,
-    four_of,
-    put_four,
+    read_four,
+    write_four,
 )
 from compressor.physics.march import COARSE_WEIGHTS, NODES, WEIGHTS
 from compressor.physics.onset import may_change_in, may_touch_in
 from compressor.physics.step_control import (
-    EVERY,
     EXPLICIT_ORDER,
     MIN_ERROR,
     STABILITY_LIMIT,
-    STIFF_STEPS,
+    STEPS_BEFORE_STIFF,
+    TEST_INTERVAL,
     count_limited,
     growth,
     is_accepted,
@@ -82,16 +82,16 @@ from compressor.physics.step_control import (
     shrinkage,
 )
 from compressor.physics.tally import (
+    count_contacts,
     larger_imbalance,
     may_beat,
     may_exceed,
-    observe_node,
     vertex,
 )
 
 
 @inline_numba
-def added_late(W, i, j, total):
+def add_late_change(W, i, j, total):
     """Return the number i of what the state at the step's end is more than at its fifth stage,
     squared.
     """
@@ -107,7 +107,7 @@ def added_late(W, i, j, total):
 
 
 @inline_numba
-def added_rate(W, i, j, total):
+def add_rate_change(W, i, j, total):
     """Return the same of dz/dt."""
     u = LANES * i + j
     change = W[K + 6 * STATE * LANES + u] - W[K + 5 * STATE * LANES + u]
@@ -117,93 +117,95 @@ def added_rate(W, i, j, total):
 @inline_numba
 def stiffness(scene, W, j):
     """Return the step's length over what stability allows, as `step_control.stiff_rate` has it."""
-    above = added_rate(W, 1, j, added_rate(W, 0, j, 0.0))
-    above = added_rate(W, 3, j, added_rate(W, 2, j, above))
-    below = added_late(W, 1, j, added_late(W, 0, j, 0.0))
-    below = added_late(W, 3, j, added_late(W, 2, j, below))
+    above = add_rate_change(W, 1, j, add_rate_change(W, 0, j, 0.0))
+    above = add_rate_change(W, 3, j, add_rate_change(W, 2, j, above))
+    below = add_late_change(W, 1, j, add_late_change(W, 0, j, 0.0))
+    below = add_late_change(W, 3, j, add_late_change(W, 2, j, below))
     if len(scene) == 3:
-        above = added_rate(W, 5, j, added_rate(W, 4, j, above))
-        above = added_rate(W, 7, j, added_rate(W, 6, j, above))
-        below = added_late(W, 5, j, added_late(W, 4, j, below))
-        below = added_late(W, 7, j, added_late(W, 6, j, below))
+        above = add_rate_change(W, 5, j, add_rate_change(W, 4, j, above))
+        above = add_rate_change(W, 7, j, add_rate_change(W, 6, j, above))
+        below = add_late_change(W, 5, j, add_late_change(W, 4, j, below))
+        below = add_late_change(W, 7, j, add_late_change(W, 6, j, below))
     rate = square_root(above / below) if below > 0.0 else 0.0
     return W[H + j] * rate / STABILITY_LIMIT
 
 
 @jit
-def control(scene, W, k):
-    """Watch for stiffness, choose the next steps' lengths, and move plain lanes on.
+def choose_next_steps(scene, W, k):
+    """Test plain lanes for stiffness, and write the length of every lane's next step.
 
     A lane CALLs for `march` where the next step is not a plain one.
     """
     W = without_refcount(W)
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
-        rests = W[REST + j] > 0.0
+        pause = W[STEPS_TO_TEST + j]
+        pauses = pause > 0.0
         steps = W[STEPS + j]
-        asked = plain & (not rests) & (steps - EVERY * math.floor(steps / EVERY) == 0.0)
-        held = W[HELD + j]
-        counted = count_limited(held, stiffness(scene, W, j))
-        W[HELD + j] = counted if asked else held
-        W[REST + j] = W[REST + j] - 1.0 if plain & rests else W[REST + j]
+        due = steps - TEST_INTERVAL * math.floor(steps / TEST_INTERVAL) == 0.0
+        limited = W[STABILITY_LIMITED + j]
+        counted = count_limited(limited, stiffness(scene, W, j))
+        W[STABILITY_LIMITED + j] = counted if plain & due & (not pauses) else limited
+        W[STEPS_TO_TEST + j] = pause - 1.0 if plain & pauses else pause
         W[STEPS + j] = steps + 1.0 if plain else steps
     for j in range(k):
         plain, alive = W[PLAIN + j] > 0.0, W[ALIVE + j] > 0.0
         error, h, t = W[ERROR + j], W[H + j], W[T + j]
         refused = alive & (error > 1.0) & (error < math.inf)
-        now, remembered = log_error(error), W[REMEMBERED + j]
+        now, last = log_error(error), W[LAST_ERROR + j]
         now = now if plain | refused else 0.0  # any other lane's error may be no number
-        longer, shorter = growth(now, remembered, EXPLICIT_ORDER), shrinkage(now, EXPLICIT_ORDER)
+        longer, shorter = growth(now, last, EXPLICIT_ORDER), shrinkage(now, EXPLICIT_ORDER)
         longer = h * longer if plain else h
         longer = h * shorter if refused else longer
         reached = t + h if plain else t
-        W[REMEMBERED + j] = max(now, MIN_ERROR) if plain else remembered
-        W[REFUSED + j] += 1.0 if refused else 0.0
+        W[LAST_ERROR + j] = max(now, MIN_ERROR) if plain else last
+        W[REJECTED + j] += 1.0 if refused else 0.0
         W[H + j] = longer
         W[T + j] = reached
         turning = W[FIRST_FIELD + j] * longer
         call = is_last_step(reached, longer, W[END + j]) | (turning > SMALL)
-        call = call | (W[HELD + j] >= STIFF_STEPS) | (W[DEEPEST + j] > W[TOO_DEEP + j])
-        call = call | (not (plain | refused)) | (W[STEPS + j] + W[REFUSED + j] >= W[BUDGET + j])
+        call = call | (W[STABILITY_LIMITED + j] >= STEPS_BEFORE_STIFF)
+        call = call | (W[DEEPEST + j] > W[MAX_DEPTH + j])
+        call = call | (not (plain | refused)) | (W[STEPS + j] + W[REJECTED + j] >= W[BUDGET + j])
         call = call | (longer < shortest_step(reached, W[FIRST_FIELD + j]))
         W[CALL + j] = 1.0 if call & alive else 0.0
 
 
 @inline_numba
-def pass_on(W, j, plain, target, source):
+def copy_if_plain(W, j, plain, target, source):
     """Copy four rows to others in a plain lane; both are read, or no vector code comes."""
-    a, b, c, d = four_of(W, source + j)
-    e, f, g, h = four_of(W, target + j)
-    put_four(W, target + j, (a if plain else e, b if plain else f,
+    a, b, c, d = read_four(W, source + j)
+    e, f, g, h = read_four(W, target + j)
+    write_four(W, target + j, (a if plain else e, b if plain else f,
                              c if plain else g, d if plain else h))  # fmt: skip
 
 
 @jit
-def move_on(scene, W, k):
-    """The end of a plain lane's step is the begin of its next: state, rates, what is seen."""
+def advance_lanes(scene, W, k):
+    """Make the end of a plain lane's step the begin of its next: state, rates and observations."""
     W = without_refcount(W)
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
-        pass_on(W, j, plain, Z, NEW)
-        pass_on(W, j, plain, Z + 4 * LANES, NEW + 4 * LANES)
-        pass_on(W, j, plain, K, K + 6 * STATE * LANES)
-        pass_on(W, j, plain, K + 4 * LANES, K + (6 * STATE + 4) * LANES)
+        copy_if_plain(W, j, plain, Z, NEW)
+        copy_if_plain(W, j, plain, Z + 4 * LANES, NEW + 4 * LANES)
+        copy_if_plain(W, j, plain, K, K + 6 * STATE * LANES)
+        copy_if_plain(W, j, plain, K + 4 * LANES, K + (6 * STATE + 4) * LANES)
         if len(scene) == 3:
-            pass_on(W, j, plain, Z + 8 * LANES, NEW + 8 * LANES)
-            pass_on(W, j, plain, K + 8 * LANES, K + (6 * STATE + 8) * LANES)
+            copy_if_plain(W, j, plain, Z + 8 * LANES, NEW + 8 * LANES)
+            copy_if_plain(W, j, plain, K + 8 * LANES, K + (6 * STATE + 8) * LANES)
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
-        pass_on(W, j, plain, R0, R4)
-        pass_on(W, j, plain, R0 + 4 * LANES, R4 + 4 * LANES)
-        pass_on(W, j, plain, R0 + 8 * LANES, R4 + 8 * LANES)
-        pass_on(W, j, plain, R0 + 12 * LANES, R4 + 12 * LANES)
+        copy_if_plain(W, j, plain, R0, R4)
+        copy_if_plain(W, j, plain, R0 + 4 * LANES, R4 + 4 * LANES)
+        copy_if_plain(W, j, plain, R0 + 8 * LANES, R4 + 8 * LANES)
+        copy_if_plain(W, j, plain, R0 + 12 * LANES, R4 + 12 * LANES)
         W[COS + j], W[SIN + j] = direction(W[FIRST_FIELD + j] * W[T + j])
 
 
 N1, N2, N3 = (float(node) for node in NODES[1:4])
 F0, F1, F2, F3, F4 = (float(weight) for weight in WEIGHTS)
 G0, _, G2, _, G4 = (float(weight) for weight in COARSE_WEIGHTS)
-# widths of the step's parts, added as `march.measure_apart` does
+# widths of the step's parts, added as `march.measure_gap_fractions` does
 FINE_WHOLE = sum(float(width) for width in np.diff(NODES))
 COARSE_WHOLE = sum(float(width) for width in np.diff(NODES[::2]))
 DEVIATION, PENETRATION, NORMAL, NEARNESS = 7 * LANES, 8 * LANES, 10 * LANES, 12 * LANES
@@ -212,90 +214,86 @@ KINETIC, POTENTIAL = 16 * LANES, 17 * LANES
 
 
 @inline_numba
-def touches(scene, joint):
+def has_clearance(scene, joint):
     """Return whether a joint of the scene has clearance."""
     return len(scene) == 3 or len(scene) == joint + 1
-
-
-@inline_numba
-def nears(W, j, column):
-    """Return whether the greatest size of a column may be beaten within the step."""
-    c = column * LANES + j
-    top = max(abs(W[R0 + c]), abs(W[R2 + c]), abs(W[R4 + c]))
-    return may_beat(top, W[PEAK + c])
-
-
-@inline_numba
-def deepens(W, j, joint):
-    """Return whether the greatest penetration of a joint may be beaten within the step."""
-    c = joint * LANES + j
-    top = max(W[R0 + PENETRATION + c], W[R2 + PENETRATION + c], W[R4 + PENETRATION + c])
-    return may_beat(top, W[MAX_PENETRATION + c])
-
-
-@inline_numba
-def changes(W, j, joint):
-    """Return whether contact may begin or end at a joint within the step, as `march.may_change`."""
-    c = NEARNESS + joint * LANES + j
-    a, b, c = W[R0 + c], W[R2 + c], W[R4 + c]
-    return may_change_in(min(a, b, c), max(a, b, c))
-
-
-@jit
-def judge(scene, W, k):
-    """Return which lanes take their step (PLAIN), and which of these are to be looked at closer
-    (NEAR).
-
-    Returns whether any is.
-    """
-    W = without_refcount(W)
-    for j in range(k):
-        near = nears(W, j, 0) | nears(W, j, 1) | nears(W, j, 2) | nears(W, j, 3)
-        near = near | nears(W, j, 4) | nears(W, j, 5) | nears(W, j, 6)
-        near = near | deepens(W, j, 0) | deepens(W, j, 1)
-        change = False
-        if touches(scene, 0):
-            change = changes(W, j, 0)
-        if touches(scene, 1):
-            change = change | changes(W, j, 1)
-        measured = W[T + j] >= W[SETTLE + j]
-        plain = is_accepted(W[ERROR + j]) & (not change) & (W[ALIVE + j] > 0.0)
-        W[MEASURED + j] = 1.0 if measured else 0.0
-        W[PLAIN + j] = 1.0 if plain else 0.0
-        W[NEAR + j] = 1.0 if near & measured & plain else 0.0
-    total = 0.0
-    for j in range(k):
-        total += W[NEAR + j]
-    return total > 0.0
-
-
-@inline_numba
-def may_touch(W, j, joint):
-    """Return `march.may_touch` at a joint, by all nodes."""
-    a, b, c, d, e = at_nodes(W, NEARNESS + joint * LANES + j)
-    return may_touch_in(min(a, b, c, d, e), max(a, b, c, d, e))
-
-
-@jit
-def judge_closer(scene, W, k):
-    """After a closer look at the lanes that are NEAR: they are left alone if contact may begin."""
-    W = without_refcount(W)
-    for j in range(k):
-        near = W[NEAR + j] > 0.0
-        touch = False
-        if touches(scene, 0):
-            touch = may_touch(W, j, 0)
-        if touches(scene, 1):
-            touch = touch | may_touch(W, j, 1)
-        plain = W[PLAIN + j]
-        W[PLAIN + j] = 0.0 if near & touch else plain
-        W[NEAR + j] = 1.0 if near & (not touch) else 0.0
 
 
 @inline_numba
 def at_nodes(W, column):
     """Return an observed column of a lane at the five nodes of its step."""
     return W[R0 + column], W[R1 + column], W[R2 + column], W[R3 + column], W[R4 + column]
+
+
+@inline_numba
+def nears_peak(W, j, column):
+    """Return whether the greatest size of a column may be beaten within the step."""
+    a, _, c, _, e = at_nodes(W, column * LANES + j)
+    return may_beat(max(abs(a), abs(c), abs(e)), W[PEAK + column * LANES + j])
+
+
+@inline_numba
+def nears_depth(W, j, joint):
+    """Return whether the greatest penetration of a joint may be beaten within the step."""
+    a, _, c, _, e = at_nodes(W, PENETRATION + joint * LANES + j)
+    return may_beat(max(a, c, e), W[MAX_PENETRATION + joint * LANES + j])
+
+
+@inline_numba
+def may_change_at(W, j, joint):
+    """Return whether contact may begin or end at a joint within the step, as `onset.may_change`."""
+    a, _, c, _, e = at_nodes(W, NEARNESS + joint * LANES + j)
+    return may_change_in(min(a, c, e), max(a, c, e))
+
+
+@jit
+def select_plain_steps(scene, W, k):
+    """Write which lanes take their step (PLAIN), and which of these need all nodes (NEAR_PEAK).
+
+    Returns whether any does.
+    """
+    W = without_refcount(W)
+    for j in range(k):
+        near = nears_peak(W, j, 0) | nears_peak(W, j, 1) | nears_peak(W, j, 2)
+        near = near | nears_peak(W, j, 3) | nears_peak(W, j, 4) | nears_peak(W, j, 5)
+        near = near | nears_peak(W, j, 6) | nears_depth(W, j, 0) | nears_depth(W, j, 1)
+        change = False
+        if has_clearance(scene, 0):
+            change = may_change_at(W, j, 0)
+        if has_clearance(scene, 1):
+            change = change | may_change_at(W, j, 1)
+        measured = W[T + j] >= W[SETTLE + j]
+        plain = is_accepted(W[ERROR + j]) & (not change) & (W[ALIVE + j] > 0.0)
+        W[MEASURED + j] = 1.0 if measured else 0.0
+        W[PLAIN + j] = 1.0 if plain else 0.0
+        W[NEAR_PEAK + j] = 1.0 if near & measured & plain else 0.0
+    total = 0.0
+    for j in range(k):
+        total += W[NEAR_PEAK + j]
+    return total > 0.0
+
+
+@inline_numba
+def may_touch_at(W, j, joint):
+    """Return `onset.may_touch` at a joint, by all nodes."""
+    a, b, c, d, e = at_nodes(W, NEARNESS + joint * LANES + j)
+    return may_touch_in(min(a, b, c, d, e), max(a, b, c, d, e))
+
+
+@jit
+def exclude_onsets(scene, W, k):
+    """Take lanes that are NEAR_PEAK out of the plain ones if contact may begin, by all nodes."""
+    W = without_refcount(W)
+    for j in range(k):
+        near = W[NEAR_PEAK + j] > 0.0
+        touch = False
+        if has_clearance(scene, 0):
+            touch = may_touch_at(W, j, 0)
+        if has_clearance(scene, 1):
+            touch = touch | may_touch_at(W, j, 1)
+        plain = W[PLAIN + j]
+        W[PLAIN + j] = 0.0 if near & touch else plain
+        W[NEAR_PEAK + j] = 1.0 if near & (not touch) else 0.0
 
 
 @inline_numba
@@ -323,11 +321,11 @@ def top_and_vertex(values, fine):
 
 
 @inline_numba
-def events_after(W, row, c, events, use, counts):
-    """Return `tally.observe_node` after a node whose rows begin at `row`, if it is one to use."""
+def count_contacts_at(W, row, c, events, use, counts):
+    """Return `tally.count_contacts` after a node whose rows begin at `row`, if it is one to use."""
     a, b, m, n = events
     normal, depth = W[row + NORMAL + c], W[row + PENETRATION + c]
-    e, f, g, h = observe_node(a, b, m, n, normal, depth, counts)
+    e, f, g, h = count_contacts(a, b, m, n, normal, depth, counts)
     return e if use else a, f if use else b, g if use else m, h if use else n
 
 
@@ -336,11 +334,11 @@ def tally_joint(W, j, joint, plain, fine, measured):
     """Add a step's contact loss, impacts, releases and penetration at one joint."""
     c = joint * LANES + j
     events = W[TOUCHING + c] > 0.0, W[FLOWN + c] > 0.0, W[IMPACTS + c], W[RELEASES + c]
-    events = events_after(W, R0, c, events, True, measured)
-    events = events_after(W, R1, c, events, fine, measured)
-    events = events_after(W, R2, c, events, True, measured)
-    events = events_after(W, R3, c, events, fine, measured)
-    touching, flown, hits, leaves = events_after(W, R4, c, events, True, measured)
+    events = count_contacts_at(W, R0, c, events, True, measured)
+    events = count_contacts_at(W, R1, c, events, fine, measured)
+    events = count_contacts_at(W, R2, c, events, True, measured)
+    events = count_contacts_at(W, R3, c, events, fine, measured)
+    touching, flown, hits, leaves = count_contacts_at(W, R4, c, events, True, measured)
     W[TOUCHING + c] = (1.0 if touching else 0.0) if plain else W[TOUCHING + c]
     W[FLOWN + c] = (1.0 if flown else 0.0) if plain else W[FLOWN + c]
     W[IMPACTS + c] = hits if plain else W[IMPACTS + c]
@@ -369,14 +367,14 @@ def add_integral(total, values, h, fine):
 
 @jit
 def tally_lanes(scene, W, k):
-    """Tally the steps of plain lanes: as `tally_energy` and `tally_step`."""
+    """Tally the steps of plain lanes, as `tally_energy` and `tally_step` do."""
     W = without_refcount(W)
     f = (8 if len(scene) == 3 else 4) * LANES
     for j in range(k):
         plain = W[PLAIN + j] > 0.0
         kinetic = W[R4 + KINETIC + j]
         gain = kinetic + W[R4 + POTENTIAL + j] - W[ENERGY + j]
-        crank, load, damping, friction = four_of(W, NEW + f + j)
+        crank, load, damping, friction = read_four(W, NEW + f + j)
         worst = W[IMBALANCE + j]
         larger = larger_imbalance(worst, gain, crank, load, damping, friction)
         W[IMBALANCE + j] = larger if plain else worst
@@ -384,14 +382,14 @@ def tally_lanes(scene, W, k):
         W[PEAK_KINETIC + j] = max(most, kinetic) if plain else most
     for j in range(k):
         plain, measured = W[PLAIN + j] > 0.0, W[MEASURED + j] > 0.0
-        fine = W[NEAR + j] > 0.0
-        if touches(scene, 0):
+        fine = W[NEAR_PEAK + j] > 0.0
+        if has_clearance(scene, 0):
             tally_joint(W, j, 0, plain, fine, measured)
-        if touches(scene, 1):
+        if has_clearance(scene, 1):
             tally_joint(W, j, 1, plain, fine, measured)
     for j in range(k):
         counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
-        fine = W[NEAR + j] > 0.0
+        fine = W[NEAR_PEAK + j] > 0.0
         h = W[H + j] if counts else 0.0
         W[SECONDS + j] += h
         a, b, c, d, e = at_nodes(W, j)
@@ -406,7 +404,7 @@ def tally_lanes(scene, W, k):
         o = column * LANES
         for j in range(k):
             counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
-            fine = W[NEAR + j] > 0.0
+            fine = W[NEAR_PEAK + j] > 0.0
             a, b, c, d, e = at_nodes(W, o + j)
             top, rise = top_and_vertex((abs(a), abs(b), abs(c), abs(d), abs(e)), fine)
             known = W[PEAK + o + j]
