@@ -36,7 +36,6 @@ from compressor.physics.lane_steps import (
     NEW,
     PEAK,
     PEAK_KINETIC,
-    PEAKED,
     PLAIN,
     R0,
     R1,
@@ -82,6 +81,7 @@ from compressor.physics.step_control import (
     shrinkage,
 )
 from compressor.physics.tally import (
+    PEAKED,
     count_contacts,
     larger_imbalance,
     may_beat,

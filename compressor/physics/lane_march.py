@@ -27,44 +27,30 @@ from compressor.physics.lane_steps import (
     BUDGET,
     CALL,
     COS,
-    DEEPEST,
     END,
-    ENERGY,
     FIELDS,
     FIRST_FIELD,
-    FLOWN,
-    IMBALANCE,
-    IMPACTS,
+    FIRST_TALLY_ROW,
+    IS_COUNT,
     LANES,
     LAST_ERROR,
-    LOSS_SECONDS,
     MAX_DEPTH,
-    MAX_PENETRATION,
-    MOMENT_SUM,
     NEXT_SAMPLE,
     PAIR,
-    PEAK,
-    PEAK_KINETIC,
-    PEAKED,
     PHASE,
     PLAIN,
     R0,
     REJECTED,
-    RELEASES,
     RTOL,
-    SECONDS,
     SETTLE,
     SIN,
     SIZE,
-    SQUARE_ACCELERATION,
-    SQUARE_DEVIATION,
     STABILITY_LIMITED,
     STAGE_COUNT,
     STATE,
     STEPS,
     STEPS_TO_TEST,
-    TORQUE_SUM,
-    TOUCHING,
+    TALLY_WORDS,
     H,
     K,
     T,
@@ -93,6 +79,8 @@ class Runs(NamedTuple):
     steppers: np.ndarray  # (m,) of STEPPER
     records: np.ndarray  # (m,) of RECORD
     tallies: np.ndarray  # (m,) of TALLY
+    sums: np.ndarray  # (m, TALLY_WORDS): the same memory, each word as a number,
+    counts: np.ndarray  # and each as an integer
     z: np.ndarray  # (m, n + 4)
     atol: np.ndarray  # (m, n)
     size: np.ndarray  # (m, n)
@@ -148,7 +136,7 @@ def next_sample_time(runs, job):
 @jit
 def load_lane(W, j, runs, job, work, limit):
     """Write a run's present state into a lane."""
-    w, p, tally = runs.steppers[job], runs.records[job], runs.tallies[job]
+    w, p = runs.steppers[job], runs.records[job]
     n = runs.size.shape[1]
     for i in range(runs.fields.shape[1]):
         W[FIRST_FIELD + i * LANES + j] = runs.fields[job, i]
@@ -172,20 +160,9 @@ def load_lane(W, j, runs, job, work, limit):
             W[K + (s * STATE + i) * LANES + j] = 0.0
     for i in range(CRANK_POWER - ACCELERATION):
         W[R0 + i * LANES + j] = work.row[ACCELERATION + i]
-    W[SECONDS + j] = tally.seconds
-    W[SQUARE_ACCELERATION + j] = tally.square_acceleration
-    W[SQUARE_DEVIATION + j] = tally.square_deviation
-    W[TORQUE_SUM + j], W[MOMENT_SUM + j] = tally.crank_torque, tally.guide_moment
-    for i in range(PEAKED):
-        W[PEAK + i * LANES + j] = tally.peak[i]
-    for joint in range(2):
-        c = joint * LANES + j
-        W[MAX_PENETRATION + c] = tally.max_penetration[joint]
-        W[LOSS_SECONDS + c] = tally.loss_seconds[joint]
-        W[IMPACTS + c], W[RELEASES + c] = tally.impacts[joint], tally.releases[joint]
-        W[TOUCHING + c], W[FLOWN + c] = tally.touching[joint], tally.flown[joint]
-    W[DEEPEST + j], W[ENERGY + j] = tally.deepest, tally.energy
-    W[IMBALANCE + j], W[PEAK_KINETIC + j] = tally.worst_imbalance, tally.peak_kinetic
+    for i in range(TALLY_WORDS):
+        word = runs.counts[job, i] if IS_COUNT[i] else runs.sums[job, i]
+        W[FIRST_TALLY_ROW + i * LANES + j] = word
 
 
 @jit
@@ -209,22 +186,12 @@ def unload_lane(W, j, runs, job, work):
         work.k[0, i] = W[K + i * LANES + j]
     for i in range(CRANK_POWER - ACCELERATION):
         work.row[ACCELERATION + i] = W[R0 + i * LANES + j]
-    tally.seconds = W[SECONDS + j]
-    tally.square_acceleration = W[SQUARE_ACCELERATION + j]
-    tally.square_deviation = W[SQUARE_DEVIATION + j]
-    tally.crank_torque, tally.guide_moment = W[TORQUE_SUM + j], W[MOMENT_SUM + j]
-    for i in range(PEAKED):
-        tally.peak[i] = W[PEAK + i * LANES + j]
-    for joint in range(2):
-        c = joint * LANES + j
-        tally.max_penetration[joint] = W[MAX_PENETRATION + c]
-        tally.loss_seconds[joint] = W[LOSS_SECONDS + c]
-        tally.impacts[joint] = np.int64(W[IMPACTS + c])
-        tally.releases[joint] = np.int64(W[RELEASES + c])
-        tally.touching[joint] = np.int64(W[TOUCHING + c])
-        tally.flown[joint] = np.int64(W[FLOWN + c])
-    tally.deepest, tally.worst_imbalance = W[DEEPEST + j], W[IMBALANCE + j]
-    tally.peak_kinetic = W[PEAK_KINETIC + j]
+    for i in range(TALLY_WORDS):
+        word = W[FIRST_TALLY_ROW + i * LANES + j]
+        if IS_COUNT[i]:
+            runs.counts[job, i] = np.int64(word)
+        else:
+            runs.sums[job, i] = word
     tally.crank_work, tally.load_work = runs.z[job, n], runs.z[job, n + 1]
     tally.damping_loss, tally.friction_loss = runs.z[job, n + 2], runs.z[job, n + 3]
 
@@ -378,9 +345,11 @@ def gather_runs(runs: Sequence[Run]) -> Runs:
         fields[:, row] = column[:, joint] if column.ndim > 1 else column
     for name in LOAD_FIELDS:  # no load is a spring without force
         fields[records["load"] == Load.NONE, FIELDS.index((name, 0))] = 0.0
+    tallies = np.array([run.tally for run in runs], TALLY)
     return Runs(
-        steppers, records, np.array([run.tally for run in runs], TALLY).view(np.recarray),
-        np.array([run.z for run in runs]), steppers["rtol"][:, None] * size, size, fields, places,
+        steppers, records, tallies.view(np.recarray), tallies.view(np.float64).reshape(m, -1),
+        tallies.view(np.int64).reshape(m, -1), np.array([run.z for run in runs]),
+        steppers["rtol"][:, None] * size, size, fields, places,
         np.concatenate([run.edges for run in runs]), np.concatenate([run.phases for run in runs]),
         np.concatenate([run.times for run in runs]),
         np.full((counts[:, 1].sum(), n), math.nan),

@@ -20,13 +20,13 @@ from compressor.physics.motion import deviating, evaluate
 from compressor.physics.observe import energies, joint_forces, observed_columns, powers
 from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import STAGES, A, C, E, RungeKuttaPair, error_share
+from compressor.physics.tally import TALLY
 
 LANES = 16
 MAX_STATES = 8  # numbers of a motion
 STATE = MAX_STATES + 4  # and energy flows
 STAGE_COUNT = 7
 OBSERVED_COUNT = 18  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potential energy
-PEAKED = 7  # of these the first ones, of which the greatest size is kept
 NODE_COUNT = 5
 
 SPRING = int(Load.SPRING)
@@ -68,12 +68,17 @@ OUT = _rows(STATE)  # dz/dt of the stage at hand
 K = _rows(STAGE_COUNT * STATE)
 OBSERVED = _rows(OBSERVED_COUNT)
 NODE_ROWS = _rows(NODE_COUNT * OBSERVED_COUNT)
-# the tally
-SECONDS, SQUARE_ACCELERATION, SQUARE_DEVIATION = _rows(), _rows(), _rows()
-TORQUE_SUM, MOMENT_SUM = _rows(), _rows()
-PEAK = _rows(PEAKED)
-MAX_PENETRATION, LOSS_SECONDS, IMPACTS, RELEASES, TOUCHING, FLOWN = (_rows(2) for _ in range(6))
-DEEPEST, ENERGY, IMBALANCE, PEAK_KINETIC = (_rows() for _ in range(4))
+# the words of the tally, in its order
+TALLY_ROWS = {name: _rows(TALLY[name].itemsize // 8) for name in TALLY.names or ()}
+FIRST_TALLY_ROW, TALLY_WORDS = TALLY_ROWS["seconds"], TALLY.itemsize // 8
+(
+    SECONDS, SQUARE_ACCELERATION, SQUARE_DEVIATION, TORQUE_SUM, MOMENT_SUM, PEAK, _,
+    MAX_PENETRATION, LOSS_SECONDS, IMPACTS, RELEASES, TOUCHING, FLOWN, DEEPEST, ENERGY, _, _, _, _,
+    IMBALANCE, PEAK_KINETIC, _,
+) = TALLY_ROWS.values()  # fmt: skip
+IS_COUNT = np.concatenate(
+    [np.full(TALLY[name].itemsize // 8, TALLY[name].base.kind == "i") for name in TALLY_ROWS]
+)
 TOTAL = _next
 
 
