@@ -28,7 +28,7 @@ from compressor.physics import (
     segments,
 )
 from compressor.reasons import Reason
-from compressor.solve.march_driver import CHUNK, check_march, prepare_stepper
+from compressor.solve.march_driver import check_march, chunks, prepare_stepper
 from compressor.solve.request import Request, Stop, with_cuts
 from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record
 
@@ -113,16 +113,17 @@ class Twins:
         """
         request, stepper, twin_stepper = self.request, self.stepper, self.twin_stepper
         stepper.status = Status.RUNNING
-        while stepper.status == Status.RUNNING and twin_stepper.status == Status.RUNNING:
-            left = request.max_steps - stepper.steps - stepper.rejected
+        for attempts in chunks(request, stepper):
             march_twins(
                 stepper, twin_stepper, request.p, self.z, self.twin, self.work, self.twin_work,
                 request.rtol * self.size, self.size, self.edges[: count + 1], self.phases[:count],
-                request.times, self.states, self.tally, self.rows, far, min(CHUNK, left),
+                request.times, self.states, self.tally, self.rows, far, attempts,
             )  # fmt: skip
-            if Status.DONE not in (stepper.status, twin_stepper.status):
+            if twin_stepper.status == Status.DONE:
+                return True
+            if stepper.status != Status.DONE:
                 self.check()
-        return bool(twin_stepper.status == Status.DONE)
+        return False
 
     def check(self) -> None:
         """Raise Stop where one of the two may go no further, or the time is up."""

@@ -6,6 +6,7 @@ is taken up again from its last checkpoint, to record its last steps one by one.
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ from compressor.physics import (
 )
 from compressor.reasons import Reason
 from compressor.solve.request import (
-    LAST,
+    HISTORY_LENGTH,
     History,
     Request,
     Stop,
@@ -153,10 +154,10 @@ def retrace(before: MarchState, after: MarchState, march: March) -> History:
     `before` is written.
     """
     made = after.attempts - before.attempts
-    if made > LAST:
-        march.advance(before, made - LAST)
+    if made > HISTORY_LENGTH:
+        march.advance(before, made - HISTORY_LENGTH)
     found = History()
-    for _ in range(min(made, LAST)):
+    for _ in range(min(made, HISTORY_LENGTH)):
         now = before.copy()
         w = now.stepper
         if w.fresh:
@@ -210,6 +211,12 @@ def describe_attempt(now: np.record, then: np.record) -> str:
 CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
 
 
+def chunks(request: Request, stepper: np.record) -> Iterator[int]:
+    """Yield the attempts that a march may take until budgets are checked, as long as it runs."""
+    while stepper.status == Status.RUNNING:
+        yield min(CHUNK, request.max_steps - stepper.steps - stepper.rejected)
+
+
 def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
     """Integrate by the compiled loop into `result`. Raises Stop."""
     deadline = time.monotonic() + request.timeout
@@ -221,11 +228,10 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     now = MarchState(stepper, z, new_work(size.size), result.tally)
     earlier = before = Checkpoint.of(now)
     seen = 0  # attempts at the last checkpoint
-    while stepper.status == Status.RUNNING:
-        if result.steps + result.rejected >= seen + LAST:
+    for attempts in chunks(request, stepper):
+        if result.steps + result.rejected >= seen + HISTORY_LENGTH:
             earlier, before = before, Checkpoint.of(now)
             seen = result.steps + result.rejected
-        attempts = min(CHUNK, request.max_steps - stepper.steps - stepper.rejected)
         march.advance(now, attempts, ends[0] if ends else phases.size)
         result.steps, result.rejected = int(stepper.steps), int(stepper.rejected)
         result.evaluations = int(stepper.evaluations)
@@ -239,7 +245,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             check_march(request, stepper, z, float(result.tally.deepest), deadline)
         except Stop:
             result.stop_time, result.stop_state = float(stepper.t), z[:-FLOWS].copy()
-            enough = result.steps + result.rejected >= seen + LAST
+            enough = result.steps + result.rejected >= seen + HISTORY_LENGTH
             result.history = retrace((before if enough else earlier).restore(), now, march)
             raise
 

@@ -107,7 +107,7 @@ def with_edge(
     return edges, np.concatenate((phases[:i], phases[i - 1 : i], phases[i:])), time
 
 
-LAST = 16  # attempts that a history keeps
+HISTORY_LENGTH = 16  # attempts that a history keeps
 NONE = -1  # in place of a number of the state
 
 
@@ -151,14 +151,14 @@ class History:
     dominant: int = NONE  # number of the state that drove the last error, or went bad
 
     def add(self, time: float, step: float, error: float, words: str) -> None:
-        """Append an attempt; more than LAST push out the first."""
+        """Append an attempt; more than HISTORY_LENGTH push out the first."""
         self.times.append(time)
         self.steps.append(step)
         self.errors.append(error)
         self.words.append(words)
         kept: list
         for kept in (self.times, self.steps, self.errors, self.words):
-            del kept[:-LAST]
+            del kept[:-HISTORY_LENGTH]
 
 
 @dataclass
