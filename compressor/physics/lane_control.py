@@ -62,7 +62,6 @@ from compressor.physics.lane_steps import (
     T,
     Z,
     read_four,
-    write_four,
 )
 from compressor.physics.march import COARSE_WEIGHTS, NODES, WEIGHTS
 from compressor.physics.onset import may_change_in, may_touch_in
@@ -174,10 +173,13 @@ def choose_next_steps(scene, W, k):
 @inline_numba
 def copy_if_plain(W, j, plain, target, source):
     """Copy four rows to others in a plain lane; both are read, or no vector code comes."""
-    a, b, c, d = read_four(W, source + j)
-    e, f, g, h = read_four(W, target + j)
-    write_four(W, target + j, (a if plain else e, b if plain else f,
-                             c if plain else g, d if plain else h))  # fmt: skip
+    t, s = target + j, source + j
+    a, b = W[s], W[s + LANES]
+    c, d = W[s + 2 * LANES], W[s + 3 * LANES]
+    e, f = W[t], W[t + LANES]
+    g, h = W[t + 2 * LANES], W[t + 3 * LANES]
+    W[t], W[t + LANES] = a if plain else e, b if plain else f
+    W[t + 2 * LANES], W[t + 3 * LANES] = c if plain else g, d if plain else h
 
 
 @jit

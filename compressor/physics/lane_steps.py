@@ -188,8 +188,8 @@ def copy_rows(W, target, source, count):
     takes one number at a time.
     """
     W = without_refcount(W)
-    for i in range(count * LANES):
-        W[target + i] = W[source + i]
+    for i in range(count * LANES):  # unsigned, or each index is first compared with zero
+        W[np.uint64(target + i)] = W[np.uint64(source + i)]
 
 
 @jit
