@@ -1,7 +1,25 @@
 """A store -> figures and a page; the tools by which studies draw and add to the page."""
 
-from compressor.report.figures import Drawing
-from compressor.report.figures.job import MODE_COLORS, UNSEEN, mode_handles
+from compressor.report.figures.contours import contour_area, contour_lines
+from compressor.report.figures.drawing import (
+    WAYS,
+    ColorScale,
+    Drawing,
+    Note,
+    Panel,
+    Scale,
+    Trace,
+    Way,
+    box,
+    entry,
+    join_with_gaps,
+    make_grid,
+    map_cells,
+    midway,
+    share_scales,
+)
+from compressor.report.figures.job import MODE_COLORS, UNSEEN, mode_entries, stack_modes
+from compressor.report.figures.pictures import render
 from compressor.report.figures.style import (
     BLACK,
     BLUE,
@@ -10,10 +28,9 @@ from compressor.report.figures.style import (
     GREY,
     RED,
     LineStyle,
-    in_style,
-    legend_above,
-    render,
-    sheet,
+    fill,
+    mark,
+    palette,
 )
 from compressor.report.figures.sweep_data import (
     FOOT,

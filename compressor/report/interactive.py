@@ -7,8 +7,9 @@ have as many points as a screen can show.
 
 import base64
 import json
+import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,12 +19,28 @@ import xarray as xr
 
 from compressor.analysis import SPOKEN, NoSeriesError, last_revolution
 from compressor.metrics import JOINTS
-from compressor.report.figures.extract import FigureData, Panel, PanelText, Scale, Trace
+from compressor.report.figures.curves import ANGLE_AXIS
+from compressor.report.figures.drawing import (
+    WAYS,
+    ColorScale,
+    Drawing,
+    Note,
+    Panel,
+    Scale,
+    Trace,
+    Way,
+    axis_title,
+    make_grid,
+    one_line,
+)
+from compressor.report.figures.job import BY_JOINT
+from compressor.report.figures.style import BLACK, LineStyle
 from compressor.store import DamagedJob, Stored, publish
 
 LIBRARY = "plotly.min.js"
 MAX_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
 FLOAT = np.dtype("f4").newbyteorder("little")
+COLORS = 33  # of a continuous scale
 EVEN = 1e-6  # of a step: how far evenly spaced numbers may be off
 
 
@@ -37,54 +54,52 @@ def publish_library(folder: Path) -> None:
         publish(path, library.read_bytes())
 
 
-def script(name: str, sheet: FigureData) -> str:
+def script(name: str, drawing: Drawing) -> str:
     """Return the script of a figure."""
-    data = json.dumps(content(sheet), separators=(",", ":"), allow_nan=False)
+    data = json.dumps(content(drawing), separators=(",", ":"), allow_nan=False)
     data = data.replace("<", "\\u003c")
     return f"compsimFigure({json.dumps(name)},{data});\n"
 
 
-def content(sheet: FigureData) -> dict[str, Any]:
+def content(drawing: Drawing) -> dict[str, Any]:
     """Return what a figure shows, as plain data. Panels with the same `link` are zoomed together.
 
     `unified`: all curves go from left to right, so that the values at one x are told together.
     """
-    links = (
-        link_scales([panel.x for panel in sheet.panels]),
-        link_scales([p.y for p in sheet.panels], "y"),
-    )
-    words = [*(panel.y.words for panel in sheet.panels)]
-    width, height = sheet.size
+    panels = drawing.panels
+    links = {way: link_scales(drawing, way) for way in WAYS}
     return {
-        "aspect": round(height / width, 4),
-        "heights": sheet.heights,
-        "widths": sheet.widths,
+        "aspect": round(drawing.height / drawing.width, 4),
+        "heights": drawing.heights,
+        "widths": drawing.widths,
         "unified": all(
-            trace.kind == "line" and not (np.diff(trace.x) < 0).any()
-            for panel in sheet.panels
+            trace.kind == "line" and not trace.is_points and not (np.diff(trace.x) < 0).any()
+            for panel in panels
             for trace in panel.traces
             if trace.name
         ),
         "panels": [
             {
-                "title": panel.title,
-                "x": axis(panel.x) | {"link": x, "unit": unit(axis_title(sheet, panel))},
-                "y": axis(panel.y, words[y]) | {"link": y, "unit": unit(panel.y.title)},
+                "title": one_line(panel.title),
+                "x": axis(drawing, panel, "x")
+                | {"link": links["x"][number], "unit": unit(title_below(drawing, panel))},
+                "y": axis(drawing, panel, "y")
+                | {"link": links["y"][number], "unit": unit(axis_title(drawing, panel, "y"))},
                 "row": panel.row,
                 "column": panel.column,
                 "square": panel.is_square,
-                "traces": [trace_data(trace, panel) for trace in panel.traces],
-                "notes": [note(one) for one in panel.notes],
+                "traces": [trace_data(trace, panel) for trace in panel.ordered],
+                "notes": [note_data(one, panel) for one in panel.notes if one.tail is None],
             }
-            for panel, x, y in zip(sheet.panels, *links, strict=True)
+            for number, panel in enumerate(panels)
         ],
     }
 
 
-def axis_title(sheet: FigureData, panel: Panel) -> str:
+def title_below(drawing: Drawing, panel: Panel) -> str:
     """Return the title of a panel's x axis, or of one below it in the same column."""
-    below = [one for one in sheet.panels if one.column == panel.column and one.row >= panel.row]
-    return next((one.x.title for one in below if one.x.title), "")
+    below = [one for one in drawing.panels if one.column == panel.column and one.row >= panel.row]
+    return next((title for one in below if (title := axis_title(drawing, one, "x"))), "")
 
 
 def unit(title: str) -> str:
@@ -93,55 +108,77 @@ def unit(title: str) -> str:
     return found[1] if found else ""
 
 
-def link_scales(scales: Sequence[Scale], way: str = "x") -> list[int]:
-    """Return a number for each scale, the same where scales show the same span of the same
-    quantity.
+def link_scales(drawing: Drawing, way: Way) -> list[int]:
+    """Return a number for each panel, the same where axes show the same span of the same quantity.
 
     In x a title that is left out is that of the panels below.
     """
     keys = []
-    for scale in scales:
-        span = scale.low, scale.high, scale.log
-        keys.append((*span, "" if way == "x" or scale.bare else scale.title))
+    for panel in drawing.panels:
+        scale = getattr(panel, way)
+        title = "" if way == "x" or scale.bare else axis_title(drawing, panel, way)
+        keys.append((*panel.limits(way), scale.log, title))
     return [keys.index(key) for key in keys]
 
 
-def axis(scale: Scale, others: Mapping[float, str] | None = None) -> dict[str, Any]:
-    """Return an axis as plain data; others: words of the axis that it is like."""
-    words = [[place, text] for place, text in (scale.words or others or {}).items()]
-    found = {"title": scale.title, "range": [scale.low, scale.high], "log": scale.log}
+def axis(drawing: Drawing, panel: Panel, way: Way) -> dict[str, Any]:
+    """Return an axis as plain data."""
+    scale: Scale = getattr(panel, way)
+    words = [[place, one_line(text)] for place, text in scale.words.items()]
     more = {"words": words, "step": scale.step, "bare": scale.bare}
-    return found | {name: value for name, value in more.items() if value}
+    found = {"title": axis_title(drawing, panel, way), "range": panel.limits(way)}
+    return found | {"log": scale.log} | {name: value for name, value in more.items() if value}
 
 
-def note(one: PanelText) -> dict[str, Any]:
-    """Return a text, or a straight line, as plain data."""
-    place = {way: value for way in "xy" if not np.isnan(value := getattr(one, way))}
-    return {"text": one.text, **place, "color": one.color, "dash": one.dash, "inside": one.inside}
+def note_data(note: Note, panel: Panel) -> dict[str, Any]:
+    """Return a text, or a straight line, as plain data; a text's place in data or in shares."""
+    place: dict[str, float] = {}
+    for way in WAYS:
+        at, (low, high) = getattr(note, way), panel.limits(way)
+        if note.inside and way not in note.inside:
+            at = (at - low) / (high - low)
+        if not math.isnan(at):
+            place[way] = at
+    more = {"color": note.style.color, "dash": dashes(note.style), "inside": bool(note.inside)}
+    return {"text": " ".join(note.text.split()), **place, **more}
+
+
+def dashes(style: LineStyle) -> list[float]:
+    """Return a line's dashes in points: lengths of strokes and gaps; none if it is solid."""
+    is_dashed = isinstance(style.linestyle, tuple)
+    return [round(d * style.linewidth, 2) for d in style.linestyle[1]] if is_dashed else []
 
 
 def trace_data(trace: Trace, panel: Panel) -> dict[str, Any]:
     """Return a trace as plain data, with the points that its panel can show."""
+    look, part = trace.style, visible(trace, panel)
+    is_bar = trace.kind in ("bars", "columns")
+    width = trace.thick if is_bar else look.markersize if trace.is_points else look.linewidth
     found: dict[str, Any] = {
-        "kind": trace.kind, "name": trace.name, "color": trace.color,
-        "width": round(float(trace.width), 3), "dash": trace.dash, "marker": trace.marker,
-        "opacity": trace.opacity,
+        "kind": "points" if trace.is_points else trace.kind, "name": trace.name,
+        "color": look.color, "width": round(float(np.max(width)), 3), "dash": dashes(look),
+        "marker": look.marker, "opacity": look.alpha,
+        "x": numbers(trace.x[part]), "y": numbers(trace.y[part]),
     }  # fmt: skip
-    if trace.z is not None:
-        more = {"z": numbers(trace.z.ravel()), "limits": trace.limits, "log": trace.log,
-                "scale": trace.scale_name}  # fmt: skip
-        found |= more
-        part: Any = slice(None)
-        found |= {"x": numbers(trace.x), "y": numbers(trace.y)}
-    else:
-        part = visible(trace, panel)
-        found |= {"x": numbers(trace.x[part]), "y": numbers(trace.y[part])}
+    if trace.scale is not None and trace.z is not None:
+        scale, z, ends = trace.scale, trace.z, (trace.scale.low, trace.scale.high)
+        if scale.log:
+            z, ends = np.log10(z), (math.log10(scale.low), math.log10(scale.high))
+        found |= {"z": numbers(z.ravel()), "color": colors_of(scale), "limits": ends,
+                  "log": scale.log, "scale": scale.title}  # fmt: skip
     if trace.errors is not None:
         found["errors"] = [numbers(ends[part]) for ends in trace.errors]
         found["across"] = trace.across
     if trace.jobs:
         found["jobs"] = [*np.array(trace.jobs, object)[part].tolist()]
     return found
+
+
+def colors_of(scale: ColorScale) -> list[str]:
+    """Return the colours of a map: all of a few, else some of them."""
+    if len(scale.colors) <= COLORS:
+        return [*scale.colors]
+    return [*scale.colors[:: len(scale.colors) // (COLORS - 1)], scale.colors[-1]]
 
 
 def visible(trace: Trace, panel: Panel) -> Any:
@@ -151,11 +188,11 @@ def visible(trace: Trace, panel: Panel) -> Any:
     Of a curve in x from left to right only what lies in the panel, and a point on either side.
     """
     x, y = trace.x, trace.y
-    if trace.kind not in ("line", "points") or x.size < 3 or not np.isfinite(x).all():
+    if trace.kind != "line" or x.size < 3 or not np.isfinite(x).all():
         return slice(None)
-    if trace.kind == "points" or (np.diff(x) < 0).any():
+    if trace.is_points or (np.diff(x) < 0).any():
         return slice(None) if x.size <= 2 * MAX_POINTS else every(x.size, 2 * MAX_POINTS)
-    low, high = sorted((panel.x.low, panel.x.high))
+    low, high = sorted(panel.limits("x"))
     first = max(0, int(np.searchsorted(x, low, "left")) - 1)
     last = min(x.size, int(np.searchsorted(x, high, "right")) + 1)
     if last - first <= MAX_POINTS:
@@ -193,21 +230,20 @@ def numbers(values: np.ndarray) -> Any:
     return base64.b64encode(values.astype(FLOAT).tobytes()).decode()
 
 
-def describe_figure(sheet: FigureData) -> str:
+def describe_figure(drawing: Drawing) -> str:
     """Return what is seen in a figure, in words: its panels, their axes and curves."""
     told = []
-    for panel in sheet.panels:
-        names = dict.fromkeys(trace.name or trace.scale_name for trace in panel.traces)
-        curves = ", ".join(name for name in names if name)
-        axes = " over ".join(title for title in (panel.y.title, panel.x.title) if title)
-        told.append(": ".join(part for part in (panel.title or axes, curves) if part))
+    for panel in drawing.panels:
+        names = [t.name or (t.scale.title if t.scale else "") for t in panel.ordered]
+        curves = ", ".join(name for name in dict.fromkeys(names) if name)
+        titles = [axis_title(drawing, panel, way) for way in WAYS[::-1]]
+        axes = " over ".join(title for title in titles if title)
+        told.append(": ".join(part for part in (one_line(panel.title) or axes, curves) if part))
     several = f"{len(told)} panels. " if len(told) > 1 else ""
     return several + "; ".join(dict.fromkeys(told))
 
 
 MAX_SERIES = 60  # jobs of a study whose time series lie beside the page
-COLORS = {"big_end": "#1f4488", "small_end": "#d0583b"}
-ANGLE = "crank angle (°), 0 = top dead centre"
 ACCELERATION, FORCE = "acceleration (m/s²)", "contact force (kN)"
 
 
@@ -221,11 +257,11 @@ def job_scripts(stored: Stored, keys: Iterable[str]) -> Iterator[tuple[str, str]
         if status is None or status.status != "ok" or not status.samples:
             continue
         try:
-            sheet = job_sheet(stored.job(key))
+            drawing = draw_job(stored.job(key))
         except (NoSeriesError, DamagedJob):
             continue  # shorter than a revolution, or its file is damaged, of which others tell
         found += 1
-        yield key, script(series_name(key), sheet)
+        yield key, script(series_name(key), drawing)
 
 
 def series_name(key: str) -> str:
@@ -233,26 +269,18 @@ def series_name(key: str) -> str:
     return f"job-{key}"
 
 
-def job_sheet(run: xr.Dataset) -> FigureData:
+def draw_job(run: xr.Dataset) -> Drawing:
     """Return a job's acceleration and the size of its contact forces, over the last revolution."""
     angle, turn = last_revolution(run)
-    moved = Trace("line", "acceleration", angle, turn["acceleration"].values, color="#000000")
+    drawing, grid = make_grid(2, 1, 5.0)
+    drawing.width = 8.0
+    above, below = grid[:, 0]
+    for panel, title in ((above, ACCELERATION), (below, FORCE)):
+        panel.title = panel.y.title = title
+        panel.x = Scale(ANGLE_AXIS, float(angle[0]), float(angle[-1]), step=90.0)
+    black = LineStyle(BLACK)
+    above.plot(angle, turn["acceleration"].values, black, "acceleration")
     sizes = 1e-3 * np.linalg.norm(turn["contact_force"].transpose("joint", "time", "axis"), axis=2)
-    forces = tuple(
-        Trace("line", SPOKEN[joint], angle, size, color=COLORS[joint])
-        for joint, size in zip(JOINTS, sizes, strict=True)
-    )
-    panels = tuple(
-        Panel(title, Scale(ANGLE, float(angle[0]), float(angle[-1]), step=90.0),
-              Scale(title, *limits(traces)), (row, row + 1), (0, 1), traces, ())
-        for row, (title, traces) in enumerate(((ACCELERATION, (moved,)), (FORCE, forces)))
-    )  # fmt: skip
-    return FigureData(panels, (1.0, 1.0), (1.0,), (8.0, 5.0))
-
-
-def limits(traces: Iterable[Trace]) -> tuple[float, float]:
-    """Return the least and the greatest value of curves, with some room."""
-    values = np.concatenate([trace.y for trace in traces])
-    low, high = float(values.min()), float(values.max())
-    room = 0.05 * (high - low) or 1.0
-    return low - room, high + room
+    for joint, size in zip(JOINTS, sizes, strict=True):
+        below.plot(angle, size, LineStyle(BY_JOINT[joint][0]), SPOKEN[joint])
+    return drawing

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, StrictUndefined
@@ -18,12 +18,10 @@ from markupsafe import Markup
 from compressor.digits import by_bar
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
-from compressor.report.figures import Drawing
+from compressor.report.figures.drawing import Drawing
+from compressor.report.figures.pictures import DPI
 from compressor.report.figures.sweep_data import Measure
 from compressor.store import Folder, StoredStudy
-
-if TYPE_CHECKING:
-    from compressor.report.figures import Drawing
 
 
 @dataclass(frozen=True)
@@ -135,7 +133,7 @@ class Plate:
     name: str
     heading: str
     caption: str
-    figure: "Drawing"
+    figure: Drawing
     csv: str
     script: str
     alt: str
@@ -144,8 +142,7 @@ class Plate:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of the PNG in pixels."""
-        width, height = self.figure.canvas.get_width_height()
-        return width, height
+        return int(self.figure.width * DPI), int(self.figure.height * DPI)
 
     @property
     def texts(self) -> dict[str, str]:

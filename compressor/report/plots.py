@@ -30,7 +30,7 @@ from compressor.report.figures.job import (
     draw_spectra,
     draw_waterfall,
 )
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render_kinds
 from compressor.report.study_section import file_name
 from compressor.store import (
     Folder,
@@ -86,10 +86,9 @@ def publish_drawings(
     """Write drawings with their names and captions as files; yields each. Raises StoreError."""
     for name, caption, drawing in drawn:
         paths = []
-        for kind in kinds:
-            path = Path(output) / f"{file_name(stem, name)}.{kind}"
-            publish(path, render(drawing, kind))
-            paths.append(path)
+        for kind, picture in zip(kinds, render_kinds(drawing, kinds), strict=True):
+            paths.append(Path(output) / f"{file_name(stem, name)}.{kind}")
+            publish(paths[-1], picture)
         yield Plotted(tuple(paths), caption)
 
 

@@ -26,7 +26,7 @@ from compressor.report.answer import (
     study_findings,
 )
 from compressor.report.figures import FIGURES, Drawing
-from compressor.report.figures.extract import as_csv, extract
+from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.pictures import pictures
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
@@ -286,9 +286,8 @@ def draw_paper(paper: PaperRuns) -> list[Plate]:
 
 def draw(name: str, heading: str, caption: str, drawing: Drawing) -> Plate:
     """Return a drawing with what the page and its data tell of it."""
-    sheet = extract(drawing)
-    jobs = dict.fromkeys(key for panel in sheet.panels for t in panel.traces for key in t.jobs)
+    jobs = dict.fromkeys(key for panel in drawing.panels for t in panel.traces for key in t.jobs)
     return Plate(
-        name, heading, caption, drawing, as_csv(sheet), script(name, sheet), describe_figure(sheet),
-        tuple(jobs),
+        name, heading, caption, drawing, as_csv(drawing), script(name, drawing),
+        describe_figure(drawing), tuple(jobs),
     )  # fmt: skip

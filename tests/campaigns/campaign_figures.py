@@ -1,20 +1,12 @@
 """Figures of campaigns: errors against tolerance and clearance, and what accuracy costs."""
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from compressor.report.figures.style import (
-    BLACK,
-    CYCLE,
-    GREY,
-    LineStyle,
-    in_style,
-    legend_above,
-    sheet,
-)
+from compressor.report.figures.drawing import Drawing, Note, Panel, entry, make_grid
+from compressor.report.figures.style import BLACK, CYCLE, GREY, LineStyle, mark
 
 MARKERS = ("o", "s", "D")
 GUIDE = LineStyle(GREY, (0, (1, 1.2)), 1.3, 1.5)
@@ -26,116 +18,87 @@ RUNGS = {
 }
 
 
-@in_style
-def draw_tolerance_ladder(ladder: xr.Dataset) -> Figure:
+def draw_tolerance_ladder(ladder: xr.Dataset) -> Drawing:
     """Return the relative errors and the energy residual against rtol, a line a scene.
 
     Dims (scene, tolerance); `RUNGS` are its variables, with `reference_uncertainty` (scene): the
     error of acceleration below which the references themselves disagree. Dotted: as the tolerance;
     for the residual its bound, `residual_bound` (tolerance).
     """
-    figure, grid = sheet(1, len(RUNGS), 4.6, sharex=True)
+    figure, _ = make_grid(1, len(RUNGS), 4.6)
     rtol = ladder["tolerance"].values
-    for panel, (name, title) in zip(grid.flat, RUNGS.items(), strict=True):
-        loglog(panel, title, "rtol")
+    for panel, (name, title) in zip(figure.panels, RUNGS.items(), strict=True):
+        scale_logs(panel, title, "rtol")
         for number, one in enumerate(ladder["scene"].values):
-            plot_line(panel, number, rtol, ladder[name].sel(scene=one).values)
+            plot_scene(panel, number, one, rtol, ladder[name].sel(scene=one).values)
         guide = ladder["residual_bound"].values if name == "energy_residual" else rtol
-        panel.plot(rtol, guide, **GUIDE.properties())
-        panel.invert_xaxis()
+        panel.plot(rtol, guide, GUIDE, "as rtol; residual: its bound")
+        panel.x.span(*panel.limits("x")[::-1])
     worst = float(ladder["reference_uncertainty"].max())
-    grid.flat[0].axhline(worst, **KNOWN.properties())
-    meanings = {
-        "as rtol; residual: its bound": GUIDE,
-        "how far references lie apart, worst scene": KNOWN,
-    }
-    legend_above(figure, scene_handles(ladder) + line_handles(meanings))
+    figure.panels[0].notes.append(Note(y=worst, style=KNOWN))
+    known = entry("how far references lie apart, worst scene", KNOWN)
+    figure.legend = [*figure.panels[0].traces, known]
     return figure
 
 
-@in_style
-def draw_scaled_limit(limit: xr.Dataset) -> Figure:
+def draw_scaled_limit(limit: xr.Dataset) -> Drawing:
     """Return greatest |x - x_ideal| against clearance, the contact scaled along; a line a scene.
 
     Dims (scene, clearance), m; variable `deviation`, m. Right: the same over the clearance.
     """
-    figure, grid = sheet(1, 2, 4.6)
+    figure, _ = make_grid(1, 2, 4.6)
     clearance = limit["clearance"].values
-    left, right = grid.flat
-    loglog(left, "greatest |x − x_ideal| (m)", "clearance (m)")
-    loglog(right, "the same over the clearance", "clearance (m)")
+    left, right = figure.panels
+    scale_logs(left, "greatest |x − x_ideal| (m)", "clearance (m)")
+    scale_logs(right, "the same over the clearance", "clearance (m)")
     for number, one in enumerate(limit["scene"].values):
         deviation = limit["deviation"].sel(scene=one).values
-        plot_line(left, number, clearance, deviation)
-        plot_line(right, number, clearance, deviation / clearance)
-    left.plot(clearance, clearance, **GUIDE.properties())
-    right.set_ylim(0.5, 10 ** np.ceil(np.log10(right.get_ylim()[1])))
-    legend_above(figure, scene_handles(limit) + line_handles({"slope 1": GUIDE}))
+        plot_scene(left, number, one, clearance, deviation)
+        plot_scene(right, number, one, clearance, deviation / clearance)
+    left.plot(clearance, clearance, GUIDE, "slope 1")
+    right.y.span(0.5, 10 ** np.ceil(np.log10(right.limits("y")[1])))
+    figure.legend = left.traces
     return figure
 
 
-def loglog(panel: Axes, title: str, along: str) -> None:
+def scale_logs(panel: Panel, title: str, along: str) -> None:
     """Logarithmic axes with room around the points."""
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    panel.margins(0.06)
-    panel.set_title(title)
-    panel.set_xlabel(along)
+    for scale in (panel.x, panel.y):
+        scale.log, scale.margin = True, 0.06
+    panel.title, panel.x.title = title, along
 
 
-def plot_line(panel: Axes, number: int, x: np.ndarray, y: np.ndarray) -> None:
-    """The line of a scene, by its number."""
-    look = CYCLE[number % len(CYCLE)].properties()
-    panel.plot(x, y, marker=MARKERS[number % len(MARKERS)], markersize=4.2, **look)
+def plot_scene(panel: Panel, number: int, name: str, x: np.ndarray, y: np.ndarray) -> None:
+    """Draw the line of a scene, styled by its number."""
+    marker = MARKERS[number % len(MARKERS)]
+    style = replace(CYCLE[number % len(CYCLE)], marker=marker, markersize=4.2)
+    panel.plot(x, y, style, name.replace("_", " "))
 
 
-def scene_handles(data: xr.Dataset) -> list[Line2D]:
-    """Return what the lines of the scenes mean."""
-    return [
-        Line2D([], [], label=str(name).replace("_", " "), marker=MARKERS[i % len(MARKERS)],
-               markersize=4.5, **CYCLE[i % len(CYCLE)].properties())
-        for i, name in enumerate(data["scene"].values)
-    ]  # fmt: skip
+PROMISED = LineStyle(GREY, (0, (3.7, 1.6)), 1.2, 1.0)
 
 
-def line_handles(meanings: dict[str, LineStyle]) -> list[Line2D]:
-    """Return what guiding lines mean."""
-    return [Line2D([], [], label=text, **line.properties()) for text, line in meanings.items()]
-
-
-PROMISED = LineStyle(GREY, "--", 1.2, 1.0)
-SHOWN = {
-    "markersize": 2.2,
-    "linestyle": "none",
-    "marker": "o",
-    "rasterized": True,
-    "markeredgewidth": 0.0,
-}
-
-
-@in_style
-def draw_kept_error(cases: xr.Dataset) -> Figure:
+def draw_kept_error(cases: xr.Dataset) -> Drawing:
     """Return the error of acceleration against the time that its run took with its check, a colour
     a word.
 
     Dims (word, case): `seconds`, and `error`, relative L2 after settling, nan where a run did not
     say `kept`; `promise` (word). Large: both medians. Dashed: the promise.
     """
-    figure, grid = sheet(1, 1, 6.0)
-    (panel,) = grid.flat
-    loglog(panel, "error of acceleration, relative L2", "time of a run with its check (ms)")
+    figure, grid = make_grid(1, 1, 6.0)
+    panel = grid[0, 0]
+    scale_logs(panel, "error of acceleration, relative L2", "time of a run with its check (ms)")
     for number, word in enumerate(cases["word"].values):
         one = cases.sel(word=word)
         kept = one["error"].notnull() & (one["error"] > 0)
         milliseconds, error = 1e3 * one["seconds"][kept].values, one["error"][kept].values
-        colour = CYCLE[number % len(CYCLE)].color
-        panel.plot(milliseconds, error, color=colour, **SHOWN)
-        middle = np.median(milliseconds), np.median(error)
-        panel.plot(*middle, "D", color=colour, markeredgecolor="white", markersize=10, label=word)
-        panel.axhline(float(one["promise"]), color=colour, linestyle="--", linewidth=1.2)
-    handles, _ = panel.get_legend_handles_labels()
-    figure.legend(
-        handles=handles + line_handles({"its promise": PROMISED}), loc="outside upper center",
-        ncols=len(handles) + 1,
-    )  # fmt: skip
+        color = CYCLE[number % len(CYCLE)].color
+        dots = mark(color, "o", 2.2, edge_width=0.0)
+        panel.plot(milliseconds, error, dots, is_raster=True)
+        middle = mark(color, "D", 10, edge="#ffffff")
+        panel.plot(np.median(milliseconds), np.median(error), middle, word)
+        promise = replace(PROMISED, color=color, zorder=2)
+        panel.notes.append(Note(y=float(one["promise"]), style=promise))
+    figure.legend = [one for one in panel.traces if one.name]
+    figure.legend.append(entry("its promise", PROMISED))
     return figure

@@ -28,7 +28,7 @@ from compressor.cases.case import Case
 from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.regime import TWIN_DISTANCE
 from compressor.solve.simulate import simulate

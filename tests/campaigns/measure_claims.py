@@ -21,7 +21,7 @@ from compressor.analysis.claims import RULES
 from compressor.cases.case import Case
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render
 from compressor.studies.claims.figures import draw_claims_map
 from compressor.studies.claims.findings import (
     change,

@@ -19,7 +19,7 @@ from measure_accuracy import provenance
 from compressor.analysis.runs import FAULTS
 from compressor.cases.case import Case
 from compressor.cases.groups import Contact
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render
 from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.error_bars import allowed_residual
 from compressor.solve.simulate import simulate, with_series

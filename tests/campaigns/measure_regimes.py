@@ -14,7 +14,7 @@ from measure_accuracy import provenance
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render
 from compressor.studies.regimes.captions import bifurcation
 from compressor.studies.regimes.dataset import open_regimes
 from compressor.studies.regimes.figures import draw_bifurcation

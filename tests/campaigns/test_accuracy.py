@@ -82,11 +82,9 @@ def test_the_figure_shows_runs_that_say_kept():
     row = {"seconds": 0.01, "error": 1e-4, "promise": "kept"}
     refused = {**row, "error": 0.5, "promise": "none"}
     cases = [{"words": dict.fromkeys(ACCURACY, one)} for one in (row, row, refused)]
-    (panel,) = drawing(cases).axes
-    clouds = [line for line in panel.lines if line.get_marker() == "o"]
-    assert [len(line.get_xdata()) for line in clouds] == [2] * len(ACCURACY)
-    medians = [line for line in panel.lines if line.get_marker() == "D"]
-    assert [line.get_label() for line in medians] == list(ACCURACY)
-    np.testing.assert_allclose([line.get_ydata()[0] for line in medians], 1e-4)
-    dashed = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "--"]
-    assert dashed == [tier.promise for tier in ACCURACY.values()]
+    (panel,) = drawing(cases).panels
+    clouds, medians = panel.traces[::2], panel.traces[1::2]
+    assert [cloud.x.size for cloud in clouds] == [2] * len(ACCURACY)
+    assert [median.name for median in medians] == list(ACCURACY)
+    np.testing.assert_allclose([median.y[0] for median in medians], 1e-4)
+    assert [note.y for note in panel.notes] == [tier.promise for tier in ACCURACY.values()]

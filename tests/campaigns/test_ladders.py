@@ -59,6 +59,7 @@ def test_a_nanometre_and_a_millimetre_pass_the_audit(joint, clearance):
 def test_the_kept_figures_are_of_the_kept_numbers():
     drawn = figures(kept("ladders.json"))
     assert all((RESULTS / name).exists() for name in drawn)
-    left, right = drawn["limit.svg"].axes
-    assert len(left.lines) == len(kept("ladders.json")["slopes"]) + 1
-    assert left.get_xscale() == right.get_yscale() == "log"
+    left, right = drawn["limit.svg"].panels
+    assert len(left.traces) == len(kept("ladders.json")["slopes"]) + 1
+    assert left.x.log
+    assert right.y.log

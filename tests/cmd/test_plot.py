@@ -183,10 +183,10 @@ def test_a_study_that_is_no_grid_says_what_else_varies(plot):
 
 
 def test_rounding_is_not_drawn_as_a_spectrum(folder):
-    ideal, worn = (draw_spectra(job(folder, name), None).axes[1] for name in ("ideal", "worn"))
-    assert not ideal.lines
-    assert "ideal joints" in ideal.texts[0].get_text()
-    assert worn.lines[0].get_ydata().max() > 0.1
+    ideal, worn = (draw_spectra(job(folder, name), None).panels[1] for name in ("ideal", "worn"))
+    assert not ideal.traces
+    assert "ideal joints" in ideal.notes[0].text
+    assert worn.traces[0].y.max() > 0.1
 
 
 def test_ideal_joints_have_no_contacts_to_draw(plot, folder):

@@ -66,13 +66,12 @@ def test_the_force_above_order_12_is_told_and_drawn(drawn, paper_runs):
         first, _, last = expected[fault]
         assert newtons(sentence) == pytest.approx([first, last], abs=0.51)
         assert ("rises" if first < last else "falls") in sentence
-    trend = figure.axes[1]
-    for line, fault in zip(trend.lines, FAULTS, strict=False):
-        assert line.get_xdata() == pytest.approx(CLEARANCES)
-        assert line.get_ydata() == pytest.approx(expected[fault], rel=1e-3)
-    lines = figure.axes[0].lines
-    for line, name in ((lines[0], "big_end 0.3"), (lines[2], "small_end 0.3")):
-        orders, amplitudes = line.get_data()
+    spectra, trend = figure.panels
+    for line, fault in zip(trend.traces, FAULTS, strict=True):
+        assert line.x == pytest.approx(CLEARANCES)
+        assert line.y == pytest.approx(expected[fault], rel=1e-3)
+    for line, name in zip(spectra.traces, ("big_end 0.3", "small_end 0.3"), strict=False):
+        orders, amplitudes = line.x, line.y
         force = frame_forces(paper_runs[name])["shaking_force"][KEPT, 0]
         whole = 2 * np.abs(np.fft.rfft(force)[::3]) / force.size
         assert amplitudes[orders == 1] == pytest.approx(whole[1], rel=1e-3)
@@ -102,7 +101,7 @@ def test_both_shares_are_told(drawn, paper_runs, found):
         assert told[:4] == pytest.approx(expected, rel=0.01, abs=1)
     assert "rings at order 7" in text
     assert "no flight and no impact" in text
-    profile = figure.axes[0].lines[0].get_ydata()
+    profile = figure.panels[0].traces[0].y
     whole = np.sqrt(np.mean(profile[:-1] ** 2))
     assert profile.size == 360 / BIN + 1
     assert whole == pytest.approx(rms(high(paper_runs["big_end 0.1"])), rel=5e-3)
@@ -113,14 +112,14 @@ def test_orbits_are_told_and_drawn_to_scale(drawn, paper_runs):
     assert "No journal leaves its wall" in text
     assert "big end it goes round 1.0 times a revolution, counter-clockwise" in text
     assert "small end it goes round 1.0 times a revolution, clockwise" in text
-    for panel, clearance in zip(figure.axes[:3], CLEARANCES, strict=True):
-        (circle,) = panel.patches
-        assert circle.radius == pytest.approx(1e3 * clearance)
+    for panel, clearance in zip(figure.panels[:3], CLEARANCES, strict=True):
+        circle, path, *_ = panel.traces
+        assert np.hypot(circle.x, circle.y) == pytest.approx(1e3 * clearance)
         place = paper_runs[label("big_end", clearance)]["eccentricity"].sel(joint="big_end")
-        x, y = panel.lines[0].get_data()
+        x, y = path.x, path.y
         assert x == pytest.approx(1e6 * place.sel(axis="x").values[-x.size :], rel=1e-6)
-        assert np.hypot(x, y).min() > circle.radius
-        assert panel.get_aspect() == 1
+        assert np.hypot(x, y).min() > 1e3 * clearance
+        assert panel.is_square
 
 
 def test_captions_follow_the_numbers_and_not_the_names(found, paper_runs):

@@ -6,7 +6,7 @@ from test_report import forget, part_of
 
 from compressor.report import interactive
 from compressor.report.figures import pictures
-from compressor.report.interactive import job_scripts, job_sheet
+from compressor.report.interactive import draw_job, job_scripts
 from compressor.report.report import write_report
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -16,14 +16,15 @@ LAST = slice(-1201, None)  # of 0.3 degrees a sample
 
 def test_the_last_revolution_is_shown(paper_runs):
     run = paper_runs["both 0.3"]
-    acceleration, force = job_sheet(run).panels
+    acceleration, force = draw_job(run).panels
     assert acceleration.traces[0].y == pytest.approx(run["acceleration"].values[LAST])
     assert acceleration.traces[0].x[[0, -1]] == pytest.approx([0.0, 360.0])
     size = np.hypot(*run["contact_force"].sel(joint="small_end").values[LAST].T) / 1e3
     assert force.traces[1].name == "small end"
     assert force.traces[1].y == pytest.approx(size)
-    assert force.y.low < min(size.min(), force.traces[0].y.min())
-    assert force.y.high > size.max()
+    low, high = force.limits("y")
+    assert low < min(size.min(), force.traces[0].y.min())
+    assert high > size.max()
 
 
 def test_only_jobs_that_kept_their_series_have_scripts(paper_store, monkeypatch):
@@ -44,7 +45,7 @@ def test_scripts_lie_beside_the_page_and_stale_ones_go(paper_store, tmp_path, mo
     out = tmp_path / "out"
     out.mkdir()
     (out / "job-old.js").write_text("an earlier report's")
-    monkeypatch.setattr(pictures, "render", lambda figure, kind: bytes(24))
+    monkeypatch.setattr(pictures, "render_kinds", lambda drawing, kinds: [bytes(24)] * 2)
     write_report(part, out)
     assert {path.name for path in out.glob("job-*.js")} == {
         f"job-{key}.js" for key in study.keys[1:]

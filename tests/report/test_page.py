@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 from jinja2 import UndefinedError
-from matplotlib.figure import Figure
 
 from compressor.analysis.claims import Claim
 from compressor.report import page
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
+from compressor.report.figures import Drawing
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -77,7 +77,7 @@ class Hostile:
 
 
 def plate(evil):
-    return Plate("drawn", evil(), evil(), Figure(), "csv", "js", evil())
+    return Plate("drawn", evil(), evil(), Drawing([], 1.0), "csv", "js", evil())
 
 
 def table(evil):

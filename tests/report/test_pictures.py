@@ -6,12 +6,11 @@ import sys
 import threading
 
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from compressor.report.figures import pictures as module
-from compressor.report.figures.pictures import can_fork, pictures
-from compressor.report.figures.style import render
+from compressor.report.figures.drawing import make_grid
+from compressor.report.figures.pictures import can_fork, pictures, render
+from compressor.report.figures.style import LineStyle
 
 NAMES = ["one", "two", "three", "four", "five"]
 HEADINGS = {name: f"Figure {name}" for name in NAMES}
@@ -22,11 +21,8 @@ pytestmark = pytest.mark.skipif(not can_fork(), reason="there is one core, or no
 def figures():
     made = {}
     for number, name in enumerate(NAMES):
-        made[name] = Figure(layout="constrained")
-        FigureCanvasAgg(made[name])
-        panel = made[name].subplots()
-        panel.plot([0, 1], [number, 2])
-        panel.xaxis.set_major_formatter(lambda value, _: f"{value:g} mm")  # cannot be sent
+        made[name], grid = make_grid(1, 1, 2.0)
+        grid[0, 0].plot([0, 1], [number, 2], LineStyle("#000000"))
     return made
 
 
@@ -56,37 +52,37 @@ def test_two_processes_draw_what_one_does(figures, alone, capfd):
 
 @pytest.mark.usefixtures("threadless")
 def test_another_process_takes_part(figures, monkeypatch, tmp_path):
-    def noted(figure):
+    def noted(*args):
         (tmp_path / str(os.getpid())).touch()
-        return both(figure)
+        return draw(*args)
 
-    both = module.both
-    monkeypatch.setattr(module, "both", noted)
+    draw = module.render_kinds
+    monkeypatch.setattr(module, "render_kinds", noted)
     pictures(figures, HEADINGS)
     assert {path.name for path in tmp_path.iterdir()} > {str(os.getpid())}
 
 
 @pytest.mark.usefixtures("threadless")
 def test_a_process_that_dies_costs_nothing(figures, alone, monkeypatch):
-    def deadly(figure):
+    def deadly(*args):
         if os.getpid() != here:
             os._exit(9)
-        return both(figure)
+        return draw(*args)
 
-    here, both = os.getpid(), module.both
-    monkeypatch.setattr(module, "both", deadly)
+    here, draw = os.getpid(), module.render_kinds
+    monkeypatch.setattr(module, "render_kinds", deadly)
     assert pictures(figures, HEADINGS) == alone
 
 
 @pytest.mark.usefixtures("threadless")
 def test_an_error_of_the_other_process_is_raised(figures, monkeypatch):
-    def failing(figure):
+    def failing(*args):
         if os.getpid() != here:
             raise ZeroDivisionError
-        return both(figure)
+        return draw(*args)
 
-    here, both = os.getpid(), module.both
-    monkeypatch.setattr(module, "both", failing)
+    here, draw = os.getpid(), module.render_kinds
+    monkeypatch.setattr(module, "render_kinds", failing)
     with pytest.raises(ZeroDivisionError):
         pictures(figures, HEADINGS)
 

@@ -86,7 +86,7 @@ def full(once, paper_store):
 @pytest.fixture(autouse=True)
 def unpainted(monkeypatch):
     """No pixels are made, which takes seconds, but for `full`, which is made before."""
-    monkeypatch.setattr(pictures, "render", lambda figure, kind: bytes(24))
+    monkeypatch.setattr(pictures, "render_kinds", lambda drawing, kinds: [bytes(24)] * 2)
 
 
 @pytest.fixture
@@ -442,7 +442,7 @@ def test_an_interrupted_report_leaves_the_old_one(own, tmp_path, monkeypatch):
     def interrupt(figure, kind):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pictures, "render", interrupt)
+    monkeypatch.setattr(pictures, "render_kinds", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_report(own, out, "second")
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before

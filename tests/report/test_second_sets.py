@@ -55,6 +55,9 @@ def sets(folder):
     return paper_sections.second_sets(stored, studies, find_paper_runs(stored, studies))
 
 
+EMPTY = Drawing([], 1.0)
+
+
 @pytest.fixture(scope="module")
 def heavy_store(once):
     """A store with the study `heavy`: an ideal machine and the nine faults, with other masses."""
@@ -74,12 +77,14 @@ def heavy(heavy_store, tmp_path):
 def undrawn(monkeypatch):
     """Nothing is drawn of the paper's figures, and no pixels are made, which takes long."""
     figures = {
-        module: tuple(replace(item, draw=lambda runs: Drawing()) for item in getattr(module, name))
+        module: tuple(
+            replace(item, draw=lambda runs: Drawing([], 1.0)) for item in getattr(module, name)
+        )
         for module, name in ((report, "FIGURES"), (paper_sections, "SET"))
     }
     monkeypatch.setattr(report, "FIGURES", figures[report])
     monkeypatch.setattr(paper_sections, "SET", figures[paper_sections])
-    monkeypatch.setattr(pictures, "render", lambda figure, kind: bytes(24))
+    monkeypatch.setattr(pictures, "render_kinds", lambda drawing, kinds: [bytes(24)] * 2)
 
 
 # ---- which studies ----------------------------------------------------------------------------
@@ -230,8 +235,8 @@ def test_figures_and_captions_are_the_second_machine_s(heavy_store):
     of = [runs[label("both", c)] for c in CLEARANCES]
     peaks = [float(run["peak_contact_force_axis"].sel(joint="big_end", axis="x")) for run in of]
     assert ", ".join(f"{peak / 1e3:.2f}" for peak in peaks) + " kN along the cylinder" in text
-    rows = [p for p in drawing.axes if p.get_subplotspec().colspan.start == 0][:3]
-    drawn = [np.abs(line.get_ydata()).max() for panel in rows for line in panel.lines]
+    rows = [panel for panel in drawing.panels if panel.column[0] == 0][:3]
+    drawn = [np.abs(one.y).max() for panel in rows for one in panel.traces if one.name]
     series = [run["contact_force"].sel(joint="big_end", axis="x").values[-1201:] for run in of]
     assert drawn == pytest.approx([np.abs(one).max() / 1e3 for one in series])
     assert found["heavy-figure-08"][1] == caption(8, runs)

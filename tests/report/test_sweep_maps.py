@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from swept_made import grid
 
-from compressor.report.figures.extract import extract
 from compressor.report.figures.sweep import draw_sweep
 
 AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]}
@@ -14,8 +13,10 @@ AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]
 
 def traces(data):
     _, drawn = draw_sweep(data)  # the ranking is the first
-    panel = extract(drawn.figure).panels[0]
-    return drawn, panel, {trace.kind + ":" + trace.name: trace for trace in panel.traces}
+    panel = drawn.figure.panels[0]
+    kinds = ("points" if one.is_points else one.kind for one in panel.traces)
+    names = (f"{kind}:{one.name}" for kind, one in zip(kinds, panel.traces, strict=True))
+    return drawn, panel, dict(zip(names, panel.traces, strict=True))
 
 
 def test_cells_are_jobs():
@@ -27,8 +28,9 @@ def test_cells_are_jobs():
         [0.05, 0.15, 0.3, 0.45, 0.55]
     )  # halfway between values
     assert cells.jobs[:5] == ("k0", "k3", "k6", "k9", "k1")  # in C order of the cells
-    assert (panel.x.title, panel.y.title) == ("clearance (mm)", "speed (rpm)")
-    assert cells.scale_name == "m/s²"
+    assert (drawn.figure.x_title, drawn.figure.y_title) == ("clearance (mm)", "speed (rpm)")
+    assert panel.limits("x") == pytest.approx((0.05, 0.55))
+    assert cells.scale.title == "m/s²"
     assert drawn.name == "map"
 
 
@@ -59,8 +61,8 @@ def test_values_and_axes_over_decades_are_logarithmic():
     _, panel, found = traces(grid(axes, lambda c, n: c * n))
     cells = found["map:peak acceleration"]
     assert panel.x.log
-    assert cells.log
-    assert cells.z[0] == pytest.approx(np.log10([3, 30, 300]))
+    assert cells.scale.log
+    assert cells.z[0] == pytest.approx([3, 30, 300])
     assert cells.x[1:3].tolist() == pytest.approx([10**-1.5, 10**-0.5])
 
 
@@ -68,7 +70,7 @@ def test_words_have_no_lines_between_them():
     axes = {"fault": ["big_end", "small_end", "both"], "load": ["spring", "gas", "none"]}
     _, panel, found = traces(grid(axes, lambda joint, load: joint + load))
     assert [*found] == ["map:peak acceleration"]
-    assert panel.x.words == {0.0: "big end", 1.0: "small end", 2.0: "both joints"}
+    assert panel.x.words == {0.0: "big\nend", 1.0: "small\nend", 2.0: "both\njoints"}
 
 
 def test_large_grids_are_thinned_with_a_word():

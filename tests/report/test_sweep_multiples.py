@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from swept_made import grid
 
-from compressor.report.figures.extract import extract
 from compressor.report.figures.sweep import draw_sweep
 
 THREE = {"clearance_mm": [0.1, 0.2, 0.3], "speed_rpm": [300.0, 400.0],
@@ -23,10 +22,10 @@ def plan(data):
 
 def test_a_panel_shows_its_jobs():
     drawn = plan(grid(THREE, peak))["panels"]
-    panels = extract(drawn.figure).panels
+    panels = drawn.figure.panels
     assert [panel.title for panel in panels] == [
-        "peak acceleration joint big end", "peak acceleration both joints",
-        "rms acceleration joint big end", "rms acceleration both joints",
+        "peak acceleration\njoint big end", "peak acceleration\nboth joints",
+        "rms acceleration\njoint big end", "rms acceleration\nboth joints",
     ]  # fmt: skip
     slow, fast = panels[1].traces
     assert (slow.name, fast.name) == ("speed 300 rpm", "speed 400 rpm")
@@ -34,8 +33,8 @@ def test_a_panel_shows_its_jobs():
     assert fast.y == pytest.approx(peak(np.array([0.1, 0.2, 0.3]), 400, 1))
     assert fast.jobs == ("k3", "k7", "k11")
     assert fast.errors is not None
-    assert len({trace.color for trace in panels[1].traces}) == 2
-    assert (panels[3].x.title, panels[2].y.title) == ("clearance (mm)", "m/s²")
+    assert len({trace.style.color for trace in panels[1].traces}) == 2
+    assert (drawn.figure.x_title, panels[2].y.title) == ("clearance (mm)", "m/s²")
     assert (
         drawn.caption
     ) == "A panel for each joint, a colour for each value of speed. A point a job."
@@ -45,7 +44,7 @@ def test_the_overview_shows_means_of_what_is_known():
     status, regime = (np.full((3, 2, 2), word, dtype="U11") for word in ("ok", "predictable"))
     status[0, 0, 0], regime[1, 1, 1] = "failed", "chaotic"
     drawn = plan(grid(THREE, peak, status=status, regime=regime))["overview"]
-    slow, fast = extract(drawn.figure).panels[0].traces
+    slow, fast = drawn.figure.panels[0].traces
     c = np.array([0.1, 0.2, 0.3])
     expected = peak(c, 300, 0.5)
     expected[0] = peak(0.1, 300, 1)
@@ -61,7 +60,7 @@ def test_failed_and_chaotic_jobs_are_marked_in_their_panel():
     status, regime = (np.full((3, 2, 2), word, dtype="U11") for word in ("ok", "predictable"))
     status[0, 0, 0], regime[1, 1, 1] = "failed", "chaotic"
     drawn = plan(grid(THREE, peak, status=status, regime=regime))["panels"]
-    one, other = extract(drawn.figure).panels[:2]
+    one, other = drawn.figure.panels[:2]
     failed = next(trace for trace in one.traces if trace.name == "a job failed here")
     assert (failed.x, failed.jobs) == (0.1, ("k0",))
     assert not [trace for trace in other.traces if trace.name == "a job failed here"]
@@ -73,7 +72,7 @@ def test_two_axes_with_words_are_lines_of_jobs():
     axes = {"clearance_mm": THREE["clearance_mm"], "fault": THREE["fault"]}
     drawn = plan(grid(axes, lambda c, joint: 10 * c + joint))
     assert [*drawn] == ["ranking", "overview"]
-    first, second = extract(drawn["overview"].figure).panels[0].traces
+    first, second = drawn["overview"].figure.panels[0].traces
     assert (first.name, second.name) == ("joint big end", "both joints")
     assert second.y == pytest.approx([2, 3, 4])
     assert second.jobs == ("k1", "k3", "k5")
@@ -91,13 +90,13 @@ def test_four_axes_are_few_lines_in_few_panels(sizes, limit):
     assert [*found] == ["ranking", "overview", "panels-peak_acceleration",
                         "panels-rms_acceleration"]  # fmt: skip
     for drawn in found.values():
-        panels = extract(drawn.figure).panels
+        panels = drawn.figure.panels
         assert len(panels) <= 12
         for panel in panels:
             names = [trace.name for trace in panel.traces]
             assert all(names)
             assert len(names) == len({*names}) <= 12
-    panels = extract(found["panels-peak_acceleration"].figure).panels
+    panels = found["panels-peak_acceleration"].figure.panels
     ends = np.ravel([(p.y.low, p.y.high) for p in panels])
     assert len({*ends.tolist()}) == 2  # one scale, so that panels compare
     told = found["panels-peak_acceleration"].caption
@@ -107,6 +106,6 @@ def test_four_axes_are_few_lines_in_few_panels(sizes, limit):
 def test_a_study_of_words_alone_is_points():
     axes = {"fault": ["big_end", "both"], "load": ["spring", "gas"], "law": ["one", "two"]}
     drawn = plan(grid(axes, lambda a, b, c: 1 + 4 * a + 2 * b + c))["panels"]
-    panel = extract(drawn.figure).panels[0]
-    assert panel.x.words == {0.0: "big end", 1.0: "both joints"}
-    assert {trace.kind for trace in panel.traces} == {"points"}
+    panel = drawn.figure.panels[0]
+    assert panel.x.words == {0.0: "big\nend", 1.0: "both\njoints"}
+    assert all(trace.is_points for trace in panel.traces)

@@ -5,7 +5,6 @@ import pytest
 from swept_made import grid, listed
 
 from compressor.cases.swept import design
-from compressor.report.figures.extract import extract
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import measures, sweep_of
 from compressor.report.figures.sweep_maps import leading, ranking
@@ -22,7 +21,7 @@ def bars(drawn):
     """The shares of an axis' panel by the kind of effect."""
     return {
         panel.title: {trace.name.partition("(")[2].rstrip(")"): trace.x for trace in panel.traces}
-        for panel in extract(drawn.figure).panels
+        for panel in drawn.figure.panels
     }
 
 
@@ -37,7 +36,7 @@ def test_bars_and_caption_are_the_exact_shares():
         assert found["clearance"][kind] == pytest.approx([100 - share] * 2)
         assert found["load"][kind] == pytest.approx([0, 0])
     assert f"Speed matters most for peak acceleration ({share:.0f} %)" in drawn.caption
-    panel = extract(drawn.figure).panels[0]
+    panel = drawn.figure.panels[0]
     assert panel.y.words == {0.0: "peak acceleration", 1.0: "rms acceleration"}
     assert panel.x.title == "share of variance (%)"
 
@@ -77,7 +76,7 @@ def test_keys_that_overlap_are_not_told_apart():
     assert "(whose intervals overlap) matters most for" in drawn.caption
     drawn = plan(listed(columns, 1 - 0.9 * points[:, 0] + 0.02 * points[:, 1]))["ranking"]
     assert "Clearance matters most for peak acceleration (−1.00)" in drawn.caption
-    panel = extract(drawn.figure).panels[0]
+    panel = drawn.figure.panels[0]
     (found,) = (trace for trace in panel.traces if trace.kind == "bars")
     assert panel.title == "clearance"
     assert found.x[0] == pytest.approx(-1.0, abs=0.01)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from swept_made import listed
 
-from compressor.report.figures.extract import extract
 from compressor.report.figures.sweep import draw_sweep
 
 RNG = np.random.default_rng(5)
@@ -25,7 +24,7 @@ def traces(panel):
 def test_points_are_jobs_and_a_parabola_is_its_own_trend():
     found = plan(listed(COLUMNS, 2 + SPEED**2))
     assert [*found] == ["ranking", "points", "scatter"]
-    panel = extract(found["points"].figure).panels[0]
+    panel = found["points"].figure.panels[0]
     assert panel.x.title == "speed (rpm)"  # what matters most
     one = traces(panel)
     assert one["a job"].x.tolist() == SPEED.tolist()
@@ -37,7 +36,7 @@ def test_points_are_jobs_and_a_parabola_is_its_own_trend():
 
 
 def test_each_key_has_a_column_and_each_metric_a_row():
-    panels = extract(plan(listed(COLUMNS, 2 + SPEED + CLEARANCE))["scatter"].figure).panels
+    panels = plan(listed(COLUMNS, 2 + SPEED + CLEARANCE))["scatter"].figure.panels
     assert [(p.row[0], p.column[0]) for p in panels] == [(0, 0), (0, 1), (1, 0), (1, 1)]
     for panel, column in zip(panels[2:], (0, 1), strict=True):
         assert panel.x.title in ("speed (rpm)", "clearance (mm)")
@@ -47,11 +46,11 @@ def test_each_key_has_a_column_and_each_metric_a_row():
 def test_words_are_colours_with_trends_of_their_own():
     load = np.array(["spring", "gas"] * 30)
     values = np.where(load == "spring", SPEED, 5 - SPEED)
-    panel = extract(plan(listed(COLUMNS | {"load": load}, values))["points"].figure).panels[0]
+    panel = plan(listed(COLUMNS | {"load": load}, values))["points"].figure.panels[0]
     one = traces(panel)
     assert one["load spring"].y == pytest.approx(values[::2])
-    assert one["trend, load spring"].color == one["load spring"].color
-    assert one["trend, load gas"].color != one["load spring"].color
+    assert one["trend, load spring"].style.color == one["load spring"].style.color
+    assert one["trend, load gas"].style.color != one["load spring"].style.color
     assert "95 % interval of the trend, load gas" in one
 
 
@@ -60,7 +59,7 @@ def test_what_is_not_known_is_drawn_but_not_fitted():
     status[3], regime[7] = "failed", "chaotic"
     values = 2 + SPEED**2
     values[7] = 60.0
-    panel = extract(plan(listed(COLUMNS, values, status=status, regime=regime))["points"].figure)
+    panel = plan(listed(COLUMNS, values, status=status, regime=regime))["points"].figure
     one = traces(panel.panels[0])
     assert one["a job failed here"].jobs == ("k3",)
     ring = next(trace for name, trace in one.items() if name.startswith("chaotic"))
@@ -76,6 +75,6 @@ def test_many_jobs_are_thinned_with_a_word():
     found = plan(data)
     assert time.process_time() - start < 5.0
     for name in ("points", "scatter"):
-        for panel in extract(found[name].figure).panels:
+        for panel in found[name].figure.panels:
             assert traces(panel)["a job"].x.size == 2000
         assert "2,000 of 100,000 jobs are drawn" in found[name].caption

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from matplotlib.figure import Figure as Drawing
-
 from compressor.analysis import CLEARANCES, label
 from compressor.report.figures.curves import Runs
+from compressor.report.figures.drawing import Drawing
 from compressor.report.figures.paper import (
     draw_cam,
     draw_contact_force,

@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
-from matplotlib.ticker import MultipleLocator
 from numpy.lib.stride_tricks import sliding_window_view
 
 from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled_part
-from compressor.report.figures.style import BY_CLEARANCE, BY_LOAD, IDEAL, LineStyle
+from compressor.report.figures.drawing import Panel, box
+from compressor.report.figures.style import BLACK, BY_CLEARANCE, BY_LOAD, IDEAL, LineStyle
 
 Runs = Mapping[str, xr.Dataset]
 
@@ -26,6 +23,7 @@ KILONEWTON = 1e-3
 TICK = 90.0  # degrees between ticks
 SAME_CURVE = 1e-9  # curves closer than this share of their range are one curve
 NEARLY = 0.98  # of the greatest difference: the first window that has this much is taken
+WINDOW = LineStyle(BLACK, linewidth=1.1, zorder=3)
 MIN_MARK = 0.05  # of a panel's height: a flatter mark would not be seen
 
 
@@ -58,10 +56,6 @@ class Curve:
     run: xr.Dataset
     line: LineStyle
 
-    def handle(self) -> Line2D:
-        """Return the curve's entry in a legend."""
-        return Line2D([], [], label=self.name, **self.line.properties())
-
 
 def degrees(run: xr.Dataset) -> np.ndarray:
     """Return the crank angle (°) of a run's samples, counted from the top dead centre before
@@ -93,59 +87,58 @@ def turn(run: xr.Dataset) -> xr.Dataset:
         return settled_part(run)
 
 
-def plot(panel: Axes, curves: Sequence[Curve], quantity: Quantity) -> None:
+def plot(panel: Panel, curves: Sequence[Curve], quantity: Quantity) -> None:
     """Draw all curves of one quantity over the revolution."""
     for curve in curves:
-        panel.plot(
-            degrees(curve.run), quantity.values(curve.run), label=curve.name,
-            **curve.line.properties(),
-        )  # fmt: skip
+        x, y = degrees(curve.run), quantity.values(curve.run)
+        panel.plot(x, y, curve.line, curve.name)
     angle = degrees(curves[0].run)
-    panel.set_xlim(angle[0], angle[-1])
-    panel.xaxis.set_major_locator(MultipleLocator(TICK))
-    panel.set_title(quantity.title)
-    panel.set_ylabel(quantity.axis)
+    panel.x.span(angle[0], angle[-1])
+    panel.x.step = TICK
+    panel.title = quantity.title
+    panel.y.title = quantity.axis
 
 
-def plot_rows(panels: np.ndarray, curves: Sequence[Curve], quantity: Quantity) -> None:
+def plot_rows(
+    panels: Sequence[Panel] | np.ndarray, curves: Sequence[Curve], quantity: Quantity
+) -> None:
     """Draw a panel a curve, from the top; the one of no clearance is in all of them."""
     ideal = [curve for curve in curves if curve.line is IDEAL]
     worn = [curve for curve in curves if curve.line is not IDEAL]
     for panel, curve in zip(panels, worn, strict=True):
         alone = replace(curve, line=replace(curve.line, linestyle="-", linewidth=1.0))
         plot(panel, [*ideal, alone], quantity)
-        panel.set_title(curve.name)
-    panels[0].set_title(f"{quantity.title}, {worn[0].name}")
-    ends = np.array([panel.get_ylim() for panel in panels])
+        panel.title = curve.name
+    panels[0].title = f"{quantity.title}, {worn[0].name}"
+    ends = np.array([panel.limits("y") for panel in panels])
     for panel in panels:
-        panel.set_ylim(ends.min(), ends.max())
-        panel.tick_params(labelbottom=panel is panels[-1])
+        panel.y.span(ends.min(), ends.max())
+        panel.x.bare = panel is not panels[-1]
 
 
 def plot_enlarged(
-    full: Sequence[Axes] | np.ndarray,
-    enlarged: Axes,
+    full: Sequence[Panel] | np.ndarray,
+    enlarged: Panel,
     curves: Sequence[Curve],
     quantity: Quantity,
     part: slice,
 ) -> None:
     """Draw the same curves over a part of the span, which is marked in the full panels."""
     plot(enlarged, curves, quantity)
-    enlarged.xaxis.set_major_locator(MultipleLocator(10 if quantity.window > 30 else 5))
+    enlarged.x.step = 10 if quantity.window > 30 else 5
     angle = degrees(curves[0].run)[part]
     values = np.array([quantity.values(curve.run)[part] for curve in curves])
     margin = 0.06 * np.ptp(values)
     low, high = values.min() - margin, values.max() + margin
-    enlarged.set_xlim(angle[0], angle[-1])
-    enlarged.set_ylim(low, high)
-    bottom, top = full[0].get_ylim()
+    enlarged.x.span(angle[0], angle[-1])
+    enlarged.y.span(low, high)
+    bottom, top = full[0].limits("y")
     lift = max(0.0, MIN_MARK * (top - bottom) - (high - low)) / 2
     low, high = low - lift, high + lift
     room = 0.01 * (top - bottom)
     for panel in full:
-        panel.set_ylim(min(bottom, low - room), max(top, high + room))
-        size = angle[-1] - angle[0], high - low
-        panel.add_patch(Rectangle((angle[0], low), *size, fill=False, linewidth=1.1, zorder=3))
+        panel.y.span(min(bottom, low - room), max(top, high + room))
+        panel.traces.append(box((angle[0], angle[-1]), (low, high), WINDOW, "line"))
 
 
 def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:

@@ -1,13 +1,9 @@
 """The healthy machine beside the paper's faults: spectra, orbits, and when the frame shakes."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import MultipleLocator
 
 from compressor.analysis import (
     CLEARANCES,
@@ -21,14 +17,22 @@ from compressor.analysis import (
     rows_modes,
 )
 from compressor.report.figures.curves import ANGLE_AXIS, Runs
+from compressor.report.figures.drawing import (
+    Drawing,
+    Note,
+    Panel,
+    band,
+    entry,
+    make_grid,
+    share_scales,
+)
 from compressor.report.figures.job import (
-    CORNERS,
     ORDERS_AXIS,
-    corner,
-    mode_handles,
+    mode_entries,
     plot_lines,
     plot_modes,
     plot_orbit,
+    share_turn,
 )
 from compressor.report.figures.style import (
     BLUE,
@@ -37,112 +41,110 @@ from compressor.report.figures.style import (
     IDEAL,
     RED,
     LineStyle,
-    in_style,
-    legend_above,
-    sheet,
+    fill,
 )
 
 Shakings = Mapping[str, Shaking]  # by label of the paper's cases
 
 SINGLE_FAULTS = FAULTS[:2]  # clearance at one joint
 BY_FAULT = {
-    "big_end": (LineStyle(BLUE, "-", 1.2, 2.3), "o"),
-    "small_end": (LineStyle(RED, (0, (6, 1.2)), 1.2, 2.2), "D"),
-    "both": (LineStyle(GOLD, (0, (6, 1, 1.2, 1)), 1.8, 2.1), "s"),
+    "big_end": LineStyle(BLUE, "-", 1.2, 2.3, "o"),
+    "small_end": LineStyle(RED, (0, (6, 1.2)), 1.2, 2.2, "D"),
+    "both": LineStyle(GOLD, (0, (6, 1, 1.2, 1)), 1.8, 2.1, "s"),
 }
 BIN = 5.0  # degrees over which the rms is taken
-NEAR_COLOR = "#f2ead9"
+NEAR = fill("#f2ead9", zorder=0.5)
 
 
-@in_style
-def draw_diagnosis_spectra(found: Shakings) -> Figure:
+def draw_diagnosis_spectra(found: Shakings) -> Drawing:
     """Return X over orders: healthy, and each joint at the greatest clearance.
 
     Rms over clearance.
     """
-    figure, panels = sheet(1, 2, 4.6, width_ratios=(2.3, 1))
+    figure, panels = make_grid(1, 2, 4.6, widths=(2.3, 1))
     lines, trend = panels.flat
+    names = {f: SPOKEN[f] + ("" if f in SINGLE_FAULTS else ", (b) only") for f in BY_FAULT}
     for fault in SINGLE_FAULTS:
-        plot_lines(lines, found[label(fault, CLEARANCES[-1])].spectrum.lines, BY_FAULT[fault][0])
-    bottom, top = lines.get_ylim()
-    plot_lines(lines, found["design"].spectrum.lines, IDEAL)
-    lines.set_ylim(bottom, top)
-    lines.set_title(f"(a) force on the frame along the cylinder, {CLEARANCES[-1]:g} mm")
-    lines.set_xlabel(ORDERS_AXIS)
-    lines.set_ylabel("amplitude of X (N)")
-    for fault, (line, marker) in BY_FAULT.items():
-        above = [found[label(fault, c)].spectrum.above for c in CLEARANCES]
-        trend.plot(CLEARANCES, above, marker=marker, **line.properties())
-    healthy = found["design"].spectrum.above
-    trend.axhline(healthy, clip_on=False, **IDEAL.properties())
-    trend.set_title(f"(b) rms of X above order {ORDER}")
-    trend.set(xticks=CLEARANCES, xlabel="clearance (mm)", ylabel="rms (N)")
-    trend.set_xlim(CLEARANCES[0] - 0.03, CLEARANCES[-1] + 0.03)
-    trend.set_ylim(bottom=0)
-    handles = [Line2D([], [], label="no clearance", **IDEAL.properties())]
-    for fault, (line, marker) in BY_FAULT.items():
-        only = "" if fault in SINGLE_FAULTS else ", (b) only"
-        handles.append(
-            Line2D([], [], label=SPOKEN[fault] + only, marker=marker, **line.properties())
-        )
-    legend_above(figure, handles)
+        spectrum = found[label(fault, CLEARANCES[-1])].spectrum
+        plot_lines(lines, spectrum.lines, replace(BY_FAULT[fault], marker=""), names[fault])
+    ends = lines.limits("y")
+    plot_lines(lines, found["design"].spectrum.lines, IDEAL, "no clearance")
+    lines.y.span(*ends)
+    lines.title = f"(a) force on the frame along the cylinder, {CLEARANCES[-1]:g} mm"
+    lines.x.title, lines.y.title = ORDERS_AXIS, "amplitude of X (N)"
+    sizes = np.array(CLEARANCES)
+    for fault, line in BY_FAULT.items():
+        above = np.array([found[label(fault, c)].spectrum.above for c in CLEARANCES])
+        trend.plot(sizes, above, line, names[fault])
+    trend.notes.append(Note(y=found["design"].spectrum.above, style=IDEAL))
+    trend.title = f"(b) rms of X above order {ORDER}"
+    trend.x.title, trend.x.ticks = "clearance (mm)", CLEARANCES
+    trend.x.span(CLEARANCES[0] - 0.03, CLEARANCES[-1] + 0.03)
+    trend.y.title = "rms (N)"
+    trend.y.span(low=0)
+    figure.legend = [entry("no clearance", IDEAL), *trend.traces]
     return figure
 
 
-@in_style
-def draw_diagnosis_orbits(runs: Runs) -> Figure:
+def draw_diagnosis_orbits(runs: Runs) -> Drawing:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
-    figure, panels = sheet(len(SINGLE_FAULTS), len(CLEARANCES), 7.2, sharex=True, sharey=True)
+    figure, panels = make_grid(len(SINGLE_FAULTS), len(CLEARANCES), 7.2)
     for row, joint in zip(panels, SINGLE_FAULTS, strict=True):
         for panel, clearance in zip(row, CLEARANCES, strict=True):
             plot_orbit(panel, runs[label(joint, clearance)], joint)
-            panel.set_title(f"{SPOKEN[joint]}, {clearance:g} mm")
-            panel.label_outer()
-    room = max(panel.dataLim.x1 for panel in panels.flat) * 1.08
-    panels[0, 0].set(xlim=(-room, room), ylim=(-room, room))
-    marks = [Line2D([], [], label=name, **corner(shape)) for name, shape in CORNERS.values()]
-    legend_above(figure, marks)
+            panel.title = f"{SPOKEN[joint]}, {clearance:g} mm"
+            panel.x.title = panel.x.title if joint == SINGLE_FAULTS[-1] else ""
+            panel.y.title = panel.y.title if clearance == CLEARANCES[0] else ""
+    room = 1.08 * max(trace.extent("x").max() for one in figure.panels for trace in one.traces)
+    for scale in (panels[0, 0].x, panels[0, 0].y):
+        scale.span(-room, room)
+    share_scales(figure.panels, "x", "y")
+    figure.legend = [one for one in panels[0, 0].traces if one.is_points]
     return figure
 
 
-@in_style
-def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Figure:
+def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Drawing:
     """Return when X has its high orders, and the joints' contact modes, over the crank angle."""
-    figure, panels = sheet(2 * len(SINGLE_FAULTS), 1, 8.4, sharex=True, height_ratios=(2.6, 1) * 2)
+    figure, panels = make_grid(2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2)
     for joint, profile, strip in zip(SINGLE_FAULTS, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)
         rows = [SweptRow(f"{c:g}", modes=angle_modes(runs[label(joint, c)])) for c in CLEARANCES]
         plot_modes(strip, rows_modes(rows)[joint])
-        strip.set_yticks(range(len(rows)), [row.value for row in rows])
-        strip.set_ylabel("mm")
-        strip.set_title(f"contact mode, clearance at the {SPOKEN[joint]}")
-    for panel in panels[::2, 0]:
-        panel.set_ylim(0, max(p.get_ylim()[1] for p in panels[::2, 0]))
-    panels[-1, 0].set_xlabel(ANGLE_AXIS)
-    panels[-1, 0].xaxis.set_major_locator(MultipleLocator(45))
-    handles = [
-        Line2D([], [], label=f"{c:g} mm", **BY_CLEARANCE[c].properties()) for c in CLEARANCES
-    ]
-    near = Patch(facecolor=NEAR_COLOR, label="the force turns")
-    legend_above(figure, [*handles, near, *mode_handles()])
+        strip.y.name([row.value for row in rows])
+        strip.y.title = "mm"
+        strip.title = f"contact mode, clearance at the {SPOKEN[joint]}"
+    top = max(panel.limits("y")[1] for panel in panels[::2, 0])
+    for joint, panel in zip(SINGLE_FAULTS, panels[::2, 0], strict=True):
+        panel.y.span(0, top)
+        mark_turns(panel, found[label(joint, CLEARANCES[-1])])
+    panels[-1, 0].x.title = ANGLE_AXIS
+    share_turn(figure.panels)
+    figure.legend = [entry(f"{c:g} mm", BY_CLEARANCE[c]) for c in CLEARANCES]
+    figure.legend += [entry("the force turns", NEAR, "band"), *mode_entries()]
     return figure
 
 
-def plot_profiles(panel: Axes, found: Shakings, joint: str) -> None:
-    """The rms of X above `ORDER` over bins of crank angle, and where the joint's force turns."""
+def plot_profiles(panel: Panel, found: Shakings, joint: str) -> None:
+    """Draw the rms of X above `ORDER` over bins of crank angle."""
     for clearance in CLEARANCES:
         one = found[label(joint, clearance)]
         count = round(360.0 / BIN)
         place = np.floor(one.angle / BIN + 1e-6).astype(int) % count
         mean = np.bincount(place, one.mean_square, count) / np.bincount(place, minlength=count)
         values = np.sqrt(np.append(mean, mean[-1]))
-        edges = np.arange(count + 1) * BIN
-        line = BY_CLEARANCE[clearance].properties()
-        panel.plot(edges, values, drawstyle="steps-post", **line)
+        line = replace(BY_CLEARANCE[clearance], is_step=True)
+        panel.plot(np.arange(count + 1) * BIN, values, line, f"{clearance:g} mm")
+    panel.title = f"rms of X above order {ORDER} in {BIN:g}°, clearance at the {SPOKEN[joint]}"
+    panel.y.title = "rms (N)"
+
+
+def mark_turns(panel: Panel, one: Shaking) -> None:
+    """Draw where the joint's force turns."""
     fine = np.arange(0.0, 360.0, 0.5)
     near = one.near(fine)
-    panel.fill_between(fine, 0, 1, where=near, transform=panel.get_xaxis_transform(),
-                       color=NEAR_COLOR, linewidth=0, zorder=0.5)  # fmt: skip
-    panel.set_title(f"rms of X above order {ORDER} in {BIN:g}°, clearance at the {SPOKEN[joint]}")
-    panel.set_ylabel("rms (N)")
-    panel.set_ylim(bottom=0)
+    ends = np.flatnonzero(np.diff(near)) + 1
+    low, high = panel.limits("y")
+    for part in np.split(np.arange(fine.size), ends):
+        if near[part[0]]:
+            flat = np.ones(part.size)
+            panel.traces.append(band(fine[part], low * flat, high * flat, NEAR))

@@ -2,16 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, LogNorm
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch
-from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from compressor.analysis import (
     MODES,
@@ -31,6 +24,20 @@ from compressor.analysis import (
 )
 from compressor.metrics import JOINTS
 from compressor.report.figures.curves import ANGLE_AXIS, KILONEWTON
+from compressor.report.figures.drawing import (
+    ColorScale,
+    Drawing,
+    Note,
+    Panel,
+    Trace,
+    circle,
+    entry,
+    join_with_gaps,
+    make_grid,
+    map_cells,
+    share_scales,
+    strokes,
+)
 from compressor.report.figures.style import (
     BLACK,
     BLUE,
@@ -38,144 +45,131 @@ from compressor.report.figures.style import (
     GREY,
     RED,
     LineStyle,
-    in_style,
-    legend_above,
-    sheet,
+    fill,
+    mark,
+    palette,
 )
 
 # flight, impact, following: lightness 30, 54, 90
 MODE_COLORS = dict(zip(MODES, (BLUE, RED, "#dde3ee"), strict=True))
-UNSEEN = "#ffffff"
+UNSEEN = fill("#ffffff", edge=GREY, is_hatched=True)
 PATH = LineStyle(BLUE, "-", 0.9, 2.3)
+ZERO = LineStyle(BLACK, linewidth=0.8)
 BY_JOINT = dict(zip(JOINTS, ((BLUE, "o"), (RED, "D")), strict=True))
 CORNERS = {0: ("top dead centre", "o"), 90: ("90°", "^"), 180: ("bottom dead centre", "s"),
            270: ("270°", "v")}  # fmt: skip
 MICROMETRE = 1e6
 
 
-@in_style
-def draw_orbits(run: xr.Dataset) -> Figure:
+def draw_orbits(run: xr.Dataset) -> Drawing:
     """Return the journal's centre in the bore of each joint with clearance, over the last
     revolution.
     """
     joints = joints_with_clearance(run)
-    figure, panels = sheet(1, len(joints), 5.4)
+    figure, panels = make_grid(1, len(joints), 5.4)
     for panel, joint in zip(panels.flat, joints, strict=True):
         plot_orbit(panel, run, joint)
-    marks = [Line2D([], [], label=name, **corner(shape)) for name, shape in CORNERS.values()]
-    legend_above(figure, marks)
+    figure.legend = [one for one in panels[0, 0].traces if one.is_points]
     return figure
 
 
-def plot_orbit(panel: Axes, run: xr.Dataset, joint: str) -> None:
-    """One orbit, to scale, in its clearance circle; marks stand at every quarter of the crank."""
+def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
+    """Draw one orbit, to scale, in its clearance circle; marks stand at every quarter turn."""
     degrees, kept = last_revolution(run)
     place = kept["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
     clearance = joints_with_clearance(run)[joint] * MICROMETRE
-    panel.add_patch(Circle((0, 0), clearance, fill=False, linewidth=1.0, color=BLACK))
-    panel.plot(*place.T, label="path of the journal's centre", **PATH.properties())
-    for angle, (_, shape) in CORNERS.items():
+    panel.traces.append(circle(clearance, LineStyle(BLACK, linewidth=1.0, zorder=1.0), "line"))
+    panel.plot(place[:, 0], place[:, 1], PATH, "path of the journal's centre")
+    for angle, (name, shape) in CORNERS.items():
         nearest = np.argmin(np.abs((degrees - angle + 180) % 360 - 180))
-        panel.plot(*place[nearest], **corner(shape))
+        x, y = place[nearest]
+        panel.plot(x, y, mark(GOLD, shape, 7, 4, edge=BLACK), name)
     room = 1.08 * max(clearance, np.linalg.norm(place, axis=1).max())
-    panel.set(xlim=(-room, room), ylim=(-room, room), aspect="equal")
-    panel.set_title(f"{SPOKEN[joint]}; circle: clearance {clearance / 1e3:.3g} mm")
-    panel.set_xlabel("$e_x$ (µm), along the cylinder")
-    panel.set_ylabel("$e_y$ (µm)")
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(MaxNLocator(5))
+    panel.is_square = True
+    panel.title = f"{SPOKEN[joint]}; circle: clearance {clearance / 1e3:.3g} mm"
+    panel.x.title, panel.y.title = "$e_x$ (µm), along the cylinder", "$e_y$ (µm)"
+    for scale in (panel.x, panel.y):
+        scale.span(-room, room)
+        scale.max_ticks = 5
 
 
-def corner(shape: str) -> dict[str, Any]:
-    """Return how a mark on an orbit looks."""
-    return {"marker": shape, "markersize": 7, "color": GOLD, "markeredgecolor": BLACK,
-            "linestyle": "none", "zorder": 4}  # fmt: skip
-
-
-@in_style
-def draw_modes(run: xr.Dataset) -> Figure:
+def draw_modes(run: xr.Dataset) -> Drawing:
     """Return contact modes over the crank angle, as shares of the revolutions, and penetration."""
     joints = joints_with_clearance(run)
     shares = angle_modes(run)
-    ratios = (1.0, 2.2) * len(joints)
-    figure, panels = sheet(2 * len(joints), 1, 2.9 * len(joints) + 0.9, sharex=True,
-                           height_ratios=ratios)  # fmt: skip
+    rows = 2 * len(joints)
+    figure, panels = make_grid(rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints))
     for joint, strip, depth in zip(joints, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_strip(strip, shares, joint)
         degrees, kept = last_revolution(run)
         values = kept["penetration"].sel(joint=joint).values * MICROMETRE
         order = np.argsort(degrees % 360.0, kind="stable")
-        depth.plot((degrees % 360.0)[order], values[order], **PATH.properties())
-        depth.axhline(0, color=BLACK, linewidth=0.8)
-        depth.set_title(f"penetration, {SPOKEN[joint]}, last revolution; below 0 a gap")
-        depth.set_ylabel("δ (µm)")
-    panels[-1, 0].set_xlabel(ANGLE_AXIS)
-    panels[-1, 0].set_xlim(0, 360)
-    panels[-1, 0].xaxis.set_major_locator(MultipleLocator(45))
-    legend_above(figure, mode_handles())
+        depth.plot((degrees % 360.0)[order], values[order], PATH)
+        depth.notes.append(Note(y=0.0, style=ZERO))
+        depth.title = f"penetration, {SPOKEN[joint]}, last revolution; below 0 a gap"
+        depth.y.title = "δ (µm)"
+    panels[-1, 0].x.title = ANGLE_AXIS
+    share_turn(figure.panels)
+    figure.legend = mode_entries()
     return figure
 
 
-def plot_strip(panel: Axes, shares: xr.Dataset, joint: str) -> None:
-    """Shares of the revolutions in each mode, stacked, over bins of the crank angle."""
+def share_turn(panels: Sequence[Panel], step: float = 45.0) -> None:
+    """Show one turn of the crank in all panels."""
+    panels[0].x.span(0.0, 360.0)
+    panels[0].x.step = step
+    share_scales(panels, "x")
+
+
+def plot_strip(panel: Panel, shares: xr.Dataset, joint: str) -> None:
+    """Draw the share of revolutions in each mode, stacked, over bins of the crank angle."""
     share = shares["share"].sel(joint=joint)
-    angle = shares["angle"].values
-    foot = np.zeros(angle.size)
-    for mode, color in MODE_COLORS.items():
-        height = share.sel(mode=mode).fillna(0.0).values
-        panel.bar(angle, height, 360.0 / angle.size, foot, color=color, linewidth=0)
-        foot = foot + height
-    panel.set_title(f"share of revolutions in each contact mode, {SPOKEN[joint]}")
-    panel.set(ylim=(0, 1), yticks=(0, 1), ylabel="share")
-    panel.grid(visible=False)
+    heights = [share.sel(mode=mode).fillna(0.0).values for mode in MODE_COLORS]
+    stack_modes(panel, shares["angle"].values, 360.0 / shares.sizes["angle"], heights)
+    panel.title = f"share of revolutions in each contact mode, {SPOKEN[joint]}"
 
 
-def mode_handles() -> list[Patch]:
+def stack_modes(
+    panel: Panel, x: np.ndarray, width: float | np.ndarray, heights: Sequence[np.ndarray]
+) -> None:
+    """Draw the shares of the contact modes one above the other, over the middles of bins."""
+    foot = np.zeros(x.size)
+    for (mode, color), height in zip(MODE_COLORS.items(), heights, strict=True):
+        panel.plot(x, foot + height, fill(color), mode, kind="columns", thick=width, foot=foot)
+        foot = foot + np.nan_to_num(height)
+    panel.y.title, panel.y.ticks, panel.grid = "share", (0, 1), ""
+    panel.y.span(0, 1)
+
+
+def mode_entries() -> list[Trace]:
     """Return the modes' colours, for a legend."""
-    return [
-        Patch(facecolor=color, edgecolor=BLACK, linewidth=0.4, label=mode)
-        for mode, color in MODE_COLORS.items()
-    ]
+    looks = {mode: fill(c, edge=BLACK, edge_width=0.4) for mode, c in MODE_COLORS.items()}
+    return [entry(mode, look, "band") for mode, look in looks.items()]
 
 
-@in_style
-def draw_impacts(run: xr.Dataset) -> Figure:
+def draw_impacts(run: xr.Dataset) -> Drawing:
     """Return the approach speed of the impacts of all settled revolutions over the crank angle."""
     found = impacts(run)
-    figure, panels = sheet(1, 1, 3.6)
+    figure, panels = make_grid(1, 1, 3.6)
     (panel,) = panels.flat
-    handles, turns = [], settled_revolutions(run)
+    turns = settled_revolutions(run)
     for joint in joints_with_clearance(run):
         color, shape = BY_JOINT[joint]
         mine = found.isel(impact=found["joint"].values == joint)
-        look: dict[str, Any] = {
-            "marker": shape,
-            "markersize": 5,
-            "color": color,
-            "linestyle": "none",
-        }
         angle, speed = mine["crank_angle"].values, mine["approach_speed"].values
-        panel.vlines(angle, 0, speed, color=color, linewidth=0.8)
-        panel.plot(angle, speed, **look)
-        handles.append(
-            Line2D(
-                [],
-                [],
-                label=f"{SPOKEN[joint]}: {angle.size / turns:.3g} impacts a revolution",
-                **look,
-            )
-        )
+        name = f"{SPOKEN[joint]}: {angle.size / turns:.3g} impacts a revolution"
+        panel.traces.append(strokes(angle, 0.0, speed, LineStyle(color, linewidth=0.8)))
+        panel.plot(angle, speed, mark(color, shape, 5), name)
     if not found.sizes["impact"]:
-        panel.text(180, 0.5, "no impact: no journal came back from flight", ha="center")
-        panel.set_ylim(0, 1)
-        panel.set_yticks([])
+        text = "no impact: no journal came back from flight"
+        panel.notes.append(Note(text, 180, 0.5, side="center"))
+        panel.y.span(0, 1)
+        panel.y.ticks = ()
     else:
-        panel.set_ylim(bottom=0)
-    panel.set_xlim(0, 360)
-    panel.xaxis.set_major_locator(MultipleLocator(45))
-    panel.set_xlabel(ANGLE_AXIS)
-    panel.set_ylabel("approach speed (m/s)")
-    legend_above(figure, handles)
+        panel.y.span(low=0)
+    panel.x.title, panel.y.title = ANGLE_AXIS, "approach speed (m/s)"
+    share_turn([panel])
+    figure.legend = [one for one in panel.traces if one.name]
     return figure
 
 
@@ -215,110 +209,93 @@ SIGNALS = (
 )  # fmt: skip
 
 
-@in_style
-def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
+def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     """Return the last settled revolution of a run, and of its machine without clearance, six
     panels.
     """
-    figure, panels = sheet(3, 2, 8.6, sharex=True)
-    drawn = {"twin": (twin, TWIN), "this": (run, THIS)}
-    for name, (one, line) in drawn.items():
+    figure, panels = make_grid(3, 2, 8.6)
+    for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
         if one is None:
             continue
         degrees, kept = last_revolution(one)
         forces = frame_forces(kept)
         for panel, signal in zip(panels.flat, SIGNALS, strict=True):
-            panel.plot(degrees, signal.values(kept, forces), **line.properties())
-            panel.set_title(signal.title)
-            panel.set_ylabel(signal.axis)
-        panels[0, 0].set_xlim(degrees[0], degrees[-1])
-        panels[0, 0].xaxis.set_major_locator(MultipleLocator(90))
-        drawn[name] = (one, line)
+            panel.plot(degrees, signal.values(kept, forces), line, name)
+            panel.title, panel.y.title = signal.title, signal.axis
+        panels[0, 0].x.span(degrees[0], degrees[-1])
+    panels[0, 0].x.step = 90.0
     for panel in panels[-1]:
-        panel.set_xlabel(ANGLE_AXIS)
-    if twin is not None:
-        legend_above(figure, legend())
+        panel.x.title = ANGLE_AXIS
+    share_scales(figure.panels, "x")
+    figure.legend = [] if twin is None else panels[0, 0].traces[::-1]
     return figure
 
 
-def legend() -> list[Line2D]:
-    """Return this job and its twin."""
-    pairs = ((NAMES["this"], THIS), (NAMES["twin"], TWIN))
-    return [Line2D([], [], label=name, **line.properties()) for name, line in pairs]
-
-
-@in_style
-def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Figure:
+def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     """Return the order spectra of X and of the crosshead's deviation.
 
     With a sensor, of its envelope.
     """
     envelope = sensor_envelope(run)
     rows = 2 if envelope is None else 3
-    figure, panels = sheet(rows, 1, 2.7 * rows + 0.5)
+    figure, panels = make_grid(rows, 1, 2.7 * rows + 0.5)
     force, deviation = panels[:2, 0]
     if twin is not None:
-        plot_lines(force, shaking(twin).spectrum.lines, TWIN)
-    plot_lines(force, shaking(run).spectrum.lines, THIS)
-    force.set_title("force on the frame along the cylinder")
-    force.set_ylabel("amplitude of X (N)")
-    force.set_xlabel(ORDERS_AXIS)
+        plot_lines(force, shaking(twin).spectrum.lines, TWIN, NAMES["twin"])
+    plot_lines(force, shaking(run).spectrum.lines, THIS, NAMES["this"])
+    force.title, force.y.title = "force on the frame along the cylinder", "amplitude of X (N)"
     plot_deviation(deviation, deviation_spectrum(run).lines)
-    deviation.set_title("acceleration of the crosshead less that of ideal joints")
-    deviation.set_ylabel("amplitude (m/s²)")
-    deviation.set_xlabel(ORDERS_AXIS)
+    deviation.title = "acceleration of the crosshead less that of ideal joints"
+    deviation.y.title = "amplitude (m/s²)"
     if envelope is not None:
         plot_envelope(panels[2, 0], (envelope.orders, envelope.amplitudes), envelope.band)
-    if twin is not None:
-        legend_above(figure, legend())
+    for panel in panels.flat:
+        panel.x.title = ORDERS_AXIS
+    figure.legend = [] if twin is None else force.traces[::-1]
     return figure
 
 
-def plot_lines(panel: Axes, lines: tuple[np.ndarray, np.ndarray], line: LineStyle) -> None:
-    """Orders and amplitudes, (k,) each, on a log scale from order 1 on, with `ORDER` marked."""
+def plot_lines(
+    panel: Panel, lines: tuple[np.ndarray, np.ndarray], line: LineStyle, name: str
+) -> None:
+    """Draw orders and amplitudes, (k,) each, on a log scale from order 1 on; mark `ORDER`."""
     shown = (lines[0] >= 1) & (lines[0] <= MAX_ORDERS)
     orders, amplitudes = (values[shown] for values in lines)
-    panel.plot(orders, amplitudes, **line.properties())
-    top = max(amplitudes.max(), panel.dataLim.y1 if panel.lines[1:] else 0.0)
-    panel.set_yscale("log")
+    panel.plot(orders, amplitudes, line, name)
+    top = max(one.y.max() for one in panel.traces)
+    panel.y.log = True
     if top > 0:
-        panel.set_ylim(top * 10.0**-DECADES, 3 * top)
-    panel.set_xlim(0, orders[-1])
-    if not panel.texts:
-        mark_order(panel)
+        panel.y.span(top * 10.0**-DECADES, 3 * top)
+    panel.x.span(0, orders[-1])
+    if not panel.notes:
+        panel.notes = [
+            Note(x=ORDER, style=MARK),
+            Note(f"order {ORDER}", ORDER, 1, LineStyle(RED), "y", (4, -4), level="top", size=8.5),
+        ]
 
 
-def plot_deviation(panel: Axes, lines: tuple[np.ndarray, np.ndarray]) -> None:
+def plot_deviation(panel: Panel, lines: tuple[np.ndarray, np.ndarray]) -> None:
     """Draw the spectrum of a deviation, m/s2; in words where it is rounding, as of ideal joints."""
     if lines[1].max() > ROUNDING:
-        plot_lines(panel, lines, THIS)
+        plot_lines(panel, lines, THIS, NAMES["this"])
         return
-    panel.text(0.5, 0.5, "none: the motion is that of ideal joints", ha="center",
-               transform=panel.transAxes)  # fmt: skip
-    panel.set(yticks=[], xlim=(0, MAX_ORDERS))
-
-
-def mark_order(panel: Axes) -> None:
-    """Draw a vertical line at `ORDER`, with its name."""
-    panel.axvline(ORDER, **MARK.properties())
-    panel.annotate(
-        f"order {ORDER}", (ORDER, 1), (4, -4), xycoords=panel.get_xaxis_transform(),
-        textcoords="offset points", va="top", color=RED, fontsize=8.5,
-    )  # fmt: skip
+    text = "none: the motion is that of ideal joints"
+    panel.notes.append(Note(text, 0.5, 0.5, inside="xy", side="center"))
+    panel.x.span(0, MAX_ORDERS)
+    panel.y.ticks = ()
 
 
 def plot_envelope(
-    panel: Axes, lines: tuple[np.ndarray, np.ndarray], band: tuple[float, float]
+    panel: Panel, lines: tuple[np.ndarray, np.ndarray], band: tuple[float, float]
 ) -> None:
-    """A sensor's envelope spectrum, orders and amplitudes (k,), without its mean; band in Hz."""
+    """Draw a sensor's envelope spectrum, orders and amplitudes (k,), without mean; band in Hz."""
     shown = (lines[0] > 0.01) & (lines[0] <= MAX_ENVELOPE)
-    panel.plot(*(values[shown] for values in lines), **THIS.properties())
+    panel.plot(lines[0][shown], lines[1][shown], THIS, NAMES["this"])
     low, high = (edge / 1e3 for edge in band)
-    panel.set_title(f"envelope of the sensor between {low:.3g} and {high:.3g} kHz")
-    panel.set_ylabel("amplitude (m/s²)")
-    panel.set_xlabel(ORDERS_AXIS)
-    panel.set_ylim(bottom=0)
-    panel.set_xlim(0, MAX_ENVELOPE)
+    panel.title = f"envelope of the sensor between {low:.3g} and {high:.3g} kHz"
+    panel.y.title = "amplitude (m/s²)"
+    panel.y.span(low=0)
+    panel.x.span(0, MAX_ENVELOPE)
 
 
 MAX_TICKS = 12
@@ -327,10 +304,9 @@ MAP_DECADES = 3  # below the greatest line above `ORDER`
 ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
 
-@in_style
-def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
+def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Drawing:
     """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
-    figure, panels = sheet(1, 2, height(len(rows)) + 0.9, width_ratios=(3, 1), sharey=True)
+    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
     image, beside = panels.flat
     found = [row.shaking for row in rows]
     size = min(MAX_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
@@ -342,63 +318,59 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Figure:
     if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
         top = np.nanmax(table)
     edges = np.arange(size + 1) + 0.5, np.arange(len(rows) + 1) - 0.5
-    colors = image.pcolormesh(
-        *edges, np.maximum(table, top * 10.0**-MAP_DECADES), cmap="cividis", rasterized=True,
-        norm=LogNorm(top * 10.0**-MAP_DECADES, top),
-    )  # fmt: skip
-    figure.colorbar(
-        colors, ax=image, location="top", aspect=50, label="amplitude of X (N)", extend="both"
-    )
-    image.axvline(ORDER + 0.5, color=RED, linewidth=1.2, linestyle=(0, (4, 1.5)))
-    image.set_xlabel(ORDERS_AXIS + f"; dashed: order {ORDER}")
+    least = top * 10.0**-MAP_DECADES
+    colors = ColorScale(palette("cividis"), least, top, True, "amplitude of X (N)", "top", 50,
+                        pointed=True)  # fmt: skip
+    image.traces.append(map_cells(*edges, np.maximum(table, least), colors))
+    image.notes.append(Note(x=ORDER + 0.5, style=LineStyle(RED, (0, (4, 1.5)))))
+    image.x.title = ORDERS_AXIS + f"; dashed: order {ORDER}"
     label_rows(image, rows, title)
-    above = [one.spectrum.above if one else np.nan for one in found]
-    beside.plot(above, np.arange(len(rows)), color=BLUE, marker="o", markersize=3.5)
-    beside.set_xlabel(f"rms of X above\norder {ORDER} (N)")
-    beside.set_xlim(0, max(1.0, 1.08 * np.nanmax(above)))
+    above = np.array([one.spectrum.above if one else np.nan for one in found])
+    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
+    beside.plot(above, np.arange(len(rows), dtype=float), dots)
+    beside.x.title = f"rms of X above\norder {ORDER} (N)"
+    beside.x.span(0, max(1.0, 1.08 * np.nanmax(above)))
+    share_scales(figure.panels, "y")
     return figure
 
 
-@in_style
-def draw_map(rows: Sequence[SweptRow], title: str) -> Figure:
+def draw_map(rows: Sequence[SweptRow], title: str) -> Drawing:
     """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)
-    figure, panels = sheet(1, len(modes), height(len(rows)) + 0.9, sharey=True)
+    figure, panels = make_grid(1, len(modes), height(len(rows)) + 0.9)
     for panel, (joint, table) in zip(panels.flat, modes.items(), strict=True):
         plot_modes(panel, table)
-        panel.set_title(SPOKEN[joint])
-        panel.set_xlabel(ANGLE_AXIS)
+        panel.title = SPOKEN[joint]
+        panel.x.title = ANGLE_AXIS
     label_rows(panels[0, 0], rows, title)
-    handles = mode_handles()
+    share_scales(figure.panels, "y")
+    figure.legend = mode_entries()
     if any((table < 0).any() for table in modes.values()):
-        nothing = "no series, or no clearance"
-        handles.append(Patch(facecolor=UNSEEN, edgecolor=GREY, hatch="////", label=nothing))
-    legend_above(figure, handles)
+        figure.legend += [entry("no series, or no clearance", UNSEEN, "band")]
     return figure
 
 
-def plot_modes(panel: Axes, table: np.ndarray) -> None:
-    """Modes, (rows, bins) of integers as in `mode_map`, in their colours; below 0 hatched."""
+def plot_modes(panel: Panel, table: np.ndarray) -> None:
+    """Draw modes, (rows, bins) of integers as in `mode_map`, in their colours; below 0 hatched."""
     edges = np.linspace(0, 360, table.shape[1] + 1), np.arange(len(table) + 1) - 0.5
-    known = np.ma.masked_less(table, 0)
-    panel.patch.set(facecolor=UNSEEN, edgecolor=GREY, hatch="////")
-    panel.pcolormesh(*edges, known, cmap=ListedColormap([*MODE_COLORS.values()]), vmin=-0.5,
-                     vmax=len(MODES) - 0.5, rasterized=True)  # fmt: skip
-    panel.hlines(edges[1][1:-1], 0, 360, color="white", linewidth=0.8 if len(table) < 40 else 0)
-    panel.grid(visible=False)
-    panel.set_xlim(0, 360)
-    panel.xaxis.set_major_locator(MultipleLocator(90))
+    colors = ColorScale((*MODE_COLORS.values(),), -0.5, len(MODES) - 0.5, side="")
+    known = np.where(table < 0, np.nan, table)
+    panel.ground, panel.grid = UNSEEN, ""
+    panel.traces.append(map_cells(*edges, known, colors))
+    if len(table) < 40:
+        between = [np.array([[0.0, edge], [360.0, edge]]) for edge in edges[1][1:-1]]
+        panel.plot(*join_with_gaps(between), LineStyle("#ffffff", linewidth=0.8))
+    panel.x.span(0, 360)
+    panel.x.step = 90.0
 
 
-def label_rows(panel: Axes, rows: Sequence[SweptRow], title: str) -> None:
+def label_rows(panel: Panel, rows: Sequence[SweptRow], title: str) -> None:
     """Draw the swept values at some of the rows, with what became of those that have no series."""
     each = -(-len(rows) // MAX_TICKS)
-    named = [*range(0, len(rows), each)]
     words = [f"{row.value} ({row.problem})" if row.problem else row.value for row in rows]
-    panel.set_yticks(named, [words[number] for number in named])
-    panel.set_ylim(-0.5, len(rows) - 0.5)
-    panel.set_ylabel(title)
-    panel.grid(visible=False)
+    panel.y.words = {float(n): words[n] for n in range(0, len(rows), each)}
+    panel.y.span(-0.5, len(rows) - 0.5)
+    panel.y.title, panel.grid = title, ""
 
 
 def height(rows: int) -> float:

@@ -1,37 +1,285 @@
-"""The pictures of finished figures, made by two processes where there are cores for them."""
+"""Pictures of drawings by matplotlib, by two processes where there are cores for them.
+
+Figures are made on the Agg canvas without pyplot, and inside a style context, so that neither a
+user's matplotlibrc nor a user's own figures are touched.
+"""
 
 import contextlib
+import io
 import multiprocessing
 import os
 import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from typing import Any
 
+import numpy as np
+from matplotlib import style
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
-from compressor.report.figures.style import render
+from compressor.report.figures.drawing import WAYS, Drawing, Note, Panel, Trace, Way
+from compressor.report.figures.style import LineStyle
 
+DPI = 150
+LEGEND_WIDTH = 130  # characters, in a row of a legend
+PLAIN_DECADES = 2.5  # of a log axis with plain numbers, up to which it has ticks at 2 and 5 as well
 KINDS = ("png", "svg")
 MIN_FIGURES_FOR_TWO = 3  # figures for which a second process is worth its start
 
-_inherited: dict[str, Figure] = {}  # what a process finds that was forked while they stood here
+STYLE: dict[str, Any] = {
+    "font.size": 9.5,
+    "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # found anew for each drawing it takes a tenth of the time
+    "axes.labelsize": 9.5,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "legend.fontsize": 9.5,
+    "legend.frameon": False,
+    "legend.handlelength": 3.2,
+    "lines.dash_capstyle": "butt",
+    "agg.path.chunksize": 20000,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "compsim",
+    "savefig.dpi": DPI,
+}
 
 
-def pictures(figures: Mapping[str, Figure], headings: Mapping[str, str]) -> dict[str, bytes]:
-    """Return PNG and SVG of each figure by the names of their files; tells on stderr what is drawn.
-
-    A forked process takes figures from the first on, this one from the last on until they meet: a
-    figure need not be sent then, which matplotlib's formatters often forbid. Where threads run,
-    whose locks a fork may copy, or the system has no fork, all is done here.
+def render(drawing: Drawing, kind: str) -> bytes:
+    """Return a drawing as the bytes of a `png` or `svg` file, which tell nothing of when they were
+    made.
     """
-    alone = len(figures) < MIN_FIGURES_FOR_TWO or threading.active_count() > 1 or not can_fork()
-    made = one_by_one(figures, headings) if alone else by_two(figures, headings)
+    (picture,) = render_kinds(drawing, [kind])
+    return picture
+
+
+@style.context(STYLE, after_reset=True)
+def render_kinds(drawing: Drawing, kinds: Iterable[str]) -> list[bytes]:
+    """Return a drawing as the bytes of a file of each kind.
+
+    Its layout is found once, and without drawing: matplotlib draws all once more to find it.
+    """
+    figure = paint(drawing)
+    layout = figure.get_layout_engine()
+    assert layout
+    layout.execute(figure)
+    figure.set_layout_engine("none")
+    pictures = []
+    for kind in kinds:
+        stream = io.BytesIO()
+        metadata = {"Date": None} if kind == "svg" else {}
+        figure.savefig(stream, format=kind, metadata=metadata)
+        pictures.append(stream.getvalue())
+    return pictures
+
+
+def paint(drawing: Drawing) -> Figure:
+    """Return a drawing as a figure of matplotlib."""
+    layout = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.06, wspace=0.03)
+    figure = Figure(figsize=(drawing.width, drawing.height), dpi=DPI, layout=layout)
+    FigureCanvasAgg(figure)
+    heights, widths = drawing.heights, drawing.widths
+    grid = figure.add_gridspec(
+        len(heights), len(widths), height_ratios=heights, width_ratios=widths
+    )
+    places = [figure.add_subplot(grid[slice(*p.row), slice(*p.column)]) for p in drawing.panels]
+    columns: dict[tuple[int, int], list[Axes]] = {}
+    for panel, axes in zip(drawing.panels, places, strict=True):
+        columns.setdefault(panel.column, []).append(axes)
+    for panel, axes in zip(drawing.panels, places, strict=True):
+        paint_panel(axes, panel, columns[panel.column])
+    if drawing.x_title:
+        figure.supxlabel(drawing.x_title, fontsize="medium")
+    if drawing.y_title:
+        figure.supylabel(drawing.y_title, fontsize="medium")
+    if drawing.legend:
+        longest = max(len(one.name) for one in drawing.legend)
+        across = min(len(drawing.legend), max(1, LEGEND_WIDTH // (longest + 9)))
+        handles = [*map(legend_handle, drawing.legend)]
+        figure.legend(handles=handles, loc="outside upper center", ncols=across)
+    return figure
+
+
+def paint_panel(axes: Axes, panel: Panel, column: Sequence[Axes]) -> None:
+    """Draw a panel on axes. column: the axes of its column, for a scale of colours beside all."""
+    axes.set_title(panel.title, fontsize=panel.title_size)
+    if panel.ground:
+        ground = patch_properties(panel.ground)
+        axes.patch.set(**{name: ground[name] for name in ("facecolor", "edgecolor", "hatch")})
+    if panel.is_square:
+        axes.set_aspect("equal", adjustable="datalim" if panel.fills_box else "box")
+    for trace in panel.traces:
+        if trace.kind == "map":
+            paint_map(axes, trace, column)
+        elif trace.kind == "band":
+            axes.add_patch(PathPatch(outline(trace), **patch_properties(trace.style)))
+        elif trace.kind in ("bars", "columns"):
+            paint_bars(axes, trace)
+        elif trace.errors is None:
+            axes.plot(trace.x, trace.y, rasterized=trace.is_raster, **line_properties(trace.style))
+        else:
+            axes.errorbar(trace.x, trace.y, **error_properties(trace), elinewidth=1.0,
+                          **line_properties(trace.style))  # fmt: skip
+    for note in panel.notes:
+        paint_note(axes, note, panel.limits("y"))
+    for way in WAYS:
+        paint_scale(axes, way, panel)
+        if way not in panel.grid:
+            axes.grid(visible=False, axis=way)
+    if panel.legend:
+        handles = [*map(legend_handle, panel.legend)]
+        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+
+
+def paint_scale(axes: Axes, way: Way, panel: Panel) -> None:
+    """Draw the title, the ends and the ticks of the axis `x` or `y`."""
+    axis, scale = (axes.xaxis, panel.x) if way == "x" else (axes.yaxis, panel.y)
+    low, high = panel.limits(way)
+    axis.set_label_text(scale.title)
+    if scale.log:
+        (axes.set_xscale if way == "x" else axes.set_yscale)("log")
+    if scale.words:
+        axis.set_ticks([*scale.words], [*scale.words.values()])
+    elif scale.ticks is not None:
+        axis.set_ticks(scale.ticks)
+    elif scale.step:
+        axis.set_major_locator(MultipleLocator(scale.step))
+    elif scale.max_ticks:
+        axis.set_major_locator(MaxNLocator(scale.max_ticks))
+    if scale.plain:
+        is_fine = np.log10(high / low) <= PLAIN_DECADES
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if is_fine else (1.0,)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    (axes.set_xlim if way == "x" else axes.set_ylim)(low, high, auto=panel.fills_box)
+    if scale.bare:
+        axis.set_tick_params(which="both", labelbottom=False, labelleft=False)
+
+
+def line_properties(look: LineStyle) -> dict[str, Any]:
+    """Return the keywords of a line of matplotlib."""
+    return {
+        "color": look.color, "linestyle": look.linestyle, "linewidth": look.linewidth,
+        "zorder": look.zorder, "marker": look.marker, "markersize": look.markersize,
+        "markeredgecolor": look.edge or look.color, "markeredgewidth": look.edge_width,
+        "markerfacecolor": "none" if look.is_hollow else look.color, "alpha": look.alpha,
+        "drawstyle": "steps-post" if look.is_step else "default",
+    }  # fmt: skip
+
+
+def error_properties(trace: Trace) -> dict[str, Any]:
+    """Return the keywords of matplotlib's error bars."""
+    return {"xerr" if trace.across else "yerr": trace.errors, "capsize": trace.caps}
+
+
+def patch_properties(look: LineStyle) -> dict[str, Any]:
+    """Return the keywords of an area of matplotlib."""
+    return {
+        "facecolor": look.color, "edgecolor": look.edge or "none", "zorder": look.zorder,
+        "linewidth": look.edge_width if look.edge else 0.0, "alpha": look.alpha,
+        "hatch": "////" if look.is_hatched else None,
+    }  # fmt: skip
+
+
+def legend_handle(trace: Trace) -> Artist:
+    """Return an entry of a legend."""
+    if trace.kind == "line":
+        return Line2D([], [], label=trace.name, **line_properties(trace.style))
+    return Patch(label=trace.name, **patch_properties(trace.style))
+
+
+def outline(trace: Trace) -> Path:
+    """Return the outlines of a band, of which those inside another are holes."""
+    ends = np.flatnonzero(np.isnan(trace.x))
+    rings = np.split(np.column_stack([trace.x, trace.y]), ends)
+    rings = [ring[np.isfinite(ring).all(axis=1)] for ring in rings]
+    return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings if ring.size))
+
+
+def paint_bars(axes: Axes, trace: Trace) -> None:
+    """Draw bars, lying or standing."""
+    look = patch_properties(trace.style) | {"linewidth": 0.0}
+    foot = 0.0 if trace.foot is None else trace.foot
+    if trace.errors is not None:
+        look |= error_properties(trace) | {"ecolor": "#303030"}
+    if trace.kind == "bars":
+        axes.barh(trace.y, trace.x - foot, trace.thick, foot, **look)
+    else:
+        axes.bar(trace.x, trace.y - foot, trace.thick, foot, **look)
+
+
+def paint_map(axes: Axes, trace: Trace, column: Sequence[Axes]) -> None:
+    """Draw the cells of a map, and the bar of its colours."""
+    scale, look = trace.scale, trace.style
+    assert scale is not None
+    assert trace.z is not None
+    norm = (LogNorm if scale.log else Normalize)(scale.low, scale.high)
+    colors = ListedColormap(scale.colors)
+    edges: dict[str, Any] = {"edgecolors": look.edge, "linewidth": look.edge_width}
+    axes.pcolormesh(trace.x, trace.y, np.ma.masked_invalid(trace.z), norm=norm, cmap=colors,
+                    rasterized=True, **(edges if look.edge else {}))  # fmt: skip
+    if not scale.side:
+        return
+    figure, places = axes.figure, [*column] if scale.beside_column else axes
+    bar = figure.colorbar(
+        ScalarMappable(norm, colors), ax=places, pad=0.02, location=scale.side, aspect=scale.aspect,
+        label=scale.bar_title or scale.title, extend="both" if scale.pointed else "neither",
+        ticks=scale.ticks,
+    )  # fmt: skip
+    if scale.levels:
+        bar.add_lines([*scale.levels], ["white"] * len(scale.levels), [0.9] * len(scale.levels))
+
+
+def paint_note(axes: Axes, note: Note, limits: tuple[float, float]) -> None:
+    """Draw a text, an arrow or a straight line; limits: of the y axis."""
+    look = note.style
+    if note.tail is not None:
+        arrow = {"arrowstyle": "-|>", "color": look.color, "mutation_scale": 22, "shrinkB": 0}
+        axes.annotate("", (note.x, note.y), note.tail, arrowprops=arrow)
+    elif note.text:
+        x_frame, y_frame = ("axes fraction" if way in note.inside else "data" for way in WAYS)
+        axes.annotate(
+            note.text, (note.x, note.y), note.shift, xycoords=(x_frame, y_frame),
+            textcoords="offset points", ha=note.side, va=note.level, fontsize=note.size,
+            color=look.color, alpha=look.alpha,
+        )  # fmt: skip
+    elif np.isnan(note.x):
+        low, high = limits
+        axes.axhline(note.y, clip_on=not low <= note.y <= high, **line_properties(look))
+    else:
+        axes.axvline(note.x, **line_properties(look))
+
+
+def pictures(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict[str, bytes]:
+    """Return PNG and SVG of drawings by the names of their files; tells on stderr what is drawn.
+
+    A forked process takes figures from the first on, this one from the last on until they meet.
+    Where threads run, whose locks a fork may copy, or the system has no fork, all is done here.
+    """
+    alone = len(drawings) < MIN_FIGURES_FOR_TWO or threading.active_count() > 1 or not can_fork()
+    made = one_by_one(drawings, headings) if alone else by_two(drawings, headings)
     return {
         f"{name}.{kind}": picture
-        for name in figures
+        for name in drawings
         for kind, picture in zip(KINDS, made[name], strict=True)
     }
 
@@ -43,36 +291,24 @@ def can_fork() -> bool:
     return cores > 1 and "fork" in multiprocessing.get_all_start_methods()
 
 
-def both(figure: Figure) -> tuple[bytes, ...]:
-    """Return a figure as PNG and as SVG."""
-    return tuple(render(figure, kind) for kind in KINDS)
-
-
 def one_by_one(
-    figures: Mapping[str, Figure], headings: Mapping[str, str]
-) -> dict[str, tuple[bytes, ...]]:
-    """Return all figures in this process."""
-    made = {}
-    for name, figure in figures.items():
-        report_figure(headings[name])
-        made[name] = both(figure)
-    return made
+    drawings: Mapping[str, Drawing], headings: Mapping[str, str]
+) -> dict[str, list[bytes]]:
+    """Return the pictures of all drawings, made in this process."""
+    return {name: draw_reported(one, headings[name]) for name, one in drawings.items()}
 
 
-def by_two(
-    figures: Mapping[str, Figure], headings: Mapping[str, str]
-) -> dict[str, tuple[bytes, ...]]:
-    """Return all figures in this process and a copy of it."""
-    made, sent, waiting = {}, {}, deque(figures)
-    _inherited.update(figures)
+def by_two(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict[str, list[bytes]]:
+    """Return the pictures of all drawings, made in this process and a copy of it."""
+    made, sent, waiting = {}, {}, deque(drawings)
     context = multiprocessing.get_context("fork")
     pool = ProcessPoolExecutor(1, context, signal.signal, (signal.SIGINT, signal.SIG_DFL))
 
     def send(_: object = None) -> None:
-        """Give the copy the next figure, when it has made one."""
+        """Give the copy the next drawing, when it has made one."""
         with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
             name = waiting.popleft()
-            sent[name] = pool.submit(draw_inherited, name, headings[name])
+            sent[name] = pool.submit(draw_reported, drawings[name], headings[name])
             sent[name].add_done_callback(send)
 
     try:
@@ -80,26 +316,19 @@ def by_two(
         while waiting:
             with contextlib.suppress(IndexError):
                 name = waiting.pop()
-                report_figure(headings[name])
-                made[name] = both(figures[name])
-        for name in figures.keys() - made.keys():
+                made[name] = draw_reported(drawings[name], headings[name])
+        for name in drawings.keys() - made.keys():
             with contextlib.suppress(KeyError, OSError, RuntimeError):  # it has died
                 made[name] = sent[name].result()
     finally:
-        _inherited.clear()
         pool.shutdown(cancel_futures=True)
-    lost = {name: figure for name, figure in figures.items() if name not in made}
+    lost = {name: drawing for name, drawing in drawings.items() if name not in made}
     return made | one_by_one(lost, headings)
 
 
-def draw_inherited(name: str, heading: str) -> tuple[bytes, ...]:
-    """Return the pictures of a figure, in the copied process."""
-    report_figure(heading)
-    return both(_inherited[name])
-
-
-def report_figure(heading: str) -> None:
-    """Say what is being drawn, in one write: two processes share the stream."""
+def draw_reported(drawing: Drawing, heading: str) -> list[bytes]:
+    """Return the pictures of a drawing; say what is drawn in one write, since two share stderr."""
     with contextlib.suppress(OSError):
         sys.stderr.write(f"drawing {heading}\n")
         sys.stderr.flush()
+    return render_kinds(drawing, KINDS)

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import xarray as xr
-from matplotlib.figure import Figure
 
 from compressor.report.figures import sweep_captions as captions
+from compressor.report.figures.drawing import Drawing
 from compressor.report.figures.sweep_data import Measure, PlottedSweep, measures, sweep_of
 from compressor.report.figures.sweep_maps import (
     Ranking,
@@ -37,7 +37,7 @@ class SweepFigure(NamedTuple):
     name: str
     title: str
     caption: str
-    figure: Figure
+    figure: Drawing
 
 
 def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:

@@ -11,13 +11,11 @@ import xarray as xr
 
 from compressor.analysis import SPOKEN
 from compressor.metrics import JOINTS, METRICS
-from compressor.report.figures.style import RED
+from compressor.report.figures.style import RED, mark
 
-MARKER_ALONE = {"linestyle": "none", "zorder": 4}
-MARKS: dict[str, dict[str, Any]] = {
-    "failed": {"marker": "x", "color": RED, "markersize": 7, "markeredgewidth": 1.8} | MARKER_ALONE,
-    "missing": {"marker": "o", "color": "#606060", "markersize": 6, "markerfacecolor": "none"}
-    | MARKER_ALONE,
+MARKS = {
+    "failed": mark(RED, "x", 7, 4, edge_width=1.8),
+    "missing": mark("#606060", "o", 6, 4, is_hollow=True),
 }
 NAMES = {"failed": "a job failed here", "missing": "a job was not run"}
 FOOT = {"failed": 0.04, "missing": 0.11}  # height in a panel
@@ -217,9 +215,9 @@ class PlottedSweep:
         return self.of(self.data["regime"]) == "chaotic"
 
     @cached_property
-    def keys(self) -> np.ndarray | None:
+    def keys(self) -> np.ndarray:
         """The key of each point's job."""
-        return self.of(self.data["key"]) if "key" in self.data else None
+        return self.of(self.data["key"])
 
 
 def sweep_of(data: xr.Dataset) -> PlottedSweep:

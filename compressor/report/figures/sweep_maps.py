@@ -2,20 +2,27 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
-from matplotlib.container import BarContainer
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from compressor.analysis import Effects, grid_effects, sampled_effects
 from compressor.metrics import METRICS
-from compressor.report.figures.extract import with_jobs
-from compressor.report.figures.style import BLUE, GOLD, GREY, in_style, legend_above, sheet
+from compressor.report.figures.contours import contour_lines
+from compressor.report.figures.drawing import (
+    ColorScale,
+    Drawing,
+    Note,
+    Panel,
+    Scale,
+    entry,
+    make_grid,
+    map_cells,
+    midway,
+    share_scales,
+)
+from compressor.report.figures.style import BLUE, GOLD, GREY, LineStyle, fill, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -26,9 +33,9 @@ from compressor.report.figures.sweep_data import (
 )
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
-    MAX_KEYS,
     RING,
     in_lines,
+    job_keys,
     mark_points,
     marks_shown,
     metric_panels,
@@ -39,7 +46,7 @@ COLORS = "cividis"
 MAX_CELLS = 64  # along an axis
 MAX_CONTOURS = 5
 MIN_RISEN = 0.2  # of the cells, above the least value
-NOTHING: dict[str, Any] = {"facecolor": "#f2f2f2", "edgecolor": GREY, "hatch": "////"}
+NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
 
 
 def across(sweep: PlottedSweep) -> tuple[int, int]:
@@ -56,11 +63,10 @@ class Cells(NamedTuple):
 
     axes: tuple[PlottedAxis, PlottedAxis]
     centres: tuple[np.ndarray, np.ndarray]
-    keys: np.ndarray | None
+    keys: np.ndarray
 
 
-@in_style
-def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
+def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
     """Return every measure over both axes of a grid, a cell a job, at most MAX_CELLS along an
     axis.
     """
@@ -72,52 +78,38 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
         return values.transpose(in_y, in_x)[np.ix_(*chosen)]
 
     status, chaotic = table(sweep.status), table(sweep.chaotic)
-    keys = None if sweep.keys is None or status.size > MAX_KEYS else table(sweep.keys)
-    cells = Cells((x, y), (x.places[chosen[1]], y.places[chosen[0]]), keys)
+    cells = Cells((x, y), (x.places[chosen[1]], y.places[chosen[0]]), table(sweep.keys))
     figure, panels = metric_panels(measures, 2.6)
     tables = [table(sweep.values(measure)) for measure in measures]
     for panel, measure, values in zip(panels, measures, tables, strict=True):
-        plot_map(figure, panel, cells, values, measure)
+        plot_map(panel, cells, values, measure)
         mark_cells(panel, cells, status, chaotic)
-        for way, axis in (("x", x), ("y", y)):
-            scale_way(panel, way, axis)
-    figure.supxlabel(x.title, fontsize="medium")
-    figure.supylabel(y.title, fontsize="medium")
-    handles: list[Any] = marks_shown(status, chaotic)
+        scale_map(panel.x, x, in_lines(x.words) if x.is_words else [])
+        scale_map(panel.y, y, y.words if y.is_words else [])
+    figure.x_title, figure.y_title = x.title, y.title
+    figure.legend = marks_shown(status, chaotic)
     if any((np.isnan(values) & (status == "ok")).any() for values in tables):
-        handles.append(Patch(label="no value: this joint has no clearance", **NOTHING))
-    if handles:
-        legend_above(figure, handles)
+        figure.legend.append(entry("no value: this joint has no clearance", NOTHING, "band"))
     return figure
 
 
-def plot_map(
-    figure: Figure, panel: Axes, cells: Cells, table: np.ndarray, measure: Measure
-) -> None:
-    """A measure's cells with their scale of colours and, over numbers, lines of equal value."""
-    panel.patch.set(**NOTHING)
-    panel.grid(visible=False)
-    low, high = np.nanmin(table), np.nanmax(table)
-    if spans_decades(table):
-        norm: Normalize = LogNorm(low, high)
-        steps = LogLocator(subs=(1.0, 3.0)).tick_values(low, high)
-    else:
-        norm = Normalize(low, high if high > low else low + (abs(low) or 1.0))
-        steps = MaxNLocator(MAX_CONTOURS + 1).tick_values(low, high)
-    edges = [edges_of(c, axis) for c, axis in zip(cells.centres, cells.axes, strict=True)]
-    mesh = panel.pcolormesh(*edges, np.ma.masked_invalid(table), norm=norm, cmap=COLORS,
-                            rasterized=True)  # fmt: skip
-    mesh.set_label(measure.title)
-    if cells.keys is not None:
-        with_jobs(mesh, cells.keys)
-    bar = figure.colorbar(mesh, ax=panel, label=measure.unit, pad=0.02, aspect=14)
+def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) -> None:
+    """Draw a measure's cells with their colour scale and, over numbers, lines of equal value."""
+    panel.ground, panel.grid = NOTHING, ""
+    low, high = float(np.nanmin(table)), float(np.nanmax(table))
+    is_log = spans_decades(table)
+    locator = LogLocator(subs=(1.0, 3.0)) if is_log else MaxNLocator(MAX_CONTOURS + 1)
+    steps = np.asarray(locator.tick_values(low, high))
     inside = steps[(steps > low) & (steps < high)]
     inside = inside[:: -(-inside.size // MAX_CONTOURS)] if inside.size else inside
-    if inside.size and has_lines(table, cells.axes):
-        lines = panel.contour(*cells.centres, np.ma.masked_invalid(table), levels=inside,
-                              colors="white", linewidths=0.9, linestyles="solid")  # fmt: skip
-        lines.set_label("lines at " + ", ".join(f"{level:g}" for level in inside))
-        bar.add_lines(lines)
+    levels = (*inside.tolist(),) if has_lines(table, cells.axes) else ()
+    top = high if high > low else low + (abs(low) or 1.0)
+    colors = ColorScale(palette(COLORS), low, top, is_log, measure.unit, levels=levels)
+    x, y = (midway(c, axis.is_log) for c, axis in zip(cells.centres, cells.axes, strict=True))
+    panel.traces.append(map_cells(x, y, table, colors, measure.title, jobs=job_keys(cells.keys)))
+    if levels:
+        lines = contour_lines(*cells.centres, table, levels)
+        panel.plot(*lines, LineStyle("#ffffff", linewidth=0.9))
 
 
 def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
@@ -128,35 +120,19 @@ def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
     return min(table.shape) >= 3 and not any(axis.is_words for axis in axes) and bool(rising)
 
 
-def mark_cells(panel: Axes, cells: Cells, status: np.ndarray, chaotic: np.ndarray) -> None:
-    """Marks in the cells of jobs that failed, were not run or are chaotic."""
+def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarray) -> None:
+    """Draw marks in the cells of jobs that failed, were not run or are chaotic."""
     x, y = cells.centres
     marks = [(status == word, mark, NAMES[word]) for word, mark in MARKS.items()]
     for here, mark, name in (*marks, (chaotic, RING, CHAOTIC)):
         rows, columns = np.nonzero(here)
-        keys = None if cells.keys is None else cells.keys[here]
-        mark_points(panel, x[columns], y[rows], keys, mark, name)
+        mark_points(panel, x[columns], y[rows], cells.keys[here], mark, name)
 
 
-def scale_way(panel: Axes, way: str, axis: PlottedAxis) -> None:
-    """Words as ticks, or a log scale, of the x or the y axis of a map."""
-    own = panel.xaxis if way == "x" else panel.yaxis
-    if axis.is_words:
-        own.set_ticks(range(len(axis.words)), in_lines(axis.words) if way == "x" else axis.words)
-    elif axis.is_log:
-        (panel.set_xscale if way == "x" else panel.set_yscale)("log")
-
-
-def edges_of(centres: np.ndarray, axis: PlottedAxis) -> np.ndarray:
-    """Return the edges between cells: halfway, on a log scale by ratio.
-
-    Outer cells are symmetric.
-    """
-    at = np.log(centres) if axis.is_log else centres
-    middle = 0.5 * (at[1:] + at[:-1])
-    ends = [2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]
-    edges = np.concatenate(ends)
-    return np.exp(edges) if axis.is_log else edges
+def scale_map(scale: Scale, axis: PlottedAxis, words: Sequence[str]) -> None:
+    """Put words at ticks, or a log scale, of the x or the y axis of a map."""
+    scale.name(words)
+    scale.log = axis.is_log
 
 
 COLUMNS = 4
@@ -215,8 +191,7 @@ def overall(found: Ranking) -> list[int]:
     return np.argsort(-np.mean(strengths, axis=0), kind="stable").tolist()
 
 
-@in_style
-def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Figure:
+def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Drawing:
     """Return a panel an axis, the strongest first, with a row a measure.
 
     Bars with 95 % intervals.
@@ -224,27 +199,26 @@ def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Figure:
     order = overall(found)
     rows, columns = math.ceil(len(order) / COLUMNS), min(COLUMNS, len(order))
     each = 0.26 * len(found) + 0.75
-    figure, grid = sheet(rows, columns, rows * each + 0.7, sharey=True)
-    panels = list(grid.flat)
-    for panel in panels[len(order) :]:
-        panel.remove()
+    figure, _ = make_grid(rows, columns, rows * each + 0.7, len(order))
     correlated = any(effects.total is None for effects in found.values())
-    for panel, axis in zip(panels, order, strict=False):
+    for panel, axis in zip(figure.panels, order, strict=True):
         plot_bars(panel, list(found.values()), axis)
-        panel.set_title(sweep.axes[axis].phrase)
-        panel.set_xlabel(RANK if correlated else "share of variance (%)")
-        panel.set_xlim(-1.05 if correlated else 0.0, 1.05 if correlated else 105.0)
-        panel.grid(visible=False, axis="y")
+        panel.title = sweep.axes[axis].phrase
+        panel.x.title = RANK if correlated else "share of variance (%)"
+        panel.x.span(-1.05 if correlated else 0.0, 1.05 if correlated else 105.0)
+        panel.grid = "x"
         if correlated:
-            panel.axvline(0.0, color="#606060", linewidth=0.8)
-    panels[0].set_yticks(range(len(found)), [measure.title for measure in found])
-    panels[0].set_ylim(len(found) - 0.5, -0.5)
-    legend_above(figure, [own for own in panels[0].containers if isinstance(own, BarContainer)])
+            panel.notes.append(Note(x=0.0, style=LineStyle("#606060", linewidth=0.8)))
+    first = figure.panels[0]
+    first.y.name([measure.title for measure in found])
+    first.y.span(len(found) - 0.5, -0.5)
+    share_scales(figure.panels, "y")
+    figure.legend = first.traces
     return figure
 
 
-def plot_bars(panel: Axes, found: Sequence[Effects], axis: int) -> None:
-    """The effects of one axis on all measures: total effects above, main effects below them."""
+def plot_bars(panel: Panel, found: Sequence[Effects], axis: int) -> None:
+    """Draw the effects of one axis on all measures: total effects above, main effects below."""
     places = np.arange(len(found), dtype=float)
     if found[0].total is None:
         bars: tuple[tuple[str, float, float, str], ...] = ((RANK, 0.0, 0.5, BLUE),)
@@ -252,9 +226,11 @@ def plot_bars(panel: Axes, found: Sequence[Effects], axis: int) -> None:
         bars = (TOTAL, -0.19, 0.36, GOLD), (MAIN, 0.19, 0.36, BLUE)
     for name, shift, height, color in bars:
         values, low, high = np.array([part(effects, axis, name) for effects in found]).T
-        error = np.nan_to_num([values - low, high - values]).clip(min=0.0)
-        more = {"xerr": error, "ecolor": "#303030", "capsize": 2.0} if error.any() else {}
-        panel.barh(places + shift, np.nan_to_num(values), height, color=color, label=name, **more)
+        errors = np.nan_to_num([values - low, high - values]).clip(min=0.0)
+        panel.plot(
+            np.nan_to_num(values), places + shift, fill(color), name, kind="bars", across=True,
+            errors=errors if errors.any() else None, thick=height,
+        )  # fmt: skip
 
 
 def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:

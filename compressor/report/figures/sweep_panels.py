@@ -1,21 +1,23 @@
 """Sweeps drawn as lines, rows and columns of lines, or points: a panel a metric."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from compressor.analysis import trend
-from compressor.report.figures.extract import with_jobs
-from compressor.report.figures.style import BLUE, CYCLE, LineStyle, in_style, legend_above, sheet
+from compressor.report.figures.drawing import (
+    Drawing,
+    Panel,
+    Trace,
+    band,
+    entry,
+    make_grid,
+    share_scales,
+)
+from compressor.report.figures.style import BLUE, CYCLE, LineStyle, fill, mark, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -35,84 +37,77 @@ VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = "osD^v"
 FEET = {"failed": 0.03, "missing": 0.08}  # of a panel's height
 CHAOTIC = "chaotic: a greatest value holds for this run only"
-RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 8,
-                        "markerfacecolor": "none", "color": "#d633a8", "markeredgewidth": 1.1,
-                        "zorder": 5}  # fmt: skip
-Keys = np.ndarray | None
+RING = mark("#d633a8", "o", 8, 5, is_hollow=True, edge_width=1.1)
 
 
-def metric_panels(measures: Sequence[Measure], height: float) -> tuple[Figure, list[Axes]]:
+def metric_panels(measures: Sequence[Measure], height: float) -> tuple[Drawing, list[Panel]]:
     """Return a figure with a panel for each measure, titled; height of a row in inches."""
     rows = math.ceil(len(measures) / COLUMNS)
     columns = min(COLUMNS, len(measures))
-    figure, grid = sheet(rows, columns, max(3.2, height * rows + 0.8))
-    panels = list(grid.flat)
-    for panel in panels[len(measures) :]:
-        panel.remove()
-    for panel, measure in zip(panels, measures, strict=False):
-        panel.set_title(measure.title)
-    return figure, panels[: len(measures)]
+    figure, _ = make_grid(rows, columns, max(3.2, height * rows + 0.8), len(measures))
+    for panel, measure in zip(figure.panels, measures, strict=True):
+        panel.title = measure.title
+    return figure, figure.panels
+
+
+def job_keys(keys: np.ndarray) -> tuple[str, ...]:
+    """Return the keys of the jobs at points; none where these are too many to tell of."""
+    return tuple(map(str, keys.ravel())) if keys.size <= MAX_KEYS else ()
 
 
 def plot_jobs(
-    panel: Axes, points: tuple[np.ndarray, np.ndarray, np.ndarray], keys: Keys, name: str,
-    line: dict[str, Any], span: float,
+    panel: Panel, points: tuple[np.ndarray, np.ndarray, np.ndarray], keys: np.ndarray, name: str,
+    line: LineStyle, span: float,
 ) -> None:  # fmt: skip
     """Draw a line through jobs (x, y, bars), with error bars where any is seen beside the span."""
     x, y, bars = points
     finite = np.where(np.isfinite(bars), bars, 0.0)
-    if (finite > VISIBLE * span).any():
-        style = {"elinewidth": 1.0, "capsize": 2.0} | line
-        drawn = panel.errorbar(x, y, yerr=finite, label=name, **style).lines[0]
-    else:
-        (drawn,) = panel.plot(x, y, label=name, **line)
-    if keys is not None and keys.size == np.size(x) <= MAX_KEYS:
-        with_jobs(drawn, keys)
+    ends = np.where(np.isfinite(y), finite, np.nan)
+    errors = np.stack([ends, ends]) if (finite > VISIBLE * span).any() else None
+    panel.plot(x, y, line, name, errors=errors, jobs=job_keys(keys))
 
 
 def mark_points(
-    panel: Axes, x: np.ndarray, y: np.ndarray, keys: Keys, mark: dict[str, Any], name: str = ""
+    panel: Panel, x: np.ndarray, y: np.ndarray, keys: np.ndarray, look: LineStyle, name: str
 ) -> None:
-    """Marks at points, which the legend names."""
+    """Draw marks at points, which the legend names."""
     if x.size:
-        (drawn,) = panel.plot(x, y, label=name, **mark)
-        if keys is not None and keys.size <= MAX_KEYS:
-            with_jobs(drawn, keys)
+        panel.plot(x, y, look, name, jobs=job_keys(keys))
 
 
-def mark_feet(panel: Axes, x: np.ndarray, status: np.ndarray, keys: Keys) -> None:
-    """Marks at the foot of a panel where jobs failed or were not run; all of one shape."""
-    low, high = panel.get_ylim()
-    for word, mark in MARKS.items():
+def mark_feet(panel: Panel, x: np.ndarray, status: np.ndarray, keys: np.ndarray) -> None:
+    """Draw marks at the foot of a panel where jobs failed or were not run; all of one shape."""
+    low, high = panel.limits("y")
+    for word, look in MARKS.items():
         here = status == word
-        if panel.get_yscale() == "log":
+        if panel.y.log:
             foot = low * (high / low) ** FEET[word]
         else:
             foot = low + FEET[word] * (high - low)
-        mark_points(panel, x[here], np.full(here.sum(), foot),
-                    None if keys is None else keys[here], mark, NAMES[word])  # fmt: skip
+        feet = np.full(here.sum(), foot)
+        mark_points(panel, x[here], feet, keys[here], look, NAMES[word])
 
 
-def marks_shown(status: np.ndarray, chaotic: np.ndarray) -> list[Line2D]:
+def marks_shown(status: np.ndarray, chaotic: np.ndarray) -> list[Trace]:
     """Return the legend's entries of the marks that are there."""
-    found = [Line2D([], [], label=NAMES[s], **mark) for s, mark in MARKS.items() if s in status]
-    return found + ([Line2D([], [], label=CHAOTIC, **RING)] if chaotic.any() else [])
+    found = [entry(NAMES[word], look) for word, look in MARKS.items() if word in status]
+    return found + ([entry(CHAOTIC, RING)] if chaotic.any() else [])
 
 
-def scale_x(panel: Axes, axis: PlottedAxis) -> None:
-    """Words as ticks, and a log scale where numbers span decades."""
+def scale_x(panel: Panel, axis: PlottedAxis) -> None:
+    """Put words at ticks, and a log scale where numbers span decades."""
     if axis.is_words:
-        panel.set_xticks(range(len(axis.words)), in_lines(axis.words))
-        panel.set_xlim(-0.3, len(axis.words) - 0.7)
+        panel.x.name(in_lines(axis.words))
+        panel.x.span(-0.3, len(axis.words) - 0.7)
         return
     low, high = np.nanmin(axis.places), np.nanmax(axis.places)
+    panel.x.log = axis.is_log
     if axis.is_log:
-        panel.set_xscale("log")
         room = (high / low) ** 0.05
-        panel.set_xlim(low / room, high * room)
+        panel.x.span(low / room, high * room)
     else:
         room = 0.05 * (high - low)
-        panel.set_xlim(low - room, high + room)
+        panel.x.span(low - room, high + room)
 
 
 def in_lines(words: Sequence[str]) -> list[str]:
@@ -120,7 +115,7 @@ def in_lines(words: Sequence[str]) -> list[str]:
     return [word.replace(" ", "\n") for word in words]
 
 
-def scale_y(panel: Axes, values: np.ndarray) -> float:
+def scale_y(panel: Panel, values: np.ndarray) -> float:
     """Return room at the foot for marks, and a log scale over decades; gives the span of the panel.
 
     Values that are all the same stand in the middle.
@@ -128,12 +123,12 @@ def scale_y(panel: Axes, values: np.ndarray) -> float:
     values = values[np.isfinite(values)]
     low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
     if spans_decades(values):
-        panel.set_yscale("log")
+        panel.y.log = True
         room = (high / low) ** PANEL_MARGIN
-        panel.set_ylim(low / room, high * room)
+        panel.y.span(low / room, high * room)
         return float(low)
     room = PANEL_MARGIN * (high - low) or 0.5 * abs(high) or 1.0
-    panel.set_ylim(low - room, high + room)
+    panel.y.span(low - room, high + room)
     return float(high - low + 2.0 * room)
 
 
@@ -147,7 +142,7 @@ def lines_for(axis: PlottedAxis, chosen: Iterable[int]) -> list[LineStyle]:
     if len(numbers) <= len(CYCLE) and (axis.is_words or len(numbers) == 1):
         return list(CYCLE[: len(numbers)])
     shares = np.linspace(0.0, 0.88, len(numbers))
-    return [LineStyle(to_hex(colormaps["viridis"](share)), "-", 1.5) for share in shares]
+    return [LineStyle(palette("viridis")[int(256 * share)], "-", 1.5) for share in shares]
 
 
 def thin_places(size: int, most: int) -> np.ndarray:
@@ -157,14 +152,11 @@ def thin_places(size: int, most: int) -> np.ndarray:
     )
 
 
-PLAIN_LINE = LineStyle(BLUE, "-", 1.4).properties() | {"marker": "o", "markersize": 3.8}
-
-
+PLAIN_LINE = LineStyle(BLUE, "-", 1.4, marker="o", markersize=3.8)
 MAX_JOBS = 1000
 
 
-@in_style
-def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
+def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
     """Return every measure over the one axis of a grid, a point a job; over words without a line.
 
     Of more than MAX_JOBS jobs as many are drawn.
@@ -173,20 +165,17 @@ def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Figure:
     (axis,) = sweep.axes
     x, status, chaotic, keys = axis.places, sweep.status, sweep.chaotic, sweep.keys
     figure, panels = metric_panels(measures, 2.35)
-    line = PLAIN_LINE | ({"linestyle": "none"} if axis.is_words else {})
+    line = replace(PLAIN_LINE, linestyle="none") if axis.is_words else PLAIN_LINE
     for panel, measure in zip(panels, measures, strict=True):
         values, bars = sweep.values(measure), sweep.bars(measure)
         scale_x(panel, axis)
         span = scale_y(panel, values)
         plot_jobs(panel, (x, values, bars), keys, measure.title, line, span)
-        mark_points(panel, x[chaotic], values[chaotic], None if keys is None else keys[chaotic],
-                    RING, CHAOTIC)  # fmt: skip
+        mark_points(panel, x[chaotic], values[chaotic], keys[chaotic], RING, CHAOTIC)
         mark_feet(panel, x, status, keys)
-        panel.set_ylabel(measure.unit)
-    figure.supxlabel(axis.title, fontsize="medium")
-    handles = marks_shown(status, chaotic)
-    if handles:
-        legend_above(figure, handles)
+        panel.y.title = measure.unit
+    figure.x_title = axis.title
+    figure.legend = marks_shown(status, chaotic)
     return figure
 
 
@@ -211,7 +200,7 @@ class MeasuredPoints:
     bars: np.ndarray
     status: np.ndarray
     chaotic: np.ndarray
-    keys: np.ndarray | None
+    keys: np.ndarray
 
     @property
     def is_jobs(self) -> bool:
@@ -236,23 +225,21 @@ def chosen_of(axis: PlottedAxis, most: int) -> np.ndarray:
     return thin_places(axis.values.size, most)
 
 
-@in_style
-def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Figure:
+def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Drawing:
     """Return every measure over two axes, as lines; means over the others, if there are any.
 
     What is not known within its error bar is no part of a mean.
     """
     sweep = coarse(sweep, role.x, MAX_PLACES)
     figure, panels = metric_panels(measures, 2.35)
-    entries: dict[str, Line2D] = {}
     for panel, measure in zip(panels, measures, strict=True):
         colors = chosen_of(sweep.axes[role.color], MAX_LINES)
         whole = whole_part(sweep, measure, role)
         parts = [line_part(whole, role, {role.color: int(n)}) for n in colors]
-        entries |= plot_parts(panel, sweep, role, parts, whole)
-        panel.set_ylabel(measure.unit)
-    figure.supxlabel(sweep.axes[role.x].title, fontsize="medium")
-    legend_above(figure, [*entries.values(), *marks_of(sweep, role)])
+        plot_parts(panel, sweep, role, parts, whole)
+        panel.y.title = measure.unit
+    figure.x_title = sweep.axes[role.x].title
+    figure.legend = named_lines(figure)
     return figure
 
 
@@ -261,37 +248,37 @@ def is_averaged(sweep: PlottedSweep, role: Roles) -> bool:
     return any(n not in role for n in range(len(sweep.axes)))
 
 
-def marks_of(sweep: PlottedSweep, role: Roles) -> list[Line2D]:
-    """Return the legend's entries of marks: means have none."""
-    return [] if is_averaged(sweep, role) else marks_shown(sweep.status, sweep.chaotic)
+def named_lines(figure: Drawing) -> list[Trace]:
+    """Return a legend of all lines by name, and behind them of the marks of jobs."""
+    named = {trace.name: trace for panel in figure.panels for trace in panel.traces}
+    ranks = {name: rank for rank, name in enumerate((*NAMES.values(), CHAOTIC), 1)}
+    return sorted(named.values(), key=lambda one: ranks.get(one.name, 0))
 
 
-@in_style
-def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Figure:
+def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Drawing:
     """Return a panel for each value of one axis and, in rows, of another, or for each measure."""
     sweep = coarse(sweep, role.x, MAX_PLACES)
     columns = chosen_of(sweep.axes[role.column], MAX_COLUMNS)
     has_rows = role.row >= 0
     rows: Sequence[int] = chosen_of(sweep.axes[role.row], MAX_ROWS).tolist() if has_rows else []
     grid_rows = [(measures[0], n) for n in rows] if has_rows else [(m, -1) for m in measures]
-    figure, grid = sheet(
-        len(grid_rows), columns.size, 2.2 * len(grid_rows) + 1.0, sharex=True,
-        sharey=True if has_rows else "row",
-    )  # fmt: skip
-    entries: dict[str, Line2D] = {}
+    figure, grid = make_grid(len(grid_rows), columns.size, 2.2 * len(grid_rows) + 1.0)
     for line, (measure, row) in zip(grid, grid_rows, strict=True):
         whole = whole_part(sweep, measure, role)
         for panel, column in zip(line, columns, strict=True):
             at = {role.column: int(column)} | ({role.row: row} if has_rows else {})
             colors = chosen_of(sweep.axes[role.color], MAX_LINES)
             parts = [line_part(whole, role, at | {role.color: int(n)}) for n in colors]
-            entries |= plot_parts(panel, sweep, role, parts, whole)
+            plot_parts(panel, sweep, role, parts, whole)
             words = [] if has_rows else [measure.title]
             words += [sweep.axes[axis].told(n) for axis, n in at.items()]
-            panel.set_title("\n".join(words), fontsize=9)
-        line[0].set_ylabel(measure.unit)
-    figure.supxlabel(sweep.axes[role.x].title, fontsize="medium")
-    legend_above(figure, [*entries.values(), *marks_of(sweep, role)])
+            panel.title, panel.title_size = "\n".join(words), 9.0
+        line[0].y.title = measure.unit
+    share_scales(figure.panels, "x")
+    for panels in [grid.flat] if has_rows else grid:
+        share_scales(panels, "y")
+    figure.x_title = sweep.axes[role.x].title
+    figure.legend = named_lines(figure)
     return figure
 
 
@@ -314,54 +301,48 @@ def line_part(whole: MeasuredPoints, role: Roles, at: dict[int, int]) -> Measure
 
     return MeasuredPoints(
         part(whole.values), part(whole.bars), part(whole.status), part(whole.chaotic),
-        None if whole.keys is None else part(whole.keys),
+        part(whole.keys),
     )  # fmt: skip
 
 
 def plot_parts(
-    panel: Axes,
+    panel: Panel,
     sweep: PlottedSweep,
     role: Roles,
     parts: Sequence[MeasuredPoints],
     whole: MeasuredPoints,
-) -> dict[str, Line2D]:
-    """Return a panel's lines and marks; gives the legend's entries by name."""
+) -> None:
+    """Draw a panel's lines and marks."""
     axis, color = sweep.axes[role.x], sweep.axes[role.color]
     x, chosen = axis.places, chosen_of(color, MAX_LINES)
     scale_x(panel, axis)
-    entries = {}
     values = whole.values  # so that all panels of a measure have one scale
     if role.column < 0 and not parts[0].is_jobs:
         values = np.stack([mean_of(part.values) for part in parts])
     span = scale_y(panel, values)
     for n, part, line in zip(chosen, parts, lines_for(color, chosen), strict=True):
         marker = MARKERS[int(n) % len(MARKERS)] if color.is_words else "o"
-        style = line.properties() | {"marker": marker, "markersize": 3.4}
-        style |= {"linestyle": "none"} if axis.is_words else {}
-        name = color.told(int(n))
-        entries[name] = Line2D([], [], label=name, **style)
-        plot_part(panel, x, part, name, style, span)
+        style = replace(line, marker=marker, markersize=3.4)
+        style = replace(style, linestyle="none") if axis.is_words else style
+        plot_part(panel, x, part, color.told(int(n)), style, span)
     if not parts[0].is_jobs:
-        return entries
+        return
     places = np.repeat(x, sum(part.values.shape[1] for part in parts))
     status = np.concatenate([part.status for part in parts], axis=1).ravel()
-    keys = [part.keys for part in parts if part.keys is not None]
-    mark_feet(panel, places, status, np.concatenate(keys, axis=1).ravel() if keys else None)
-    return entries
+    keys = np.concatenate([part.keys for part in parts], axis=1).ravel()
+    mark_feet(panel, places, status, keys)
 
 
 def plot_part(
-    panel: Axes, x: np.ndarray, part: MeasuredPoints, name: str, style: dict[str, Any], span: float
+    panel: Panel, x: np.ndarray, part: MeasuredPoints, name: str, style: LineStyle, span: float
 ) -> None:  # fmt: skip
     """Draw a line through jobs with their bars, or through means."""
     if part.is_jobs:
-        keys = None if part.keys is None else part.keys[:, 0]
-        values, ring = part.values[:, 0], part.chaotic[:, 0]
+        values, ring, keys = part.values[:, 0], part.chaotic[:, 0], part.keys[:, 0]
         plot_jobs(panel, (x, values, part.bars[:, 0]), keys, name, style, span)
-        mark_points(panel, x[ring], values[ring], None if keys is None else keys[ring], RING,
-                    CHAOTIC)  # fmt: skip
+        mark_points(panel, x[ring], values[ring], keys[ring], RING, CHAOTIC)
         return
-    panel.plot(x, mean_of(part.values), label=name, **style)
+    panel.plot(x, mean_of(part.values), style, name)
 
 
 def mean_of(values: np.ndarray) -> np.ndarray:
@@ -375,8 +356,7 @@ MAX_POINTS = 2000  # in a panel
 PLACES = 60  # of a trend
 
 
-@in_style
-def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
+def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Drawing:
     """Return every measure over the axis that matters most for it.
 
     axes: their numbers, one a measure.
@@ -384,26 +364,25 @@ def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Mea
     figure, panels = metric_panels(measures, 2.35)
     for panel, axis, measure in zip(panels, axes, measures, strict=True):
         plot_points(panel, sweep, axis, measure)
-        panel.set_xlabel(sweep.axes[axis].title)
-        panel.set_ylabel(measure.unit)
-    legend_above(figure, entries(sweep))
+        panel.x.title = sweep.axes[axis].title
+        panel.y.title = measure.unit
+    figure.legend = scatter_entries(sweep)
     return figure
 
 
-@in_style
-def draw_scatter(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Figure:
+def draw_scatter(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Drawing:
     """Return the measures in rows over axes in columns."""
-    figure, grid = sheet(
-        len(measures), len(axes), 2.3 * len(measures) + 0.9, sharex="col", sharey="row"
-    )
+    figure, grid = make_grid(len(measures), len(axes), 2.3 * len(measures) + 0.9)
     for row, measure in zip(grid, measures, strict=True):
         for panel, axis in zip(row, axes, strict=True):
             plot_points(panel, sweep, axis, measure)
-        row[0].set_title(measure.title)
-        row[0].set_ylabel(measure.unit)
-    for panel, axis in zip(grid[-1], axes, strict=True):
-        panel.set_xlabel(sweep.axes[axis].title)
-    legend_above(figure, entries(sweep))
+        row[0].title = measure.title
+        row[0].y.title = measure.unit
+        share_scales(row, "y")
+    for column, axis in zip(grid.T, axes, strict=True):
+        column[-1].x.title = sweep.axes[axis].title
+        share_scales(column, "x")
+    figure.legend = scatter_entries(sweep)
     return figure
 
 
@@ -418,7 +397,7 @@ def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
     return "", [""], np.zeros(sweep.place.shape, int)
 
 
-def plot_points(panel: Axes, sweep: PlottedSweep, axis: int, measure: Measure) -> None:
+def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) -> None:
     """Draw the jobs over one axis, and for each group the trend and its interval."""
     one = sweep.axes[axis]
     x, y, keys = one.places, sweep.values(measure), sweep.keys
@@ -431,20 +410,20 @@ def plot_points(panel: Axes, sweep: PlottedSweep, axis: int, measure: Measure) -
         name = name_value(phrase, word) if phrase else "a job"
         here = shown & (group == n)
         color = CYCLE[n].color if phrase else BLUE
-        mark = {"linestyle": "none", "marker": MARKERS[n], "markersize": 3.0, "color": color,
-                "alpha": 0.55 if y.size < 500 else 0.35, "markeredgewidth": 0.0}  # fmt: skip
-        mark_points(panel, x[here], y[here], None if keys is None else keys[here], mark, name)
+        alpha = 0.55 if y.size < 500 else 0.35
+        dots = mark(color, MARKERS[n], 3.0, edge_width=0.0, alpha=alpha)
+        mark_points(panel, x[here], y[here], keys[here], dots, name)
         if not one.is_words:
             known = np.where(group == n, sweep.known(measure), np.nan)
             plot_trend(panel, x, known, color, name)
     ring = shown & sweep.chaotic
-    mark_points(panel, x[ring], y[ring], None if keys is None else keys[ring], RING, CHAOTIC)
-    mark_feet(panel, x[shown], sweep.status[shown], None if keys is None else keys[shown])
+    mark_points(panel, x[ring], y[ring], keys[ring], RING, CHAOTIC)
+    mark_feet(panel, x[shown], sweep.status[shown], keys[shown])
 
 
-def plot_trend(panel: Axes, x: np.ndarray, y: np.ndarray, color: str, name: str) -> None:
+def plot_trend(panel: Panel, x: np.ndarray, y: np.ndarray, color: str, name: str) -> None:
     """Draw a parabola through points and the 95 % interval of its mean, on the panel's scales."""
-    logs = panel.get_xscale() == "log", panel.get_yscale() == "log"
+    logs = panel.x.log, panel.y.log
     there = x[np.isfinite(x) & np.isfinite(y)]
     if not there.size or not np.ptp(there):
         return
@@ -457,22 +436,21 @@ def plot_trend(panel: Axes, x: np.ndarray, y: np.ndarray, color: str, name: str)
         return
     middle, below, above = (np.exp(part) if logs[1] else part for part in found)
     name = "" if name == "a job" else f", {name}"
-    panel.fill_between(at, below, above, color=color, alpha=0.22, linewidth=0.0,
-                       label=f"95 % interval of the trend{name}")  # fmt: skip
-    panel.plot(at, middle, color=color, linewidth=1.8, label=f"trend{name}", zorder=3)
+    area = fill(color, 0.22)
+    panel.traces.append(band(at, below, above, area, f"95 % interval of the trend{name}"))
+    panel.plot(at, middle, LineStyle(color, "-", 1.8, 3), f"trend{name}")
 
 
-def entries(sweep: PlottedSweep) -> list[Any]:
+def scatter_entries(sweep: PlottedSweep) -> list[Trace]:
     """Return the legend of a scatter diagram."""
-    return [*_entries(sweep), *marks_shown(sweep.status, sweep.chaotic)]
-
-
-def _entries(sweep: PlottedSweep) -> Iterator[Any]:
     phrase, words, _ = grouping(sweep)
+    found = []
     for n, word in enumerate(words):
         color = CYCLE[n].color if phrase else BLUE
-        yield Line2D([], [], color=color, linestyle="none", marker=MARKERS[n], markersize=4.5,
-                     label=name_value(phrase, word) if phrase else "a job")  # fmt: skip
+        found.append(
+            entry(name_value(phrase, word) if phrase else "a job", mark(color, MARKERS[n], 4.5))
+        )
     color = BLUE if not phrase else "#606060"
-    yield Line2D([], [], color=color, linewidth=1.8, label="trend")
-    yield Patch(facecolor=color, alpha=0.3, label="its 95 % interval")
+    found.append(entry("trend", LineStyle(color, "-", 1.8)))
+    found.append(entry("its 95 % interval", fill(color, 0.3), "band"))
+    return found + marks_shown(sweep.status, sweep.chaotic)

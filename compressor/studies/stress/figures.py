@@ -1,14 +1,11 @@
 """How extreme scenes ended: a map of outcomes over the planes of their parameters."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
 
 from compressor.reasons import Reason
 from compressor.report import (
@@ -17,9 +14,14 @@ from compressor.report import (
     GOLD,
     GREY,
     RED,
-    in_style,
-    legend_above,
-    sheet,
+    Drawing,
+    LineStyle,
+    Panel,
+    Trace,
+    box,
+    entry,
+    make_grid,
+    mark,
 )
 
 PLANES = (
@@ -30,38 +32,35 @@ PLANES = (
     ("rtol", "damping"),
     ("exponent", "pin_radius"),
 )
-# outcome: colour, marker, size, height; reasons that are not named here are drawn as others
+# reasons that are not named here are drawn as others
 LOOKS = {
-    "ok": (BLUE, "o", 2.2, 2.0),
-    "budget": (GOLD, "s", 2.8, 2.2),
-    Reason.PENETRATION_IMPLAUSIBLE: (GREY, "v", 3.2, 2.1),
-    Reason.ENERGY_AUDIT_FAILED: ("#8c5fa8", "D", 3.0, 2.3),
-    "other failure": (BLACK, "^", 3.2, 2.4),
-    "unjudged": (RED, "x", 4.0, 2.5),
-    "silent_wrong": (RED, "*", 9.0, 2.6),
+    "ok": mark(BLUE, "o", 2.2, 2.0, edge_width=0.0),
+    "budget": mark(GOLD, "s", 2.8, 2.2, edge_width=0.0),
+    Reason.PENETRATION_IMPLAUSIBLE: mark(GREY, "v", 3.2, 2.1, edge_width=0.0),
+    Reason.ENERGY_AUDIT_FAILED: mark("#8c5fa8", "D", 3.0, 2.3, edge_width=0.0),
+    "other failure": mark(BLACK, "^", 3.2, 2.4, edge_width=0.0),
+    "unjudged": mark(RED, "x", 4.0, 2.5, edge_width=0.8),
+    "silent_wrong": mark(RED, "*", 9.0, 2.6, edge_width=0.0),
 }
 UNDAMPED = 5e-3  # where scenes without damping are drawn
 
 
-@in_style
-def draw_outcomes(study: xr.Dataset) -> Figure:
+def draw_outcomes(study: xr.Dataset) -> Drawing:
     """Return a panel a plane of parameters, a mark a scene; the supported range is framed."""
     ends = np.array([*outcomes(study)], object)
-    figure, grid = sheet(2, 3, 6.6)
-    for panel, (first, second) in zip(grid.flat, PLANES, strict=True):
-        x, y = coordinate(study, first), coordinate(study, second)
-        for name, (color, marker, size, height) in LOOKS.items():
-            some = ends == name
-            panel.plot(x[some], y[some], marker, color=color, markersize=size, zorder=height,
-                       markeredgewidth=0.8 if marker == "x" else 0.0)  # fmt: skip
-        for scale, parameter in ((panel.set_xscale, first), (panel.set_yscale, second)):
-            scale("log" if describe_draw(study, parameter)["logarithmic"] else "linear")
-        panel.set_xlabel(axis_label(study, first))
-        panel.set_ylabel(axis_label(study, second))
-        panel.margins(0.03)
-        frame(panel, describe_draw(study, first), describe_draw(study, second))
     present = [name for name in LOOKS if (ends == name).any()]
-    legend_above(figure, [handle(name, int((ends == name).sum())) for name in present])
+    figure, _ = make_grid(2, 3, 6.6)
+    for panel, names in zip(figure.panels, PLANES, strict=True):
+        x, y = (coordinate(study, name) for name in names)
+        for name in present:
+            some = ends == name
+            panel.plot(x[some], y[some], LOOKS[name], name.replace("_", " "))
+        for scale, parameter in zip((panel.x, panel.y), names, strict=True):
+            scale.log = bool(describe_draw(study, parameter)["logarithmic"])
+            scale.title = axis_label(study, parameter)
+            scale.margin = 0.03
+        frame(panel, *(describe_draw(study, name) for name in names))
+    figure.legend = [legend_entry(name, int((ends == name).sum())) for name in present]
     return figure
 
 
@@ -93,18 +92,15 @@ def axis_label(study: xr.Dataset, name: str) -> str:
     return name.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
 
 
-def frame(panel: Axes, first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
+def frame(panel: Panel, first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
     """Draw a rectangle around the supported range, where a plane has one."""
     if all(list(one["range"]) == list(one["supported_range"]) for one in (first, second)):
         return
-    (left, right), (low, high) = first["supported_range"], second["supported_range"]
-    panel.add_patch(Rectangle((left, low), right - left, high - low, fill=False, zorder=3,
-                              edgecolor=BLACK, linewidth=1.0))  # fmt: skip
+    ends = first["supported_range"], second["supported_range"]
+    panel.traces.append(box(*ends, LineStyle(BLACK, linewidth=1.0, zorder=3), "line"))
 
 
-def handle(name: str, count: int) -> Line2D:
+def legend_entry(name: str, count: int) -> Trace:
     """Return what a mark means, and how many there are."""
-    color, marker, size, _ = LOOKS[name]
-    label = f"{name.replace('_', ' ')} ({count})"
-    return Line2D([], [], color=color, marker=marker, linestyle="none", label=label,
-                  markersize=max(size, 4.0))  # fmt: skip
+    look = replace(LOOKS[name], markersize=max(LOOKS[name].markersize, 4.0), edge_width=1.0)
+    return entry(f"{name.replace('_', ' ')} ({count})", look)

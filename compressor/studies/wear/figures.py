@@ -4,63 +4,74 @@ import math
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from compressor.metrics import JOINTS
-from compressor.report import BLACK, CYCLE, GREY, in_style, legend_above, sheet
+from compressor.report import (
+    BLACK,
+    CYCLE,
+    GREY,
+    Drawing,
+    LineStyle,
+    Note,
+    Panel,
+    fill,
+    make_grid,
+)
 
 MAX_PROFILES = 5
 
 
-@in_style
-def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Figure:
+def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Drawing:
     """Return the clearance at the deepest place, greatest force, and what is worn off by place on
     the bore.
 
     stages: of `stages.open_wear`; limit_mm: of the clearance; factor: by which the coefficient may
     be smaller or greater, whose hours are shaded. Profiles are of the joint that is worn the most.
     """
-    figure, panels = sheet(1, 3, 3.6)
+    figure, grid = make_grid(1, 3, 3.6)
+    opening, force, profiles = grid.flat
     hours = stages["hours"].values
     worn = [joint for joint in JOINTS if (stages["clearance"].sel(joint=joint) > 0).all()]
-    handles = []
     for joint, line in zip(worn, CYCLE, strict=False):
-        opened = 1e3 * stages["clearance"].sel(joint=joint).values
-        (handle,) = panels[0, 0].plot(
-            hours, opened, label=joint.replace("_", " "), **line.properties()
-        )
-        panels[0, 0].fill_betweenx(
-            opened, hours / factor, hours * factor, color=line.color, alpha=0.15, linewidth=0
-        )
-        force = stages["peak_contact_force"].sel(joint=joint).values
-        panels[0, 1].plot(hours, 1e-3 * force, **line.properties())
-        handles.append(handle)
+        name, one = joint.replace("_", " "), stages.sel(joint=joint)
+        opened = 1e3 * one["clearance"].values
+        opening.plot(hours, opened, line, name)
+        around = np.concatenate([hours / factor, hours[::-1] * factor])
+        there_and_back = np.concatenate([opened, opened[::-1]])
+        opening.plot(around, there_and_back, fill(line.color, 0.15), kind="band")
+        force.plot(hours, 1e-3 * one["peak_contact_force"].values, line, name)
     if math.isfinite(limit_mm):
-        panels[0, 0].axhline(limit_mm, color=BLACK, linewidth=0.8)
-        panels[0, 0].annotate("limit", (0.02 * hours[-1], limit_mm), (0, 2),
-                              textcoords="offset points", fontsize=8.5)  # fmt: skip
-    panels[0, 0].set(ylabel="clearance, deepest place (mm)", xlabel="operating hours")
-    panels[0, 0].set_xlim(0.0, max(float(hours[-1]), 1e-9))
-    panels[0, 1].set(ylabel="greatest contact force (kN)", xlabel="operating hours", ylim=(0, None))
+        opening.notes.append(Note(y=limit_mm, style=LineStyle(BLACK, linewidth=0.8)))
+        opening.notes.append(Note("limit", 0.02 * hours[-1], limit_mm, shift=(0, 2), size=8.5))
+    opening.x.title = force.x.title = "operating hours"
+    opening.x.span(0.0, max(float(hours[-1]), 1e-9))
+    opening.y.title = "clearance, deepest place (mm)"
+    force.y.title = "greatest contact force (kN)"
+    force.y.span(low=0.0)
     deepest = max(worn, key=lambda joint: float(stages["worn_depth"].sel(joint=joint).max()))
+    figure.legend = force.traces
+    plot_profiles(profiles, stages.sel(joint=deepest))
+    profiles.y.title = f"worn off the {deepest.replace('_', ' ')} (µm)"
+    for panel, letter in zip(grid.flat, "abc", strict=True):
+        panel.title = f"({letter})"
+        panel.notes.append(Note(y=0.0, style=LineStyle(GREY, linewidth=0.5, zorder=0)))
+    return figure
+
+
+def plot_profiles(panel: Panel, stages: xr.Dataset) -> None:
+    """Draw what is worn off one joint at some of the stages, the later the darker."""
+    hours = stages["hours"].values
     shown = np.unique(np.linspace(0, hours.size - 1, MAX_PROFILES + 1).round().astype(int))[1:]
     half = stages.sizes["angle"] // 2  # profiles go from -180 to 180 degrees
     angles = (np.degrees(stages["angle"].values) + 180.0) % 360.0 - 180.0
     around = np.append(np.roll(angles, half), angles.max() + angles[1])
     for place, number in enumerate(shown):
-        depth = 1e6 * stages["worn_depth"].isel(stage=number).sel(joint=deepest).values
-        depth = np.roll(depth, half)
+        depth = np.roll(1e6 * stages["worn_depth"].isel(stage=number).values, half)
         depth = np.append(depth, depth[0])
-        share = (place + 1) / shown.size
-        panels[0, 2].plot(around, depth, color=BLACK, alpha=share, linewidth=1.0)
-        panels[0, 2].annotate(
-            f"{hours[number]:.3g} h", (around[depth.argmax()], depth.max()), (0, 2),
-            textcoords="offset points", ha="center", fontsize=7.5, alpha=max(share, 0.5),
+        share, name = (place + 1) / shown.size, f"{hours[number]:.3g} h"
+        panel.plot(around, depth, LineStyle(BLACK, linewidth=1.0, alpha=share), name)
+        panel.notes.append(
+            Note(name, around[depth.argmax()], depth.max(), shift=(0, 2), side="center", size=7.5,
+                 style=LineStyle(BLACK, alpha=max(share, 0.5)))
         )  # fmt: skip
-    panels[0, 2].set(ylabel=f"worn off the {deepest.replace('_', ' ')} (µm)")
-    panels[0, 2].set(xlabel="place, from the rod's axis (deg)", xticks=range(-180, 181, 90))
-    for panel, letter in zip(panels.flat, "abc", strict=True):
-        panel.set_title(f"({letter})")
-        panel.axhline(0.0, color=GREY, linewidth=0.5, zorder=0)
-    legend_above(figure, handles)
-    return figure
+    panel.x.title, panel.x.ticks = "place, from the rod's axis (deg)", range(-180, 181, 90)

@@ -1,11 +1,10 @@
 """The report's machines: maps and bars show the margins, and the words beside say the same."""
 
-import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
+from compressor.report.figures import Drawing
 from compressor.report.page import Plate, document
 from compressor.store.files import StoreError
 from compressor.store.series_file import write_dataset
@@ -66,12 +65,11 @@ def test_the_map_comes_first_and_says_what_it_shows(drawn):
     )
     assert "claim 3 7 (0 within the error)" in sentences[-1]
     assert "claim 8 5 (5 within the error)" in sentences[-1]
-    panels = {panel.get_title(loc="left"): panel for panel in figure.axes}
-    claim = panels["claim 3"].collections[0].get_array()
-    assert np.asarray(claim).ravel()[:7] == pytest.approx([-0.2] * 7)
+    panels = {panel.title: panel for panel in figure.panels}
+    cells, *_, place = panels["claim 3"].traces
+    assert cells.z[0] == pytest.approx([-0.2] * 7)
     assert "most of them: 7 hold" in panels
-    (mark,) = panels["claim 3"].lines
-    assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (4.7, 14.0)
+    assert (place.x, place.y) == (4.7, 14.0)
 
 
 def test_the_bars_are_those_of_the_sentences(drawn):
@@ -80,8 +78,8 @@ def test_the_bars_are_those_of_the_sentences(drawn):
     said = next(text for text in sentences if text.startswith("Claim 3:"))
     assert said.startswith("Claim 3: most by reciprocating mass, ")
     value = float(said.split("mass, ")[1].split(" ")[0])
-    panel = next(one for one in figure.axes if one.get_title(loc="left") == "claim 3")
-    widths = [bar.get_width() for bar in panel.patches]
+    panel = next(one for one in figure.panels if one.title == "claim 3")
+    widths = [width for trace in panel.traces if trace.kind == "bars" for width in trace.x]
     assert len(widths) == 16
     assert min(abs(width - value) for width in widths) <= 0.005
     assert "Claim 7: its margin is the same at all machines." in sentences
@@ -96,7 +94,7 @@ def test_a_search_is_told_in_words_alone(drawn):
 
 def test_the_section_of_the_page_has_words_and_figures(folder, capsys):
     def draw(name, heading, caption, drawing):
-        assert isinstance(drawing, Figure)
+        assert isinstance(drawing, Drawing)
         return Plate(name, heading, caption, drawing, "csv", "js", "alt")
 
     (chapter,) = add("results", [], draw, folder).chapters

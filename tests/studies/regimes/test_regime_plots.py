@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from regimes_made import REVOLUTIONS, failed, made, plane
 
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render
 from compressor.report.plots import PlotChoice, PlotError, publish_drawings
 from compressor.studies.regimes.figures import (
     CLASSES,
@@ -14,7 +14,6 @@ from compressor.studies.regimes.figures import (
     draw_bifurcation,
     draw_periods,
     draw_sections,
-    edges_of,
     period_classes,
     period_rows,
 )
@@ -33,18 +32,18 @@ def data():
     return made()
 
 
-def words(figure):
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+def words(drawing):
+    return [one.name for one in drawing.legend]
 
 
-def points(panel, color=None):
+def points(panel):
     """Finite points of a panel's marks, those without lines."""
-    found = [line.get_xydata() for line in panel.lines if line.get_linestyle() == "None"]
+    found = [np.column_stack((one.x, one.y)) for one in panel.traces if one.is_points]
     return [xy[np.isfinite(xy).all(axis=1)] for xy in found]
 
 
 def test_bifurcation_points_are_the_stored_ones(data):
-    panel = draw_bifurcation(data).axes[0]
+    panel = draw_bifurcation(data).panels[0]
     for direction, drawn in zip(("up", "down"), points(panel), strict=True):
         stored = data["section"].sel(direction=direction, joint="big_end", coordinate="x").values
         there = np.isfinite(stored)
@@ -52,17 +51,17 @@ def test_bifurcation_points_are_the_stored_ones(data):
         np.testing.assert_allclose(
             drawn, np.column_stack((x[there], 1e3 * stored[there])), rtol=1e-12
         )
-    assert panel.get_ylabel() == "$e_x$ (mm)"
-    assert panel.get_xscale() == "log"
+    assert panel.y.title == "$e_x$ (mm)"
+    assert panel.x.log
 
 
 def test_each_worn_joint_has_its_panels():
     pair = made(np.linspace(0.2, 0.4, 5), BOTH, ("up",))
-    figure = draw_bifurcation(pair)
-    small = figure.axes[1]
+    drawing = draw_bifurcation(pair)
+    small = drawing.panels[1]
     stored = pair["section"].sel(joint="small_end", coordinate="x").values
     np.testing.assert_allclose(points(small)[0][:, 1], 1e3 * stored[np.isfinite(stored)])
-    assert words(figure) == ["up", "flight", "impact", "following"]
+    assert words(drawing) == ["up", "flight", "impact", "following"]
 
 
 def test_periods_stand_in_their_rows(data):
@@ -81,58 +80,57 @@ def test_periods_stand_in_their_rows(data):
 def test_exponents_have_their_bars_and_a_zero_line(data):
     unsure = data.copy(deep=True)
     unsure["lyapunov_exponent_error"][0, 3] = np.inf
-    panel = draw_bifurcation(unsure).axes[2]
-    up = panel.containers[0]
-    np.testing.assert_allclose(up[0].get_ydata(), data["lyapunov_exponent"].values[0])
-    lengths = [np.ptp(segment[:, 1]) / 2 for segment in up[2][0].get_segments() if len(segment)]
-    bars = np.delete(data["lyapunov_exponent_error"].values[0], 3)
-    np.testing.assert_allclose(
-        lengths[:3] + lengths[-30:], np.append(bars[:3], bars[-30:]), atol=1e-12
-    )
-    assert any(np.all(np.array(line.get_ydata()) == 0.0) for line in panel.lines)
+    panel = draw_bifurcation(unsure).panels[2]
+    up = panel.traces[0]
+    np.testing.assert_allclose(up.y, data["lyapunov_exponent"].values[0])
+    bars = data["lyapunov_exponent_error"].values[0].copy()
+    bars[3] = np.nan
+    np.testing.assert_allclose(up.errors, [bars, bars])
+    assert [note.y for note in panel.notes] == [0.0]
 
 
 def test_contact_modes_are_stacked_to_the_whole(data):
-    panel = draw_bifurcation(failed(data, "up", [4])).axes[-1]
-    n = data.sizes[OVER]
-    assert len(panel.patches) == 3 * n
-    tops = [bar.get_y() + bar.get_height() for bar in panel.patches[2 * n :]]
-    np.testing.assert_allclose(np.delete(tops, 4), 1.0)
-    assert np.isnan(tops[4])
-    assert panel.get_title(loc="left").endswith("big end, up")
+    panel = draw_bifurcation(failed(data, "up", [4])).panels[-1]
+    flight, impact, following, _ = panel.traces
+    np.testing.assert_array_equal(impact.foot, np.nan_to_num(flight.y))
+    np.testing.assert_allclose(np.delete(following.y, 4), 1.0)
+    assert np.isnan(following.y[4])
+    assert panel.title.endswith("big end, up")
 
 
 def test_failed_values_are_marked_in_every_panel(data):
-    figure = draw_bifurcation(failed(data, "down", [3, 30]))
-    for panel in figure.axes:
-        (mark,) = [line for line in panel.lines if line.get_marker() == "x"]
-        np.testing.assert_allclose(mark.get_xdata(), data[OVER].values[[3, 30]])
-    assert "a run failed here" in words(figure)
+    drawing = draw_bifurcation(failed(data, "down", [3, 30]))
+    for panel in drawing.panels:
+        (mark,) = [trace for trace in panel.traces if trace.style.marker == "x"]
+        np.testing.assert_allclose(mark.x, data[OVER].values[[3, 30]])
+        low, high = panel.limits("y")
+        assert (low < mark.y).all()
+        assert (mark.y < high).all()
+    assert "a run failed here" in words(drawing)
     assert "a run failed here" not in words(draw_bifurcation(data))
 
 
 def test_sections_show_the_points_of_their_values(data):
     chosen = chosen_values(data)
-    figure = draw_sections(data.isel({OVER: chosen}))
-    assert len(figure.axes) == len(chosen) == MAX_SECTIONS
-    for place, panel in zip(chosen, figure.axes, strict=True):
+    drawing = draw_sections(data.isel({OVER: chosen}))
+    assert len(drawing.panels) == len(chosen) == MAX_SECTIONS
+    for place, panel in zip(chosen, drawing.panels, strict=True):
         stored = data["section"].isel({OVER: place}).sel(direction="up", joint="big_end")
         x, rate = (stored.sel(coordinate=name).values for name in ("x", "x_rate"))
         there = np.isfinite(x)
         expected = np.column_stack((1e6 * x[there], 1e3 * rate[there]))
         np.testing.assert_allclose(points(panel)[0], expected)
-        assert panel.get_title(loc="left").startswith(f"{float(data[OVER][place]):.4g} mm: ")
-        (left, right), (low, high) = panel.get_xlim(), panel.get_ylim()
+        assert panel.title.startswith(f"{float(data[OVER][place]):.4g} mm: ")
         for drawn in points(panel):
-            assert (left < drawn[:, 0]).all()
-            assert (drawn[:, 0] < right).all()
-            assert (low < drawn[:, 1]).all()
-            assert (drawn[:, 1] < high).all()
+            for values, way in zip(drawn.T, "xy", strict=True):
+                low, high = panel.limits(way)
+                assert (low < values).all()
+                assert (values < high).all()
 
 
 def test_a_fixed_point_is_not_blown_up(data):
-    panels = draw_sections(data.isel({OVER: [0, 38]})).axes
-    widths = [np.ptp(panel.get_xlim()) for panel in panels]
+    panels = draw_sections(data.isel({OVER: [0, 38]})).panels
+    widths = [np.ptp(panel.limits("x")) for panel in panels]
     assert widths[0] >= 0.1 * widths[1]
 
 
@@ -160,32 +158,25 @@ def test_a_map_colours_each_regime():
     assert found == ["period 1", "period 4", *["period 5 to 16"] * 2, "chaotic", "undecided"]
     assert names[period_classes(data)[1, 0, 0]] == "failed"
     assert period_classes(data)[1, 0, 1] == -1
-    figure = draw_periods(data, "speed_rpm")
-    (mesh,) = figure.axes[0].collections
-    drawn = mesh.get_array()
-    assert drawn.shape == (3, 6)
-    assert drawn.mask.sum() == 1
-    np.testing.assert_array_equal(drawn[0], period_classes(data)[0, 0])
-    assert {"failed", "not run", "chaotic"} <= {*words(figure)}
-
-
-@pytest.mark.parametrize("log", [False, True])
-def test_edges_lie_between_values(log):
-    edges = edges_of(np.array([4.0, 1.0, 2.0]), log)
-    assert (edges[:-1] < [1, 2, 4]).all()
-    assert (edges[1:] > [1, 2, 4]).all()
-    assert edges_of(np.array([3.0]), log).size == 2
+    drawing = draw_periods(data, "speed_rpm")
+    (cells,) = drawing.panels[0].traces
+    assert cells.z.shape == (3, 6)
+    assert np.isnan(cells.z).sum() == 1
+    np.testing.assert_array_equal(cells.z[0], period_classes(data)[0, 0])
+    assert {"failed", "not run", "chaotic"} <= {*words(drawing)}
 
 
 def test_all_axes_say_what_they_are(data):
     swept = plane(values=np.geomspace(0.01, 1, 4))
     chosen = data.isel({OVER: chosen_values(data)})
-    for figure in (draw_bifurcation(data), draw_sections(chosen), draw_periods(swept, "speed_rpm")):
-        assert all(panel.get_title(loc="left") for panel in figure.axes)
-        assert any(panel.get_xlabel() for panel in figure.axes)
-        assert figure.axes[0].get_ylabel() or figure.axes[1].get_yticklabels()
-        assert words(figure)
-        assert render(figure, "png").startswith(b"\x89PNG")
+    for drawing in (
+        draw_bifurcation(data), draw_sections(chosen), draw_periods(swept, "speed_rpm"),
+    ):  # fmt: skip
+        assert all(panel.title for panel in drawing.panels)
+        assert any(panel.x.title for panel in drawing.panels)
+        assert drawing.panels[0].y.title
+        assert words(drawing)
+        assert render(drawing, "png").startswith(b"\x89PNG")
 
 
 # ---- which are drawn, and why not ---------------------------------------------------------------
@@ -212,8 +203,8 @@ def test_another_axis_makes_a_map_and_is_fixed_elsewhere():
     ((_, caption, drawing),) = regime_figures(data, asked)
     assert caption.endswith("Here speed_rpm 600.")
     chain = data.isel(speed_rpm=2).sel(direction="down")
-    drawn = drawing.axes[2].containers[1][0].get_ydata()
-    np.testing.assert_allclose(drawn, chain["lyapunov_exponent"].values)
+    drawn = drawing.panels[2].traces[1]
+    np.testing.assert_allclose(drawn.y, chain["lyapunov_exponent"].values)
 
 
 def test_of_several_axes_the_map_is_over_the_one_asked_for():
@@ -221,7 +212,7 @@ def test_of_several_axes_the_map_is_over_the_one_asked_for():
     data = xr.concat([part, part], "rod_mass_kg").assign_coords(rod_mass_kg=[1.0, 2.0])
     asked = PlotChoice(("periods",), over="rod_mass_kg", at=("speed_rpm=500",))
     ((_, caption, drawing),) = regime_figures(data, asked)
-    assert drawing.axes[0].get_ylabel() == "rod_mass_kg"
+    assert drawing.panels[0].y.title == "rod_mass_kg"
     assert caption.endswith("Here speed_rpm 500.")
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 from compsim import cli
 
 from compressor.cases.case import Case
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render
 from compressor.solve.error_bars import bars
 from compressor.solve.solution import solve
 from compressor.store.files import StoreError
@@ -236,9 +236,8 @@ def test_a_map_marks_every_outcome():
         "unjudged",
     ]  # fmt: skip
     drawing = draw_outcomes(study)
-    assert len(drawing.axes) == 6
-    (legend,) = drawing.legends
-    assert [text.get_text() for text in legend.get_texts()] == [
+    assert len(drawing.panels) == 6
+    assert [one.name for one in drawing.legend] == [
         "ok (1)", "budget (2)", "penetration implausible (1)", "other failure (1)", "unjudged (1)",
         "silent wrong (1)",
     ]  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from compressor.cases.case import Case
-from compressor.report.figures.style import render
+from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.store.series_file import write_dataset
 from compressor.studies.tradeoff.figures import draw_work_precision
@@ -139,9 +139,10 @@ def test_a_study_is_stored_for_other_tools(study, tmp_path):
 
 def test_the_figure_draws_what_is_there(study):
     drawing = draw_work_precision(study)
-    (panel,) = drawing.axes
-    assert panel.get_xscale() == panel.get_yscale() == "log"
-    lines = [line.get_ydata() for line in panel.lines if len(line.get_ydata()) == 3]
+    (panel,) = drawing.panels
+    assert panel.x.log
+    assert panel.y.log
+    lines = [trace.y for trace in panel.traces if trace.y.size == 3]
     assert len(lines) == len(METHODS)
     assert lines[0] == pytest.approx(study["error_acceleration"].values[0, 0])
     assert render(drawing, "svg").startswith(b"<?xml")
@@ -153,7 +154,7 @@ def test_the_figure_has_a_panel_for_each_scene(study):
         [study.assign_coords(scene=[name]) for name in scenes], "scene", data_vars="all"
     )
     drawing = draw_work_precision(many)
-    assert [panel.get_title("left") for panel in drawing.axes] == scenes
+    assert [panel.title for panel in drawing.panels] == scenes
 
 
 def test_the_figure_bears_failures(study):
