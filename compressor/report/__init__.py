@@ -45,7 +45,6 @@ from compressor.report.page import (
     Additions,
     Cell,
     Chapter,
-    Draw,
     PageTable,
     Plate,
     Running,

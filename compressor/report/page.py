@@ -6,7 +6,7 @@ text that they print.
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
@@ -18,9 +18,10 @@ from markupsafe import Markup
 from compressor.digits import by_bar
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
-from compressor.report.figures.drawing import Drawing
+from compressor.report.figures.drawing import Drawing, as_csv
 from compressor.report.figures.pictures import DPI
 from compressor.report.figures.sweep_data import Measure
+from compressor.report.interactive import describe_figure, script
 from compressor.store import Folder, StoredStudy
 
 
@@ -124,30 +125,33 @@ class Section:
 
 @dataclass(frozen=True)
 class Plate:
-    """A figure that has been drawn, under the name of its files.
-
-    script: what the page draws it from interactively; csv: its numbers; alt: what is seen; jobs:
-    the keys of the jobs that its points are.
-    """
+    """A figure of the page, under the name of its files."""
 
     name: str
     heading: str
     caption: str
-    figure: Drawing
-    csv: str
-    script: str
-    alt: str
-    jobs: tuple[str, ...] = ()
+    drawing: Drawing
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of the PNG in pixels."""
-        return int(self.figure.width * DPI), int(self.figure.height * DPI)
+        return int(self.drawing.width * DPI), int(self.drawing.height * DPI)
+
+    @property
+    def alt(self) -> str:
+        """What is seen, in words."""
+        return describe_figure(self.drawing)
+
+    @property
+    def jobs(self) -> Iterator[str]:
+        """The keys of the jobs that its points are."""
+        return (key for panel in self.drawing.panels for t in panel.traces for key in t.jobs)
 
     @property
     def texts(self) -> dict[str, str]:
         """The files beside the page that are no pictures, by their names."""
-        return {f"{self.name}.csv": self.csv, f"{self.name}.js": self.script}
+        drawing = self.drawing
+        return {f"{self.name}.csv": as_csv(drawing), f"{self.name}.js": script(self.name, drawing)}
 
 
 class Running(NamedTuple):
@@ -217,9 +221,6 @@ def restate_page(page: str, before: Running, now: Running) -> str:
     return page.replace(status.render(running=before), status.render(running=now))
 
 
-Draw = Callable[[str, str, str, Drawing], Plate]  # of name, heading, caption and drawing
-
-
 class StudyNote(NamedTuple):
     """A line in the section of a study, and a link below it: the id of a section, and its words."""
 
@@ -242,4 +243,4 @@ class Additions(NamedTuple):
     chapters: Sequence[Chapter]
 
 
-Add = Callable[[Folder, Sequence[StoredStudy], Draw], Additions]  # of the folder of results
+Add = Callable[[Folder, Sequence[StoredStudy]], Additions]  # of the folder of results

@@ -25,15 +25,12 @@ from compressor.report.answer import (
     round_robin,
     study_findings,
 )
-from compressor.report.figures import FIGURES, Drawing
-from compressor.report.figures.drawing import as_csv
+from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import pictures
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
-    describe_figure,
     job_scripts,
     publish_library,
-    script,
     series_name,
 )
 from compressor.report.page import (
@@ -103,15 +100,14 @@ def write_report(
     """
     made = compose(results, command, add, running)
     folder = Path(report)
-    drawn = pictures(
-        {plate.name: plate.figure for plate in made.plates},
+    files = pictures(
+        {plate.name: plate.drawing for plate in made.plates},
         {plate.name: plate.heading for plate in made.plates},
     )
-    for name, content in drawn.items():
-        publish(folder / name, content)
     for plate in made.plates:
-        for name, text in plate.texts.items():
-            publish(folder / name, text.encode())
+        files |= {name: text.encode() for name, text in plate.texts.items()}
+    for name, content in files.items():
+        publish(folder / name, content)
     for key, text in made.series.items():
         publish(folder / f"{series_name(key)}.js", text.encode())
     publish_library(folder)
@@ -150,12 +146,12 @@ def compose(
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = draw_paper(paper)
     others = second_sets(stored, studies, paper)
-    of_others = {n: [draw(*parts) for parts in second_drawings(one)] for n, one in others.items()}
+    of_others = {n: [Plate(*parts) for parts in second_drawings(one)] for n, one in others.items()}
     found = shakings(paper)
-    of_faults = [draw(*parts) for parts in diagnosis_drawings(found, paper)]
+    of_faults = [Plate(*parts) for parts in diagnosis_drawings(found, paper)]
     shown = {run.attrs["key"] for run in paper.stored.values()}
     own = [study for study in studies if not shown.issuperset(study.keys)]
-    added = [one(results, studies, draw) for one in add]
+    added = [one(results, studies) for one in add]
     drawn = [
         drawn_study(stored, study, others.get(study.name), notes_on(study.name, added))
         for study in own
@@ -217,8 +213,8 @@ def drawn_study(
     whole = other is not None and other.keys.issuperset(study.keys)
     with open_study(stored.folder, study.name) as data:
         plates = [
-            draw(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
-                 one.caption, one.figure)
+            Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
+                  one.caption, one.figure)
             for one in ([] if whole else draw_sweep(data))
         ]  # fmt: skip
         figures, table = study_sections(stored, study, data, plates, anchor, notes)
@@ -277,17 +273,8 @@ def remove_stale(report: Path, made: Made) -> None:
 def draw_paper(paper: PaperRuns) -> list[Plate]:
     """Return every figure of the paper whose cases are there."""
     return [
-        draw(f"figure-{item.number:02d}", f"Figure {item.number}: {item.title}",
-             caption(item.number, paper.usable), item.draw(paper.usable))
+        Plate(f"figure-{item.number:02d}", f"Figure {item.number}: {item.title}",
+              caption(item.number, paper.usable), item.draw(paper.usable))
         for item in FIGURES
         if paper.usable.keys() >= {*item.needs}
     ]  # fmt: skip
-
-
-def draw(name: str, heading: str, caption: str, drawing: Drawing) -> Plate:
-    """Return a drawing with what the page and its data tell of it."""
-    jobs = dict.fromkeys(key for panel in drawing.panels for t in panel.traces for key in t.jobs)
-    return Plate(
-        name, heading, caption, drawing, as_csv(drawing), script(name, drawing),
-        describe_figure(drawing), tuple(jobs),
-    )  # fmt: skip

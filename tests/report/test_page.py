@@ -16,7 +16,7 @@ from jinja2 import UndefinedError
 from compressor.analysis.claims import Claim
 from compressor.report import page
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
-from compressor.report.figures import Drawing
+from compressor.report.figures.drawing import Drawing, Panel
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -77,7 +77,7 @@ class Hostile:
 
 
 def plate(evil):
-    return Plate("drawn", evil(), evil(), Drawing([], 1.0), "csv", "js", evil())
+    return Plate("drawn", evil(), evil(), Drawing([Panel((0, 1), (0, 1), evil())], 1.0))
 
 
 def table(evil):

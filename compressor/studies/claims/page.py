@@ -7,7 +7,7 @@ from pathlib import Path
 import xarray as xr
 
 from compressor.cases import Case
-from compressor.report import Additions, Chapter, Draw, Drawing, Plate, Section, file_name
+from compressor.report import Additions, Chapter, Drawing, Plate, Section, file_name
 from compressor.store import Folder, StoredStudy
 from compressor.studies.claims.figures import OF_MASSES, draw_claims_map, draw_sensitivity
 from compressor.studies.claims.findings import (
@@ -98,14 +98,14 @@ def borders(found: xr.Dataset) -> str:
     return f"Of {pairs} pairs of neighbours, one holds and the other does not: {', '.join(parts)}."
 
 
-def add(results: Folder, studies: Sequence[StoredStudy], draw: Draw, place: Folder) -> Additions:
+def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
     """Return the section of the judged machines that are in a folder; nothing where none are.
 
     Raises StoreError for a file that is something else.
     """
     parts, found = [], machine_files(place) if place else {}
     for name, sentences, heading, caption, drawing in machine_drawings(found):
-        plate = draw(file_name("machines", name), heading, caption, drawing) if drawing else None
+        plate = Plate(file_name("machines", name), heading, caption, drawing) if drawing else None
         parts.append(MachinesFile(name, sentences, plate))
     if not parts:
         return Additions({}, [])

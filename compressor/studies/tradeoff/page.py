@@ -22,7 +22,6 @@ from compressor.report import (
     Additions,
     Cell,
     Chapter,
-    Draw,
     Measure,
     PageTable,
     Section,
@@ -257,7 +256,7 @@ def read_models(folder: Folder, study: StoredStudy) -> xr.Dataset | None:
     return None
 
 
-def add(results: Folder, studies: Sequence[StoredStudy], draw: Draw, place: Folder) -> Additions:
+def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
     """Return what is stored of choices of the model: a line on each study, and a section."""
     notes, chapters = {}, []
     for study in studies:

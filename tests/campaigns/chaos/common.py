@@ -23,8 +23,7 @@ from compsim import cli
 
 from compressor.cases.load import load_studies
 from compressor.report import report
-from compressor.report.figures import Drawing, pictures
-from compressor.report.page import Plate
+from compressor.report.figures import pictures
 from compressor.store.reader import open_study
 from compressor.store.status import standings, verify
 from compressor.sweep import plan as forecast
@@ -33,9 +32,7 @@ from compressor.sweep.sweep import sweep
 
 def undrawn():
     """Let reports draw nothing, which takes seconds, and copy no library."""
-    plate = ("caption", Drawing([], 1.0), "numbers", "script", "alt")
     report.draw_sweep = lambda data: []
-    report.draw = lambda name, heading, *rest: Plate(name, heading, *plate)
     pictures.render_kinds = lambda drawing, kinds: [b"drawn"] * 2
     report.publish_library = lambda folder: None
 

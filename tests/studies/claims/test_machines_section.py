@@ -4,8 +4,7 @@ import pytest
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.report.figures import Drawing
-from compressor.report.page import Plate, document
+from compressor.report.page import document
 from compressor.store.files import StoreError
 from compressor.store.series_file import write_dataset
 from compressor.studies.claims.page import (
@@ -93,11 +92,7 @@ def test_a_search_is_told_in_words_alone(drawn):
 
 
 def test_the_section_of_the_page_has_words_and_figures(folder, capsys):
-    def draw(name, heading, caption, drawing):
-        assert isinstance(drawing, Drawing)
-        return Plate(name, heading, caption, drawing, "csv", "js", "alt")
-
-    (chapter,) = add("results", [], draw, folder).chapters
+    (chapter,) = add("results", [], folder).chapters
     assert [part.plate is None for part in chapter.section.content] == [False, False, True]
     assert [plate.name for plate in chapter.plates] == ["machines-claims", "machines-assumptions"]
     text = document([chapter.section], {})
@@ -108,7 +103,7 @@ def test_the_section_of_the_page_has_words_and_figures(folder, capsys):
 @pytest.mark.parametrize("place", ["", "none"])
 def test_without_judged_machines_nothing_is_added(place, folder, monkeypatch):
     monkeypatch.chdir(folder)
-    assert add("results", [], None, place) == ({}, [])
+    assert add("results", [], place) == ({}, [])
 
 
 def test_without_a_folder_there_is_nothing_and_other_files_are_refused(tmp_path, folder):
