@@ -68,7 +68,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "pyarrow": {"compressor.studies.diagnosis"},
     "sklearn": set(),  # of campaigns alone
 }  # fmt: skip
-MAX_NAMES = 26  # that cross a wall between two rooms, a package
+MAX_NAMES = 27  # on average, of those that other rooms import
 
 Sources = dict[str, str]  # module -> text; a package's door has the package's name
 

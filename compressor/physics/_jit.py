@@ -97,7 +97,8 @@ def _compile(function: Function, **options: Any) -> Function:
     def make() -> Any:
         import numba
 
-        how: Any = {"cache": True, "error_model": "numpy", **options}
+        # C code calls none of them: its wrappers would only take time to compile
+        how: Any = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
         return numba.njit(**how)(function)
 
     deferred: Any = Deferred(make, function)

@@ -96,7 +96,8 @@ def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
                 total += A[stage, j] * u[j, i]
             new[i] = total
         if stage == 0:
-            work[:] = rates
+            for i in range(z.size):  # a slice would have numba compile its error message: seconds
+                work[i] = rates[i]
         else:
             derivative_with_flows(t + NODES[stage] * h, new, phase, p, work)
         for i in range(z.size):
