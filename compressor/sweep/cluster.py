@@ -158,7 +158,7 @@ class Remote(Batches):
     ):
         super().__init__(jobs, rules.target_seconds, 1)
         self.client, self.work, self.rules = client, work, rules
-        self.executor = client.get_executor(pure=False)
+        self.distant: dict[int, Any] = {}  # dask's future of each batch that is out
         self.asked = versions()
         self.remark: Callable[[str], None] = lambda text: None
         self.threads, self.census = -1, 0.0  # of all workers, when they were counted
@@ -173,7 +173,11 @@ class Remote(Batches):
     def submit(self, number: int, batch: list[Job]) -> "Future[bytes]":
         jobs = [Job(n, *job[1:3]) for n, job in enumerate(batch)]
         asked = Batch(self.asked, self.work, self.rules, jobs)
-        return self.executor.submit(on_worker, pickle.dumps(asked, pickle.HIGHEST_PROTOCOL))
+        data = pickle.dumps(asked, pickle.HIGHEST_PROTOCOL)
+        self.distant[number] = self.client.submit(on_worker, data, pure=False)
+        ended: Future[bytes] = Future()
+        self.distant[number].add_done_callback(partial(pass_on, ended))
+        return ended
 
     def watch(self, now: float, news: bool) -> None:
         """Count the threads of all workers now and then, and tell where there is none."""
@@ -192,6 +196,7 @@ class Remote(Batches):
             self.patience = math.inf
 
     def ends_of(self, number: int, data: bytes) -> list[End]:
+        del self.distant[number]
         self.size = max(len(data) / len(self.out[number]), 0.9 * self.size)
         return pickle.loads(data)
 
@@ -205,6 +210,7 @@ class Remote(Batches):
             unfit = unfitness(error) or f"a batch failed: {type(error).__name__}: {error}"
             raise ClusterError(f"worker {unfit}") from error
         batch = self.out.pop(number)
+        del self.distant[number]
         if self.alone and len(batch) == 1:
             how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
             yield JobLost(batch[0].id, Reason.WORKER_DIED, f"{how}, {FAILED_ALONE}")
@@ -216,7 +222,21 @@ class Remote(Batches):
 
     def end_pool(self) -> None:
         """Cancel what has not begun; what runs ends by itself."""
-        self.executor.shutdown(wait=False)
+        with contextlib.suppress(OSError, TimeoutError, ValueError):  # the scheduler may be gone
+            self.client.cancel([*self.distant.values()])
+        self.distant.clear()
+
+
+def pass_on(ended: "Future[bytes]", distant: Any) -> None:
+    """Set what a future of dask's gives.
+
+    Where its worker died with the result, dask does the batch again: its own executor
+    (`Client.get_executor`) would raise a ValueError for that.
+    """
+    try:
+        ended.set_result(distant.result())
+    except BaseException as error:
+        ended.set_exception(error)
 
 
 def describe_lost_scheduler(client: Any) -> ClusterError:

@@ -242,7 +242,7 @@ def fell(_):
 
 
 def test_joblib_s_own_dask_backend_waits_for_ever_for_a_lost_batch(dask, client, monkeypatch):
-    """Why batches are sent by dask's own executor; it may go once joblib tells of the loss."""
+    """Why batches are sent by dask's own `submit`; it may go once joblib tells of the loss."""
     monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
 
     def lose():
