@@ -71,7 +71,7 @@ class Intrinsic(Deferred):
 
 @functools.cache
 def load_numba() -> None:
-    """Tell numba where machine code is kept, and that a Deferred is what it stands for."""
+    """Set numba's folder for machine code, and register the types of `Deferred` and `ByKind`."""
     import numba
     from numba.core.registry import cpu_target
     from numba.extending import typeof_impl
@@ -117,16 +117,18 @@ def jit(function: Function) -> Function:
 
 
 def inline_llvm(function: Function) -> Function:
-    """Return `jit`, written by LLVM into each caller, whatever its size: at a small part of the
-    time that `inline_numba` takes to compile.
+    """Return `jit`, written by LLVM into each caller, whatever its size.
+
+    It compiles in a small part of the time that `inline_numba` takes.
     """
     return _compile(function, forceinline=True)
 
 
 def inline_numba(function: Function) -> Function:
-    """Return `jit`, written into each caller by numba, with its types: for what loops over lanes
-    call with tuples or arrays. By `inline_llvm`, LLVM sees too late that nothing is called there,
-    and makes no vector code of the loop.
+    """Return `jit`, written into each caller by numba, with its types.
+
+    For what loops over lanes call with tuples or arrays. By `inline_llvm`, LLVM sees too late that
+    nothing is called there, and makes no vector code of the loop.
     """
     return _compile(function, inline="always")
 
@@ -158,9 +160,7 @@ class ByKind:
         return self.usual.made
 
     def get_call_template(self, arguments: Any, keywords: Any) -> Any:
-        """Return what numba asks of a function that another calls: it compiles the one that is
-        meant.
-        """
+        """Return numba's template of a call, of the function that is meant, which it compiles."""
         return self.of(arguments).get_call_template(arguments, keywords)
 
     def get_overload(self, arguments: Any) -> Any:
@@ -238,8 +238,9 @@ def fma(a: float, b: float, c: float) -> float:
 
 
 def square_root(a: float) -> float:
-    """Return the square root, by one instruction: numba's own calls the C library, which sets
-    errno.
+    """Return the square root by one instruction.
+
+    numba's own square root calls the C library, which sets errno.
     """
     return math.sqrt(a)
 

@@ -43,9 +43,7 @@ AMBROSIO, LUGRE = int(FrictionLaw.AMBROSIO), int(FrictionLaw.LUGRE)
 
 @inline_llvm
 def adams(slip, p):
-    """Return ADAMS's law: rises from 0 to `static` over the stiction velocity, falls to
-    `dynamic`.
-    """
+    """Return ADAMS's law: a rise to `static` at the stiction velocity, then a fall to `dynamic`."""
     fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
     size = fma(p.dynamic - p.static, fall, p.static)
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
@@ -60,9 +58,7 @@ def threlfall(slip, p):
 
 @jit
 def ambrosio(slip, p):
-    """Return Ambrosio's law: nothing below the stiction velocity, then a line up to the friction
-    one.
-    """
+    """Return Ambrosio's law: 0 up to the stiction velocity, then a line to the friction one."""
     share = (abs(slip) - p.stiction_velocity) * p.per_transition
     return math.copysign(p.dynamic * min(1.0, max(0.0, share)), slip)
 
@@ -109,15 +105,16 @@ def chosen_coefficient(slip, bristle, p):
 
 @inline_llvm
 def friction_coefficient(slip, bristle, p):
-    """Return signed friction coefficient of a slip (m/s) and of the bristles' deflection (m)."""
+    """Return the signed friction coefficient at a slip (m/s) and a bristle deflection (m)."""
     if has_chosen_laws(p):
         return chosen_coefficient(slip, bristle, p)
     return adams(slip, p)
 
 
 def steepest(p) -> float:
-    """Return the greatest change of a record's coefficient with the slip (s/m), which holds
-    steps back.
+    """Return the greatest change of a record's friction coefficient with the slip (s/m).
+
+    It holds explicit steps back: times the normal force over the mass, it is friction's rate (1/s).
     """
     law, rise_over = p["friction"], p["stiction_velocity"].item()
     if law == FrictionLaw.ADAMS:
@@ -132,9 +129,10 @@ def steepest(p) -> float:
 
 
 def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
-    """Set a record's laws by their names, and what the coefficient of restitution makes.
+    """Set a record's contact and friction laws by their names, and chi by the restitution.
 
-    Raises KeyError where there is no law of a name.
+    p: a record, or a dict that one is filled from; contact, friction: names of `Law` and of
+    `FrictionLaw` in small letters. Raises KeyError where there is no law of a name.
     """
     law = Law[contact.upper()]
     p["law"], p["friction"] = law, FrictionLaw[friction.upper()]
@@ -145,15 +143,17 @@ def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
 def hysteresis(contact: str, restitution: float) -> float:
     """Return chi, the damping force over the elastic one at the approach speed, by a law's name.
 
-    Raises KeyError for a law that has none.
+    restitution: e; the formulas and their papers stand in `contact_laws.HYSTERESIS`. Raises
+    KeyError for a law that has none.
     """
     return HYSTERESIS[Law[contact.upper()]](restitution)
 
 
 @inline_llvm
 def carried_by(joint, y, p):
-    """Return what a joint's contact carries in the state: the speed (m/s) at which the bodies met,
-    and the mean deflection (m) of the bristles. Nothing with the default laws.
+    """Return a joint's numbers among what contacts carry in the state; zeros with the default laws.
+
+    The speed (m/s) at which the bodies met, and the mean deflection (m) of the bristles.
     """
     if has_chosen_laws(p):
         return y[2 * p.freedoms + joint], y[2 * p.freedoms + 2 + joint]
@@ -217,12 +217,10 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
 
 @inline_llvm
 def nearness(contact, stiffness, clearance, p):
-    """Return the positive in contact.
+    """Return how near a joint is to contact (m): positive in contact, else minus its distance.
 
-    Otherwise how far from it: the gap (m), or the clamped force as one.
-
-    A clamped force is turned into a length by the contact's stiffness at the penetration of full
-    damping, so that both parts are small where contact is near.
+    The distance is the gap, or the clamped force as a length: divided by the contact's stiffness at
+    the penetration of full damping, so that both parts are small where contact is near.
     """
     if contact.penetration <= 0.0:
         return contact.penetration

@@ -65,7 +65,7 @@ def johnson(penetration, stiffness, clearance):
 
 @jit
 def johnson_energy(elastic, penetration, stiffness, clearance):
-    """Return energy (J) that is stored where Johnson's force (N) has reached a penetration (m)."""
+    """Return the energy (J) stored where Johnson's force (N) has reached a penetration (m)."""
     force = 4.0 * stiffness * clearance * math.exp(-1.0 - FLATTEST)
     depth = FLATTEST * force / stiffness
     if penetration <= depth:
@@ -125,8 +125,9 @@ class Conformal:
         return solve_rising(self.energy, 0.5 * mass * speed**2)
 
     def impact_time(self, depth: float, speed: float) -> float:
-        """Return the contact time (s) of an impact that goes to a depth (m): 2 / v times the
-        integral of 1 / sqrt(1 - U / U_max) over the penetration.
+        """Return the contact time (s) of an impact that goes to a depth (m).
+
+        2 / v times the integral of 1 / sqrt(1 - U / U_max) over the penetration.
         """
         if not speed > 0.0:
             return math.inf
@@ -260,9 +261,7 @@ def elastic_force(penetration, stiffness, clearance, p):
 
 @inline_llvm
 def elastic_energy(elastic, penetration, stiffness, clearance, p):
-    """Return the energy (J) that is stored where the elastic force (N) has reached a penetration
-    (m).
-    """
+    """Return the energy (J) stored where the elastic force (N) has reached a penetration (m)."""
     if has_chosen_laws(p) and elastic > 0.0 and p.law == JOHNSON:
         return johnson_energy(elastic, penetration, stiffness, clearance)
     if has_chosen_laws(p) and elastic > 0.0 and p.law == LIU:
@@ -282,7 +281,7 @@ def hysteretic(penetration, rate, approach, stiffness, clearance, p):
 
 @inline_llvm
 def normal_force(penetration, rate, approach, stiffness, clearance, p):
-    """F_N, its elastic part, and F_N before its lower bound (N), by the record's law.
+    """Return F_N, its elastic part, and F_N before its lower bound (N), by the record's law.
 
     At a penetration (m), its rate and the speed at which the bodies met (m/s): the elastic force
     with damping times rate added, but never pulling. All are 0 unless the penetration is positive.
@@ -300,8 +299,9 @@ def in_contact(normal):
 
 @dataclass(frozen=True)
 class Power:
-    """An elastic force K delta^p in closed form, and the damping beside it, as far as it is known
-    before a run; SI.
+    """An elastic force K delta^p in closed form, for scales before a run; SI.
+
+    The damping beside it is as far as it is known then.
     """
 
     stiffness: float
@@ -332,9 +332,10 @@ class Power:
         return (above * mass * speed**2 / (2.0 * self.stiffness)) ** (1.0 / above)
 
     def impact_time(self, depth: float, speed: float) -> float:
-        """Return the contact time (s) of an impact that goes to a depth (m): 2 (delta / v) times
-        the integral of 1 / sqrt(1 - x^(p+1)) from 0 to 1; 2.9432 delta / v with Hertz's 1.5
-        (Johnson 1985).
+        """Return the contact time (s) of an impact that goes to a depth (m).
+
+        2 (delta / v) times the integral of 1 / sqrt(1 - x^(p+1)) from 0 to 1; 2.9432 delta / v with
+        Hertz's 1.5 (Johnson 1985).
         """
         share = 1.0 / (self.exponent + 1.0)
         beta = math.sqrt(math.pi) * math.gamma(1.0 + share) / math.gamma(0.5 + share)
@@ -342,8 +343,10 @@ class Power:
 
 
 def elastic_form(stiffness: float, clearance: float, p) -> Power | Conformal:
-    """Return the record's law with a joint's stiffness and clearance (m), for scales before a
-    run.
+    """Return the record's law with a joint's stiffness and clearance (m), for scales before a run.
+
+    stiffness: in N/m^p, of Johnson's and Liu's laws as for `johnson` and `liu`. Raises ValueError
+    for a number that is no member of `Law`.
     """
     if p["law"] == Law.IMPACT:
         return Power(stiffness, p["exponent"], p["damping"], p["per_full_damping"])

@@ -28,7 +28,7 @@ C4, C5, C6 = -2.75573143513906633035e-7, 2.08757232129817482790e-9, -1.135964755
 
 @inline_llvm
 def logarithm(x):
-    """Return natural logarithm of a normal positive number, to 1e-8: enough to choose a step by.
+    """Return the natural logarithm of a normal positive number, to 1e-8: enough to choose a step.
 
     x = m 2^e with m about 1, and log m = 2 artanh((m - 1) / (m + 1)) as a series.
     """
@@ -47,7 +47,7 @@ def logarithm(x):
 
 @inline_llvm
 def exponential(y):
-    """Return the e^y for |y| < 700, to 1e-8: 2^k times a Taylor series of the rest."""
+    """Return e^y for |y| < 700, to 1e-8: 2^k times a Taylor series of the rest."""
     k = math.floor(y * PER_LOG_2 + 0.5)
     r = fma(-k, LOG_2, y)
     s = r * r

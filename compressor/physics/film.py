@@ -45,7 +45,7 @@ TURNED, SQUEEZED = 14, 28  # where the second and the third begin
 
 @jit
 def polynomial(constants, begin, end, x):
-    """Return value of the polynomial whose constants, the lowest first, stand from begin to end."""
+    """Return the value of the polynomial whose constants, lowest first, stand from begin to end."""
     total = 0.0
     for i in range(end - 1, begin - 1, -1):
         total = total * x + constants[i]
@@ -54,8 +54,9 @@ def polynomial(constants, begin, end, x):
 
 @jit
 def ends(eps, b):
-    """Return how the open ends weaken a film, by the length over the diameter b: Butenschoen's
-    a1, a2.
+    """Return by what factor the open ends weaken a film: Butenschoen's, of a1 and a2.
+
+    b: length over diameter.
     """
     a1 = 1.1642 + b * (-1.9456 + b * (7.1161 + b * (-10.1073 + b * 5.0141)))
     a2 = 1.000026 + b * (0.023634 + b * (0.4215 + b * (0.038817 + b * 0.090551)))
@@ -91,12 +92,11 @@ def attitude_shape(eps, b):
 
 
 def film_constants(ratio, share, number):
-    """Return the constants of the film's polynomials, `TERMS` of them, and the squeeze's number at
-    the wall.
+    """Return the constants of the film's polynomials, and the squeeze's number at the wall.
 
-    They lead from Butenschoen's approximations to other numbers at Chebyshev's points of the
-    eccentricities that a film with this last share may have. ratio: B / D; number: of a name in
-    `SHAPES`, an eccentricity and a ratio.
+    (`TERMS` + 1,) numbers. The polynomials lead from Butenschoen's approximations to other numbers
+    at Chebyshev's points of the eccentricities that a film with this last share may have. ratio: B
+    / D; number: a function of a name in `SHAPES`, an eccentricity and a ratio.
     """
     each = {"rotation": rotation_shape, "attitude": attitude_shape, "squeeze": squeeze_shape}
     most, found = 1.0 - 0.5 * share, []
@@ -149,12 +149,11 @@ def bounded_eccentricity(eps, share):
 
 @jit
 def film(joint, eccentricity, spins, p):
-    """Return the force on the journal x, y (N), moments on journal and bore (N m), and the power
-    lost (W).
+    """Return the force on the journal x, y (N), both moments (N m), and the power lost (W).
 
     eccentricity: journal centre less bore centre, x and y (m), and its rate (m/s); spins: of
-    journal and bore (rad/s). The moments balance: both have half of that of the
-    force pair, and the shear of the film (Petroff's over sqrt(1 - eps^2)) against their spin.
+    journal and bore (rad/s). The moments, on journal and bore, balance: both have half of that of
+    the force pair, and the shear of the film (Petroff's over sqrt(1 - eps^2)) against their spin.
     """
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, constants = p.pin_radius[joint], p.clearance[joint], p.film_constants[joint]

@@ -34,14 +34,14 @@ class IdealMotion(NamedTuple):
 
 @jit
 def ideal(t, p):
-    """Return the ideal `IdealMotion` at time t (s): Eq. 1 exactly, with its derivatives."""
+    """Return the `IdealMotion` at time t (s): Eq. 1 exactly, with its derivatives."""
     theta = p.omega * t
     return ideal_at(math.cos(theta), math.sin(theta), p)
 
 
 @inline_numba
 def ideal_at(cos_theta, sin_theta, p):
-    """Return the ideal `IdealMotion` at a crank angle given by its cosine and sine."""
+    """Return the `IdealMotion` at a crank angle given by its cosine and sine."""
     ratio = p.crank_ratio
     sin_phi = ratio * sin_theta
     cos_phi = square_root((1.0 - sin_phi) * (1.0 + sin_phi))
@@ -58,7 +58,7 @@ def ideal_at(cos_theta, sin_theta, p):
 
 @inline_numba
 def small_angle(angle, p):
-    """Return sine and cosine of an angle (rad); up to SMALL by their series, which are exact there.
+    """Return sine and cosine of an angle (rad), up to SMALL by series that are exact there.
 
     Where the record says that no angle is `wide`, there is nothing but the series.
     """
@@ -89,11 +89,11 @@ def ideal_after(base, span, p):
 
 
 def exact_motion(theta, crank_radius, rod_length, omega):
-    """Return the exact piston displacement (m), velocity (m/s) and acceleration (m/s^2) over theta
-    (rad).
+    """Return the exact piston displacement (m), velocity (m/s) and acceleration (m/s^2).
 
-    Arrays of theta's shape. The displacement counts from the crank centre (Eq. 1 counts from the
-    head: L + R + S0 minus this).
+    theta: crank angle (rad), of any shape, which the three arrays have; lengths in m, omega in
+    rad/s. The displacement counts from the crank centre (Eq. 1 counts from the head: L + R + S0
+    minus this).
     """
     theta = np.asarray(theta, dtype=float)
     sin_phi = crank_radius / rod_length * np.sin(theta)
@@ -108,9 +108,7 @@ def exact_motion(theta, crank_radius, rod_length, omega):
 
 
 def series_motion(theta, crank_radius, rod_length, omega):
-    """Return the paper's truncated series (Eq. 3-4), in this program's frame.
-
-    To be compared with only.
+    """Return the paper's truncated series (Eq. 3-4), in this program's frame, for comparison only.
 
     Arrays of theta's shape: displacement from the crank centre (m), velocity (m/s), acceleration
     (m/s^2). Off by 0.122 mm at 90 degrees for the paper's geometry.

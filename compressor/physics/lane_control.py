@@ -91,9 +91,7 @@ from compressor.physics.tally import (
 
 @inline_numba
 def add_late_change(W, i, j, total):
-    """Return the number i of what the state at the step's end is more than at its fifth stage,
-    squared.
-    """
+    """Return a total and the square of number i's change from the fifth stage to the step's end."""
     u = LANES * i + j
     h, w = W[H + j], STEP_WEIGHTS[5]
     change = W[NEW + u] - W[Z + u]
@@ -107,7 +105,7 @@ def add_late_change(W, i, j, total):
 
 @inline_numba
 def add_rate_change(W, i, j, total):
-    """Return the same of dz/dt."""
+    """Return a total and the square of the same change of the rate of number i."""
     u = LANES * i + j
     change = W[K + 6 * STATE * LANES + u] - W[K + 5 * STATE * LANES + u]
     return total + (change / W[SIZE + u]) ** 2

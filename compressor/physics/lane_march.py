@@ -311,8 +311,8 @@ def fits_lane(p: np.record) -> bool:
 def march_side_by_side(runs: Sequence[Run], limit: int) -> list[Run | None]:
     """Return the runs of one scene with clearance at their ends, to the bit as by `march`.
 
-    None for one that does not fit into a lane, that failed, or that took more than `limit` attempts
-    of a step. What the runs hold is left as it is.
+    limit: attempts of a step that a run may take. None stands for a run that does not fit into a
+    lane, that failed, or that took more attempts. What the runs hold is left as it is.
     """
     fitting = [i for i, run in enumerate(runs) if fits_lane(run.p)]
     ended: list[Run | None] = [None] * len(runs)

@@ -184,8 +184,10 @@ def write_observed(W, j, g, energy):
 
 @jit
 def copy_rows(W, target, source, count):
-    """Copy rows of all lanes: what a loop over lanes writes to a row that is no constant, LLVM
-    takes one number at a time.
+    """Copy `count` rows of all lanes from the row `source` on to the row `target` on.
+
+    A loop over lanes may write to constant rows alone: to any other LLVM writes one number at a
+    time.
     """
     W = without_refcount(W)
     for i in range(count * LANES):  # unsigned, or each index is first compared with zero
@@ -248,9 +250,7 @@ def finish_step(scene, W, k, w):
 
 @inline_numba
 def add_error_square(W, i, j, total):
-    """Return a total and the square of number i's estimated error over its tolerance and the
-    step.
-    """
+    """Return a total and the square of number i's estimated error over tolerance and step."""
     u, w = LANES * i + j, ERROR_WEIGHTS
     e = fma(w[1], W[K + 12 * LANES + u], fma(w[0], W[K + u], 0.0))
     e = fma(w[3], W[K + 36 * LANES + u], fma(w[2], W[K + 24 * LANES + u], e))

@@ -7,9 +7,9 @@ from compressor.physics._jit import jit
 
 @jit
 def factorize(matrix, pivots):
-    """Return the LU of a small square matrix in place, with partial pivoting.
+    """Write the LU factors of a small square matrix in place; return False if it is singular.
 
-    False if it is singular.
+    pivots: (n,) integers, written: rows that were exchanged.
     """
     n = pivots.size
     for j in range(n):
@@ -47,9 +47,10 @@ def substitute(matrix, pivots, b):
 
 @jit
 def factorize_positive(matrix, n):
-    """L D L' in place, in the lower half, of n rows of a symmetric matrix; False if not positive.
+    """Write L D L' of a symmetric matrix in place, in its lower half; return False if not positive.
 
-    Needs no pivots (Golub and Van Loan, Matrix Computations, 4.1.2 and 4.2).
+    n: rows and columns that count. Needs no pivots (Golub and Van Loan, Matrix Computations, 4.1.2
+    and 4.2).
     """
     for j in range(n):
         for m in range(j):

@@ -21,8 +21,9 @@ EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
 
 @inline_llvm
 def gas_force(phase, x, p):
-    """Return the gas force (N) with the crosshead at x (m): Eq. 6, isentropic, less the back
-    pressure.
+    """Return the gas force (N), less the back pressure: Eq. 6, isentropic.
+
+    x: of the crosshead (m).
     """
     if phase == 1:
         return p.suction_force - p.back_force
@@ -68,7 +69,11 @@ def piston_force(phase, x, v, deviation, deviation_rate, p):
 
 
 def static_load(p):
-    """Return the greatest force (N) of the record's load on a piston that stands still."""
+    """Return the greatest force (N) of the record's load on a piston that stands still.
+
+    p: a record, or a dict with its fields; the spring's at its full stroke (Eq. 8-10), or that of
+    the discharge pressure.
+    """
     if p["load"] == Load.SPRING:
         return p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
     if p["load"] == Load.GAS:
@@ -77,7 +82,10 @@ def static_load(p):
 
 
 def greatest_load(p):
-    """Return the load's greatest value in the ideal machine (N), at most."""
+    """Return an upper bound (N) of the load in the ideal machine.
+
+    p: a record, or a dict with its fields.
+    """
     if p["load"] == Load.SPRING:
         return static_load(p) + p["spring_damping"] * p["omega"] * p["crank_radius"]
     if p["load"] == Load.GAS:
@@ -86,16 +94,15 @@ def greatest_load(p):
 
 
 def printed_corners():
-    """Return the Eq. 13's corners (rad): 38.95, 180 and 294.2 degrees."""
+    """Return Eq. 13's corners (rad): 38.95, 180 and 294.2 degrees."""
     return math.radians(38.95), math.pi, math.radians(294.2)
 
 
 def gas_corners(p, pressure_ratio):
-    """Return the exact corners of the ideal gas cycle (rad): ends of expansion, suction and
-    compression.
+    """Return the exact corners of the ideal gas cycle (rad), (3,).
 
-    `pressure_ratio`: p_d / p_s. Raises ValueError when the gas left in the head clearance never
-    expands to the suction pressure within the stroke.
+    The ends of expansion, suction and compression. `pressure_ratio`: p_d / p_s. Raises ValueError
+    when the gas left in the head clearance never expands to the suction pressure within the stroke.
     """
     crank_radius, rod_length = p["crank_radius"], p["rod_length"]
     head_clearance, exponent = p["head_clearance"], float(p["gas_exponent"])
@@ -108,8 +115,7 @@ def gas_corners(p, pressure_ratio):
 
 
 def cam_corners(crank_radius, rod_length, stroke):
-    """Return the corners of the closed cam (rad): the follower dwells for `stroke` (m) of travel
-    each way.
+    """Return the corners (rad) of the closed cam, whose follower dwells for `stroke` (m) each way.
 
     84.2608, 180 and 275.7392 degrees in the paper. Raises ValueError unless 0 < stroke < 2R.
     """
@@ -121,8 +127,9 @@ def cam_corners(crank_radius, rod_length, stroke):
 
 
 def load_corners(p, pressure_ratio, printed):
-    """Return the corners (rad) of the record's load, (3,): Eq. 13's if `printed`, where it is
-    the gas's.
+    """Return the corners (rad) of the record's load, (3,).
+
+    printed: of a gas those of Eq. 13, not the exact ones.
     """
     if p["load"] == Load.NONE:
         return 0.0, 0.0, 0.0
@@ -132,13 +139,16 @@ def load_corners(p, pressure_ratio, printed):
 
 
 def complete(p, pressure_ratio, printed):
-    """Fill the fields of a record that follow from its others, its corners as `load_corners`."""
+    """Fill the fields of a record that follow from its others, its corners as by `load_corners`.
+
+    p: a record, or a dict with its fields. Raises ValueError as `gas_corners` and `cam_corners`.
+    """
     p["corners"] = load_corners(p, pressure_ratio, printed)
     derive(p)
 
 
 def segments(p, duration):
-    """Return the cut [0, duration] (s) at every corner of the record's load.
+    """Return the segments into which the load's corners cut [0, duration] (s).
 
     Returns edges, shape (n + 1,) in s, and phases, shape (n,). A corner closer than a
     billionth of a turn to the end opens no segment of its own.
@@ -157,10 +167,10 @@ def segments(p, duration):
 
 
 def sample_segments(times, edges):
-    """Return the segment of each sample, shape of times: on a corner the one that begins, at the
-    end the last.
+    """Return the number of the segment of each sample, shape of times.
 
-    A sample within a billionth of a segment of an edge counts as on it.
+    times, edges: s. On a corner it is the segment that begins there, at the end the last one. A
+    sample within a billionth of a segment of an edge counts as on it.
     """
     slack = 1e-9 * (edges[1:] - edges[:-1]).min()
     found = np.searchsorted(edges[:-1], times + slack, side="right") - 1

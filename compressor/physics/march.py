@@ -183,7 +183,7 @@ def new_work(n):
 
 @jit
 def nothing_worn(w, base, h, z, work, phase, p, tally):
-    """Return what sliding wears off where no bore can."""
+    """Return at once: no bore of these records wears."""
 
 
 @jit
@@ -231,8 +231,7 @@ def try_step(w, base, h, z, work, atol, size, phase, p):
 
 @inline_llvm
 def observe_step(w, base, h, z, work, phase, p, tally):
-    """Observe the step's interpolant at its nodes; return their stride: 1 for all, 2 for ends and
-    middle.
+    """Observe the step's interpolant at its nodes and return their stride: 1 for all, 2 for three.
 
     An explicit step is observed in its middle and at its ends, where its last stage has observed it
     already; also between them if a peak may be beaten, or if contact may change, for which the
@@ -296,7 +295,7 @@ def onset_ahead(w, h, every, work, phase, p):
 def sample_grid(w, t_end, h, z, work, times, states):
     """Fill the output samples up to t_end.
 
-    Most steps hold one sample or none, for which laying the whole interpolant is not worth it.
+    Most steps hold one sample or none, for which computing the whole interpolant is not worth it.
     """
     while w.sample < times.size and times[w.sample] <= t_end:
         s = min(1.0, max(0.0, (times[w.sample] - w.t) / h))
@@ -312,7 +311,8 @@ def sample_grid(w, t_end, h, z, work, times, states):
 def measure_gap_fractions(w, h, every, work, phase, p):
     """Write the share of a step that each joint is without contact.
 
-    Where it changes between two nodes, to where it does on the interpolant, if that is laid.
+    Where contact changes between two nodes, up to where it does on the interpolant, if there is
+    one.
     """
     for joint in range(2):
         gap_fraction = 0.0
@@ -334,7 +334,7 @@ def measure_gap_fractions(w, h, every, work, phase, p):
 
 @inline_llvm
 def accumulate_metrics(w, h, every, work, phase, p, tally):
-    """Tally an accepted step that has been looked at, and audit its energy."""
+    """Tally an accepted step that has been observed, and audit its energy."""
     last = NODES.size - 1
     for j in range(ACCELERATION, COLUMNS):
         work.row[j] = work.rows[last, j]
@@ -488,7 +488,7 @@ def step_twin(w, twin_stepper, twin, work, atol, size, phase, p):
 
 @inline_llvm
 def match_contact_speeds(w, z, twin, work, phase, p):
-    """Have the twin's contacts carry the speeds at which they meet where the first motion's do."""
+    """Store approach speeds in the twin where the first motion has just stored its own."""
     n = work.y.size
     for joint in range(2):
         if p.clearance[joint] > 0.0:
@@ -504,7 +504,7 @@ def march_twins(
     w, twin_stepper, p, z, twin, work, twin_work, atol, size, edges, phases, times, states, tally,
     rows, far, limit,
 ):  # fmt: skip
-    """Advance a motion and a twin in step, until they are `far` apart: twin_stepper is then DONE.
+    """Advance a motion and its twin in step, until they are `far` apart: twin_stepper is then DONE.
 
     twin_stepper: of the same pair; twin: its motion and flows, (n + 4,); far: as a share of the
     clearance; rows: scratch, (2, COLUMNS). The rest as for `march`.

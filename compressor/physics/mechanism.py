@@ -110,7 +110,7 @@ def add_rod(axes, spin, q, rates, p, mass, force):
 
 @jit
 def add_modes(axes, spin, q, rates, p, mass, force):
-    """`add_rod` of the modes: their inertia, their coupling and the material's forces."""
+    """Add the rod's modes to `add_rod`: their inertia, their coupling and the material's forces."""
     ux, uy, vx, vy = axes
     m = p.rod_mass
     for i in range(MODES):
@@ -144,8 +144,9 @@ def material(i, q, p):
 
 @jit
 def material_work(q, other, p):
-    """Return the sum of the elastic forces of deflections q times others, both (4,): twice the
-    energy (J).
+    """Return the sum of the elastic forces of deflections q times others, both (4,).
+
+    Of q and q it is twice the energy (J).
     """
     total = 0.0
     if p.elastic:
@@ -181,20 +182,17 @@ def guide_coefficient(slip, p):
 
 @jit
 def spent(u, chi):
-    """Return the integral of u / (1 + chi u) from 0 to u: what damping has taken of a strike's
-    motion.
-    """
+    """Return the integral of u / (1 + chi u) from 0 to u: how far damping has taken a strike."""
     return (u - math.log(1.0 + chi * u) / chi) / chi
 
 
 @jit
 def approach_speed(rate, stored, mass, chi):
-    """Return the speed (m/s) at which a mass (kg) that strikes freely has met, by depth's rate and
-    energy (J).
+    """Return the speed (m/s) at which a mass (kg) that strikes freely has met the guide.
 
-    From m delta'' = -F_e (1 + chi delta' / v) with the elastic energy E: u du / (1 + chi u) from
-    delta' / v to 1 is E / (m v^2). So a free strike has the restitution of the joints' law, and no
-    state holds its beginning.
+    rate: of its depth (m/s); stored: energy (J). From m delta'' = -F_e (1 + chi delta' / v) with
+    the elastic energy E: u du / (1 + chi u) from delta' / v to 1 is E / (m v^2). So a free strike
+    has the restitution of the joints' law, and no state holds its beginning.
     """
     speed = math.sqrt(rate * rate + 2.0 * stored / mass)
     if chi < ELASTIC:
@@ -215,10 +213,10 @@ def approach_speed(rate, stored, mass, chi):
 
 @jit
 def corner_force(penetration, rate, lever, p):
-    """Return the normal force (N) of a corner and its elastic part, at a penetration (m) and its
-    rate (m/s).
+    """Return the normal force (N) of a corner and its elastic part.
 
-    lever: of the force about the pin (m), by which the crosshead weighs less there than as a whole.
+    penetration in m, rate in m/s; lever: of the force about the pin (m), by which the crosshead
+    weighs less there than as a whole.
     """
     if penetration <= 0.0:
         return 0.0, 0.0
@@ -243,8 +241,9 @@ def corner_depth(height, tilt, end, side, p):
 
 @jit
 def corners(height, tilt, rates, p):
-    """Return `Guided` of a crosshead with play: height of its pin (m), tilt (rad), rates of x,
-    y, tilt.
+    """Return what the guide does to a crosshead with play, as `Guided`.
+
+    height: of its pin (m); tilt: rad; rates: of x, height and tilt.
     """
     v, rise, spin = rates
     fx, fy, moment, stored, damped, rubbed = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -365,7 +364,10 @@ def pose_of(motion, w, rates, p):
 
 @jit
 def carry(pose, rates, p, velocity):
-    """Write the bodies' velocities of the coordinates' rates, (11,) both: linear in these."""
+    """Write the bodies' velocities that follow from the coordinates' rates, (11,) both.
+
+    They are linear in the rates.
+    """
     crank, reach = p.crank_radius * rates[0], pose.length * pose.cos_phi
     velocity[0] = rates[0]
     velocity[1] = -pose.sin_theta * crank - rates[1]
@@ -381,7 +383,7 @@ def carry(pose, rates, p, velocity):
 
 @jit
 def project(pose, force, p, pushed):
-    """Write what the bodies' forces are on the coordinates, (11,) both: `carry`, transposed."""
+    """Write the forces on the coordinates by those on the bodies, (11,): `carry`, transposed."""
     along, reach = force[1] + force[8], pose.length * pose.cos_phi
     turning = (force[3] + pose.length * pose.sin_phi * force[8]) / reach
     across = force[2] - turning
@@ -421,8 +423,9 @@ def oiled_contact(joint, contact, eccentricity, spins, p):
 
 @jit
 def bore_axes(slope, modes, pose, p):
-    """Return the cosine and sine of a bore's angle, counter-clockwise, by the slope of the rod's
-    end there.
+    """Return the cosine and sine of a bore's angle, counter-clockwise.
+
+    slope: of the rod's modes at that end, (4,), as `BIG_SLOPE`.
     """
     turned = dot_rows(slope, 0, MODES, modes) / p.rod_length
     c, s = math.cos(turned), math.sin(turned)

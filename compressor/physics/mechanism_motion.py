@@ -96,8 +96,7 @@ def row_times(row, vector):
 
 @jit
 def reactions_of(pose, joints, needed, velocity, last, p):
-    """Return `Reactions` that the motion asks for, with the friction that they make where joints
-    rub.
+    """Return the `Reactions` that the motion needs, with their friction where joints rub.
 
     needed: forces on the rod, its moment about the big end's bore, and the crosshead's force along
     x, that the accelerations need beside the bodies' weight, (4,); velocity: of the bodies; last:
@@ -198,7 +197,7 @@ def solve(motion, y, phase, p):
 
 @jit
 def needed_of(mass, body, own, p):
-    """Return what `reactions_of` asks for, by the bodies' accelerations and their own forces."""
+    """Return what `reactions_of` needs, by the bodies' accelerations and their own forces."""
     return (
         row_times(mass[1], body) - own[1],
         row_times(mass[2], body) - own[2],

@@ -59,7 +59,7 @@ IMPLAUSIBLE = 0.1  # of half the crosshead, or of the rod: more than any contact
 
 @jit
 def pace_of(now, p):
-    """Return the time that passes while a steady crank would turn as far, over the steady one's."""
+    """Return the time that passes over the time in which a steady crank would turn as far."""
     return p.omega / now.pose.speed
 
 
@@ -104,10 +104,10 @@ def crank_torque(now, p):
 
 @jit
 def guide_moment(now, p):
-    """Return the moment (N m) of the crosshead on its guide about the crank's centre,
-    counter-clockwise.
+    """Return the moment (N m) of the crosshead on its guide about the crank's centre.
 
-    An ideal guide lets no crosshead tilt: it bears the couple on the pin as well.
+    Counter-clockwise. An ideal guide lets no crosshead tilt: it bears the couple on the pin as
+    well.
     """
     pose, guide, forces = now.pose, now.joints.guide, now.reactions
     moment = guide.moment - pose.height * (guide.fx + forces.rubbing)
@@ -157,9 +157,7 @@ def write_energies(now, p, row):
 
 @jit
 def ideal_acceleration(now, p):
-    """Return the acceleration (m/s^2) of the ideal machine's crosshead, whose crank turns as
-    this one does.
-    """
+    """Return the acceleration (m/s^2) of an ideal machine's crosshead with this crank's motion."""
     if not p.driven:
         return now.motion.a
     speed = 1.0 + now.pose.slip
@@ -195,13 +193,13 @@ def write_row(now, p, row):
 
 @jit
 def derivative(t, y, phase, p, out):
-    """`motion.derivative` of the mechanism."""
+    """Write what `motion.derivative` does, of the mechanism."""
     write_rates(solve(ideal(t, p), y, phase, p), y, p, out)
 
 
 @jit
 def write_flowing_derivative(motion, z, phase, p, out):
-    """`observe.write_flowing_derivative` of the mechanism."""
+    """Write what `observe.write_flowing_derivative` does, of the mechanism."""
     n = z.size - 4
     now = solve(motion, z[:n], phase, p)
     write_rates(now, z[:n], p, out[:n])
@@ -212,13 +210,13 @@ def write_flowing_derivative(motion, z, phase, p, out):
 
 @jit
 def derivative_with_flows(t, z, phase, p, out):
-    """`observe.derivative_with_flows` of the mechanism."""
+    """Write what `observe.derivative_with_flows` does, of the mechanism."""
     write_flowing_derivative(ideal(t, p), z, phase, p, out)
 
 
 @jit
 def derivative_and_gauge(motion, z, phase, p, out, row):
-    """`observe.derivative_and_gauge` of the mechanism."""
+    """Write what `observe.derivative_and_gauge` does, of the mechanism."""
     n = z.size - 4
     now = solve(motion, z[:n], phase, p)
     write_rates(now, z[:n], p, out[:n])
@@ -229,19 +227,19 @@ def derivative_and_gauge(motion, z, phase, p, out, row):
 
 @jit
 def observe_contact(motion, y, phase, p, row):
-    """`observe.observe_contact` of the mechanism."""
+    """Write what `observe.observe_contact` does, of the mechanism."""
     write_glanced(solve(motion, y, phase, p), p, row)
 
 
 @jit
 def observe_with_energy(motion, y, phase, p, row):
-    """`observe.observe_with_energy` of the mechanism."""
+    """Write what `observe.observe_with_energy` does, of the mechanism."""
     write_row(solve(motion, y, phase, p), p, row)
 
 
 @jit
 def observe(t, y, phase, p, row):
-    """`observe.observe` of the mechanism; row: (COLUMNS,), or (WIDE,) for what series have."""
+    """Write the row of `observe.observe`, of the mechanism: (COLUMNS,), or (WIDE,) for series."""
     now = solve(ideal(t, p), y, phase, p)
     pose, guide, forces = now.pose, now.joints.guide, now.reactions
     row[DISPLACEMENT], row[VELOCITY] = pose.x, now.velocity[8]
@@ -261,16 +259,17 @@ def observe(t, y, phase, p, row):
 
 @jit
 def observe_all(times, states, phases, p, rows):
-    """`observe` at each of m times: states (m, k), phases (m,) integers, rows (m, ...)."""
+    """Write the rows of `observe` at m times (s).
+
+    states: (m, k); phases: of the load, (m,) integers; rows: (m, ...).
+    """
     for i in range(times.size):
         observe(times[i], states[i], phases[i], p, rows[i])
 
 
 @jit
 def at_joint(joint, now, p):
-    """Return a joint's `Contact`, eccentricity with its rate, the axes of its bore and the
-    bore's spin.
-    """
+    """Return a joint's `ContactState`, eccentricity with its rate, and its bore's axes and spin."""
     i = 1 + 2 * joint
     off = now.w[i], now.w[i + 1], now.rates[i], now.rates[i + 1]
     if joint == 0:
@@ -293,14 +292,17 @@ def wear_at(motion, y, phase, weight, p, tally):
 
 @jit
 def wear_all(times, states, phases, weights, p, tally):
-    """`wear_at` for each of m states, (m, k), at times and with weights (s), (m,)."""
+    """Add to the tally what sliding wears off at m states, (m, k), as `wear_at` does.
+
+    times, weights: s, (m,); phases: of the load, (m,) integers; p: of a mechanism with worn bores.
+    """
     for i in range(times.size):
         wear_at(ideal(times[i], p), states[i], phases[i], weights[i], p, tally)
 
 
 @jit
 def contact_at(joint, t, y, phase, p):
-    """Return a joint's `Contact` at a time and state; on a worn bore as it meets the wall."""
+    """Return a joint's `ContactState` at a time and state; on a worn bore as it meets the wall."""
     contact, off, axes, spin = at_joint(joint, solve(ideal(t, p), y, phase, p), p)
     return at_the_wall(joint, contact, off, axes, spin, p) if p.sectors else contact
 
@@ -315,8 +317,10 @@ def write_eccentricities(t, y, p, row):
 
 @jit
 def beyond_model(y, p):
-    """Return what a state has that no machine can: 1 a crank that has all but stopped, 2 a corner
-    of the crosshead deep in its guide, 3 a rod bent or pressed out of shape; 0 nothing.
+    """Return the number of what no machine can do in a state, or 0.
+
+    1 is a crank that has all but stopped, 2 a corner of the crosshead deep in its guide, 3 a rod
+    bent or pressed out of shape.
     """
     if p.driven and y[p.at[0]] <= STALLED - 1.0:
         return 1
@@ -336,7 +340,7 @@ def beyond_model(y, p):
 
 @jit
 def start(offset, y, p):
-    """`motion.start` of the mechanism: concentric but for the offsets, an undeflected rod."""
+    """Write the state of `motion.start`, of the mechanism, with a straight rod."""
     for i in range(y.size):
         y[i] = 0.0
     for joint in range(2):

@@ -45,9 +45,7 @@ class Turn(NamedTuple):
 
 @inline_llvm
 def rod_turn(motion, eta, eta_rate, p):
-    """Return `Turn` of the rod from the ideal angle phi by the deviation eta, without
-    cancellation.
-    """
+    """Return the `Turn` of the rod by eta from the ideal angle phi, without cancellation."""
     sin_half, cos_half = small_angle(0.5 * eta, p)
     dc = -2.0 * sin_half * fma(motion.sin_phi, cos_half, motion.cos_phi * sin_half)
     ds = 2.0 * sin_half * fma(motion.cos_phi, cos_half, -(motion.sin_phi * sin_half))
@@ -58,8 +56,9 @@ def rod_turn(motion, eta, eta_rate, p):
 
 @inline_llvm
 def eccentricity_big_end(y, turn, p):
-    """Return the journal centre less bore centre at the big end and its rate, small end ideal
-    (m, m/s).
+    """Return the eccentricity (m) at the big end and its rate (m/s), small end ideal.
+
+    Journal centre less bore centre: x, y and their rates.
     """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
@@ -68,8 +67,9 @@ def eccentricity_big_end(y, turn, p):
 
 @inline_llvm
 def eccentricity_small_end(y, turn, p):
-    """Return the journal centre less bore centre at the small end and its rate, big end ideal
-    (m, m/s).
+    """Return the eccentricity (m) at the small end and its rate (m/s), big end ideal.
+
+    Journal centre less bore centre: x, y and their rates.
     """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
@@ -78,7 +78,10 @@ def eccentricity_small_end(y, turn, p):
 
 @inline_llvm
 def eccentricities_both(y, turn, p):
-    """Return the same at the big end, then the small end, of a rod that is free in the plane."""
+    """Return the eccentricities with their rates at the big end and the small end of a free rod.
+
+    A rod that two gaps let move freely in the plane.
+    """
     dc, ds, dc_rate, ds_rate = turn
     a = p.rod_centre
     b = p.rod_length - a
@@ -193,7 +196,7 @@ def ideal_centre_acceleration(motion, p):
 
 
 class Instant(NamedTuple):
-    """Everything the forces and accelerations at one time and state depend on, evaluated once."""
+    """All that the forces and accelerations at one time and state depend on, evaluated once."""
 
     motion: IdealMotion
     turn: Turn
@@ -295,7 +298,7 @@ def contact_at(joint, t, y, phase, p):
 
 @jit
 def versine(angle):
-    """1 - cos(angle) without cancellation."""
+    """Return 1 - cos(angle) without cancellation."""
     return 2.0 * math.sin(0.5 * angle) ** 2
 
 

@@ -122,7 +122,7 @@ def centre_velocity(now, y, p):
 
 @inline_numba
 def centre_acceleration(now, y, p):
-    """Return rod centre's acceleration (m/s^2), x and y, of a rod that hangs on an ideal joint."""
+    """Return the acceleration (m/s^2), x and y, of the centre of a rod with an ideal joint."""
     motion = now.motion
     sin_phi = motion.sin_phi + now.turn.ds
     cos_phi = motion.cos_phi + now.turn.dc
@@ -139,11 +139,10 @@ def centre_acceleration(now, y, p):
 
 @inline_numba
 def joint_forces(now, y, p):
-    """Return the forces on the rod at both joints: the contact's, or by inverse dynamics at an
-    ideal joint.
+    """Return the forces (N) on the rod: big end x and y, small end x and y.
 
-    Newton-Euler of the rod with the crosshead's x balance; returns (big x, big y, small x, small
-    y) in N.
+    Those of a clearance joint are the contact's. At an ideal joint they follow by inverse dynamics:
+    Newton-Euler of the rod with the crosshead's x balance.
     """
     big, small = now.big, now.small
     if p.scene == BOTH:
@@ -176,7 +175,7 @@ def damping_power(contact):
 
 @inline_numba
 def torque_and_moment(crank, x, forces, friction, penetration, p):
-    """Return the torque (N m) that drives the crank, and moment of the crosshead on its guide.
+    """Return the torque (N m) that drives the crank, and the moment of the crosshead on its guide.
 
     The guide bears the crosshead's force at its lever and, since the crosshead cannot tilt, the
     couple that the small end's friction puts on the pin.
@@ -209,7 +208,7 @@ def write_frame_forces(guide, turning, row):
 
 @jit
 def write_scene_frame(p, row):
-    """`write_frame_forces` of a scene, whose crosshead keeps its height and crank is balanced."""
+    """Write `write_frame_forces` of a scene: a crosshead at its height, a balanced crank."""
     guide = 0.0, -row[FORCE + 3] - p.reciprocating_mass * p.gravity
     write_frame_forces(guide, (0.0, 0.0), row)
 
@@ -320,7 +319,7 @@ def observe(t, y, phase, p, row):
 
 @inline_llvm
 def observe_contact(motion, y, phase, p, row):
-    """The columns from ACCELERATION to GUIDE_MOMENT: what a step is tallied by within its ends."""
+    """Write the columns from ACCELERATION to GUIDE_MOMENT: by which a step is tallied within."""
     now = evaluate(motion, y, phase, p)
     write_glanced(now, y, joint_forces(now, y, p), p, row)
 
@@ -334,20 +333,26 @@ def observe_with_energy(motion, y, phase, p, row):
 
 @jit
 def observe_all(times, states, phases, p, rows):
-    """`observe` at each of m times: states (m, k), phases (m,) integers, rows (m, ...)."""
+    """Write the rows of `observe` at m times (s).
+
+    states: (m, k); phases: of the load, (m,) integers; rows: (m, COLUMNS) or (m, WIDE).
+    """
     for i in range(times.size):
         observe(times[i], states[i], phases[i], p, rows[i])
 
 
 @jit
 def derivative_with_flows(t, z, phase, p, out):
-    """Return dz/dt of the motion and of its four energy flows, z = (y, flows)."""
+    """Write dz/dt of the motion and of its four energy flows into out, z = (y, flows).
+
+    t: s, of a steady crank; z, out: (n + 4,); phase: of the load, 0 to 3.
+    """
     write_flowing_derivative(ideal(t, p), z, phase, p, out)
 
 
 @inline_llvm
 def write_flowing_derivative(motion, z, phase, p, out):
-    """`derivative_with_flows` around an ideal motion that is known, written into its caller."""
+    """Write `derivative_with_flows` around an ideal motion that is known."""
     n = z.size - 4
     y = z[:n]
     now = evaluate(motion, y, phase, p)
@@ -357,7 +362,7 @@ def write_flowing_derivative(motion, z, phase, p, out):
 
 @inline_llvm
 def derivative_and_gauge(motion, z, phase, p, out, row):
-    """`derivative_with_flows` and `observe_with_energy` from one evaluation."""
+    """Write both `derivative_with_flows` and `observe_with_energy` from one evaluation."""
     n = z.size - 4
     y = z[:n]
     now = evaluate(motion, y, phase, p)

@@ -25,10 +25,10 @@ NEVER = 2.0  # a fraction of the step beyond its end
 
 @inline_llvm
 def may_change_in(low, high):
-    """Return whether contact may begin or end where a step's ends and middle have a nearness from
-    low to high.
+    """Return whether contact may begin or end in a step, by the range of its nearness.
 
-    Twice their range is allowed for beyond them.
+    low, high: the least and the greatest at its ends and in its middle. Twice their range is
+    allowed for beyond them.
     """
     beyond = 2.0 * (high - low)
     return (low - beyond <= 0.0) & (high + beyond > 0.0)
@@ -123,7 +123,7 @@ def touching_between(joint, low, high, t, h, dense, phase, p, y):
 
 @jit
 def look_fraction(i):
-    """Return the fraction of a step at which look i, 0 to LOOKS, is taken."""
+    """Return the fraction of a step at which sample i is taken, 0 to LOOKS."""
     if i <= 1:
         return i * STEP_EDGE
     if i >= LOOKS - 1:
@@ -133,10 +133,10 @@ def look_fraction(i):
 
 @jit
 def joint_onset(joint, t, h, dense, phase, p, y):
-    """Return the first fraction of a step at which a joint that was apart touches, and until when
-    it does.
+    """Return from where to where in a step a joint touches that was apart at its begin.
 
-    Returns (begin, end); (NEVER, NEVER) without an onset, end = 1 where contact outlasts the step.
+    Fractions (begin, end) of the step: (NEVER, NEVER) without an onset, end = 1 where contact
+    outlasts the step.
     """
     earlier = nearness_at(joint, 0.0, t, h, dense, phase, p, y)
     before = earlier
@@ -182,7 +182,7 @@ def first_onset(t, h, dense, phase, p, y):
 def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
     """Return the fraction at which contact begins or ends between two others, to CHANGE_TOLERANCE.
 
-    at_low, at_high: the nearness at low and high, of different signs. Two looks where the line
+    at_low, at_high: the nearness at low and high, of different signs. Two samples where the line
     through both ends crosses zero, then one halfway: where contact ends, the nearness has a corner.
     """
     looks = 0
@@ -203,11 +203,11 @@ def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
 
 @jit
 def approach_at(joint, t, y, phase, p, rates, before):
-    """Return how near a joint's contact is to its begin, at a time and a state within a hair of it.
+    """Return a joint's penetration (m), and the speed (m/s) at which its gap closes.
 
-    Returns its penetration (m) there, and the speed (m/s) at which its gap closes, at the moment
-    when it does: two motions that are a little apart meet a little apart in time. rates, before:
-    scratch, (n,).
+    Of a time and a state within a hair of the begin of contact. The speed is that of the moment at
+    which the gap closes: two motions that are a little apart meet a little apart in time. rates,
+    before: scratch, (n,).
     """
     now = contact_at(joint, t, y, phase, p)
     # the landing lies near the onset, not on it: go back, or on, by the difference

@@ -214,9 +214,7 @@ def is_featured(p: np.record) -> bool:
 
 
 def present(p: np.record) -> list[Coordinate]:
-    """Return the coordinates that a mechanism's features and clearances give it, the crank's
-    left out.
-    """
+    """Return the coordinates, but the crank's, of a mechanism's features and clearances."""
     found = []
     if p["clearance"][BIG_END] > 0.0:
         found += [Coordinate.BIG_X, Coordinate.BIG_Y]
@@ -244,11 +242,11 @@ def place_coordinates(p: np.record) -> None:
 
 
 def state_names(p: np.record) -> tuple[str, ...]:
-    """Return the names of the numbers of a record's state: deviations, their rates, what contacts
-    carry.
+    """Return the names of the numbers of a record's state, each with its unit.
 
-    Of a mechanism: its coordinates and their rates in place of deviations, the crank's lag and slip
-    and the rod's loss at the end; numbers that are not used fill the state up to whole fours.
+    Deviations, their rates, and what contacts carry. Of a mechanism: its coordinates and their
+    rates in place of deviations, the crank's lag and slip and the rod's loss at the end; numbers
+    that are not used fill the state up to whole fours.
     """
     if not is_featured(p):
         names = STATE_NAMES[Scene(int(p["scene"]))]

@@ -48,7 +48,7 @@ TIME_SHARE = 1e-3  # of a step, by which time is varied either way
 
 @jit
 def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, time_rate):
-    """Jacobian of motion and flows by the motion, (n + 4, n), and the rate of dz/dt in time.
+    """Write the Jacobian of motion and flows by the motion, (n + 4, n), and d/dt of dz/dt.
 
     By forward differences from `rates`, dz/dt at (t, z), with `size` (n,) the natural size of
     each unknown; in time by central ones, on which the method's order depends. Costs n + 2
@@ -73,10 +73,11 @@ def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, tim
 
 @jit
 def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
-    """Return one step from (t, z); the state at its end into new, the increments (6, n + 4) into u.
+    """Take a step of length h from (t, z); return False where its linear system is singular.
 
-    rates: dz/dt at (t, z); size: as in `differentiate`; jacobian: (n + 4, n), written. The last
-    increment is the error estimate. Returns False where the linear system is singular.
+    Writes the state at its end into new and the increments, (6, n + 4), into u. rates: dz/dt at (t,
+    z); size: as in `differentiate`; jacobian: (n + 4, n), written. The last increment is the error
+    estimate.
     """
     n = z.size - FLOWS
     time_rate = np.empty(z.size)
@@ -117,7 +118,7 @@ def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
 
 @jit
 def spectral_radius(jacobian, size, v, w):
-    """Estimate of the largest eigenvalue's size (1/s) by a few power iterations.
+    """Return an estimate of the largest eigenvalue's size (1/s) by a few power iterations.
 
     v: a start (n,), overwritten; w: scratch (n,).
     """
@@ -152,7 +153,10 @@ def error_norm(z, new, u, rtol, atol):
 
 @jit
 def extend(z, new, u, dense):
-    """Coefficients of the step's cubic interpolant into dense, (5, n), as in runge_kutta."""
+    """Write the coefficients of the step's cubic interpolant into dense, (5, n).
+
+    As in runge_kutta, with zeros for the fourth power.
+    """
     for i in range(dense.shape[1]):
         first = 0.0
         second = 0.0

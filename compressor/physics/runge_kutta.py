@@ -102,10 +102,10 @@ P = np.array(
 
 @inline_llvm
 def take_step(pair, base, h, z, k, phase, p, new, row):
-    """Stages 1 to 6 of a step from z of length h into k, and the state at its end into new.
+    """Take a step of length h from z: write stages 1 to 6 into k, and its end's state into new.
 
     base: cosine and sine of the crank angle at its begin; z and new: motion and flows, shape
-    (n + 4,); k: (7, n + 4), its first row already dz/dt; row: (COLUMNS,), gauged at the step's
+    (n + 4,); k: (7, n + 4), its first row already dz/dt; row: (COLUMNS,), observed at the step's
     end, where the last stage stands.
     Only the motion enters the right-hand side, so flows are summed at the end alone.
     """
@@ -133,7 +133,10 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
 
 @inline_llvm
 def error_share(error, before, after, rtol, atol):
-    """Return a number's estimated error over its tolerance, which its larger end of a step sets."""
+    """Return a number's estimated error over its tolerance.
+
+    before, after: the number at both ends of the step, of which the larger one sets the tolerance.
+    """
     return error / fma(rtol, max(abs(before), abs(after)), atol)
 
 
@@ -160,7 +163,7 @@ def error_norm(pair, h, z, new, k, rtol, atol):
 
 @inline_llvm
 def weights_at(pair, s, weights):
-    """Weights of the stages at the fraction s of a step into weights, (STAGES,)."""
+    """Write the weights of the stages at the fraction s of a step into weights, (STAGES,)."""
     for stage in range(STAGES):
         a, b = P[pair, stage, 0], P[pair, stage, 1]
         c, d = P[pair, stage, 2], P[pair, stage, 3]
@@ -169,7 +172,7 @@ def weights_at(pair, s, weights):
 
 @inline_llvm
 def combine(weights, h, z, k, out):
-    """The motion where the stages have these weights into out, (n,): no interpolant is laid."""
+    """Write the motion for these weights of the stages into out, (n,), without the interpolant."""
     for i in range(0, out.size, LANES):
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for stage in range(STAGES):
@@ -186,7 +189,7 @@ def combine(weights, h, z, k, out):
 
 @inline_llvm
 def extend(pair, h, z, k, dense):
-    """Coefficients of a step's interpolant into dense, (5, n): y(s) = sum_j dense[j] s^j."""
+    """Write a step's interpolant into dense, (5, n): y(s) = sum over j of dense[j] s^j."""
     for i in range(0, dense.shape[1], LANES):
         for lane in range(LANES):
             dense[0, i + lane] = z[i + lane]

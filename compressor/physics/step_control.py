@@ -48,7 +48,8 @@ AUTO = int(Mode.AUTO)
 def step_error(w, before, after, step):
     """Return the estimated error of each number of an attempted step, flows included, (n + 4,).
 
-    `w`: the stepper before it; `before` and `after`: `Work.k` then and now; `step` (s): its length.
+    `w`: the stepper before it; `before` and `after`: `WorkArrays.k` then and now; `step` (s): its
+    length.
     """
     if w.stiff:
         return after[rosenbrock.STIFF_STAGES]
@@ -57,8 +58,10 @@ def step_error(w, before, after, step):
 
 @jit
 def first_step(w, z, work, atol, phase, p, end):
-    """Return the length (s) of a first step that an order-5 method can take (Hairer, Norsett,
-    Wanner II.4).
+    """Return a length (s) for the first step of an order-5 method.
+
+    By the rates at its begin and after a small trial step (Hairer, Norsett, Wanner II.4); end: of
+    the segment (s).
     """
     n = z.size - FLOWS
     rates, trial = work.k[0], work.column
@@ -87,7 +90,7 @@ def first_step(w, z, work, atol, phase, p, end):
 
 @inline_llvm
 def is_accepted(error):
-    """Return whether a step with an error norm is taken; one that is not a number is not."""
+    """Return whether a step with an error norm is taken; nan is refused."""
     return error <= 1.0
 
 
@@ -111,8 +114,9 @@ def log_error(error):
 
 @inline_llvm
 def growth(now, last, order):
-    """Return the next step's length over that of an accepted one, by `log_error` of both and the
-    one before (PI control).
+    """Return the next step's length over that of an accepted one, by PI control.
+
+    now, last: `log_error` of the accepted step and of the one before it.
     """
     # the last error damps steps that stability holds, which I control lets swing about the limit
     factor = SAFETY * exponential((INTEGRAL * last - PROPORTIONAL * now) / order)
@@ -144,7 +148,7 @@ def refuse(w, h, error):
 
 @jit
 def stiff_rate(w, h, z, work, size):
-    """Estimate of the largest eigenvalue's size (1/s) from the step just taken.
+    """Return an estimate of the largest eigenvalue's size (1/s) from the step just taken.
 
     Explicit: the last two stages stand at the same time, so their rates differ by the Jacobian
     times the difference of their states (Hairer & Wanner II, IV.2). Stiff partner: power
@@ -168,9 +172,10 @@ def stiff_rate(w, h, z, work, size):
 
 @inline_llvm
 def count_limited(limited, reach):
-    """Return the explicit steps that stability has held, after a test; reach: of `STABILITY_LIMIT`.
+    """Return the count of steps in a row that stability has held, after a test.
 
-    One test alone decides nothing: under PI control such steps swing around the limit.
+    limited: the count before; reach: the step's length over `STABILITY_LIMIT`. One test alone
+    decides nothing: under PI control such steps swing around the limit.
     """
     return limited + TEST_INTERVAL if reach > LIMITED_REACH else max(0, limited - TEST_INTERVAL)
 

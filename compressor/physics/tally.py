@@ -31,8 +31,9 @@ PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
 
 
 def lobatto(n):
-    """Return the nodes in [0, 1], both ends included, and weights of n-point Gauss-Lobatto
-    quadrature.
+    """Return the nodes in [0, 1] and the weights of n-point Gauss-Lobatto quadrature, (n,) each.
+
+    Both ends are nodes. Exact for polynomials up to degree 2 n - 3.
     """
     legendre = np.polynomial.legendre.Legendre.basis(n - 1)
     inner = np.sort(legendre.deriv().roots().real)
@@ -96,8 +97,7 @@ def new_tally(p=None):
 
 @jit
 def vertex(left, right, before, here, after):
-    """Return the top of the parabola through three values, or the middle one if it has none between
-    them.
+    """Return the top of the parabola through three values, or the middle one without a top there.
 
     left, right: places of the outer values from the middle one's.
     """
@@ -114,8 +114,9 @@ def vertex(left, right, before, here, after):
 
 @inline_llvm
 def may_exceed(top, known):
-    """Return whether a parabola through nodes whose greatest is `top` may rise above a known peak:
-    to less than twice as much.
+    """Return whether a parabola through nodes whose greatest is `top` may rise above a known peak.
+
+    It rises to less than twice `top`.
     """
     return 2.0 * top >= known
 
@@ -155,7 +156,7 @@ def larger_imbalance(known, gain, crank, load, damping, friction):
 
 @inline_llvm
 def tally_energy(row, flows, tally):
-    """Keep the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
+    """Write the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
 
     `row` is observed at the end of a step; the first call, with flows of zero, sets the start.
     """
@@ -187,9 +188,7 @@ def may_beat(top, known):
 
 @inline_llvm
 def near_record(rows, middle, tally):
-    """Return whether a peak may be beaten within a step, by the rows at its ends and in its
-    middle.
-    """
+    """Return whether a peak may be beaten within a step, by its first, middle and last row."""
     last = rows.shape[0] - 1
     for k in range(PEAKED):
         column = ACCELERATION + k
@@ -206,9 +205,7 @@ def near_record(rows, middle, tally):
 
 @inline_llvm
 def gap_fraction_between(before, after):
-    """Return the share of the way from one nearness to another that is without contact, by a
-    straight line.
-    """
+    """Return the share without contact of the way between two nearnesses, by a straight line."""
     low, high = min(before, after), max(before, after)
     if high <= 0.0:
         return 1.0
@@ -217,7 +214,10 @@ def gap_fraction_between(before, after):
 
 @jit
 def write_gap_fractions(nodes, rows, gap_fraction):
-    """Write the share of a step that each joint is without contact, by lines between its nodes."""
+    """Write the share of a step that each joint is without contact, by lines between its nodes.
+
+    nodes: (m,), rows: (m, COLUMNS), gap_fraction: (2,), written.
+    """
     gap_fraction[:] = 0.0
     for joint in range(2):
         for i in range(1, nodes.size):
@@ -227,7 +227,10 @@ def write_gap_fractions(nodes, rows, gap_fraction):
 
 @jit
 def contact_within(rows, joint):
-    """Return whether contact at a joint begins and ends between a step's first and last row."""
+    """Return whether contact at a joint begins and ends between a step's first and last row.
+
+    rows: (m, COLUMNS), observed within one step; joint: 0 or 1.
+    """
     last = rows.shape[0] - 1
     ends = in_contact(rows[0, NORMAL + joint]) or in_contact(rows[last, NORMAL + joint])
     inside = False
@@ -238,10 +241,11 @@ def contact_within(rows, joint):
 
 @inline_llvm
 def count_contacts(touching, flown, impacts, releases, normal, depth, counts):
-    """Return the same four after a node of a step: whether a joint touches, whether its journal was
-    off its bore since the last contact, and how many contacts began after flight or without it.
+    """Return `touching`, `flown`, `impacts` and `releases` of a joint after a node of a step.
 
-    normal, depth: contact force and penetration at the node; counts: whether contacts count.
+    Whether it touches, whether its journal was off its bore since the last contact, and how many
+    contacts began after flight or without it. normal, depth: contact force and penetration at the
+    node; counts: whether contacts count.
     """
     now = in_contact(normal)
     flown = flown | (depth < 0.0)

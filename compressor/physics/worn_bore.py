@@ -30,7 +30,7 @@ ROUNDS, AGREED = 20, 1e-15  # of Newton's method, which has 3 to 5
 
 
 def bore_fields(sectors: int) -> dict:
-    """Return the fields of a record for bores of so many sectors, unworn.
+    """Return the fields of a record for unworn bores of so many sectors, at most `MAX_SECTORS`.
 
     Directions are longer than 1 by what the straight lines between two nodes are short of.
     """
@@ -44,7 +44,7 @@ def bore_fields(sectors: int) -> dict:
 
 @jit
 def unworn(depth, clearance):
-    """S (m^2) of an unworn bore at a penetration (m), and its derivative (m)."""
+    """Return S (m^2) of an unworn bore at a penetration (m), and its derivative (m)."""
     x = depth / clearance
     if x < SMALL:
         total, slope = 0.0, 0.0
@@ -76,7 +76,10 @@ def depth_of(energy, clearance):
 
 @jit
 def overlaps(ex, ey, joint, p, overlap):
-    """Write the overlap (m) at each node, the eccentricity in the rod's frame; returns the most."""
+    """Write the overlap (m) at each node, and return the greatest.
+
+    ex, ey: eccentricity in the frame of the rod's bore (m).
+    """
     most = -math.inf
     for i in range(p.sectors):
         found = p.towards[i, 0] * ex + p.towards[i, 1] * ey - p.clearance[joint] - p.worn[joint, i]
@@ -87,7 +90,7 @@ def overlaps(ex, ey, joint, p, overlap):
 
 @jit
 def foundation(overlap, p):
-    """S (m^2) of overlaps that are straight lines between the nodes, and its gradient (m)."""
+    """Return S (m^2) of overlaps that are straight lines between nodes, and its gradient (m)."""
     energy, gx, gy = 0.0, 0.0, 0.0
     for i in range(p.sectors):
         j = i + 1 if i + 1 < p.sectors else 0
@@ -110,9 +113,7 @@ def foundation(overlap, p):
 
 @jit
 def nearest_wall(overlap, most, p):
-    """Return the direction of the place on the bore that is nearest to the journal: a parabola's
-    vertex.
-    """
+    """Return the direction of the nearest place on the bore: a parabola's vertex."""
     i = 0
     while overlap[i] < most:
         i += 1
@@ -128,9 +129,9 @@ def nearest_wall(overlap, most, p):
 
 @jit
 def penetration_of(ex, ey, joint, p):
-    """Return the penetration (m) of a journal, negative: the gap.
+    """Return the penetration (m) of a journal and its gradient in the rod's frame.
 
-    And its gradient. In the rod's frame.
+    The penetration is negative in a gap.
     """
     overlap = np.empty(p.sectors)
     most = overlaps(ex, ey, joint, p, overlap)
@@ -144,8 +145,9 @@ def penetration_of(ex, ey, joint, p):
 
 @jit
 def seen_by_rod(eccentricity, axes, rod_spin):
-    """Return the eccentricity (m) and its rate (m/s) in the frame of the rod's bore: x, y, and
-    their rates.
+    """Return the eccentricity (m) and its rate (m/s) in the frame of the rod's bore.
+
+    x, y, and their rates.
     """
     c, s = axes
     ex, ey = c * eccentricity[0] + s * eccentricity[1], c * eccentricity[1] - s * eccentricity[0]
@@ -155,7 +157,7 @@ def seen_by_rod(eccentricity, axes, rod_spin):
 
 @jit
 def at_the_wall(joint, contact, eccentricity, axes, rod_spin, p):
-    """Return a contact with the overlap of the nearest wall (m) and its rate for penetration's.
+    """Return a contact with the nearest wall's overlap (m) for penetration, and its rate.
 
     Both meet a wall at the speed at which its overlap begins. The penetration's own rate has a jump
     there: how fast an arc of contact grows depends on how it is curved.
