@@ -96,8 +96,9 @@ def closed_form(
 
 
 def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
-    """Return the points that cut every segment of the ideal motion into pieces a quadrature
-    resolves.
+    """Return points that cut every segment into pieces short enough for a quadrature.
+
+    edges: of the segments (s); pieces: of a revolution, whose length is `turn` (s).
     """
     grids = []
     for begin, end in itertools.pairwise(edges):
@@ -107,8 +108,9 @@ def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
 
 
 def prepare_run(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndarray]:
-    """Return what a request begins with: an empty trajectory, the load's edges and phases, the
-    motion.
+    """Return what a request begins with: an empty trajectory, the load's edges and phases, z.
+
+    z: motion and flows at the start, (n + 4,).
     """
     edges, phases = segments(request.p, float(request.times[-1]))
     owner = sample_segments(request.times, edges)
@@ -200,7 +202,8 @@ def run_at_tolerance(
     `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
     without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
     top dead centre (`physics.state_names`), in place of the case's own; no ideal scene has one.
-    `worn`: what is worn off the bores, as `si_record.record` takes it.
+    `worn`: what is worn off the bores (m), (joint, sector). A run that stops raises nothing: its
+    `reason` says why.
     """
     p, times = record(case, worn), times_of(case, sampled)
     if is_ideal(case):
@@ -222,7 +225,7 @@ def run_at_tolerance(
 def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, float]]) -> Solution:
     """Return the first run whose energy balances, or that stops, at a tolerance or at tenths of it.
 
-    run_at: takes a tolerance, gives a run and how many revolutions it went through. If no run
+    run_at: takes a tolerance, returns a run and how many revolutions it went through. If no run
     balances, the last one has `energy_audit_failed` as its reason.
     """
     failures, rung = 0, rtol
@@ -268,7 +271,7 @@ def times_of(case: Case, sampled: bool) -> Times:
 def request(
     case: Case, rtol: float, p: np.record, times: Times, state: np.ndarray | None = None
 ) -> Request:
-    """Return what `run_at_tolerance` asks to be integrated, without a limit in wall time."""
+    """Return the request that `run_at_tolerance` integrates, without a limit in wall time."""
     how = case.solve
     if state is None:
         y = initial_state(case, p)
@@ -281,7 +284,7 @@ def request(
 def solution_of_trajectory(
     rtol: float, p: np.record, times: Times, trajectory: Trajectory
 ) -> Solution:
-    """Return what an attempt's trajectory tells."""
+    """Return the `Solution` of an attempt's trajectory: metrics and samples, without errors."""
     rows = np.empty((0, WIDE))
     if times.sampled.size:
         stay = np.union1d(times.output, times.compared)
@@ -295,16 +298,13 @@ def solution_of_trajectory(
 
 
 def companion_rtol(p: np.record, rtol: float) -> float | None:
-    """Return the tolerance of a run's `comparison_run`, if that is by the run's own method and
-    tighter.
-    """
+    """Return the tolerance of a run's tighter `comparison_run` by its own method, or None."""
     fits = rtol >= 0.99 * TIGHTER_FACTOR * TIGHTEST and not overruns_friction(p, rtol)
     return rtol / TIGHTER_FACTOR if fits else None
 
 
 def overruns_friction(p: np.record, rtol: float) -> bool:
-    """Return whether explicit steps may run over friction's fast modes, or over the turn of its
-    sign.
+    """Return whether explicit steps may run over friction's fast modes or its change of sign.
 
     Then two explicit runs may agree on a force that friction never has.
     """
@@ -317,11 +317,10 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
 def comparison_run(
     case: Case, solution: Solution, timeout: float, ahead: Ahead = NOTHING_AHEAD
 ) -> Solution:
-    """Return the run that a run's errors are estimated by, where no looser one is there: a tighter
-    one.
+    """Return another run of a case, by which a run's errors are estimated.
 
-    At the tightest tolerance, a looser one. Where explicit steps may run over friction, the stiff
-    method is asked.
+    For a run with no looser one before it. A tighter run; at the tightest tolerance a looser one.
+    Where explicit steps may run over friction, it is a run by the stiff method.
     """
     tighter = companion_rtol(solution.p, solution.rtol)
     if tighter is not None:
@@ -346,7 +345,7 @@ def looser_comparison_run(
 
 
 def estimate_errors(solution: Solution, *others: Solution) -> None:
-    """Give a run its error bars and the errors of its time series by other runs of its case.
+    """Write a run's error bars and the errors of its time series, by other runs of its case.
 
     The longest by any of them; inf without one that reached its end.
     """
@@ -360,6 +359,6 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
 
 
 def compare_with_run(solution: Solution, other: Solution) -> Companion:
-    """Return what another run that reached its end tells of a run."""
+    """Return the `Companion` of a run: another one, which reached its end, and their distances."""
     apart = distances(solution.samples, other.samples)
     return Companion(other.metrics, other.rtol / solution.rtol, apart)

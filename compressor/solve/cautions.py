@@ -80,10 +80,10 @@ def greatest_force(p: np.record, joint: str) -> float:
 def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
     """Return the scales of a joint with clearance under a force (N).
 
-    A journal that the force holds against its bore can roll to and fro on the wall, on a circle of
-    radius e, clearance and penetration. It swings like a pendulum, at sqrt(F / (m e)); m is what
-    the rod's end weighs across the force, the other end being held: (J + m_r l^2) / L^2, l from
-    the mass centre to the other end.
+    p: the case's record; joint: `big_end` or `small_end`. A journal that the force holds against
+    its bore can roll to and fro on the wall, on a circle of radius e, clearance and penetration. It
+    swings like a pendulum, at sqrt(F / (m e)); m is what the rod's end weighs across the force, the
+    other end being held: (J + m_r l^2) / L^2, l from the mass centre to the other end.
     """
     number = JOINTS.index(joint)
     clearance, stiffness = p["clearance"][number].item(), p["stiffness"][number].item()
@@ -109,9 +109,7 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
 
 
 def across(p: np.record, joint: str) -> float:
-    """Return the mass (kg) that moves with an end of the rod across the rod, the other end being
-    held.
-    """
+    """Return the mass (kg) of a rod's end that moves across the rod, the other end being held."""
     centre, length = p["rod_centre"].item(), p["rod_length"].item()
     lever = length - centre if joint == "big_end" else centre
     return (p["rod_inertia"].item() + p["rod_mass"].item() * lever**2) / length**2
@@ -134,11 +132,11 @@ def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, flo
 
 
 def expected_steps(case: Case, joints: Sequence[JointScales]) -> float:
-    """About how many steps a run of a case attempts; good to a factor of four in random cases.
+    """Return about how many steps a run of a case attempts.
 
-    As many as accuracy asks for while the contact rings, or as stability does where that is not
-    more than the stiff partner's: a few a radian. 0 where nothing is integrated. Far from the
-    defaults only its order of magnitude holds.
+    Good to a factor of four in random cases. As many as accuracy asks for while the contact rings,
+    or as stability does where that is not more than the stiff partner's: a few a radian. 0 where
+    nothing is integrated. Far from the defaults only its order of magnitude holds.
     """
     if not joints:
         return 0.0
@@ -222,10 +220,7 @@ def slips(cases: Sequence[Case]) -> list[Slip]:
 
 
 def values_of(case: Case, key: str) -> list[float]:
-    """Return the values of a key that a case's simulation reads.
-
-    Of clearances, those of worn joints.
-    """
+    """Return the values of a key that a simulation reads; of clearances, those of worn joints."""
     group, _, name = key.partition(".")
     if not reads(case, key):
         return []
@@ -426,11 +421,11 @@ def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:
 
 
 def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:
-    """Return what is odd about the selected jobs of a study, an entry for each oddity.
+    """Return what is odd about the selected jobs of a study, a `Caution` for each oddity.
 
     A key whose values look like another unit's has that remark alone, with the judged range where
-    it leaves that. Of more than `most` jobs
-    as many are looked at, drawn evenly and always the same, so that a large sweep takes no longer.
+    it leaves that. Of more than `most` jobs as many are looked at, drawn evenly and always the
+    same, so that a large sweep takes no longer.
     """
     numbers: Sequence[int] = study.selected
     if len(numbers) > most:

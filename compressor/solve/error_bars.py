@@ -31,8 +31,9 @@ RUNGS = 2  # by tens of the tolerance, for a run that fails its audit to be repe
 
 
 def energy_residual(tally: np.record) -> float:
-    """Return the worst imbalance relative to the contact's losses, floored at 1e-3 of the
-    kinetic energy.
+    """Return the worst imbalance of energy over the contacts' losses.
+
+    The losses count as at least 1e-3 of the greatest kinetic energy.
     """
     lost = tally["damping_loss"] + tally["friction_loss"]
     return float(tally["worst_imbalance"] / max(lost, 1e-3 * tally["peak_kinetic"]))
@@ -80,21 +81,20 @@ class Companion(NamedTuple):
 
     @property
     def closeness(self) -> float:
-        """What the difference from this run counts, as against one from a tighter run."""
+        """Return the share of the difference from this run that counts; 1 of a tighter run."""
         return closeness(self.ratio)
 
 
 def closeness(ratio: float) -> float:
-    """Return the share of the error of a run some ratio looser by which a run's own one is
-    bounded.
+    """Return the share of the distance to a run that bounds a run's own error.
+
+    ratio: the other run's tolerance over the run's. 1 of a tighter run.
     """
     return 1.0 if ratio < 1.0 else LOOSER * (ratio / TEN) ** -FALL
 
 
 def is_amplified(rtol: float, apart: Mapping[str, Any]) -> bool:
-    """Return whether a motion enlarges errors, by how far a run is apart from one at a like
-    tolerance.
-    """
+    """Return whether a motion enlarges errors, by its distance from a run at a like tolerance."""
     return bool(apart["acceleration"] > AMPLIFIED_FACTOR * rtol**ORDER)
 
 
@@ -154,8 +154,7 @@ def series_errors(other: Companion | None) -> Metrics:
 def unmet(
     targets: Sequence[tuple[str, float]], metrics: Mapping[str, Any], error: Mapping[str, Any]
 ) -> list[str]:
-    """Return what to say of each metric whose relative bar, at its worst joint, is longer than
-    asked for.
+    """Return a message for each metric whose relative bar, at its worst joint, exceeds its target.
 
     A metric of 0, such as the penetration of an ideal joint, is met by a bar of 0 alone.
     """

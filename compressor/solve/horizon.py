@@ -40,7 +40,7 @@ TWINS_RTOL = 1e-12  # of the twins, whatever the case asks for
 def predictability_horizon(
     case: Case, timeout: float = math.inf, rtol: float = TWINS_RTOL, close: float = TWIN_DISTANCE
 ) -> float:
-    """Return time (s) until a twin, shifted by 1e-9 of the clearance, is 1 % of the clearance away.
+    """Return the time (s) until a twin that starts 1e-9 of the clearance away is 1 % of it away.
 
     The journal of each joint with clearance is shifted, as much along x as along y; the distance
     is that of the eccentricities at the worse joint, seen at the end of each step. inf where the
@@ -64,7 +64,7 @@ class Parting(NamedTuple):
 
     @property
     def horizon(self) -> float:
-        """Time (s) up to which they stayed together; inf to the end."""
+        """Return the time (s) up to which they stayed together; inf to the end."""
         return math.inf if self.whole else self.time
 
 
@@ -73,7 +73,7 @@ def follow_case_twins(
 ) -> Parting:
     """Follow twins over a span (s), `close` at its begin, within a wall time (s).
 
-    As `predictability_horizon`, which tells more.
+    As `predictability_horizon`, whose docstring says what counts as apart.
     """
     if is_ideal(case):
         return Parting(span, False, True)
@@ -107,9 +107,9 @@ class Twins:
         self.states = np.empty((request.times.size, n))
 
     def advance(self, count: int, far: float) -> bool:
-        """Go on through the first `count` segments, or until the twins are `far` apart: True.
+        """Advance through `count` segments; return whether the twins got `far` apart before.
 
-        far: as a share of the clearance. Raises Stop.
+        far: as a share of the clearance, at which they stop. Raises Stop.
         """
         request, stepper, twin_stepper = self.request, self.stepper, self.twin_stepper
         stepper.status = Status.RUNNING

@@ -67,7 +67,7 @@ class MarchState(NamedTuple):
 
     @property
     def attempts(self) -> int:
-        """Steps attempted so far: taken, refused, and those that an onset cut short."""
+        """Return the steps attempted so far: taken, refused, and cut short by an onset."""
         w = self.stepper
         return int(w.steps + w.rejected + w.onsets + (w.landing > 0.0))
 

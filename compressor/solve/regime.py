@@ -64,17 +64,17 @@ class HorizonSearch:
 
     @property
     def left(self) -> float:
-        """Wall time (s) that the case may still take."""
+        """Return the wall time (s) that the case may still take."""
         return self.case.solve.timeout_s - (time.monotonic() - self.began)
 
     @property
     def work(self) -> float:
-        """Evaluations that the job's runs and twins may take together."""
+        """Return the evaluations that the job's runs and twins may take together."""
         return max(WORK * self.first, MIN_WORK)
 
     @property
     def work_left(self) -> float:
-        """Evaluations that twins may still take."""
+        """Return the evaluations that twins may still take."""
         return self.work - self.of_runs - self.of_twins
 
     def count(self, run: Trajectory) -> None:
@@ -110,8 +110,8 @@ class HorizonSearch:
     def look(self, whole: bool) -> bool:
         """Return whether twins part, as far as is known.
 
-        A short span is looked at first, of which most chaotic motions need no more, and the whole
-        one only if so asked.
+        A short span is tried first, of which most chaotic motions need no more, and the whole one
+        only where `whole` says so.
         """
         end = self.case.duration
         if self.case.solve.horizon != "auto":
@@ -124,10 +124,10 @@ class HorizonSearch:
         return self.horizon < end
 
     def twins(self, span: float, work: float) -> bool:
-        """Look at a span (s) by so many evaluations, and at where twins part by tighter ones again.
+        """Follow twins over a span (s) by at most `work` evaluations; return whether it sufficed.
 
-        Where the tighter ones stay together it was the steps that parted the others; what follows
-        is looked at as tightly. Returns False where evaluations or time ended it.
+        Where twins part, tighter ones are followed up to there. If these stay together it was the
+        steps that parted the others; what follows is followed as tightly.
         """
         self.began += load_twins(self.case)
         most = self.of_twins + work
@@ -155,7 +155,10 @@ class HorizonSearch:
 
 
 def load_twins(case: Case) -> float:
-    """Load what twins need, or compile it once on a machine; the time (s) that took counts not."""
+    """Load what twins need, or compile it once on a machine; return the time (s) that took.
+
+    That time does not count against the case's.
+    """
     began = time.monotonic()
     follow_case_twins(case, MOMENT_REV * case.turn, RTOL, TWIN_DISTANCE, math.inf)
     return time.monotonic() - began
@@ -173,10 +176,11 @@ def doubtful(metrics: Metrics, bars: Metrics) -> bool:
 def find_repetition(
     count: int, most: int, is_same: Callable[[int, int], bool], least: int = 1, more: int = 0
 ) -> tuple[int, int] | None:
-    """Return from which revolution on a motion of `count` repeats itself, and its shortest period.
+    """Return the revolution from which on a motion repeats itself, and its shortest period.
 
-    As many revolutions as a period and `more`, and at least so many, must be the same as one period
-    later: is_same takes the number of a revolution and a period. None up to a period of `most`.
+    count: revolutions of the motion; is_same: takes the number of a revolution and a period, and
+    returns whether the one a period later is the same. As many revolutions as a period and `more`,
+    and at least `least`, must be the same. None where no period up to `most` does.
     """
     for period in range(1, most + 1):
         first = count - period - max(least, period + more)
@@ -188,7 +192,7 @@ def find_repetition(
 def repeats(
     case: Case, samples: np.ndarray, errors: Metrics
 ) -> tuple[int, float] | tuple[None, float]:
-    """Return period of a motion in revolutions, and the revolution from which on it repeats itself.
+    """Return the period of a motion (rev), and the revolution from which on it repeats itself.
 
     samples: observed rows at the times of `compressor.solve.series.compared_times`. Revolutions
     are the same if no series is farther apart than both its errors. None and nan where the settled
@@ -231,7 +235,10 @@ class Settling:
 
 
 def with_span(case: Case, search: HorizonSearch) -> Settling:
-    """Give numbers to `settle_rev: auto` and `duration_rev: auto`, within the case's wall time."""
+    """Return a case with numbers for `settle_rev: auto` and `duration_rev: auto`, as `Settling`.
+
+    Within the case's wall time.
+    """
     if case.solve.settle_rev != "auto":
         return Settling(with_settle_rev(case, float(case.solve.settle_rev), 1))
     if is_ideal(case):
@@ -257,8 +264,7 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
 
 
 def with_settle_rev(case: Case, settle: float, period: int, duration: float | None = None) -> Case:
-    """Return a case with a number for where it settles (rev), and for its duration where that is a
-    word.
+    """Return a case that settles at a number (rev), with a number also for `duration_rev: auto`.
 
     period (rev): of which whole ones are measured; duration (rev): in place of the case's.
     """
@@ -276,9 +282,9 @@ def with_settle_rev(case: Case, settle: float, period: int, duration: float | No
 
 
 def least_promise(case: Case) -> float:
-    """Return the relative error that a case's accuracy promises.
+    """Return the relative error that a case's accuracy promises: the least of several.
 
-    Of one that promises none, standard's.
+    Of a case that promises none it is that of `standard`.
     """
     if case.targets:
         return min(target for _, target in case.targets)
@@ -286,9 +292,9 @@ def least_promise(case: Case) -> float:
 
 
 def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
-    """Return the first of the last revolutions that agree, and their period.
+    """Return the first of the last revolutions that agree, and their period (rev), or None.
 
-    None where they do not.
+    turns: metrics of each revolution; within: the relative difference that agreement allows.
     """
 
     def is_same(k: int, period: int) -> bool:
@@ -300,7 +306,7 @@ def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
 def agree(one: Metrics, other: Metrics, within: float) -> bool:
     """Return whether the metrics of two revolutions differ by less than a share.
 
-    Forces by the joint's.
+    Forces by axis are compared with the joint's greatest.
     """
     for name, row in METRICS.items():
         if not row.bar.relative:

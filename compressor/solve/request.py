@@ -44,7 +44,7 @@ class Cuts:
     states: list[np.ndarray] = field(default_factory=list)
 
     def cut(self, tally: np.record, z: np.ndarray) -> bool:
-        """Keep what was tallied since the last cut, begin again, and tell whether to go on.
+        """Append the tally since the last cut to `turns`, clear it, and return whether to go on.
 
         z: motion and flows there.
         """
@@ -59,7 +59,10 @@ class Cuts:
 
 
 def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
-    """Return the ends (s) of the whole revolutions from one time to another."""
+    """Return the ends (s) of the whole revolutions between two times, (m,).
+
+    turn: the time of one (s).
+    """
     return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
 
 
@@ -69,7 +72,7 @@ def worn_sums(tally: np.record) -> tuple[str, ...]:
 
 
 def merge_turns(turns: Sequence[np.record]) -> np.record:
-    """Return one tally of several revolutions in a row."""
+    """Return one tally of several revolutions in a row: sums are added, peaks the greatest."""
     whole = turns[-1].copy()
     for name in (*SUMS, *worn_sums(whole)):
         whole[name] = sum(turn[name] for turn in turns)
@@ -81,9 +84,7 @@ def merge_turns(turns: Sequence[np.record]) -> np.record:
 def with_cuts(
     edges: np.ndarray, phases: np.ndarray, cuts: Cuts | None
 ) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Return the segments that end at all cuts as well, and how many of them there are up to
-    each cut.
-    """
+    """Return segments that end at all cuts as well, and their number up to each cut."""
     times = []
     for time in cuts.times if cuts else ():
         edges, phases, near = with_edge(edges, phases, time)
@@ -94,8 +95,9 @@ def with_cuts(
 def with_edge(
     edges: np.ndarray, phases: np.ndarray, time: float
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the segments that end at a time as well, and that time: of an edge that lies there
-    already.
+    """Return segments that end at a time as well, and that time.
+
+    Where an edge lies there already, the segments are the same, and the time is that edge's.
     """
     near = edges[np.abs(edges - time).argmin()]
     if abs(near - time) <= SAME_TIME * edges[-1]:
@@ -112,7 +114,7 @@ NONE = -1  # in place of a number of the state
 
 
 def passed_time(p: np.record, times: Any, states: np.ndarray) -> Any:
-    """Return time (s) that has passed when the crank is where a steady one were at these times.
+    """Return the time (s) that has passed when the crank is where a steady one were at these times.
 
     times: (...) in s; states: (..., n). Of rates in place of states, and of 1 in place of times, it
     is how fast time passes there.

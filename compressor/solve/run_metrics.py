@@ -26,7 +26,10 @@ ROUNDING = 1e-12
 
 
 def metrics(p: np.record, tally: np.record) -> Metrics:
-    """Return the metrics by name, from what was tallied after settling."""
+    """Return the metrics by name, from what was tallied after settling.
+
+    In the units and shapes of `compressor.metrics.TABLE`: (), (joint,) or (joint, axis).
+    """
     ideal = p["clearance"] == 0
     seconds = tally["seconds"] or math.nan
     axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
@@ -86,7 +89,7 @@ SMALL_END = Column.FORCE + 2  # of the pin's force along x, positive in tension
 def sampled_times(case: Case) -> np.ndarray:
     """Return the times (s) after settling at which a run is sampled for `SAMPLED` metrics.
 
-    None without signals.
+    Empty without signals.
     """
     span = case.duration - case.settle
     count = round(min(max(A_TURN * span / case.turn, FEWEST), MOST)) if case.output.signals else 0
@@ -180,8 +183,9 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
 
 
 def of_peaks(name: str, values: np.ndarray) -> Metrics:
-    """Return the mean and quantiles of the revolutions' greatest values, (n, ...), with standard
-    errors.
+    """Return mean and quantiles of the revolutions' greatest values, with standard errors.
+
+    values: (revolutions, ...).
     """
     means = np.array([part.mean(axis=0) for part in parts(values, MAX_BATCHES, 1)])
     sections = parts(values, MAX_BATCHES, MIN_SECTION)
@@ -200,7 +204,10 @@ def quantiles(values: np.ndarray) -> np.ndarray:
 
 
 def parts(items: Sequence | np.ndarray, most: int, least: int) -> list:
-    """Up to `most` batches of equally many items in a row, at least `least`; the first are left."""
+    """Return up to `most` batches of equally many items in a row, at least `least` in each.
+
+    The first items are left out where the batches do not take all.
+    """
     size = max(least, math.ceil(len(items) / most))
     count = max(1, len(items) // size)
     skipped = max(0, len(items) - count * size)
@@ -215,7 +222,10 @@ def standard_error(means: np.ndarray) -> np.ndarray:
 
 
 def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
-    """Return half the length of the interval that holds in 95 % of cases, by Student's t."""
+    """Return half the length of the interval that holds in 95 % of cases, by Student's t.
+
+    error: standard error of a mean by `parts` of so many revolutions.
+    """
     batches = len(parts(range(revolutions), MAX_BATCHES, 1))
     from scipy.special import stdtrit  # takes a tenth of a second, of chaotic motions alone
 
@@ -223,20 +233,16 @@ def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
 
 
 def mean_bar(values: np.ndarray) -> float:
-    """Return half of the 95 % interval of the mean of revolutions' values in a row, (n,), by batch
-    means.
+    """Return half of the 95 % interval of the mean of revolutions' values, by batch means.
 
-    inf of a single one.
+    values: (n,), in a row. inf of a single one.
     """
     means = np.array([part.mean() for part in parts(values, MAX_BATCHES, 1)])
     return float(sure(standard_error(means), len(values)))
 
 
 def chaotic_bars(found: Metrics, numbers: Metrics) -> Metrics:
-    """Return the error bars of a chaotic run's metrics: of averages.
-
-    A greatest value is not known.
-    """
+    """Return the error bars of a chaotic run's metrics: of averages; greatest values have inf."""
     bars = {}
     for name, row in METRICS.items():
         if row.kind == "greatest":

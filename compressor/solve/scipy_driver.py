@@ -94,9 +94,9 @@ class Landings:
         return first if end - first > LANDING_FRACTION * (end - begin) else None
 
     def land(self, begin: float, end: float, dense, z: np.ndarray) -> None:
-        """At the end of a step that began apart: joints whose gaps close there carry their speed.
+        """Write the approach speed of joints whose gaps close at the end of a step.
 
-        z: motion and flows, (n + 4,), written.
+        Of a step that they began apart. z: motion and flows, (n + 4,), written.
         """
         y, rates, before = z[:-FLOWS].copy(), np.empty(z.size - FLOWS), np.empty(z.size - FLOWS)
         apart = self.depths(np.array([begin]), np.ascontiguousarray(dense([begin])[:-FLOWS].T))[0]
@@ -178,8 +178,9 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
 
 @cache
 def scipy_method(name: str) -> Any:
-    """Return SciPy's method of a name, loaded when first used: a third of what a short run would
-    take.
+    """Return SciPy's method of a name, loaded when first used.
+
+    Loading takes a third of the time of a short run.
     """
     from scipy import integrate as scipy_integrate
 
@@ -208,9 +209,10 @@ class LoadStretch:
         return z
 
     def go(self, t: float, z: np.ndarray, bound: float) -> tuple[float, np.ndarray, float]:
-        """Return step from (t, z) to a bound by a fresh solver, or until bodies meet within a step.
+        """Integrate from (t, z) to a bound by a fresh solver, or until bodies meet within a step.
 
-        Returns where it stands, and the next bound: that step is then to be taken again.
+        Returns the time and the state that were reached, and the next bound: the step in which they
+        met is then to be taken again.
         """
         request, result = self.request, self.result
         rtol = max(request.rtol * LOCAL.get(request.method, 1.0), MIN_RTOL)

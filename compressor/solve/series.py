@@ -65,8 +65,9 @@ def rows_of(p: np.record, run: Trajectory, columns: int = WIDE) -> np.ndarray:
 
 
 def finer(case: Case) -> int:
-    """Return how many times finer than the output grid forces are sampled for the body and its
-    sensor.
+    """Return how many times finer than the output grid the body's forces are sampled.
+
+    As often as the body's fastest motion and its sensor need.
     """
     body = case.body
     if body is None:
@@ -88,8 +89,7 @@ def block(name: str, rows: np.ndarray) -> np.ndarray:
 
 
 def compared_times(case: Case) -> np.ndarray:
-    """Return the times (s) at which runs of a case are compared, from where it has settled to its
-    end.
+    """Return the times (s) at which runs of a case are compared, from where it has settled on.
 
     In each whole revolution at the same angles, so that revolutions can be compared, too.
     """
@@ -101,10 +101,7 @@ def compared_times(case: Case) -> np.ndarray:
 
 
 def a_turn(case: Case) -> int:
-    """Return how many of these times a revolution has.
-
-    0 where the run settles within no whole one.
-    """
+    """Return how many of `compared_times` a revolution has; 0 where no whole one is settled."""
     revolutions = (case.duration - case.settle) / case.turn
     return round(min(A_TURN, max(1.0, MOST / revolutions))) if revolutions >= 1.0 else 0
 
@@ -130,8 +127,7 @@ def take_samples(
 
 @cache
 def places() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
-    """Return where `distances` finds what it sums: columns, where each sum begins, and sums by
-    name.
+    """Return where `distances` finds what it sums: columns, begins of sums, and sums by name.
 
     A vector's squares are one sum; a series over joints has two.
     """
@@ -162,12 +158,10 @@ def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
-    """Return the greatest distance of the eccentricities of two runs, over the room.
-
-    0 for ideal joints.
+    """Return the greatest distance of the eccentricities of two runs, over the journals' room.
 
     ours, theirs: observed rows at the same times. A journal's room is its clearance, or how far it
-    came if that is more.
+    came if that is more. 0 for ideal joints.
     """
     one, other = block("eccentricity", ours), block("eccentricity", theirs)
     faulty = p["clearance"] > 0

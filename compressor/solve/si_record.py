@@ -52,7 +52,8 @@ def is_ideal(case: Case) -> bool:
 def record(case: Case, worn: np.ndarray | None = None) -> np.record:
     """Return the record of a case, every number in SI.
 
-    worn: what was worn off both bores (m), (joint, sector); None: they are round.
+    worn: what was worn off both bores (m), (joint, sector); None: they are round. Raises ValueError
+    where the gas cycle or the cam has no corners, as `gas_corners` and `cam_corners`.
     """
     p: dict[str, Any] = {}  # what is not set stays zero
     p["scene"] = scene(case)
@@ -84,7 +85,7 @@ def offsets(case: Case) -> np.ndarray:
 
 
 def stiffness_of(case: Case, joint: str) -> float:
-    """Return the contact stiffness of a joint, as of `joint_stiffness`."""
+    """Return the contact stiffness (N/m^p) of a joint, as of `joint_stiffness`."""
     clearance = getattr(case.clearance_mm, joint)
     return joint_stiffness(case.contact, case.machine.pin_radius(joint), clearance)
 
@@ -140,7 +141,7 @@ def _spring(case: Case, p: dict[str, Any]) -> None:
 
 
 def _film(case: Case, p: dict[str, Any]) -> None:
-    """The oil film of the joints with clearance."""
+    """Set the numbers of the oil film in the joints with clearance."""
     lubricant = case.lubricant
     if lubricant is None:
         return
@@ -155,8 +156,9 @@ def _film(case: Case, p: dict[str, Any]) -> None:
 
 
 def _guide_contact(case: Case, guide: Guide, p: dict[str, Any]) -> None:
-    """How a corner of the crosshead meets its guide: as the joints do, where it has no keys of its
-    own; without their restitution by ADAMS's IMPACT.
+    """Set how a corner of the crosshead meets its guide.
+
+    As the joints do, where it has no keys of its own; without their restitution by ADAMS's IMPACT.
     """
     contact = case.contact
     exponent = guide.exponent or contact.exponent
@@ -174,7 +176,7 @@ def _guide_contact(case: Case, guide: Guide, p: dict[str, Any]) -> None:
 
 
 def _features(case: Case, p: dict[str, Any]) -> None:
-    """What frees more than the joints: guide, drive, rod, friction of ideal joints."""
+    """Set what frees more than the joints: guide, drive, rod, friction of ideal joints."""
     p["rubbing"] = int(bool(case.friction and case.friction.ideal_joints))
     p["driven"], p["elastic"] = int(case.drive is not None), int(case.rod is not None)
     p["tilting"] = int(case.guide is not None and case.guide.clearance_mm > 0)
@@ -215,10 +217,10 @@ UNCONTROLLED = 1e12
 
 
 def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -> np.ndarray:
-    """Return the size of each number of a mechanism's state, (n,): deflections under the forces at
-    hand.
+    """Return the size of each number of a mechanism's state, (n,).
 
-    joints: length (m) and speed (m/s) of the journals in their bores; bristle: of bristles (m).
+    Deflections are those under the forces at hand. joints: length (m) and speed (m/s) of the
+    journals in their bores; bristle: of bristles (m).
     """
     sizes = np.ones(len(state_names(p)))
     n = int(p["freedoms"])
@@ -298,10 +300,10 @@ def film_damping(p: np.record) -> float:
 
 
 def natural_sizes(p: np.record) -> np.ndarray:
-    """Return the size of each number of the state: deviations (m, rad), their rates (per s), shape
-    (2 n,).
+    """Return the size of each number of the state: deviations, then their rates.
 
-    With chosen laws also of what contacts carry (`state_names`): speeds, bristles as they slide.
+    (2 n,), in m, rad and per s. With chosen laws also of what contacts carry (`state_names`):
+    speeds, bristles as they slide.
     """
     if is_featured(p):
         joints = length_and_speed(p) if p["clearance"].any() else (1.0, 1.0)
@@ -325,10 +327,9 @@ def bristle_size(p: np.record, length: float) -> float:
 
 
 def contact_sizes(p: np.record, sizes: np.ndarray) -> tuple[float, float]:
-    """Return the length (m) and speed (m/s) of the journals in their bores, of sizes by
-    `natural_sizes`.
+    """Return the length (m) and speed (m/s) of the journals in their bores.
 
-    Of a mechanism with ideal joints no step need be as short as theirs.
+    sizes: by `natural_sizes`. Of a mechanism with ideal joints no step need be as short as theirs.
     """
     if not is_featured(p):
         return sizes[0], sizes[sizes.size // 2]
@@ -346,8 +347,10 @@ MODE_SHIFT = 1e-7  # m, by which its modes are moved to learn how they answer
 
 
 def initial_state(case: Case, p: np.record, shift: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return the state at time 0, journals as offset by the case and by a shift (m), (joint,
-    axis).
+    """Return the state at time 0, (n,), as `physics.state_names` names it.
+
+    shift: of the journals (m), (joint, axis), beside the case's own offsets. An elastic rod is bent
+    as it is then, at rest in itself.
     """
     y = np.zeros(len(state_names(p)))
     start(offsets(case) + shift, y, p)

@@ -80,9 +80,7 @@ def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
 
 
 def sensor_variables(record: "Record") -> Variables:
-    """Return a sensor's record: its samples and the tacho's pulses, each with a dimension of its
-    own.
-    """
+    """Return a sensor's samples and the tacho's pulses, each with a dimension of its own."""
     since = "time since the record's begin"
     return {
         "sensor_time": (("sensor_time",), record.times, {"units": "s", "long_name": since}),
@@ -160,10 +158,10 @@ def simulate(case: Case) -> "xr.Dataset":
 
 
 def as_dataset(table: DatasetParts) -> "xr.Dataset":
-    """Return the Dataset of a table: the last one's like with other values, where shapes are the
-    same.
+    """Return the Dataset of a table.
 
-    To make one anew takes xarray three times as long: it compares each variable with all others.
+    Where the last one had the same shapes, it is copied with other values: to make one anew takes
+    xarray three times as long, since it compares each variable with all others.
     """
     import xarray as xr
 
@@ -189,7 +187,7 @@ def as_dataset(table: DatasetParts) -> "xr.Dataset":
 
 
 def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, DatasetParts]:
-    """Simulate one case for its `Outcome` and what its Dataset is made of (see `simulate`)."""
+    """Simulate one case; return its `Outcome` and what its Dataset is made of (see `simulate`)."""
     if case.problems:
         found = refused_outcome(case)
         return found, found.table({})
@@ -197,7 +195,10 @@ def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, DatasetP
 
 
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
-    """Return the `Outcome` of a solution and what its Dataset is made of."""
+    """Return the `Outcome` of a solution and what its Dataset is made of.
+
+    Time series are part of it with `output.keep: series`.
+    """
     kept = case.output.keep == "series"
     found = outcome(case, solution)
     more = series(case, solution) if kept else {}
@@ -207,7 +208,7 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
 
 
 def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
-    """Simulate one case for its `Outcome` alone: what `simulate` gives less the time series."""
+    """Simulate one case; return its `Outcome` alone: what `simulate` gives less the time series."""
     return refused_outcome(case) if case.problems else outcome(case, solve(case, ahead))
 
 
@@ -218,9 +219,7 @@ def refused_outcome(case: Case) -> Outcome:
 
 
 def series(case: Case, solution: Solution) -> dict[str, tuple]:
-    """Return the time series as xarray variables, with signals, body and sensor where they are
-    wanted.
-    """
+    """Return the time series as xarray variables, with the signals, body and sensor of the case."""
     p, every = solution.p, finer(case)
     whole = rows_of(p, solution.trajectory)
     rows, times = whole[::every], solution.trajectory.times[::every]

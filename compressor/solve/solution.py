@@ -71,8 +71,9 @@ class LaneRequest(NamedTuple):
 
 
 def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
-    """Return the first attempts of each case, as far as lanes can make them: of scenes for which
-    they are compiled.
+    """Return the first attempts of each case, by tolerance, as far as lanes can make them.
+
+    scenes: those for which lanes are compiled. A case that cannot run in lanes has none.
     """
     asked: dict[int, list[LaneRequest]] = {number: [] for number in scenes}
     for number, case in enumerate(cases):
@@ -122,7 +123,7 @@ def with_tolerance(one: LaneRequest, rtol: float) -> LaneRequest:
 
 
 def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Times) -> LaneRequest:
-    """Return an attempt made ready."""
+    """Return an attempt of a case in the form that lanes take."""
     wanted = request(case, rtol, p, times)
     trajectory, edges, phases, z = prepare_run(wanted)
     size = natural_sizes(p)
@@ -152,14 +153,13 @@ MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run
 
 
 def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> Solution:
-    """Return the first run that balances and keeps its promise, or the last whole one as a failed
-    job.
+    """Return the first run that keeps its promise, or the last whole one as a failed job.
 
     A first run is compared with one a little tighter, and with a looser one, too, where the motion
     enlarges errors. Each further one is as much tighter as its errors are expected to need. It is
     compared with the one before and, where it seems to keep the promise, with one a little tighter
     as well. Where errors are as large as the numbers, twins tell whether the motion is chaotic;
-    that ends the climb, and so does the budget of the search.
+    that ends the search, and so does its budget.
     """
     rtol = case.rtol
     best: Solution | None = None  # the last whole run
@@ -209,7 +209,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
 
 
 def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
-    """Return the tightest of some runs that balances, and than which one can be tighter."""
+    """Return the tightest of some runs that balances and can still be made tighter; else `now`."""
     fit = [one for one in others if one.rtol > 1.01 * TIGHTEST and energy_balances(case, one)]
     return min([now, *fit], key=lambda run: run.rtol)
 
@@ -217,7 +217,7 @@ def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
 def recheck(
     case: Case, now: Solution, other: Solution, first: bool, search: HorizonSearch
 ) -> tuple[float, Solution | None]:
-    """Compare a run that seems to keep its promise with a third one, too; two may agree by chance.
+    """Compare a run that seems to keep its promise with a third one; two may agree by chance.
 
     first: the run is the case's first, which needs a third one only where the motion enlarges
     errors. Returns the error over what is promised by the worse of both comparisons, and the third
@@ -244,10 +244,7 @@ def has_promise(case: Case) -> bool:
 
 
 def excess_over_promise(case: Case, solution: Solution) -> float:
-    """Return the greatest estimated error over what accuracy promises.
-
-    0 where it promises nothing.
-    """
+    """Return the greatest estimated error over the promised one; 0 where none is promised."""
     if case.targets:
         return max(
             beyond(solution.metrics[name], solution.bars[name]) / target
@@ -271,7 +268,7 @@ def tighten_factor(excess: float, ratio: float) -> float:
 
 
 def round_rtol(rtol: float) -> float:
-    """Return a tolerance that is told in two digits."""
+    """Return a tolerance rounded to two digits."""
     return float(f"{rtol:.1e}")
 
 
@@ -312,7 +309,7 @@ def fail_accuracy(case: Case, best: Solution, detail: str, reason: str = "") -> 
 
 
 def missed_promises(case: Case, solution: Solution) -> list[str]:
-    """Return what a run promised and does not keep, a message each."""
+    """Return a message for each promise that a run does not keep."""
     if case.targets:
         return unmet(case.targets, solution.metrics, solution.bars)
     error = solution.series_errors["acceleration"]
@@ -327,7 +324,8 @@ CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
     """Return a case's motion, with errors, regime and horizon as far as they are wanted.
 
-    ahead: of its attempts those that `side_by_side` has made.
+    ahead: its attempts that `side_by_side` has made. Raises nothing for a run that fails: its
+    `reason` and `detail` say why.
     """
     search = HorizonSearch(case)
     for made in ahead.values():
@@ -349,7 +347,7 @@ def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
 
 
 def find_horizon(case: Case, solution: Solution, search: HorizonSearch) -> None:
-    """The horizon of a motion, where it is asked for, or where errors are as large as numbers."""
+    """Find a motion's horizon, where it is asked for, or where errors are as large as numbers."""
     if case.solve.horizon is True:
         search.horizon = predictability_horizon(case, search.left)
     elif case.wants_bars and is_in_doubt(case, solution):
@@ -374,7 +372,7 @@ def is_in_doubt(case: Case, solution: Solution) -> bool:
 
 
 def name_regime(case: Case, solution: Solution, search: HorizonSearch) -> None:
-    """Say whether a motion that is not chaotic can be foretold, and whether it repeats itself."""
+    """Set the regime of a motion that is not chaotic: predictable, periodic or undecided."""
     if is_in_doubt(case, solution):
         whole = search.horizon == math.inf
         solution.regime = Regime.PREDICTABLE if whole else Regime.UNDECIDED
@@ -388,7 +386,7 @@ def name_regime(case: Case, solution: Solution, search: HorizonSearch) -> None:
 
 
 def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> Solution:
-    """Return a motion that cannot be foretold: one more run, for statistics over its revolutions.
+    """Run a motion that cannot be foretold once more, for statistics over its revolutions.
 
     No error of a single course is claimed; averages have their statistical one.
     """
