@@ -22,7 +22,7 @@ from compressor.program import machine_code_folder
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 ENABLED = os.environ.get("COMPSIM_JIT", "1") != "0"
-MAKING = threading.RLock()  # or two threads would each make a function, of two types to numba
+TARGET_LOCK = threading.RLock()  # or two threads would each make a function, of two types to numba
 
 
 def discard_other_code(folder: Path) -> None:
@@ -43,23 +43,23 @@ class Deferred:
         self.make = make
 
     @functools.cached_property
-    def made(self) -> Any:
-        with MAKING:
+    def target(self) -> Any:
+        with TARGET_LOCK:
             load_numba()
-            return vars(self).get("made") or self.make_here()
+            return vars(self).get("target") or self.make_target()
 
-    def make_here(self) -> Any:
+    def make_target(self) -> Any:
         """Make it, and hold it before another thread may look."""
-        vars(self)["made"] = self.make()
-        return vars(self)["made"]
+        vars(self)["target"] = self.make()
+        return vars(self)["target"]
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.made(*arguments)
+        return self.target(*arguments)
 
     def __getattr__(self, name: str) -> Any:  # what numba asks of a function that another calls
         if name.startswith("__"):
             raise AttributeError(name)
-        return getattr(self.made, name)
+        return getattr(self.target, name)
 
 
 class Intrinsic(Deferred):
@@ -82,7 +82,7 @@ def load_numba() -> None:
 
     @typeof_impl.register(Deferred)
     def type_of(value: Deferred, _: object) -> Any:
-        return cpu_target.typing_context.resolve_value_type(value.made)
+        return cpu_target.typing_context.resolve_value_type(value.target)
 
     @typeof_impl.register(ByKind)
     def type_of_choice(value: ByKind, _: object) -> Any:
@@ -90,7 +90,7 @@ def load_numba() -> None:
 
     # to be known before anything is compiled
     for intrinsic in (without_refcount, fma, square_root):
-        intrinsic.make_here()  # type: ignore[union-attr]
+        intrinsic.make_target()  # type: ignore[union-attr]
 
 
 def _compile(function: Function, **options: Any) -> Function:
@@ -156,8 +156,8 @@ class ByKind:
             members = getattr(one, "members", ())
             for name, field in members:
                 if name == "laws" and field.shape[0] >= self.least:
-                    return self.special.made
-        return self.usual.made
+                    return self.special.target
+        return self.usual.target
 
     def get_call_template(self, arguments: Any, keywords: Any) -> Any:
         """Return numba's template of a call, of the function that is meant, which it compiles."""
@@ -193,12 +193,12 @@ def _without_refcount() -> Any:
 
         def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             source = make_array(signature.args[0])(context, builder, values[0])
-            made = make_array(signature.return_type)(context, builder)
+            view = make_array(signature.return_type)(context, builder)
             populate_array(
-                made, data=source.data, shape=source.shape, strides=source.strides,
+                view, data=source.data, shape=source.shape, strides=source.strides,
                 itemsize=source.itemsize, meminfo=None,
             )  # fmt: skip
-            return made._getvalue()
+            return view._getvalue()
 
         return array(array), lower
 

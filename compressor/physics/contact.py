@@ -78,8 +78,8 @@ def bristle_rate(slip, bristle, p):
     """
     if p.static == 0.0 and p.dynamic == 0.0:
         return 0.0
-    held = p.bristle_stiffness * abs(slip) * bristle / stribeck(slip, p)
-    return slip - held
+    relaxation = p.bristle_stiffness * abs(slip) * bristle / stribeck(slip, p)
+    return slip - relaxation
 
 
 @jit
@@ -150,7 +150,7 @@ def hysteresis(contact: str, restitution: float) -> float:
 
 
 @inline_llvm
-def carried_by(joint, y, p):
+def carried_numbers(joint, y, p):
     """Return a joint's numbers among what contacts carry in the state; zeros with the default laws.
 
     The speed (m/s) at which the bodies met, and the mean deflection (m) of the bristles.
@@ -184,8 +184,9 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
 
     eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); spins of
     journal and rod (rad/s, counter-clockwise); bearing: the joint's journal radius (m), clearance
-    (m) and stiffness (N/m^p); carried: as by `carried_by`. Returns a `ContactState`; one contact
-    point serves both bodies, so that angular momentum balances. Concentric circles exert no force.
+    (m) and stiffness (N/m^p); carried: as by `carried_numbers`. Returns a `ContactState`; one
+    contact point serves both bodies, so that angular momentum balances. Concentric circles exert
+    no force.
     """
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, stiffness = bearing

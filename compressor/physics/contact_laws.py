@@ -31,8 +31,8 @@ from compressor.physics._jit import fma, inline_llvm, inline_numba, jit, square_
 
 FLATTEST = 1.25  # of ln(4 S c / F) - 1: from there on Johnson's force goes on along its tangent
 JOHNSON_DEEPEST = 0.5  # of the clearance: up to which the law is meant, before that
-NEWTON = 6  # steps that give Johnson's force to rounding
-FEW = 0.02  # of the clearance: depths up to which the energy of Liu's law is summed as a series
+NEWTON_STEPS = 6  # steps that give Johnson's force to rounding
+MAX_SERIES_DEPTH = 0.02  # of the clearance: up to it the energy of Liu's law is a sum of `SERIES`
 SERIES = (
     1 / 5, -1 / 14, 1 / 24, -5 / 176, 35 / 1664, -63 / 3840, 231 / 17408, -429 / 38912,
 )  # fmt: skip
@@ -47,7 +47,7 @@ def johnson_share(depth):
     level = -1.0 - math.log(depth)
     above = max(level - 1.0, 0.0)
     share = 1.0 + math.sqrt(2.0 * above) + above + math.log(1.0 + above) / 3.0
-    for _ in range(NEWTON):
+    for _ in range(NEWTON_STEPS):
         share -= (share - math.log(share) - level) * share / (share - 1.0)
     return share
 
@@ -84,7 +84,7 @@ def liu(penetration, stiffness, clearance):
 def liu_energy(penetration, stiffness, clearance):
     """Return the energy (J) that is stored at a penetration (m): the integral of Liu's force."""
     x = penetration / clearance
-    if x < FEW:
+    if x < MAX_SERIES_DEPTH:
         whole = 0.0
         for i in range(len(SERIES) - 1, -1, -1):
             whole = whole * x + SERIES[i]
@@ -132,10 +132,10 @@ class Conformal:
         if not speed > 0.0:
             return math.inf
         nodes, weights = np.polynomial.legendre.leggauss(64)
-        left = (nodes + 1.0) / 2.0  # the root of what is left of the depth
-        most = self.energy(depth)
-        spent = np.array([self.energy(depth * (1.0 - one * one)) / most for one in left])
-        return float(2.0 * depth / speed * np.sum(weights * left / np.sqrt(1.0 - spent)))
+        roots = (nodes + 1.0) / 2.0  # the root of what is left of the depth
+        max_energy = self.energy(depth)
+        shares = np.array([self.energy(depth * (1.0 - x * x)) / max_energy for x in roots])
+        return float(2.0 * depth / speed * np.sum(weights * roots / np.sqrt(1.0 - shares)))
 
 
 def solve_rising(rising: Callable[[float], float], value: float) -> float:

@@ -23,7 +23,8 @@ Where both parts act, |w| and |eps'| of the formulas along the line of centres a
 which is nearer to one Reynolds field than the sum is (physics/README.md, Oil film); of a film that
 only turns, or is only squeezed, the numbers are exact.
 
-Below `CENTRED` the numbers go to those that make the centre smooth: a force against the velocity.
+Below `CENTRE_ECCENTRICITY` the numbers go to those that make the centre smooth: a force against
+the velocity.
 In the film's last share the numbers stay what they are where it begins: the film bears no more.
 Beyond the wall, as deep as that share is wide, it fades, and the dry contact is left alone: the
 transition of Flores, Ambrosio, Claro and Lankarani (Proc. IMechE K 218, 2004), whose dry force also
@@ -37,7 +38,7 @@ import numpy as np
 from compressor.physics._jit import jit, uncompiled
 from compressor.physics.contact_laws import rise
 
-CENTRED = 0.1
+CENTRE_ECCENTRICITY = 0.1
 SHAPES = {"rotation": 14, "attitude": 14, "squeeze": 22}  # numbers, and terms of each polynomial
 TERMS = sum(SHAPES.values())
 TURNED, SQUEEZED = 14, 28  # where the second and the third begin
@@ -53,7 +54,7 @@ def polynomial(constants, begin, end, x):
 
 
 @jit
-def ends(eps, b):
+def end_factor(eps, b):
     """Return by what factor the open ends weaken a film: Butenschoen's, of a1 and a2.
 
     b: length over diameter.
@@ -68,7 +69,7 @@ def rotation_shape(eps, b):
     """Return the Sommerfeld number of the rotation over eps, which stays finite at the centre."""
     room = 1.0 - eps * eps
     size = math.sqrt(math.pi * math.pi * room + 16.0 * eps * eps)
-    return size / (2.0 * room * room) * ends(eps, b)
+    return size / (2.0 * room * room) * end_factor(eps, b)
 
 
 @jit
@@ -77,7 +78,7 @@ def squeeze_shape(eps, b):
     room = 1.0 - eps * eps
     half = (0.5 * math.pi - 0.5 * math.acos(eps)) * (1.0 + 2.0 * eps * eps)
     shape = half + 1.5 * eps * math.sqrt(room)
-    return 4.0 * shape / (room * room * math.sqrt(room)) * ends(eps, b)
+    return 4.0 * shape / (room * room * math.sqrt(room)) * end_factor(eps, b)
 
 
 @jit
@@ -98,32 +99,32 @@ def film_constants(ratio, share, number):
     at Chebyshev's points of the eccentricities that a film with this last share may have. ratio: B
     / D; number: a function of a name in `SHAPES`, an eccentricity and a ratio.
     """
-    each = {"rotation": rotation_shape, "attitude": attitude_shape, "squeeze": squeeze_shape}
-    most, found = 1.0 - 0.5 * share, []
+    shape_of = {"rotation": rotation_shape, "attitude": attitude_shape, "squeeze": squeeze_shape}
+    max_eps, constants = 1.0 - 0.5 * share, []
     for name, count in SHAPES.items():
-        least = -most if name == "squeeze" else 0.0
+        least = -max_eps if name == "squeeze" else 0.0
         nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
-        eps = least + (most - least) * (nodes + 1.0) / 2.0
-        quotient = [number(name, one, ratio) / each[name](one, ratio) for one in eps]
+        eps = least + (max_eps - least) * (nodes + 1.0) / 2.0
+        quotient = [number(name, one, ratio) / shape_of[name](one, ratio) for one in eps]
         fit = np.polynomial.Chebyshev.fit(eps, quotient, count - 1)
-        found += fit.convert(kind=np.polynomial.Polynomial).coef.tolist()
+        constants += fit.convert(kind=np.polynomial.Polynomial).coef.tolist()
     wall = uncompiled(bounded_eccentricity)(1.0, share)
-    return (*found, uncompiled(squeeze_number)(wall, ratio, np.array(found)))
+    return (*constants, uncompiled(squeeze_number)(wall, ratio, np.array(constants)))
 
 
 @jit
 def rotation_number(eps, b, constants):
     """Return `rotation_shape` as Reynolds' equation has it; level at the centre."""
-    found = rotation_shape(eps, b) * polynomial(constants, 0, TURNED, eps)
+    number = rotation_shape(eps, b) * polynomial(constants, 0, TURNED, eps)
     centre = rotation_shape(0.0, b) * constants[0]
-    return centre + (found - centre) * rise(eps / CENTRED)
+    return centre + (number - centre) * rise(eps / CENTRE_ECCENTRICITY)
 
 
 @jit
 def attitude(eps, b, constants):
     """Return `attitude_shape` as Reynolds' equation has it; a right angle at the centre."""
-    found = attitude_shape(eps, b) * polynomial(constants, TURNED, SQUEEZED, eps)
-    return 0.5 * math.pi + (found - 0.5 * math.pi) * rise(eps / CENTRED)
+    angle = attitude_shape(eps, b) * polynomial(constants, TURNED, SQUEEZED, eps)
+    return 0.5 * math.pi + (angle - 0.5 * math.pi) * rise(eps / CENTRE_ECCENTRICITY)
 
 
 @jit
@@ -132,9 +133,9 @@ def squeeze_number(eps, b, constants):
 
     At the centre the same in all directions.
     """
-    found = squeeze_shape(eps, b) * polynomial(constants, SQUEEZED, TERMS, eps)
+    number = squeeze_shape(eps, b) * polynomial(constants, SQUEEZED, TERMS, eps)
     centre = 2.0 * rotation_number(0.0, b, constants)
-    return centre + (found - centre) * rise(abs(eps) / CENTRED)
+    return centre + (number - centre) * rise(abs(eps) / CENTRE_ECCENTRICITY)
 
 
 @jit

@@ -12,7 +12,7 @@ import numpy as np
 from compressor.physics._jit import fma, inline_numba, jit, square_root
 from compressor.physics.elementary import direction
 
-SMALL = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
+MAX_SERIES_ANGLE = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
 # their coefficients: faster than to divide
 S3, S5, S7, S9 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880
 C4, C6, C8 = 1 / 24, -1 / 720, 1 / 40320
@@ -58,11 +58,12 @@ def ideal_at(cos_theta, sin_theta, p):
 
 @inline_numba
 def small_angle(angle, p):
-    """Return sine and cosine of an angle (rad), up to SMALL by series that are exact there.
+    """Return sine and cosine of an angle (rad).
 
-    Where the record says that no angle is `wide`, there is nothing but the series.
+    Up to MAX_SERIES_ANGLE they are series, which are exact there. Where the record says that no
+    angle is `wide`, there is nothing but the series.
     """
-    if p.wide and abs(angle) > SMALL:
+    if p.wide and abs(angle) > MAX_SERIES_ANGLE:
         return math.sin(angle), math.cos(angle)
     s = angle * angle
     q = s * s

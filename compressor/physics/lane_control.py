@@ -11,7 +11,7 @@ import numpy as np
 
 from compressor.physics._jit import inline_numba, jit, square_root, without_refcount
 from compressor.physics.elementary import direction
-from compressor.physics.kinematics import SMALL
+from compressor.physics.kinematics import MAX_SERIES_ANGLE
 from compressor.physics.lane_steps import (
     ALIVE,
     BUDGET,
@@ -152,19 +152,19 @@ def choose_next_steps(scene, W, k):
         now, last = log_error(error), W[LAST_ERROR + j]
         now = now if plain | refused else 0.0  # any other lane's error may be no number
         longer, shorter = growth(now, last, EXPLICIT_ORDER), shrinkage(now, EXPLICIT_ORDER)
-        longer = h * longer if plain else h
-        longer = h * shorter if refused else longer
+        next_h = h * longer if plain else h
+        next_h = h * shorter if refused else next_h
         reached = t + h if plain else t
         W[LAST_ERROR + j] = max(now, MIN_ERROR) if plain else last
         W[REJECTED + j] += 1.0 if refused else 0.0
-        W[H + j] = longer
+        W[H + j] = next_h
         W[T + j] = reached
-        turning = W[FIRST_FIELD + j] * longer
-        call = is_last_step(reached, longer, W[END + j]) | (turning > SMALL)
+        turning = W[FIRST_FIELD + j] * next_h
+        call = is_last_step(reached, next_h, W[END + j]) | (turning > MAX_SERIES_ANGLE)
         call = call | (W[STABILITY_LIMITED + j] >= STEPS_BEFORE_STIFF)
         call = call | (W[DEEPEST + j] > W[MAX_DEPTH + j])
         call = call | (not (plain | refused)) | (W[STEPS + j] + W[REJECTED + j] >= W[BUDGET + j])
-        call = call | (longer < shortest_step(reached, W[FIRST_FIELD + j]))
+        call = call | (next_h < shortest_step(reached, W[FIRST_FIELD + j]))
         W[CALL + j] = 1.0 if call & alive else 0.0
 
 
@@ -226,14 +226,14 @@ def at_nodes(W, column):
 
 
 @inline_numba
-def nears_peak(W, j, column):
+def may_beat_peak(W, j, column):
     """Return whether the greatest size of a column may be beaten within the step."""
     a, _, c, _, e = at_nodes(W, column * LANES + j)
     return may_beat(max(abs(a), abs(c), abs(e)), W[PEAK + column * LANES + j])
 
 
 @inline_numba
-def nears_depth(W, j, joint):
+def may_beat_depth(W, j, joint):
     """Return whether the greatest penetration of a joint may be beaten within the step."""
     a, _, c, _, e = at_nodes(W, PENETRATION + joint * LANES + j)
     return may_beat(max(a, c, e), W[MAX_PENETRATION + joint * LANES + j])
@@ -254,9 +254,9 @@ def select_plain_steps(scene, W, k):
     """
     W = without_refcount(W)
     for j in range(k):
-        near = nears_peak(W, j, 0) | nears_peak(W, j, 1) | nears_peak(W, j, 2)
-        near = near | nears_peak(W, j, 3) | nears_peak(W, j, 4) | nears_peak(W, j, 5)
-        near = near | nears_peak(W, j, 6) | nears_depth(W, j, 0) | nears_depth(W, j, 1)
+        near = may_beat_peak(W, j, 0) | may_beat_peak(W, j, 1) | may_beat_peak(W, j, 2)
+        near = near | may_beat_peak(W, j, 3) | may_beat_peak(W, j, 4) | may_beat_peak(W, j, 5)
+        near = near | may_beat_peak(W, j, 6) | may_beat_depth(W, j, 0) | may_beat_depth(W, j, 1)
         change = False
         if has_clearance(scene, 0):
             change = may_change_at(W, j, 0)
@@ -343,15 +343,15 @@ def tally_joint(W, j, joint, plain, fine, measured):
     W[FLOWN + c] = (1.0 if flown else 0.0) if plain else W[FLOWN + c]
     W[IMPACTS + c] = hits if plain else W[IMPACTS + c]
     W[RELEASES + c] = leaves if plain else W[RELEASES + c]
-    top, rise = top_and_vertex(at_nodes(W, PENETRATION + c), fine)
+    top, top_of_parabola = top_and_vertex(at_nodes(W, PENETRATION + c), fine)
     known = W[MAX_PENETRATION + c]
-    best = max(top, known, rise if may_exceed(top, known) else top)
+    best = max(top, known, top_of_parabola if may_exceed(top, known) else top)
     W[MAX_PENETRATION + c] = best if plain & measured else known
     W[DEEPEST + j] = max(W[DEEPEST + j], top) if plain else W[DEEPEST + j]
     # contact does not change within the step
-    whole = FINE_WHOLE if fine else COARSE_WHOLE
-    more = whole * W[H + j] if W[R2 + NEARNESS + c] <= 0.0 else 0.0
-    W[LOSS_SECONDS + c] += more if plain & measured else 0.0
+    gap_fraction = FINE_WHOLE if fine else COARSE_WHOLE
+    gap_seconds = gap_fraction * W[H + j] if W[R2 + NEARNESS + c] <= 0.0 else 0.0
+    W[LOSS_SECONDS + c] += gap_seconds if plain & measured else 0.0
 
 
 @inline_numba
@@ -406,7 +406,7 @@ def tally_lanes(scene, W, k):
             counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
             fine = W[NEAR_PEAK + j] > 0.0
             a, b, c, d, e = at_nodes(W, o + j)
-            top, rise = top_and_vertex((abs(a), abs(b), abs(c), abs(d), abs(e)), fine)
+            top, top_of_parabola = top_and_vertex((abs(a), abs(b), abs(c), abs(d), abs(e)), fine)
             known = W[PEAK + o + j]
-            best = max(known, top, rise if may_exceed(top, known) else top)
+            best = max(known, top, top_of_parabola if may_exceed(top, known) else top)
             W[PEAK + o + j] = best if counts else known

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import fma, inline_numba, jit
-from compressor.physics.kinematics import SMALL, crank_direction
+from compressor.physics.kinematics import MAX_SERIES_ANGLE, crank_direction
 from compressor.physics.lane_control import (
     advance_lanes,
     choose_next_steps,
@@ -103,7 +103,7 @@ def segment_end(runs, job):
 def plain_ahead(w, omega, end):
     """Return whether the next step is an explicit one in which nothing is known to begin or end."""
     ready = not w.fresh and w.observed and not w.stiff and w.landing == 0.0 and w.h > 0.0
-    return ready and not is_last_step(w.t, w.h, end) and omega * w.h <= SMALL
+    return ready and not is_last_step(w.t, w.h, end) and omega * w.h <= MAX_SERIES_ANGLE
 
 
 @jit
@@ -315,20 +315,20 @@ def march_side_by_side(runs: Sequence[Run], limit: int) -> list[Run | None]:
     lane, that failed, or that took more attempts. What the runs hold is left as it is.
     """
     fitting = [i for i, run in enumerate(runs) if fits_lane(run.p)]
-    ended: list[Run | None] = [None] * len(runs)
+    results: list[Run | None] = [None] * len(runs)
     if not fitting:
-        return ended
-    whole = gather_runs([runs[i] for i in fitting])
+        return results
+    batch = gather_runs([runs[i] for i in fitting])
     scene = (0,) * int(runs[0].p["scene"])
-    march_lanes(scene, new_lanes(), LANES, whole, np.full(LANES, -1), limit)
+    march_lanes(scene, new_lanes(), LANES, batch, np.full(LANES, -1), limit)
     for k, i in enumerate(fitting):
-        begin, samples = whole.places[k, 2:].tolist()
-        if whole.steppers["status"][k] == DONE:
-            ended[i] = runs[i]._replace(
-                stepper=whole.steppers[k], z=whole.z[k], tally=whole.tallies[k],
-                states=whole.states[begin : begin + samples],
+        begin, samples = batch.places[k, 2:].tolist()
+        if batch.steppers["status"][k] == DONE:
+            results[i] = runs[i]._replace(
+                stepper=batch.steppers[k], z=batch.z[k], tally=batch.tallies[k],
+                states=batch.states[begin : begin + samples],
             )  # fmt: skip
-    return ended
+    return results
 
 
 def gather_runs(runs: Sequence[Run]) -> Runs:

@@ -16,7 +16,7 @@ from compressor.physics.contact_laws import Law
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.march import NODE_WEIGHTS as ALL_NODE_WEIGHTS
 from compressor.physics.march import NODES
-from compressor.physics.motion import deviating, evaluate
+from compressor.physics.motion import deviation_accelerations, evaluate
 from compressor.physics.observe import energies, joint_forces, observed_columns, powers
 from compressor.physics.record import RECORD, Load
 from compressor.physics.runge_kutta import STAGES, A, C, E, RungeKuttaPair, error_share
@@ -203,7 +203,8 @@ def stage_rates(scene, W, k, fraction, w, s):
         motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
         y = stage_state(scene, W, j, w)
         now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
-        write_rates(scene, W, j, y, deviating(now, p), powers(now, y, joint_forces(now, y, p), p))
+        accelerations = deviation_accelerations(now, p)
+        write_rates(scene, W, j, y, accelerations, powers(now, y, joint_forces(now, y, p), p))
     copy_rows(W, K + s * STATE * LANES, OUT, STATE if len(scene) == 3 else MAX_STATES)
 
 

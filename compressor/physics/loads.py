@@ -107,10 +107,10 @@ def gas_corners(p, pressure_ratio):
     crank_radius, rod_length = p["crank_radius"], p["rod_length"]
     head_clearance, exponent = p["head_clearance"], float(p["gas_exponent"])
     head = rod_length + crank_radius + head_clearance
-    growth = pressure_ratio ** (1.0 / exponent)
-    expansion = angle_at(head - head_clearance * growth, crank_radius, rod_length)
-    packed = (2.0 * crank_radius + head_clearance) / growth
-    compression = angle_at(head - packed, crank_radius, rod_length)
+    expansion_ratio = pressure_ratio ** (1.0 / exponent)
+    expansion = angle_at(head - head_clearance * expansion_ratio, crank_radius, rod_length)
+    compressed_length = (2.0 * crank_radius + head_clearance) / expansion_ratio
+    compression = angle_at(head - compressed_length, crank_radius, rod_length)
     return expansion, math.pi, 2.0 * math.pi - compression
 
 
@@ -173,5 +173,5 @@ def sample_segments(times, edges):
     sample within a billionth of a segment of an edge counts as on it.
     """
     slack = 1e-9 * (edges[1:] - edges[:-1]).min()
-    found = np.searchsorted(edges[:-1], times + slack, side="right") - 1
-    return np.maximum(np.minimum(found, edges.size - 2), 0)
+    numbers = np.searchsorted(edges[:-1], times + slack, side="right") - 1
+    return np.maximum(np.minimum(numbers, edges.size - 2), 0)

@@ -80,7 +80,7 @@ from compressor.physics.systems import (
 from compressor.physics.tally import (
     gap_fraction_between,
     lobatto,
-    near_record,
+    may_beat_peaks,
     tally_energy,
     tally_step,
 )
@@ -182,12 +182,12 @@ def new_work(n):
 
 
 @jit
-def nothing_worn(w, base, h, z, work, phase, p, tally):
+def skip_wear(w, base, h, z, work, phase, p, tally):
     """Return at once: no bore of these records wears."""
 
 
 @jit
-def wear_by_step(w, base, h, z, work, phase, p, tally):
+def add_step_wear(w, base, h, z, work, phase, p, tally):
     """Add to the tally what sliding wears off in the step just taken, by its nodes."""
     if not p.sectors or w.t < w.settle:
         return
@@ -203,7 +203,7 @@ def wear_by_step(w, base, h, z, work, phase, p, tally):
         wear_at(ideal_after(base, NODES[i] * h, p), work.y, phase, WEIGHTS[i] * h, p, tally)
 
 
-wear_step = dispatch_on_record(MECHANISM, wear_by_step, nothing_worn)
+wear_step = dispatch_on_record(MECHANISM, add_step_wear, skip_wear)
 
 
 MIDDLE = NODES.size // 2
@@ -262,7 +262,7 @@ def observe_step(w, base, h, z, work, phase, p, tally):
                 every = 1
                 extend(w.pair, h, z, work.k, work.dense)
                 w.has_dense = 1
-            elif w.t >= w.settle and near_record(work.rows, MIDDLE, tally):
+            elif w.t >= w.settle and may_beat_peaks(work.rows, MIDDLE, tally):
                 every = 1
     if every == 1 and not w.has_dense and may_touch(work.rows, p):
         extend(w.pair, h, z, work.k, work.dense)
@@ -277,18 +277,18 @@ def onset_ahead(w, h, every, work, phase, p):
     Searched only where the nodes of the step let it be. The step after the landing is kept within
     the pulse that begins, or to the contact's own time scale.
     """
-    found = False
+    must_land = False
     if w.watch and w.has_dense and may_touch(work.rows, p):
         begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
         # a step that begins on an onset finds it again at its start: to land there would never end
         if begin < 1.0 and not (w.landed and begin < LANDING_FRACTION):
-            found = True
+            must_land = True
             w.landing = begin * h
             # the error control knows nothing of a pulse that the last step did not see
             pulse = (end - begin) * h if end < 1.0 else math.inf
             w.h = min(w.h, w.contact_step, 0.5 * pulse)
     w.landed = 0
-    return found
+    return must_land
 
 
 @inline_llvm
@@ -437,8 +437,8 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
                 if w.h < shortest_step(w.t, p.omega):
                     w.status = STEP_UNDERFLOW if is_finite(work.k[0]) else NON_FINITE
                 continue
-            longer = next_step_length(w, h, error)
-            w.h = max(w.h, longer) if h < w.h else longer
+            next_h = next_step_length(w, h, error)
+            w.h = max(w.h, next_h) if h < w.h else next_h
         every = observe_step(w, base, h, z, work, phase, p, tally)
         met = landing and finish_at_event(w, h, work, phase, p, tally)
         if not landing and onset_ahead(w, h, every, work, phase, p):
@@ -466,10 +466,10 @@ def separation(t, y, other, p, rows):
     for joint in range(2):
         if p.clearance[joint] > 0.0:
             i = ECCENTRICITY + 2 * joint
-            x, y_apart = rows[1, i] - rows[0, i], rows[1, i + 1] - rows[0, i + 1]
-            apart = square_root(x * x + y_apart * y_apart) / p.clearance[joint]
-            if not apart <= worst:  # keeps a nan
-                worst = apart
+            dx, dy = rows[1, i] - rows[0, i], rows[1, i + 1] - rows[0, i + 1]
+            distance = square_root(dx * dx + dy * dy) / p.clearance[joint]
+            if not distance <= worst:  # keeps a nan
+                worst = distance
     return worst
 
 

@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import fma, jit, square_root
-from compressor.physics.contact import NO_CONTACT, ContactState, carried_by, joint_contact
+from compressor.physics.contact import NO_CONTACT, ContactState, carried_numbers, joint_contact
 from compressor.physics.contact_laws import power, rise
 from compressor.physics.film import film
 from compressor.physics.loads import piston_force
@@ -155,8 +155,8 @@ def material_work(q, other, p):
     return total
 
 
-ROUNDS, AGREED = 30, 1e-14  # of Newton's method for the approach speed
-ELASTIC = 1e-3  # chi below which damping is too weak to change the approach speed
+NEWTON_ROUNDS, NEWTON_TOLERANCE = 30, 1e-14  # of Newton's method for the approach speed
+MIN_CHI = 1e-3  # chi below which damping is too weak to change the approach speed
 
 
 class Guided(NamedTuple):
@@ -181,7 +181,7 @@ def guide_coefficient(slip, p):
 
 
 @jit
-def spent(u, chi):
+def damped_part(u, chi):
     """Return the integral of u / (1 + chi u) from 0 to u: how far damping has taken a strike."""
     return (u - math.log(1.0 + chi * u) / chi) / chi
 
@@ -195,16 +195,16 @@ def approach_speed(rate, stored, mass, chi):
     has the restitution of the joints' law, and no state holds its beginning.
     """
     speed = math.sqrt(rate * rate + 2.0 * stored / mass)
-    if chi < ELASTIC:
+    if chi < MIN_CHI:
         return speed
-    whole, least = spent(1.0, chi), max(rate, -chi * rate)  # where the strike has its end
+    total, least = damped_part(1.0, chi), max(rate, -chi * rate)  # where the strike has its end
     speed = max(speed, 2.0 * least)
-    for _ in range(ROUNDS):
+    for _ in range(NEWTON_ROUNDS):
         u = rate / speed
-        left = whole - spent(u, chi)
-        change = speed * speed * left - stored / mass
-        change /= speed * (2.0 * left + u * u / (1.0 + chi * u))
-        if abs(change) <= AGREED * speed:
+        rest = total - damped_part(u, chi)
+        change = speed * speed * rest - stored / mass
+        change /= speed * (2.0 * rest + u * u / (1.0 + chi * u))
+        if abs(change) <= NEWTON_TOLERANCE * speed:
             break
         lower = speed - change
         speed = lower if lower > least else 0.5 * (speed + least)
@@ -363,7 +363,7 @@ def pose_of(motion, w, rates, p):
 
 
 @jit
-def carry(pose, rates, p, velocity):
+def apply_jacobian(pose, rates, p, velocity):
     """Write the bodies' velocities that follow from the coordinates' rates, (11,) both.
 
     They are linear in the rates.
@@ -382,8 +382,8 @@ def carry(pose, rates, p, velocity):
 
 
 @jit
-def project(pose, force, p, pushed):
-    """Write the forces on the coordinates by those on the bodies, (11,): `carry`, transposed."""
+def apply_jacobian_transpose(pose, force, p, pushed):
+    """Write the forces on the coordinates that follow from those on the bodies, (11,) both."""
     along, reach = force[1] + force[8], pose.length * pose.cos_phi
     turning = (force[3] + pose.length * pose.sin_phi * force[8]) / reach
     across = force[2] - turning
@@ -414,11 +414,11 @@ def oiled_contact(joint, contact, eccentricity, spins, p):
     if p.viscosity == 0.0:
         return contact, NO_FILM
     fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
-    found = ContactState(
+    oiled = ContactState(
         contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
         contact.penetration, contact.rate, contact.slip, contact.elastic, contact.unclamped,
     )  # fmt: skip
-    return found, Film(journal, lost)
+    return oiled, Film(journal, lost)
 
 
 @jit
@@ -433,7 +433,7 @@ def bore_axes(slope, modes, pose, p):
 
 
 @jit
-def touching(joint, eccentricity, axes, spins, carried, p):
+def bore_contact(joint, eccentricity, axes, spins, carried, p):
     """Return a joint's `ContactState`, with a round bore or a worn one."""
     if p.sectors:
         return worn_contact(joint, eccentricity, axes, spins, carried, p)
@@ -452,20 +452,20 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
     big_film, small_film = NO_FILM, NO_FILM
     if p.clearance[0] > 0.0:
         place = p.at[1]
-        off = y[place], y[place + 1], y[n + place], y[n + place + 1]
-        kept = carried_by(BIG_END, y, p)
+        eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
+        carried = carried_numbers(BIG_END, y, p)
         spins = pose.speed, big_spin
         axes = bore_axes(BIG_SLOPE, w[7:11], pose, p)
-        big = touching(BIG_END, off, axes, spins, kept, p)
-        big, big_film = oiled_contact(BIG_END, big, off, spins, p)
+        big = bore_contact(BIG_END, eccentricity, axes, spins, carried, p)
+        big, big_film = oiled_contact(BIG_END, big, eccentricity, spins, p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
-        off = y[place], y[place + 1], y[n + place], y[n + place + 1]
-        kept = carried_by(SMALL_END, y, p)
+        eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
+        carried = carried_numbers(SMALL_END, y, p)
         spins = pin_spin, small_spin
         axes = bore_axes(SMALL_SLOPE, w[7:11], pose, p)
-        small = touching(SMALL_END, off, axes, spins, kept, p)
-        small, small_film = oiled_contact(SMALL_END, small, off, spins, p)
+        small = bore_contact(SMALL_END, eccentricity, axes, spins, carried, p)
+        small, small_film = oiled_contact(SMALL_END, small, eccentricity, spins, p)
     guide = UNGUIDED
     if p.tilting:
         rates = velocity[8], velocity[9], velocity[10]

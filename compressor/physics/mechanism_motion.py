@@ -20,17 +20,17 @@ from compressor.physics.mechanism import (
     add_forces,
     add_on_rod,
     add_rod,
-    carry,
+    apply_jacobian,
+    apply_jacobian_transpose,
     fill_bias,
     guide_coefficient,
     joints_of,
     pose_of,
-    project,
     unpack,
 )
 
 MAX_ROUNDS = 50  # in which friction and the forces that it depends on agree
-FRICTION_AGREED = 1e-14  # of the friction
+FRICTION_TOLERANCE = 1e-14  # of the friction
 
 
 class Reactions(NamedTuple):
@@ -71,15 +71,15 @@ def add_times(columns, vector, out):
 
 
 @jit
-def reduce(pose, mass, p, room, matrix):
+def reduce_mass(pose, mass, p, memory, matrix):
     """Write the mass matrix of the coordinates that move; room: zeros, (4, 11)."""
-    unit, velocity, momentum, pushed = room[0], room[1], room[2], room[3]
+    unit, velocity, momentum, pushed = memory[0], memory[1], memory[2], memory[3]
     for i in range(p.degrees):
         unit[p.coordinates[i]] = 1.0
-        carry(pose, unit, p, velocity)
+        apply_jacobian(pose, unit, p, velocity)
         momentum[:] = 0.0
         add_times(mass, velocity, momentum)
-        project(pose, momentum, p, pushed)
+        apply_jacobian_transpose(pose, momentum, p, pushed)
         for j in range(p.degrees):
             matrix[i, j] = pushed[p.coordinates[j]]
         unit[p.coordinates[i]] = 0.0
@@ -138,12 +138,12 @@ def ideal_torque(turning, fx, fy, pin, p):
 
 
 @jit
-def apart(one, other):
+def friction_differs(one, other):
     """Return whether the friction of two `Reactions` differs beyond rounding."""
     size = abs(other.big_torque) + abs(other.small_torque)
-    far = abs(one.big_torque - other.big_torque) + abs(one.small_torque - other.small_torque)
-    pushed = abs(one.rubbing - other.rubbing)
-    return far > FRICTION_AGREED * size or pushed > FRICTION_AGREED * abs(other.rubbing)
+    torque = abs(one.big_torque - other.big_torque) + abs(one.small_torque - other.small_torque)
+    force, most = abs(one.rubbing - other.rubbing), abs(other.rubbing)
+    return torque > FRICTION_TOLERANCE * size or force > FRICTION_TOLERANCE * most
 
 
 @jit
@@ -154,21 +154,21 @@ def solve(motion, y, phase, p):
     are found in rounds, of which each leaves some hundredths of the last one's error.
     """
     # one array of them all: to ask for memory takes longer than to use it
-    room = np.zeros((2 * ROWS + 13, ROWS))
-    mass, matrix, vectors = room[:ROWS], room[ROWS : 2 * ROWS], room[2 * ROWS :]
+    memory = np.zeros((2 * ROWS + 13, ROWS))
+    mass, matrix, vectors = memory[:ROWS], memory[ROWS : 2 * ROWS], memory[2 * ROWS :]
     w, rates, velocity, bias, own = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     unpack(y, p, w, rates)
     pose = pose_of(motion, w, rates, p)
-    carry(pose, rates, p, velocity)
+    apply_jacobian(pose, rates, p, velocity)
     fill_bias(pose, rates, p, bias)
     axes = pose.cos_phi, -pose.sin_phi, pose.sin_phi, pose.cos_phi
     add_rod(axes, pose.spin, w[7:11], rates[7:11], p, mass, own)
     add_bodies(p, mass)
     joints = joints_of(phase, y, motion, pose, w, velocity, p)
-    reduce(pose, mass, p, vectors[5:9], matrix)
+    reduce_mass(pose, mass, p, vectors[5:9], matrix)
     regular = factorize_positive(matrix, p.degrees)
     accelerations, body, steady, force = vectors[9], vectors[10], vectors[11], vectors[12]
-    pushed, found = vectors[5], vectors[6, : p.degrees]
+    pushed, solution = vectors[5], vectors[6, : p.degrees]
     add_times(mass, bias, steady)
     for row in range(ROWS):
         steady[row] = own[row] - steady[row]
@@ -177,18 +177,18 @@ def solve(motion, y, phase, p):
     for _ in range(MAX_ROUNDS):
         force[:] = steady
         add_rubbing(pose, reactions, p, force)
-        project(pose, force, p, pushed)
+        apply_jacobian_transpose(pose, force, p, pushed)
         for i in range(p.degrees):
-            found[i] = pushed[p.coordinates[i]]
-        substitute_positive(matrix, found)
+            solution[i] = pushed[p.coordinates[i]]
+        substitute_positive(matrix, solution)
         for i in range(p.degrees):
-            accelerations[p.coordinates[i]] = found[i] if regular else math.nan
-        carry(pose, accelerations, p, body)
+            accelerations[p.coordinates[i]] = solution[i] if regular else math.nan
+        apply_jacobian(pose, accelerations, p, body)
         for row in range(ROWS):
             body[row] += bias[row]
         last = reactions
         reactions = reactions_of(pose, joints, needed_of(mass, body, own, p), velocity, last, p)
-        if not apart(last, reactions):
+        if not friction_differs(last, reactions):
             break
     return Solved(
         motion, pose, joints, reactions, w, rates, accelerations, velocity, body, mass

@@ -48,7 +48,7 @@ from compressor.physics.observe import (
     damping_power,
     write_frame_forces,
 )
-from compressor.physics.worn_bore import at_the_wall, wear_off
+from compressor.physics.worn_bore import contact_at_wall, wear_off
 
 GUIDE_GAP, CRANK_SPEED = int(Column.GUIDE_GAP), int(Column.CRANK_SPEED)
 MOTOR_TORQUE = int(Column.MOTOR_TORQUE)
@@ -127,13 +127,13 @@ def write_powers(now, p, row):
     torque = crank_torque(now, p) + p.unbalance * p.gravity * pose.cos_theta
     row[0] = (motor_torque(pose, p) if p.driven else torque) * pose.speed
     row[1] = -now.joints.load * now.velocity[8]
-    damped = damping_power(big) + damping_power(small) + guide.damped
-    damped += now.joints.big_film.loss + now.joints.small_film.loss
-    row[2] = damped + rod_damping_power(now, p)
-    rubbed = guide.rubbed - big.friction * big.slip - small.friction * small.slip
-    rubbed += forces.big_torque * (pose.speed - now.joints.big_spin)
-    rubbed += forces.small_torque * (now.joints.pin_spin - now.joints.small_spin)
-    row[3] = rubbed - forces.rubbing * now.velocity[8]
+    damping = damping_power(big) + damping_power(small) + guide.damped
+    damping += now.joints.big_film.loss + now.joints.small_film.loss
+    row[2] = damping + rod_damping_power(now, p)
+    friction = guide.rubbed - big.friction * big.slip - small.friction * small.slip
+    friction += forces.big_torque * (pose.speed - now.joints.big_spin)
+    friction += forces.small_torque * (now.joints.pin_spin - now.joints.small_spin)
+    row[3] = friction - forces.rubbing * now.velocity[8]
 
 
 @jit
@@ -165,7 +165,7 @@ def ideal_acceleration(now, p):
 
 
 @jit
-def write_glanced(now, p, row):
+def write_contact_columns(now, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT, and the pace."""
     forces = now.reactions
     row[ACCELERATION] = now.body[8]
@@ -186,7 +186,7 @@ def write_glanced(now, p, row):
 @jit
 def write_row(now, p, row):
     """Write the columns from ACCELERATION on."""
-    write_glanced(now, p, row)
+    write_contact_columns(now, p, row)
     write_powers(now, p, row[CRANK_POWER:KINETIC])
     write_energies(now, p, row)
 
@@ -215,8 +215,8 @@ def derivative_with_flows(t, z, phase, p, out):
 
 
 @jit
-def derivative_and_gauge(motion, z, phase, p, out, row):
-    """Write what `observe.derivative_and_gauge` does, of the mechanism."""
+def derivative_and_columns(motion, z, phase, p, out, row):
+    """Write what `observe.derivative_and_columns` does, of the mechanism."""
     n = z.size - 4
     now = solve(motion, z[:n], phase, p)
     write_rates(now, z[:n], p, out[:n])
@@ -228,7 +228,7 @@ def derivative_and_gauge(motion, z, phase, p, out, row):
 @jit
 def observe_contact(motion, y, phase, p, row):
     """Write what `observe.observe_contact` does, of the mechanism."""
-    write_glanced(solve(motion, y, phase, p), p, row)
+    write_contact_columns(solve(motion, y, phase, p), p, row)
 
 
 @jit
@@ -271,12 +271,12 @@ def observe_all(times, states, phases, p, rows):
 def at_joint(joint, now, p):
     """Return a joint's `ContactState`, eccentricity with its rate, and its bore's axes and spin."""
     i = 1 + 2 * joint
-    off = now.w[i], now.w[i + 1], now.rates[i], now.rates[i + 1]
+    eccentricity = now.w[i], now.w[i + 1], now.rates[i], now.rates[i + 1]
     if joint == 0:
         axes = bore_axes(BIG_SLOPE, now.w[7:11], now.pose, p)
-        return now.joints.big, off, axes, now.joints.big_spin
+        return now.joints.big, eccentricity, axes, now.joints.big_spin
     axes = bore_axes(SMALL_SLOPE, now.w[7:11], now.pose, p)
-    return now.joints.small, off, axes, now.joints.small_spin
+    return now.joints.small, eccentricity, axes, now.joints.small_spin
 
 
 @jit
@@ -286,8 +286,8 @@ def wear_at(motion, y, phase, weight, p, tally):
     weight *= pace_of(now, p)
     for joint in range(2):
         if p.clearance[joint] > 0.0:
-            contact, off, axes, _ = at_joint(joint, now, p)
-            wear_off(joint, contact, off, axes, weight, p, tally)
+            contact, eccentricity, axes, _ = at_joint(joint, now, p)
+            wear_off(joint, contact, eccentricity, axes, weight, p, tally)
 
 
 @jit
@@ -303,8 +303,8 @@ def wear_all(times, states, phases, weights, p, tally):
 @jit
 def contact_at(joint, t, y, phase, p):
     """Return a joint's `ContactState` at a time and state; on a worn bore as it meets the wall."""
-    contact, off, axes, spin = at_joint(joint, solve(ideal(t, p), y, phase, p), p)
-    return at_the_wall(joint, contact, off, axes, spin, p) if p.sectors else contact
+    contact, eccentricity, axes, spin = at_joint(joint, solve(ideal(t, p), y, phase, p), p)
+    return contact_at_wall(joint, contact, eccentricity, axes, spin, p) if p.sectors else contact
 
 
 @jit

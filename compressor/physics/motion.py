@@ -19,7 +19,7 @@ from compressor.physics.contact import (
     NO_CONTACT,
     ContactState,
     bristle_rate,
-    carried_by,
+    carried_numbers,
     joint_contact,
 )
 from compressor.physics.contact_laws import has_chosen_laws
@@ -161,7 +161,7 @@ def contact_big_end(y, motion, turn, p):
     big = eccentricity_big_end(y, turn, p)
     spins = p.omega, -motion.rate - y[3]
     bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
-    return joint_contact(big, spins, bearing, carried_by(AT_BIG_END, y, p), p)
+    return joint_contact(big, spins, bearing, carried_numbers(AT_BIG_END, y, p), p)
 
 
 @inline_numba
@@ -170,7 +170,7 @@ def contact_small_end(y, motion, turn, p):
     small = eccentricity_small_end(y, turn, p)
     spins = 0.0, -motion.rate - y[3]
     bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
-    return joint_contact(small, spins, bearing, carried_by(AT_SMALL_END, y, p), p)
+    return joint_contact(small, spins, bearing, carried_numbers(AT_SMALL_END, y, p), p)
 
 
 @inline_numba
@@ -179,9 +179,9 @@ def contacts_both(y, motion, turn, p):
     big, small = eccentricities_both(y, turn, p)
     spin = -motion.rate - y[7]
     bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
-    at_big = joint_contact(big, (p.omega, spin), bearing, carried_by(AT_BIG_END, y, p), p)
+    at_big = joint_contact(big, (p.omega, spin), bearing, carried_numbers(AT_BIG_END, y, p), p)
     bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
-    at_small = joint_contact(small, (0.0, spin), bearing, carried_by(AT_SMALL_END, y, p), p)
+    at_small = joint_contact(small, (0.0, spin), bearing, carried_numbers(AT_SMALL_END, y, p), p)
     return at_big, at_small
 
 
@@ -237,7 +237,7 @@ def evaluate(motion, y, phase, p):
 
 
 @inline_numba
-def deviating(now, p):
+def deviation_accelerations(now, p):
     """Return the accelerations (x, X, Y, phi) at an evaluated instant less the ideal motion's.
 
     Those of the rod's centre are 0 unless it is an unknown of the scene.
@@ -270,7 +270,7 @@ def write_derivative(now, y, p, out):
     n = p.freedoms
     for i in range(n):
         out[i] = y[n + i]
-    accelerations = deviating(now, p)
+    accelerations = deviation_accelerations(now, p)
     out[n] = accelerations[0]
     if p.scene == BOTH:
         out[n + 1], out[n + 2] = accelerations[1], accelerations[2]

@@ -281,7 +281,7 @@ def observed_columns(now, y, forces, p):
 
 
 @inline_numba
-def write_glanced(now, y, forces, p, row):
+def write_contact_columns(now, y, forces, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT into the row."""
     columns = observed_columns(now, y, forces, p)
     for i in range(CRANK_POWER - ACCELERATION):
@@ -289,9 +289,9 @@ def write_glanced(now, y, forces, p, row):
 
 
 @inline_numba
-def write_gauged(now, y, forces, p, row):
+def write_columns(now, y, forces, p, row):
     """Write the columns from ACCELERATION on into the row."""
-    write_glanced(now, y, forces, p, row)
+    write_contact_columns(now, y, forces, p, row)
     write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
     row[KINETIC], row[POTENTIAL] = energies(now, y, p)
 
@@ -311,7 +311,7 @@ def observe(t, y, phase, p, row):
     row[ROD_ANGLE] = math.atan2(motion.sin_phi + turn.ds, motion.cos_phi + turn.dc)
     row[PISTON_FORCE] = now.load
     eccentricity_row(y, turn, p, row)
-    write_gauged(now, y, joint_forces(now, y, p), p, row)
+    write_columns(now, y, joint_forces(now, y, p), p, row)
     row[PACE] = 1.0
     if row.size == WIDE:
         write_scene_frame(p, row)
@@ -321,14 +321,14 @@ def observe(t, y, phase, p, row):
 def observe_contact(motion, y, phase, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT: by which a step is tallied within."""
     now = evaluate(motion, y, phase, p)
-    write_glanced(now, y, joint_forces(now, y, p), p, row)
+    write_contact_columns(now, y, joint_forces(now, y, p), p, row)
 
 
 @inline_llvm
 def observe_with_energy(motion, y, phase, p, row):
     """Write the columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     now = evaluate(motion, y, phase, p)
-    write_gauged(now, y, joint_forces(now, y, p), p, row)
+    write_columns(now, y, joint_forces(now, y, p), p, row)
 
 
 @jit
@@ -361,12 +361,12 @@ def write_flowing_derivative(motion, z, phase, p, out):
 
 
 @inline_llvm
-def derivative_and_gauge(motion, z, phase, p, out, row):
+def derivative_and_columns(motion, z, phase, p, out, row):
     """Write both `derivative_with_flows` and `observe_with_energy` from one evaluation."""
     n = z.size - 4
     y = z[:n]
     now = evaluate(motion, y, phase, p)
     write_derivative(now, y, p, out[:n])
-    write_gauged(now, y, joint_forces(now, y, p), p, row)
+    write_columns(now, y, joint_forces(now, y, p), p, row)
     for i in range(4):
         out[n + i] = row[CRANK_POWER + i]

@@ -14,9 +14,9 @@ from compressor.physics.observe import NEARNESS, PENETRATION
 from compressor.physics.runge_kutta import interpolate
 from compressor.physics.systems import contact_at, derivative
 
-SAMPLES = 12  # intervals of a step that are looked at
+INTERVALS = 12  # of a step, at whose ends the nearness is sampled
 STEP_EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
-LOOKS = SAMPLES + 2
+MAX_SAMPLE = INTERVALS + 2  # number of the last sample; the first is 0
 MAX_HALVINGS = 40
 CHANGE_TOLERANCE = 1e-5  # of a step: as well as a change of contact is placed for the metrics
 LANDING_FRACTION = 1e-3  # of a step: an onset nearer to its start is the one it started from
@@ -95,7 +95,7 @@ def locate_onset(joint, low, high, t, h, dense, phase, p, y):
 
 
 @jit
-def touching_between(joint, low, high, t, h, dense, phase, p, y):
+def locate_contact_between(joint, low, high, t, h, dense, phase, p, y):
     """Return a fraction in (low, high) at which there is contact, by golden section; NEVER if none.
 
     For a bracket around a local maximum of the nearness whose ends are both apart.
@@ -122,13 +122,13 @@ def touching_between(joint, low, high, t, h, dense, phase, p, y):
 
 
 @jit
-def look_fraction(i):
-    """Return the fraction of a step at which sample i is taken, 0 to LOOKS."""
+def sample_fraction(i):
+    """Return the fraction of a step at which sample i is taken, 0 to MAX_SAMPLE."""
     if i <= 1:
         return i * STEP_EDGE
-    if i >= LOOKS - 1:
-        return 1.0 - (LOOKS - i) * STEP_EDGE
-    return (i - 1) / SAMPLES
+    if i >= MAX_SAMPLE - 1:
+        return 1.0 - (MAX_SAMPLE - i) * STEP_EDGE
+    return (i - 1) / INTERVALS
 
 
 @jit
@@ -141,25 +141,25 @@ def joint_onset(joint, t, h, dense, phase, p, y):
     earlier = nearness_at(joint, 0.0, t, h, dense, phase, p, y)
     before = earlier
     begin = NEVER
-    for i in range(1, LOOKS + 1):
-        s = look_fraction(i)
+    for i in range(1, MAX_SAMPLE + 1):
+        s = sample_fraction(i)
         now = nearness_at(joint, s, t, h, dense, phase, p, y)
         if begin < NEVER:
             if now <= 0.0:
                 return begin, s
         elif now > 0.0:
             if before <= 0.0:
-                begin = locate_onset(joint, look_fraction(i - 1), s, t, h, dense, phase, p, y)
+                begin = locate_onset(joint, sample_fraction(i - 1), s, t, h, dense, phase, p, y)
         # a pulse shorter than the distance of two looks shows as a maximum between them
         elif i > 1 and before >= earlier and before >= now and before <= 0.0:
-            low, middle = look_fraction(i - 2), look_fraction(i - 1)
+            low, middle = sample_fraction(i - 2), sample_fraction(i - 1)
             # where the nearness is concave, its top lies below the two chords prolonged
             rise = (before - earlier) * (s - middle) / (middle - low)
             fall = (before - now) * (middle - low) / (s - middle)
             if before + rise + fall > 0.0:
-                inside = touching_between(joint, low, s, t, h, dense, phase, p, y)
-                if inside < NEVER:
-                    return locate_onset(joint, low, inside, t, h, dense, phase, p, y), s
+                touching = locate_contact_between(joint, low, s, t, h, dense, phase, p, y)
+                if touching < NEVER:
+                    return locate_onset(joint, low, touching, t, h, dense, phase, p, y), s
         earlier, before = before, now
     if begin < NEVER:
         return begin, 1.0
@@ -172,9 +172,9 @@ def first_onset(t, h, dense, phase, p, y):
     begin, end = NEVER, NEVER
     for joint in range(2):
         if p.clearance[joint] > 0.0:
-            found, until = joint_onset(joint, t, h, dense, phase, p, y)
-            if found < begin:
-                begin, end = found, until
+            first, last = joint_onset(joint, t, h, dense, phase, p, y)
+            if first < begin:
+                begin, end = first, last
     return begin, end
 
 
@@ -229,8 +229,8 @@ def store_approach_velocity(w, t, work, phase, p, tally):
     n = work.y.size
     for joint in range(2):
         begin, middle = work.rows[0], work.rows[work.rows.shape[0] // 2]
-        apart = min(begin[PENETRATION + joint], middle[PENETRATION + joint])
-        flown = tally.flown[joint] > 0 or apart < 0.0
+        least_depth = min(begin[PENETRATION + joint], middle[PENETRATION + joint])
+        flown = tally.flown[joint] > 0 or least_depth < 0.0
         if p.clearance[joint] > 0.0 and flown and not tally.touching[joint]:
             depth, speed = approach_at(joint, t, work.new[:n], phase, p, work.y, work.column[:n])
             if depth + LANDING_FRACTION * w.h * speed > 0.0:

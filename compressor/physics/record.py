@@ -213,31 +213,31 @@ def is_featured(p: np.record) -> bool:
     return bool(p["laws"].size == MECHANISM)
 
 
-def present(p: np.record) -> list[Coordinate]:
+def find_coordinates(p: np.record) -> list[Coordinate]:
     """Return the coordinates, but the crank's, of a mechanism's features and clearances."""
-    found = []
+    coordinates = []
     if p["clearance"][BIG_END] > 0.0:
-        found += [Coordinate.BIG_X, Coordinate.BIG_Y]
+        coordinates += [Coordinate.BIG_X, Coordinate.BIG_Y]
     if p["clearance"][SMALL_END] > 0.0:
-        found += [Coordinate.SMALL_X, Coordinate.SMALL_Y]
+        coordinates += [Coordinate.SMALL_X, Coordinate.SMALL_Y]
     if p["tilting"]:
-        found += [Coordinate.GUIDE, Coordinate.TILT]
+        coordinates += [Coordinate.GUIDE, Coordinate.TILT]
     if p["elastic"]:
-        found += [Coordinate.BEND_1, Coordinate.BEND_2, Coordinate.STRETCH_MIDDLE]
-        found += [Coordinate.STRETCH]
-    return found
+        coordinates += [Coordinate.BEND_1, Coordinate.BEND_2, Coordinate.STRETCH_MIDDLE]
+        coordinates += [Coordinate.STRETCH]
+    return coordinates
 
 
 def place_coordinates(p: np.record) -> None:
     """Give each coordinate of a mechanism its place in a state; the crank's is its speed's."""
-    found = present(p)
-    at = [found.index(one) if one in found else -1 for one in Coordinate]
+    positions = find_coordinates(p)
+    at = [positions.index(c) if c in positions else -1 for c in Coordinate]
     if p["driven"]:
-        at[Coordinate.CRANK] = 2 * len(found) + len(CARRIED) + 1
-    p["at"], p["freedoms"] = at, len(found)
-    behind = 2 * len(found) + len(CARRIED) + (len(CRANK) if p["driven"] else 0)
+        at[Coordinate.CRANK] = 2 * len(positions) + len(CARRIED) + 1
+    p["at"], p["freedoms"] = at, len(positions)
+    behind = 2 * len(positions) + len(CARRIED) + (len(CRANK) if p["driven"] else 0)
     p["rod_loss"] = behind if p["elastic"] else -1
-    moving = [one for one in Coordinate if at[one] >= 0]
+    moving = [c for c in Coordinate if at[c] >= 0]
     p["degrees"], p["coordinates"] = len(moving), moving + [-1] * (len(at) - len(moving))
 
 
@@ -251,12 +251,12 @@ def state_names(p: np.record) -> tuple[str, ...]:
     if not is_featured(p):
         names = STATE_NAMES[Scene(int(p["scene"]))]
         return names + CARRIED if names and p["laws"].size > 1 else names
-    found = present(p)
-    coordinates = [COORDINATE_NAMES[one] for one in found]
+    positions = find_coordinates(p)
+    coordinates = [COORDINATE_NAMES[c] for c in positions]
     names = tuple(f"{name}, {unit}" for name, unit in coordinates)
     names += tuple(f"rate of {name}, {unit}/s" for name, unit in coordinates) + CARRIED
     names += (CRANK if p["driven"] else ()) + (ROD_LOSS if p["elastic"] else ())
-    return names + ("unused",) * (-len(names) % 4) if found or p["driven"] else ()
+    return names + ("unused",) * (-len(names) % 4) if positions or p["driven"] else ()
 
 
 def derive(p: np.record) -> None:

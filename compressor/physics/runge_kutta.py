@@ -12,7 +12,7 @@ import numpy as np
 
 from compressor.physics._jit import fma, inline_llvm, square_root
 from compressor.physics.kinematics import ideal_after
-from compressor.physics.systems import derivative_and_gauge, write_flowing_derivative
+from compressor.physics.systems import derivative_and_columns, write_flowing_derivative
 
 STAGES = 7
 FLOWS = 4
@@ -128,7 +128,7 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
         if stage < STAGES - 1:
             write_flowing_derivative(motion, new, phase, p, k[stage])
         else:
-            derivative_and_gauge(motion, new, phase, p, k[stage], row)
+            derivative_and_columns(motion, new, phase, p, k[stage], row)
 
 
 @inline_llvm

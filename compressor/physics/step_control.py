@@ -21,7 +21,7 @@ PROPORTIONAL, INTEGRAL = 0.7, 0.4  # of PI control, over the order (Hairer & Wan
 MIN_ERROR = math.log(1e-4)  # that the control remembers
 LAST_STRETCH = 1.01  # steps: a segment that is shorter is taken as one step
 MIN_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
-UNFINISHED = 0.1  # of a step without a finite error: the next attempt's length
+NON_FINITE_SHRINK = 0.1  # of a step without a finite error: the next attempt's length
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 # stiffness: an explicit step is held by stability where h |lambda| exceeds the limit
 STABILITY_LIMIT = 3.25  # of both pairs on the negative real axis, about
@@ -84,8 +84,8 @@ def first_step(w, z, work, atol, phase, p, end):
         change += ((trial[i] - rates[i]) / scale) ** 2
     change = square_root(change / n) / guess
     steepest = max(rate, change)
-    bold = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** 0.2
-    return min(100.0 * guess, bold, end - w.t)
+    by_slope = max(1e-6, guess * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** 0.2
+    return min(100.0 * guess, by_slope, end - w.t)
 
 
 @inline_llvm
@@ -143,7 +143,7 @@ def refuse(w, h, error):
     """Shorten the step after a refused attempt."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
     w.rejected += 1
-    w.h = h * (shrinkage(log_error(error), order) if error < math.inf else UNFINISHED)
+    w.h = h * (shrinkage(log_error(error), order) if error < math.inf else NON_FINITE_SHRINK)
 
 
 @jit

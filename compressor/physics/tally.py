@@ -187,7 +187,7 @@ def may_beat(top, known):
 
 
 @inline_llvm
-def near_record(rows, middle, tally):
+def may_beat_peaks(rows, middle, tally):
     """Return whether a peak may be beaten within a step, by its first, middle and last row."""
     last = rows.shape[0] - 1
     for k in range(PEAKED):
@@ -335,14 +335,14 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, measured, tally,
 
     span is that of a steady crank; what is tallied are shares and means of the time that passes.
     """
-    passing = span * pace_of_step(weights, rows, every, p)
+    seconds = span * pace_of_step(weights, rows, every, p)
     if p.clearance[0] > 0.0:
-        tally_contact(0, passing, nodes, rows, every, gap_fraction, measured, tally)
+        tally_contact(0, seconds, nodes, rows, every, gap_fraction, measured, tally)
     if p.clearance[1] > 0.0:
-        tally_contact(1, passing, nodes, rows, every, gap_fraction, measured, tally)
+        tally_contact(1, seconds, nodes, rows, every, gap_fraction, measured, tally)
     if not measured:
         return
-    add_time(span, passing, tally, p)
+    add_time(span, seconds, tally, p)
     for k in range(PEAKED):
         tally.top[k] = 0.0
     for i in range(0, nodes.size, every):

@@ -25,8 +25,8 @@ SERIES = np.array(
     [1.0, -13 / 28, 73 / 224, -7565 / 29568, 186335 / 878592, -212835 / 1171456,
      2305295 / 14483456, -12001985 / 84672512]
 )  # fmt: skip
-SMALL = 0.03  # x up to which the series is exact, and from which on the closed form is
-ROUNDS, AGREED = 20, 1e-15  # of Newton's method, which has 3 to 5
+MAX_SERIES_DEPTH = 0.03  # x up to which the series is exact, and from which on the closed form is
+NEWTON_ROUNDS, NEWTON_TOLERANCE = 20, 1e-15  # of Newton's method, which has 3 to 5
 
 
 def bore_fields(sectors: int) -> dict:
@@ -43,10 +43,10 @@ def bore_fields(sectors: int) -> dict:
 
 
 @jit
-def unworn(depth, clearance):
+def unworn_energy(depth, clearance):
     """Return S (m^2) of an unworn bore at a penetration (m), and its derivative (m)."""
     x = depth / clearance
-    if x < SMALL:
+    if x < MAX_SERIES_DEPTH:
         total, slope = 0.0, 0.0
         for k in range(SERIES.size - 1, -1, -1):
             total = total * x + SERIES[k]
@@ -65,26 +65,26 @@ def depth_of(energy, clearance):
     """Return the penetration (m) of an unworn bore whose S is `energy` (m^2), and dS by it (m)."""
     depth = clearance * (energy / (FULL * clearance * clearance)) ** 0.4
     slope = 0.0
-    for _ in range(ROUNDS):
-        reached, slope = unworn(depth, clearance)
+    for _ in range(NEWTON_ROUNDS):
+        reached, slope = unworn_energy(depth, clearance)
         change = (energy - reached) / slope
         depth += change
-        if abs(change) <= AGREED * depth:
+        if abs(change) <= NEWTON_TOLERANCE * depth:
             break
     return depth, slope
 
 
 @jit
-def overlaps(ex, ey, joint, p, overlap):
+def write_overlaps(ex, ey, joint, p, overlap):
     """Write the overlap (m) at each node, and return the greatest.
 
     ex, ey: eccentricity in the frame of the rod's bore (m).
     """
     most = -math.inf
     for i in range(p.sectors):
-        found = p.towards[i, 0] * ex + p.towards[i, 1] * ey - p.clearance[joint] - p.worn[joint, i]
-        overlap[i] = found
-        most = max(most, found)
+        depth = p.towards[i, 0] * ex + p.towards[i, 1] * ey - p.clearance[joint] - p.worn[joint, i]
+        overlap[i] = depth
+        most = max(most, depth)
     return most
 
 
@@ -134,7 +134,7 @@ def penetration_of(ex, ey, joint, p):
     The penetration is negative in a gap.
     """
     overlap = np.empty(p.sectors)
-    most = overlaps(ex, ey, joint, p, overlap)
+    most = write_overlaps(ex, ey, joint, p, overlap)
     if most <= 0.0:
         gx, gy = nearest_wall(overlap, most, p)
         return most, gx, gy
@@ -144,7 +144,7 @@ def penetration_of(ex, ey, joint, p):
 
 
 @jit
-def seen_by_rod(eccentricity, axes, rod_spin):
+def in_rod_frame(eccentricity, axes, rod_spin):
     """Return the eccentricity (m) and its rate (m/s) in the frame of the rod's bore.
 
     x, y, and their rates.
@@ -156,15 +156,15 @@ def seen_by_rod(eccentricity, axes, rod_spin):
 
 
 @jit
-def at_the_wall(joint, contact, eccentricity, axes, rod_spin, p):
+def contact_at_wall(joint, contact, eccentricity, axes, rod_spin, p):
     """Return a contact with the nearest wall's overlap (m) for penetration, and its rate.
 
     Both meet a wall at the speed at which its overlap begins. The penetration's own rate has a jump
     there: how fast an arc of contact grows depends on how it is curved.
     """
-    ex, ey, vx, vy = seen_by_rod(eccentricity, axes, rod_spin)
+    ex, ey, vx, vy = in_rod_frame(eccentricity, axes, rod_spin)
     overlap = np.empty(p.sectors)
-    most = overlaps(ex, ey, joint, p, overlap)
+    most = write_overlaps(ex, ey, joint, p, overlap)
     x, y = nearest_wall(overlap, most, p)
     return ContactState(
         contact.fx, contact.fy, contact.moment, contact.normal, contact.friction, most,
@@ -178,10 +178,10 @@ def worn_contact(joint, eccentricity, axes, spins, carried, p):
 
     eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); axes: cosine
     and sine of the bore's angle, counter-clockwise; spins of journal and rod (rad/s); carried: as
-    by `contact.carried_by`.
+    by `contact.carried_numbers`.
     """
     journal_spin, rod_spin = spins
-    ex, ey, vx, vy = seen_by_rod(eccentricity, axes, rod_spin)
+    ex, ey, vx, vy = in_rod_frame(eccentricity, axes, rod_spin)
     penetration, gx, gy = penetration_of(ex, ey, joint, p)
     size = square_root(gx * gx + gy * gy)
     nx, ny = gx / size, gy / size
@@ -211,9 +211,9 @@ def wear_off(joint, contact, eccentricity, axes, weight, p, tally):
 
     By node, as the foundation presses; eccentricity, axes: as for `worn_contact`.
     """
-    ex, ey, _, _ = seen_by_rod(eccentricity, axes, 0.0)
+    ex, ey, _, _ = in_rod_frame(eccentricity, axes, 0.0)
     overlap = np.empty(p.sectors)
-    if overlaps(ex, ey, joint, p, overlap) <= 0.0 or not in_contact(contact.normal):
+    if write_overlaps(ex, ey, joint, p, overlap) <= 0.0 or not in_contact(contact.normal):
         return
     pressing = contact.fx**2 + contact.fy**2 - contact.friction**2
     work = weight * square_root(max(pressing, 0.0)) * abs(contact.slip)

@@ -6,7 +6,7 @@ Runge-Kutta methods hang on inf.
 Where journal and bore meet in a step of SciPy's: laws with a restitution need its speed there.
 SciPy's methods end no step where contact begins. A step in which a gap closes is forgotten and
 taken again up to that moment, by a fresh solver; from there on the joint carries the speed at which
-it met, as after a landing of the compiled march (`physics.onset.remember`).
+it met, as after a landing of the compiled march (`physics.onset.store_approach_velocity`).
 """
 
 import math

@@ -22,9 +22,9 @@ from compressor.physics.observe import COLUMNS, WIDE, Column
 from compressor.physics.observe import observe as scene_observe
 from compressor.physics.record import (
     Coordinate,
+    find_coordinates,
     new_record,
     place_coordinates,
-    present,
     state_names,
 )
 from compressor.solve.si_record import record
@@ -65,7 +65,7 @@ def featured(joint="none", features=(), values=None, **numbers):
 def state_of(p, w, rates):
     """The state of coordinates and their rates, (11,) each; the crank's speed is a rate."""
     y, n = np.zeros(len(state_names(p))), int(p["freedoms"])
-    for place, coordinate in enumerate(present(p)):
+    for place, coordinate in enumerate(find_coordinates(p)):
         y[place], y[n + place] = w[coordinate], rates[coordinate]
     if p["driven"]:
         y[p["at"][Coordinate.CRANK]] = rates[0] / p["omega"] - 1.0
@@ -76,7 +76,7 @@ def state_of(p, w, rates):
 def random_motion(p, rng):
     """Coordinates and rates that a mechanism may have, zeros of what it does not."""
     w, rates = np.zeros(11), np.zeros(11)
-    here = present(p)
+    here = find_coordinates(p)
     w[here] = rng.normal(size=len(here)) * SIZES[here]
     rates[here] = rng.normal(size=len(here)) * RATES[here]
     w[0] = rng.uniform(0.0, 2.0 * math.pi)

@@ -8,7 +8,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics.kinematics import (
-    SMALL,
+    MAX_SERIES_ANGLE,
     angle_at,
     exact_motion,
     ideal,
@@ -56,9 +56,9 @@ def test_compiled_equals_array_form():
 
 
 def test_sine_and_cosine_of_a_small_angle_are_exact():
-    """To the last digit on both sides of the change from series to library, at SMALL."""
+    """To the last digit on both sides of the change from series to library, at MAX_SERIES_ANGLE."""
     p = record(Case())
-    near = np.linspace(-1.05 * SMALL, 1.05 * SMALL, 401)
+    near = np.linspace(-1.05 * MAX_SERIES_ANGLE, 1.05 * MAX_SERIES_ANGLE, 401)
     for angle in np.concatenate((near, [1e-9, -2.0, 0.7])):
         with mpmath.workdps(30):
             exact = [float(f(mpmath.mpf(float(angle)))) for f in (mpmath.sin, mpmath.cos)]
@@ -67,9 +67,9 @@ def test_sine_and_cosine_of_a_small_angle_are_exact():
 
 
 def test_the_series_of_a_small_angle_lacks_no_term():
-    """Just below SMALL, where a last term would be missed most: by more than its last digit."""
+    """Just below MAX_SERIES_ANGLE a lost term is missed most: by more than its last digit."""
     p, biases = record(Case()), np.zeros(2)
-    angles = np.linspace(0.99 * SMALL, 0.999 * SMALL, 200)
+    angles = np.linspace(0.99 * MAX_SERIES_ANGLE, 0.999 * MAX_SERIES_ANGLE, 200)
     with mpmath.workdps(30):
         for angle in angles:
             exact = mpmath.sin(mpmath.mpf(float(angle))), mpmath.cos(mpmath.mpf(float(angle)))

@@ -32,17 +32,17 @@ from compressor.physics.observe import (
 )
 from compressor.physics.onset import (
     CHANGE_TOLERANCE,
-    LOOKS,
+    INTERVALS,
+    MAX_SAMPLE,
     NEVER,
-    SAMPLES,
     STEP_EDGE,
     first_onset,
     joint_onset,
     locate_change,
+    locate_contact_between,
     locate_onset,
-    look_fraction,
     nearness_at,
-    touching_between,
+    sample_fraction,
 )
 from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, RungeKuttaPair, interpolate, take_step
@@ -167,7 +167,7 @@ def test_the_share_of_a_step_without_contact_ends_where_contact_does(coefficient
 @pytest.mark.parametrize("height", [PULSE, 1e-14, -1e-14, -PULSE])
 def test_a_maximum_is_searched_for_contact(height):
     dense = small_end_only(hump(0.37, height, WIDTH))
-    found = touching_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, parameters(), np.zeros(4))
+    found = locate_contact_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, parameters(), np.zeros(4))
     if height > 0:
         assert found == pytest.approx(0.37, abs=WIDTH)
     else:
@@ -179,12 +179,12 @@ def test_a_journal_that_rests_at_the_edge_does_not_touch():
     dense, p, y = small_end_only([CLEARANCE]), parameters(), np.zeros(4)
     assert nearness_at(SMALL_END, 0.5, 0.0, H, dense, 0, p, y) == 0.0
     assert joint_onset(SMALL_END, 0.0, H, dense, 0, p, y) == (NEVER, NEVER)
-    assert touching_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, p, y) == NEVER
+    assert locate_contact_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, p, y) == NEVER
 
 
 def test_looks_stand_evenly_and_beside_both_ends():
-    looks = [look_fraction(i) for i in range(LOOKS + 1)]
-    inner = [i / SAMPLES for i in range(1, SAMPLES)]
+    looks = [sample_fraction(i) for i in range(MAX_SAMPLE + 1)]
+    inner = [i / INTERVALS for i in range(1, INTERVALS)]
     assert looks == pytest.approx([0.0, STEP_EDGE, *inner, 1.0 - STEP_EDGE, 1.0], abs=1e-15)
 
 

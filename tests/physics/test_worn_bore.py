@@ -14,7 +14,13 @@ from compressor.cases.optional_groups import Drive
 from compressor.physics import FLOWS, derivative_with_flows, state_names
 from compressor.physics.mechanism_rows import contact_at
 from compressor.physics.record import BIG_END
-from compressor.physics.worn_bore import depth_of, overlaps, penetration_of, unworn, worn_contact
+from compressor.physics.worn_bore import (
+    depth_of,
+    penetration_of,
+    unworn_energy,
+    worn_contact,
+    write_overlaps,
+)
 from compressor.solve.attempts import integrate, request, times_of
 from compressor.solve.error_bars import energy_residual
 from compressor.solve.run_metrics import metrics
@@ -37,12 +43,12 @@ def test_the_foundation_of_a_round_bore(x):
     """S is the integral of the overlap squared, and its inverse gives the penetration back."""
     end = math.acos(1.0 / (1.0 + x))
     area, _ = quad(lambda b: ((1 + x) * math.cos(b) - 1) ** 2, 0, end, epsabs=0, epsrel=1e-10)
-    energy, slope = unworn(x * C, C)
+    energy, slope = unworn_energy(x * C, C)
     assert energy == pytest.approx(2 * area * C**2, rel=1e-7)
     depth, again = depth_of(energy, C)
     assert depth == pytest.approx(x * C, rel=1e-12)
     assert again == pytest.approx(slope, rel=1e-12)
-    more, less = (unworn(x * C * (1 + shift), C)[0] for shift in (1e-5, -1e-5))
+    more, less = (unworn_energy(x * C * (1 + shift), C)[0] for shift in (1e-5, -1e-5))
     assert (more - less) / (2e-5 * x * C) == pytest.approx(slope, rel=1e-8)
 
 
@@ -65,7 +71,9 @@ def test_a_gap_is_told_in_the_direction_of_the_nearest_wall():
     _, p = made(lobes)
     gap, gx, gy = penetration_of(1e-4 * math.cos(2.0), 1e-4 * math.sin(2.0), BIG_END, p)
     every = np.empty(72)
-    assert overlaps(1e-4 * math.cos(2.0), 1e-4 * math.sin(2.0), BIG_END, p, every) == gap < 0.0
+    assert (
+        write_overlaps(1e-4 * math.cos(2.0), 1e-4 * math.sin(2.0), BIG_END, p, every) == gap < 0.0
+    )
     assert math.hypot(gx, gy) == pytest.approx(1.0, abs=1e-3)
     toward = math.atan2(gy, gx)
     assert toward == pytest.approx(2 * math.pi / 72 * every.argmax(), abs=math.pi / 72)

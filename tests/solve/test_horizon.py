@@ -217,6 +217,6 @@ def test_show_and_report_tell_of_chaos(tmp_path, capsys, monkeypatch):
 def test_twins_go_by_the_march_that_is_compiled_already():
     """numba made a second one for a plain 1 among its arguments, in half a minute."""
     assert predictability_horizon(case(REGULAR, duration_rev=0.02, settle_rev=0)) == math.inf
-    index = march.made._cache._cache_file._load_index()
+    index = march.target._cache._cache_file._load_index()
     assert index
     assert not [types for (types, *_) in index if "Literal" in str(types)]

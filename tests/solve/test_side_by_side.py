@@ -145,7 +145,7 @@ from compressor.physics import lane_steps
 weights = (0.1,) * 7
 for function in (lane_steps.stage_rates, lane_steps.observe_node):
     function((0, 0, 0), lane_steps.new_lanes(), lane_steps.LANES, 0.5, weights, 1)
-    print(*function.made.inspect_asm().values())
+    print(*function.target.inspect_asm().values())
 """
 
 
