@@ -37,8 +37,8 @@ from compressor.solve.error_bars import (
     bars,
     energy_residual,
     is_amplified,
-    longest,
-    rung_below,
+    longest_bars,
+    next_audit_rtol,
     series_errors,
 )
 from compressor.solve.march_driver import COMPILED, march_through
@@ -55,7 +55,7 @@ from compressor.solve.series import (
 from compressor.solve.si_record import initial_state, is_ideal, length_and_speed, record
 
 NODES, WEIGHTS = lobatto(9)
-PIECES_A_LOOK = 256  # of the quadrature between two looks at the clock
+PIECES_PER_CHECK = 256  # of the quadrature between two looks at the clock
 
 
 def closed_form(
@@ -71,16 +71,16 @@ def closed_form(
     result = Trajectory(
         times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally(p)
     )
-    began = time.perf_counter()
+    start = time.perf_counter()
     grid = fine_grid(edges, pieces, 2.0 * math.pi / p.omega)
     cuts = np.unique(np.concatenate((edges, [settle], grid)))
     owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
     states = np.zeros((NODES.size, 4))
     rows = np.empty((NODES.size, COLUMNS))
-    flows, apart = np.zeros(FLOWS), np.zeros(2)
+    flows, gaps = np.zeros(FLOWS), np.zeros(2)
     for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
         phase = phases[owner[number]]
-        if number % PIECES_A_LOOK == 0 and time.monotonic() > deadline:
+        if number % PIECES_PER_CHECK == 0 and time.monotonic() > deadline:
             result.reason = Reason.BUDGET_SECONDS
             result.detail, result.stop_time = overdue(timeout), float(begin)
             result.states[times >= begin] = math.nan
@@ -90,8 +90,8 @@ def closed_form(
         tally_energy(rows[0], flows, result.tally)
         add_flows(rows, WEIGHTS, end - begin, flows)
         tally_energy(rows[-1], flows, result.tally)
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, begin >= settle, result.tally, p)
-    result.seconds = time.perf_counter() - began
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gaps, begin >= settle, result.tally, p)
+    result.seconds = time.perf_counter() - start
     return result
 
 
@@ -145,7 +145,7 @@ PIECES = 32  # of the ideal scene's quadrature
 FINER_POWER = 0.3  # power of the tolerance by which they become more
 TIGHTER_FACTOR = 2.5  # times: the run that errors are estimated by
 OVERRUN_RTOL = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
-BLUNT = 0.02  # the same, of the journals' speed, over the speed at which friction turns about
+MAX_SPEED_ERROR = 0.02  # the same, of the journals' speed, over friction's stiction velocity
 STIFF_TIGHTER = 10.0  # the same at loose tolerances
 LOOSER_FACTOR = 3.0  # times: the run that is asked as well where a motion enlarges errors
 
@@ -211,15 +211,15 @@ def run_at_tolerance(
         return solution_of_trajectory(
             rtol, p, times, closed_form(p, times.all, case.settle, pieces, timeout)
         )
-    asked = request(case, rtol, p, times, state)
-    asked.timeout, asked.cuts = timeout, cuts
-    trajectory = integrate(asked)
+    request = build_request(case, rtol, p, times, state)
+    request.timeout, request.cuts = timeout, cuts
+    trajectory = integrate(request)
     turns = cuts.turns if cuts else []
     if turns:
         trajectory.tally = merge_turns([*turns, trajectory.tally])
-    made = solution_of_trajectory(rtol, p, times, trajectory)
-    made.turns = turns
-    return made
+    solution = solution_of_trajectory(rtol, p, times, trajectory)
+    solution.turns = turns
+    return solution
 
 
 def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, float]]) -> Solution:
@@ -236,7 +236,7 @@ def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, fl
         if run.reason or residual <= most:
             return run
         failures += 1
-        below = rung_below(rung, failures)
+        below = next_audit_rtol(rung, failures)
         if below is None:
             break
         rung = below
@@ -261,24 +261,24 @@ def times_of(case: Case, sampled: bool) -> Times:
     output = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else output[:0]
     metered = sampled_times(case)
-    every = output
-    for more in (compared, metered):
-        if more.size:
-            every = np.union1d(every, more)
-    return Times(case.settle, output, compared, metered, every)
+    union = output
+    for times in (compared, metered):
+        if times.size:
+            union = np.union1d(union, times)
+    return Times(case.settle, output, compared, metered, union)
 
 
-def request(
+def build_request(
     case: Case, rtol: float, p: np.record, times: Times, state: np.ndarray | None = None
 ) -> Request:
     """Return the request that `run_at_tolerance` integrates, without a limit in wall time."""
-    how = case.solve
+    settings = case.solve
     if state is None:
         y = initial_state(case, p)
     else:
         y = np.zeros(len(state_names(p)))
         y[:] = state
-    return Request(p, y, times.all, times.settle, rtol, how.method, how.max_steps)
+    return Request(p, y, times.all, times.settle, rtol, settings.method, settings.max_steps)
 
 
 def solution_of_trajectory(
@@ -287,13 +287,13 @@ def solution_of_trajectory(
     """Return the `Solution` of an attempt's trajectory: metrics and samples, without errors."""
     rows = np.empty((0, WIDE))
     if times.sampled.size:
-        stay = np.union1d(times.output, times.compared)
-        rows = take_samples(p, trajectory, times.sampled, stay, WIDE)
-    taken = take_samples(p, trajectory, times.compared, times.output)
+        remaining = np.union1d(times.output, times.compared)
+        rows = take_samples(p, trajectory, times.sampled, remaining, WIDE)
+    samples = take_samples(p, trajectory, times.compared, times.output)
     reason, detail = trajectory.reason, trajectory.detail
-    found = {} if reason else metrics(p, trajectory.tally) | sampled_metrics(rows)
+    numbers = {} if reason else metrics(p, trajectory.tally) | sampled_metrics(rows)
     return Solution(
-        p, trajectory, rtol, times.settle, found, taken, reason, detail, rows=rows
+        p, trajectory, rtol, times.settle, numbers, samples, reason, detail, rows=rows
     )  # fmt: skip
 
 
@@ -311,7 +311,7 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
     if rtol > OVERRUN_RTOL:
         return True
     rubs = bool(p["friction"]) and bool(p["clearance"].any())
-    return rubs and rtol * length_and_speed(p)[1] > BLUNT * p["stiction_velocity"]
+    return rubs and rtol * length_and_speed(p)[1] > MAX_SPEED_ERROR * p["stiction_velocity"]
 
 
 def comparison_run(
@@ -340,8 +340,8 @@ def looser_comparison_run(
     """
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
-    found = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, False)
-    return None if found.reason else found
+    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, False)
+    return None if looser.reason else looser
 
 
 def estimate_errors(solution: Solution, *others: Solution) -> None:
@@ -350,12 +350,12 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
     The longest by any of them; inf without one that reached its end.
     """
     residual = energy_residual(solution.trajectory.tally)
-    known = [compare_with_run(solution, one) for one in others if not one.reason]
-    by: list[Companion | None] = [*known] or [None]
-    solution.bars = longest(
-        [bars(solution.metrics, one, residual) | sampled_bars(solution.rows, one) for one in by]
+    companions = [compare_with_run(solution, one) for one in others if not one.reason]
+    runs: list[Companion | None] = [*companions] or [None]
+    solution.bars = longest_bars(
+        [bars(solution.metrics, one, residual) | sampled_bars(solution.rows, one) for one in runs]
     )
-    solution.series_errors = longest([series_errors(one) for one in by])
+    solution.series_errors = longest_bars([series_errors(one) for one in runs])
 
 
 def compare_with_run(solution: Solution, other: Solution) -> Companion:

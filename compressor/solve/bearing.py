@@ -108,7 +108,7 @@ def _number(shape: str, eps: float, ratio: float) -> float:
     if shape == "squeeze":
         way = 1 if eps >= 0.0 else -1
         return way * reynolds(abs(eps), ratio, way).normal
-    found = reynolds(eps, ratio)
+    numbers = reynolds(eps, ratio)
     if shape == "rotation":
-        return float(np.hypot(found.normal, found.across))
-    return float(np.arctan2(found.across, found.normal))
+        return float(np.hypot(numbers.normal, numbers.across))
+    return float(np.arctan2(numbers.across, numbers.normal))

@@ -209,14 +209,14 @@ class Slip(NamedTuple):
 
 def slips(cases: Sequence[Case]) -> list[Slip]:
     """Return the keys of a study's cases of which all values look like another unit's."""
-    found = []
+    look_alikes = []
     for key, usual in USUAL.items():
         read = [values for case in cases if (values := values_of(case, key))]
         values = sorted({value for several in read for value in several})
         unit = other_unit(key, usual, values)
         if unit:
-            found.append(Slip(key, describe_slip(key, usual, values, unit), len(read)))
-    return found
+            look_alikes.append(Slip(key, describe_slip(key, usual, values, unit), len(read)))
+    return look_alikes
 
 
 def values_of(case: Case, key: str) -> list[float]:
@@ -432,13 +432,13 @@ def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:
         numbers = sorted(random.Random(0).sample(numbers, most))
     cases = [study.cases[number] for number in numbers]
     units = {one.key: Caution(one.key, one.message, one.jobs, len(cases)) for one in slips(cases)}
-    found: dict[tuple[str, str], list[str]] = {}
+    messages: dict[tuple[str, str], list[str]] = {}
     for case in cases:
-        once = {(one.key, one.kind): one.message for one in remarks(case)}
-        for what, message in once.items():
-            found.setdefault(what, []).append(message)
+        reasons = {(one.key, one.kind): one.message for one in remarks(case)}
+        for oddity, message in reasons.items():
+            messages.setdefault(oddity, []).append(message)
     others = []
-    for (key, kind), texts in sorted(found.items(), key=lambda item: -len(item[1])):
+    for (key, kind), texts in sorted(messages.items(), key=lambda item: -len(item[1])):
         if key not in units:
             others.append(Caution(key, texts[0], len(texts), len(cases)))
         elif kind == "judged":

@@ -24,10 +24,10 @@ import numpy as np
 from compressor.cases import TIGHTEST
 from compressor.metrics import NUMBERS, SERIES
 
-PER_TURN = 10.0  # of rtol: the residual that a revolution may leave
+RESIDUAL_PER_REV = 10.0  # of rtol: the residual that a revolution may leave
 ROUNDING = 1e-9  # a residual below it says nothing of a run
 MAX_RESIDUAL = 0.05  # a residual above it is too large at any tolerance
-RUNGS = 2  # by tens of the tolerance, for a run that fails its audit to be repeated at
+MAX_AUDIT_REPEATS = 2  # by tens of the tolerance, for a run that fails its audit to be repeated at
 
 
 def energy_residual(tally: np.record) -> float:
@@ -47,7 +47,7 @@ def allowed_residual(rtol: float, revolutions: float) -> float:
     stiction and mass ratio, mostly keep it at a tenth of the tolerance; those that never do are
     far off (mu 0.5 at rtol 2e-8: 1.6e-4 of the acceleration).
     """
-    return min(max(PER_TURN * rtol * max(revolutions, 1.0), ROUNDING), MAX_RESIDUAL)
+    return min(max(RESIDUAL_PER_REV * rtol * max(revolutions, 1.0), ROUNDING), MAX_RESIDUAL)
 
 
 Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
@@ -60,12 +60,12 @@ ORDER = 0.8  # power of the tolerance with which errors fall
 AMPLIFIED_FACTOR = 50.0
 
 
-def rung_below(rtol: float, failures: int) -> float | None:
+def next_audit_rtol(rtol: float, failures: int) -> float | None:
     """Return the tolerance at which a run is tried again whose energy does not balance.
 
     failures: runs of the case that did not, this one included. None where no more are tried.
     """
-    return None if failures > RUNGS or rtol < 9.9 * TIGHTEST else rtol / 10.0
+    return None if failures > MAX_AUDIT_REPEATS or rtol < 9.9 * TIGHTEST else rtol / 10.0
 
 
 class Companion(NamedTuple):
@@ -98,7 +98,7 @@ def is_amplified(rtol: float, apart: Mapping[str, Any]) -> bool:
     return bool(apart["acceleration"] > AMPLIFIED_FACTOR * rtol**ORDER)
 
 
-def longest(found: Sequence[Metrics]) -> Metrics:
+def longest_bars(found: Sequence[Metrics]) -> Metrics:
     """Return the greatest of several bars or errors of each name."""
     return {name: np.maximum.reduce([one[name] for one in found]) for name in found[0]}
 
@@ -117,22 +117,22 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
     """
     if other is None:
         return {name: np.full(np.shape(value), np.inf) for name, value in metrics.items()}
-    found = {}
+    errors = {}
     for name, value in metrics.items():
-        row = NUMBERS[name]
-        if row.source != "tally":
+        metric = NUMBERS[name]
+        if metric.source != "tally":
             continue
-        bar, size = row.bar, np.ones(np.shape(value)) if row.is_pure_number else np.abs(value)
+        bar, size = metric.bar, np.ones(np.shape(value)) if metric.is_pure_number else np.abs(value)
         # a metric's own difference may be small by chance, that of its series is not
-        own = bar.own * np.abs(np.asarray(value) - other.metrics[name])
-        path = bar.path * to_metric_shape(other.apart[row.series], np.ndim(value)) * size
-        found[name] = other.closeness * np.hypot(own, path)
-        if not row.is_pure_number:
-            found[name] = np.maximum(found[name], max(FLOOR * residual, bar.least) * size)
-            farthest = np.maximum(other.apart[row.series], other.apart["acceleration"])
+        difference = bar.own * np.abs(np.asarray(value) - other.metrics[name])
+        series_part = bar.path * to_metric_shape(other.apart[metric.series], np.ndim(value)) * size
+        errors[name] = other.closeness * np.hypot(difference, series_part)
+        if not metric.is_pure_number:
+            errors[name] = np.maximum(errors[name], max(FLOOR * residual, bar.least) * size)
+            farthest = np.maximum(other.apart[metric.series], other.apart["acceleration"])
             lost = TIGHTER_DISTANCE_FACTOR * other.closeness * farthest >= 1.0
-            found[name] = np.where(to_metric_shape(lost, np.ndim(value)), np.inf, found[name])
-    return found
+            errors[name] = np.where(to_metric_shape(lost, np.ndim(value)), np.inf, errors[name])
+    return errors
 
 
 def to_metric_shape(apart: Any, ndim: int) -> np.ndarray:
@@ -151,7 +151,7 @@ def series_errors(other: Companion | None) -> Metrics:
     }
 
 
-def unmet(
+def missed_targets(
     targets: Sequence[tuple[str, float]], metrics: Mapping[str, Any], error: Mapping[str, Any]
 ) -> list[str]:
     """Return a message for each metric whose relative bar, at its worst joint, exceeds its target.
@@ -160,13 +160,13 @@ def unmet(
     """
     messages = []
     for name, target in targets:
-        long = beyond(metrics[name], error[name])
+        long = relative_bar(metrics[name], error[name])
         if long > target:
             messages.append(f"{name}: its error bar is {long:.2g} of it, not {target:g}")
     return messages
 
 
-def beyond(metric: Any, bar: Any) -> float:
+def relative_bar(metric: Any, bar: Any) -> float:
     """Return the relative length of a metric's error bar at its worst joint; 0 where both are 0."""
     size, length = np.ravel(np.abs(metric)), np.ravel(bar)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -78,13 +78,13 @@ def follow_case_twins(
     if is_ideal(case):
         return Parting(span, False, True)
     p = record(case)
-    moved = initial_state(case, p)
-    shifted = initial_state(case, p, close * p["clearance"][:, None] / math.sqrt(2.0))
+    start = initial_state(case, p)
+    twin_start = initial_state(case, p, close * p["clearance"][:, None] / math.sqrt(2.0))
     if is_featured(p) and p["tilting"]:
-        shifted[p["at"][Coordinate.GUIDE]] += close * p["guide_clearance"]
+        twin_start[p["at"][Coordinate.GUIDE]] += close * p["guide_clearance"]
     ends = np.array([0.0, span])
-    request = Request(p, moved, ends, 0.0, rtol, "auto", case.solve.max_steps, timeout)
-    return follow_twins(request, shifted)
+    request = Request(p, start, ends, 0.0, rtol, "auto", case.solve.max_steps, timeout)
+    return follow_twins(request, twin_start)
 
 
 class Twins:

@@ -153,11 +153,11 @@ def retrace(before: MarchState, after: MarchState, march: March) -> History:
 
     `before` is written.
     """
-    made = after.attempts - before.attempts
-    if made > HISTORY_LENGTH:
-        march.advance(before, made - HISTORY_LENGTH)
-    found = History()
-    for _ in range(min(made, HISTORY_LENGTH)):
+    attempts = after.attempts - before.attempts
+    if attempts > HISTORY_LENGTH:
+        march.advance(before, attempts - HISTORY_LENGTH)
+    history = History()
+    for _ in range(min(attempts, HISTORY_LENGTH)):
         now = before.copy()
         w = now.stepper
         if w.fresh:
@@ -169,9 +169,9 @@ def retrace(before: MarchState, after: MarchState, march: March) -> History:
         error = math.sqrt(float(np.mean(scaled**2)))
         p, rates = march.request.p, now.work.k[0]
         time, pace = float(passed_time(p, w.t, now.z)), float(passed_time(p, 1.0, rates))
-        found.add(time, step * pace, error, describe_attempt(now.stepper, before.stepper))
-        found.dominant = dominant(scaled, before.work.new[: march.size.size])
-    return found
+        history.add(time, step * pace, error, describe_attempt(now.stepper, before.stepper))
+        history.dominant = dominant(scaled, before.work.new[: march.size.size])
+    return history
 
 
 def attempted_length(now: np.record, then: np.record, end: float) -> float:

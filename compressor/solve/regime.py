@@ -20,11 +20,11 @@ from compressor.cases import ACCURACY, TIGHTEST, Case
 from compressor.metrics import METRICS
 from compressor.reasons import Reason
 from compressor.solve.attempts import run_at_tolerance
-from compressor.solve.error_bars import Metrics, beyond
+from compressor.solve.error_bars import Metrics, relative_bar
 from compressor.solve.horizon import Parting, follow_case_twins
 from compressor.solve.request import Cuts, Trajectory, Turns, revolutions
 from compressor.solve.run_metrics import metrics
-from compressor.solve.series import a_turn, distances
+from compressor.solve.series import compared_per_rev, distances
 from compressor.solve.si_record import is_ideal, record
 
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
@@ -56,10 +56,10 @@ class HorizonSearch:
         self.horizon = math.nan
         self.stopped = False
         self.rtol = RTOL
-        self.seen = 0.0  # s up to which twins stayed together
+        self.together_until = 0.0  # s up to which twins stayed together
         self.first = 0  # evaluations of the first run
-        self.of_runs = 0  # evaluations of all runs
-        self.of_twins = 0.0  # evaluations
+        self.run_evaluations = 0  # evaluations of all runs
+        self.twin_evaluations = 0.0  # evaluations
         self.per_step = 1.0  # evaluations of an attempt of a step, in the last run
 
     @property
@@ -75,12 +75,12 @@ class HorizonSearch:
     @property
     def work_left(self) -> float:
         """Return the evaluations that twins may still take."""
-        return self.work - self.of_runs - self.of_twins
+        return self.work - self.run_evaluations - self.twin_evaluations
 
     def count(self, run: Trajectory) -> None:
         """Count the evaluations of a run."""
         self.first = self.first or run.evaluations
-        self.of_runs += run.evaluations
+        self.run_evaluations += run.evaluations
         self.per_step = max(run.evaluations / max(run.steps + run.rejected, 1), 1.0)
 
     def within_budget(self, case: Case, evaluations: float | None = None) -> Case:
@@ -91,7 +91,7 @@ class HorizonSearch:
         if not self.first:
             return case
         if evaluations is None:
-            evaluations = FOR_RUNS * self.work - self.of_runs - self.of_twins
+            evaluations = FOR_RUNS * self.work - self.run_evaluations - self.twin_evaluations
         steps = min(case.solve.max_steps, max(1, int(evaluations / self.per_step)))
         return replace(case, solve=replace(case.solve, max_steps=steps))
 
@@ -107,7 +107,7 @@ class HorizonSearch:
             "solve.rtol sets a tolerance without it"
         )
 
-    def look(self, whole: bool) -> bool:
+    def twins_part(self, whole: bool) -> bool:
         """Return whether twins part, as far as is known.
 
         A short span is tried first, of which most chaotic motions need no more, and the whole one
@@ -117,41 +117,41 @@ class HorizonSearch:
         if self.case.solve.horizon != "auto":
             return self.horizon < end
         for span in [min(FIRST_LOOK_REV * self.case.turn, end), end][: 1 + whole]:
-            work = min(TWINS_BUDGET * self.of_runs - self.of_twins, self.work_left)
-            if math.isnan(self.horizon) and span > self.seen:
-                may = work > 0.0 and self.left > 0.0
-                self.stopped = not (may and self.twins(span, work))
+            work = min(TWINS_BUDGET * self.run_evaluations - self.twin_evaluations, self.work_left)
+            if math.isnan(self.horizon) and span > self.together_until:
+                has_budget = work > 0.0 and self.left > 0.0
+                self.stopped = not (has_budget and self.search_span(span, work))
         return self.horizon < end
 
-    def twins(self, span: float, work: float) -> bool:
+    def search_span(self, span: float, work: float) -> bool:
         """Follow twins over a span (s) by at most `work` evaluations; return whether it sufficed.
 
         Where twins part, tighter ones are followed up to there. If these stay together it was the
         steps that parted the others; what follows is followed as tightly.
         """
         self.began += load_twins(self.case)
-        most = self.of_twins + work
+        limit = self.twin_evaluations + work
 
         def follow(span: float, rtol: float) -> Parting:
-            case = self.within_budget(self.case, (most - self.of_twins) / TWO)
-            found = follow_case_twins(case, span, rtol, TWIN_DISTANCE, self.left)
-            self.of_twins += TWO * found.attempts * self.per_step
-            return found
+            case = self.within_budget(self.case, (limit - self.twin_evaluations) / TWO)
+            parting = follow_case_twins(case, span, rtol, TWIN_DISTANCE, self.left)
+            self.twin_evaluations += TWO * parting.attempts * self.per_step
+            return parting
 
-        found = follow(span, self.rtol)
-        while found.parted and self.rtol > TIGHTEST * SURE_FACTOR:
-            again = min(LATER_FACTOR * found.time, self.case.duration)
-            surely = follow(again, self.rtol / SURE_FACTOR)
-            if surely.parted:
-                self.horizon = surely.time
-            if not surely.whole:
-                return surely.parted
+        parting = follow(span, self.rtol)
+        while parting.parted and self.rtol > TIGHTEST * SURE_FACTOR:
+            longer_span = min(LATER_FACTOR * parting.time, self.case.duration)
+            tighter = follow(longer_span, self.rtol / SURE_FACTOR)
+            if tighter.parted:
+                self.horizon = tighter.time
+            if not tighter.whole:
+                return tighter.parted
             self.rtol /= SURE_FACTOR
-            found = follow(span, self.rtol)
-        if found.whole:
-            self.seen = span
+            parting = follow(span, self.rtol)
+        if parting.whole:
+            self.together_until = span
             self.horizon = math.inf if span == self.case.duration else math.nan
-        return found.whole or found.parted
+        return parting.whole or parting.parted
 
 
 def load_twins(case: Case) -> float:
@@ -164,10 +164,10 @@ def load_twins(case: Case) -> float:
     return time.monotonic() - began
 
 
-def doubtful(metrics: Metrics, bars: Metrics) -> bool:
+def has_doubtful_bars(metrics: Metrics, bars: Metrics) -> bool:
     """Return whether a metric's error bar reaches a tenth of it; shares and counts do not tell."""
     return any(
-        beyond(metrics[name], bars[name]) >= DOUBTFUL
+        relative_bar(metrics[name], bars[name]) >= DOUBTFUL
         for name, row in METRICS.items()
         if row.bar.relative
     )
@@ -198,9 +198,9 @@ def repeats(
     are the same if no series is farther apart than both its errors. None and nan where the settled
     part is too short to tell, or does not repeat itself.
     """
-    per = a_turn(case)
-    count = len(samples) // per if per else 0
-    turns = [samples[k * per : (k + 1) * per] for k in range(count)]
+    per_rev = compared_per_rev(case)
+    count = len(samples) // per_rev if per_rev else 0
+    turns = [samples[k * per_rev : (k + 1) * per_rev] for k in range(count)]
 
     def is_same(k: int, period: int) -> bool:
         return all(
@@ -208,10 +208,10 @@ def repeats(
             for name, apart in distances(turns[k], turns[k + period]).items()
         )
 
-    found = find_repetition(count, count // 2, is_same)
-    if found is None:
+    repetition = find_repetition(count, count // 2, is_same)
+    if repetition is None:
         return None, math.nan
-    first, period = found
+    first, period = repetition
     while first > 0 and is_same(first - 1, period):
         first -= 1
     return period, case.settle / case.turn + first
@@ -246,20 +246,20 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
     most = int(case.duration / case.turn * (1 + 1e-12))
     p, within = record(case), least_promise(case)
 
-    def enough(turns: Turns) -> bool:
+    def is_settled(turns: Turns) -> bool:
         return steady([metrics(p, turn) for turn in turns], within) is not None
 
     scout = with_settle_rev(case, 0.0, 1, float(most))
     scout = replace(scout, solve=replace(scout.solve, error_bars=False, accuracy="standard"))
-    cuts = Cuts(revolutions(0.0, scout.duration, case.turn), enough)
+    cuts = Cuts(revolutions(0.0, scout.duration, case.turn), is_settled)
     run_at_tolerance(scout, case.rtol, search.left, False, cuts)
-    each = [metrics(p, turn) for turn in cuts.turns]
-    found = steady(each, within)
-    if found is None:
+    per_revolution = [metrics(p, turn) for turn in cuts.turns]
+    repetition = steady(per_revolution, within)
+    if repetition is None:
         half = float(most // 2)
         text = f"in {most} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
         return Settling(with_settle_rev(case, half, 1, float(most)), math.nan, text)
-    first, period = found
+    first, period = repetition
     return Settling(with_settle_rev(case, float(first), period), float(first))
 
 
@@ -272,13 +272,13 @@ def with_settle_rev(case: Case, settle: float, period: int, duration: float | No
         duration = settle + period * math.ceil(MEASURED_REV / period)
     if duration is None and settle == case.solve.settle_rev:
         return case
-    how = replace(case.solve, settle_rev=settle)
+    settings = replace(case.solve, settle_rev=settle)
     if duration is not None:
         steps = case.steps * duration * case.turn / case.duration
-        how = replace(how, duration_rev=duration, duration_s=None)
-        if how.output_step_s is None:
-            how = replace(how, output_step_deg=360.0 * duration / round(steps))
-    return replace(case, solve=how)
+        settings = replace(settings, duration_rev=duration, duration_s=None)
+        if settings.output_step_s is None:
+            settings = replace(settings, output_step_deg=360.0 * duration / round(steps))
+    return replace(case, solve=settings)
 
 
 def least_promise(case: Case) -> float:
@@ -311,9 +311,9 @@ def agree(one: Metrics, other: Metrics, within: float) -> bool:
     for name, row in METRICS.items():
         if not row.bar.relative:
             continue
-        away, size = np.abs(np.subtract(one[name], other[name])), np.abs(one[name])
+        difference, size = np.abs(np.subtract(one[name], other[name])), np.abs(one[name])
         if "axis" in row.dims:
             size = size.max(axis=-1, keepdims=True)
-        if not (away <= within * size).all():
+        if not (difference <= within * size).all():
             return False
     return True

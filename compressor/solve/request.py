@@ -87,9 +87,9 @@ def with_cuts(
     """Return segments that end at all cuts as well, and their number up to each cut."""
     times = []
     for time in cuts.times if cuts else ():
-        edges, phases, near = with_edge(edges, phases, time)
-        times.append(near)
-    return edges, phases, [int(np.searchsorted(edges, near)) for near in times]
+        edges, phases, edge = with_edge(edges, phases, time)
+        times.append(edge)
+    return edges, phases, [int(np.searchsorted(edges, edge)) for edge in times]
 
 
 def with_edge(
@@ -99,9 +99,9 @@ def with_edge(
 
     Where an edge lies there already, the segments are the same, and the time is that edge's.
     """
-    near = edges[np.abs(edges - time).argmin()]
-    if abs(near - time) <= SAME_TIME * edges[-1]:
-        return edges, phases, float(near)
+    edge = edges[np.abs(edges - time).argmin()]
+    if abs(edge - time) <= SAME_TIME * edges[-1]:
+        return edges, phases, float(edge)
     i = int(np.searchsorted(edges, time))
     if i == edges.size:
         return edges, phases, time
@@ -158,9 +158,9 @@ class History:
         self.steps.append(step)
         self.errors.append(error)
         self.words.append(words)
-        kept: list
-        for kept in (self.times, self.steps, self.errors, self.words):
-            del kept[:-HISTORY_LENGTH]
+        column: list
+        for column in (self.times, self.steps, self.errors, self.words):
+            del column[:-HISTORY_LENGTH]
 
 
 @dataclass

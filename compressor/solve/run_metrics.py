@@ -37,7 +37,7 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
     name = "steady_seconds" if is_featured(p) else "seconds"
     steady = tally[name] or math.nan
     revolutions = round(float(steady * p["omega"]) / math.tau, 9)
-    found = {
+    numbers = {
         "peak_acceleration": tally["peak"][0],
         "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
         "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
@@ -52,7 +52,7 @@ def metrics(p: np.record, tally: np.record) -> Metrics:
         "impacts_per_rev": np.where(ideal, 0.0, tally["impacts"] / revolutions),
         "releases_per_rev": np.where(ideal, 0.0, tally["releases"] / revolutions),
     }
-    return {name: value for name, value in found.items() if has_metric(p, NUMBERS[name].when)}
+    return {name: value for name, value in numbers.items() if has_metric(p, NUMBERS[name].when)}
 
 
 def has_metric(p: np.record, flag: str) -> bool:
@@ -81,8 +81,8 @@ def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
     }
 
 
-A_TURN = 1440  # samples a revolution
-FEWEST, MOST = 64, 200_000  # of them over a settled part
+SAMPLES_PER_REV = 1440  # for `SAMPLED` metrics
+MIN_SAMPLES, MAX_SAMPLES = 64, 200_000  # of them over a settled part
 SMALL_END = Column.FORCE + 2  # of the pin's force along x, positive in tension
 
 
@@ -92,7 +92,8 @@ def sampled_times(case: Case) -> np.ndarray:
     Empty without signals.
     """
     span = case.duration - case.settle
-    count = round(min(max(A_TURN * span / case.turn, FEWEST), MOST)) if case.output.signals else 0
+    samples = min(max(SAMPLES_PER_REV * span / case.turn, MIN_SAMPLES), MAX_SAMPLES)
+    count = round(samples) if case.output.signals else 0
     return case.settle + span / max(count, 1) * (np.arange(count) + 0.5)
 
 
@@ -138,14 +139,14 @@ def sampled_bars(rows: np.ndarray, other: Companion | None) -> Metrics:
     """
     if other is None:
         return {}
-    coarse, found = sampled_metrics(rows[::2]), {}
+    coarse, bars = sampled_metrics(rows[::2]), {}
     for name, value in sampled_metrics(rows).items():
         row = NUMBERS[name]
         apart = float(np.ravel(other.apart[row.series])[row.joint])
         path = row.bar.path * apart * abs(value)
         by_run = other.closeness * math.hypot(row.bar.own * (value - other.metrics[name]), path)
-        found[name] = by_run + abs(value - coarse[name])
-    return found
+        bars[name] = by_run + abs(value - coarse[name])
+    return bars
 
 
 MAX_BATCHES = 30
@@ -159,13 +160,13 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
 
     A standard error is inf where there are too few revolutions to tell.
     """
-    found: Metrics = {"revolutions": float(len(turns))}
+    estimates: Metrics = {"revolutions": float(len(turns))}
     whole = metrics(p, merge_turns(turns))
-    each = [metrics(p, turn) for turn in turns]
+    per_revolution = [metrics(p, turn) for turn in turns]
     batches = [metrics(p, merge_turns(part)) for part in parts(turns, MAX_BATCHES, 1)]
     for name, row in METRICS.items():
         if row.kind == "greatest":
-            found |= of_peaks(name, np.array([one[name] for one in each]))
+            estimates |= summarize_peaks(name, np.array([one[name] for one in per_revolution]))
             continue
         averages = np.array([one[name] for one in batches])
         if row.kind == "root":  # the mean square is what is averaged
@@ -174,27 +175,27 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
             error = len(batches) * standard_error(averages)
         else:
             error = standard_error(averages)
-        found[f"{name}_standard_error"] = error
-    share = found["rms_acceleration_standard_error"] / whole["rms_acceleration"]
-    found["revolutions_to_one_percent"] = max(
+        estimates[f"{name}_standard_error"] = error
+    share = estimates["rms_acceleration_standard_error"] / whole["rms_acceleration"]
+    estimates["revolutions_to_one_percent"] = max(
         1.0, np.ceil(len(turns) * (share / RMS_ERROR_AIM) ** 2)
     )
-    return found
+    return estimates
 
 
-def of_peaks(name: str, values: np.ndarray) -> Metrics:
+def summarize_peaks(name: str, values: np.ndarray) -> Metrics:
     """Return mean and quantiles of the revolutions' greatest values, with standard errors.
 
     values: (revolutions, ...).
     """
     means = np.array([part.mean(axis=0) for part in parts(values, MAX_BATCHES, 1)])
     sections = parts(values, MAX_BATCHES, MIN_SECTION)
-    own = np.array([quantiles(part) for part in sections])
+    section_quantiles = np.array([quantiles(part) for part in sections])
     return {
         f"{name}_mean": values.mean(axis=0),
         f"{name}_mean_standard_error": standard_error(means),
         f"{name}_quantile": quantiles(values),
-        f"{name}_quantile_standard_error": standard_error(own),
+        f"{name}_quantile_standard_error": standard_error(section_quantiles),
     }
 
 
@@ -241,12 +242,12 @@ def mean_bar(values: np.ndarray) -> float:
     return float(sure(standard_error(means), len(values)))
 
 
-def chaotic_bars(found: Metrics, numbers: Metrics) -> Metrics:
+def chaotic_bars(estimates: Metrics, numbers: Metrics) -> Metrics:
     """Return the error bars of a chaotic run's metrics: of averages; greatest values have inf."""
     bars = {}
     for name, row in METRICS.items():
         if row.kind == "greatest":
             bars[name] = np.where(np.asarray(numbers[name]) == 0.0, 0.0, math.inf)
         else:
-            bars[name] = sure(found[f"{name}_standard_error"], int(found["revolutions"]))
+            bars[name] = sure(estimates[f"{name}_standard_error"], int(estimates["revolutions"]))
     return bars

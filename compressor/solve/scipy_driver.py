@@ -46,7 +46,7 @@ from compressor.solve.request import (
 )
 from compressor.solve.si_record import absolute_tolerances, length_and_speed
 
-LOOKS_IN_STEP = 17  # times in a step at which gaps are looked at, both ends included
+SAMPLES_IN_STEP = 17  # times in a step at which gaps are looked at, both ends included
 MAX_HALVINGS = 50
 LANDING_FRACTION = 1e-3  # of a step: a gap that closes nearer to its end closes at its end
 
@@ -62,7 +62,7 @@ class Landings:
     def __init__(self, p: np.record, phase: int):
         self.p, self.phase = p, phase
         self.worn = [joint for joint in range(2) if p["clearance"][joint] > 0.0]
-        self.deaf = [-np.inf, -np.inf]  # s up to which a gap's close is one that was landed on
+        self.landed_until = [-np.inf, -np.inf]  # s: a gap that closes before was landed on
 
     def depths(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Return the penetrations (m) of both joints, (m, 2), at times (s) and states (m, n)."""
@@ -76,11 +76,11 @@ class Landings:
         def depths(times: np.ndarray) -> np.ndarray:
             return self.depths(times, np.ascontiguousarray(dense(times)[:-FLOWS].T))
 
-        times = np.linspace(begin, end, LOOKS_IN_STEP)
-        seen, first = depths(times), end
+        times = np.linspace(begin, end, SAMPLES_IN_STEP)
+        penetration, onset = depths(times), end
         for joint in self.worn:
-            closing = (seen[:-1, joint] < 0.0) & (seen[1:, joint] >= 0.0)
-            for i in np.flatnonzero(closing & (times[1:] > self.deaf[joint])):
+            closing = (penetration[:-1, joint] < 0.0) & (penetration[1:, joint] >= 0.0)
+            for i in np.flatnonzero(closing & (times[1:] > self.landed_until[joint])):
                 apart, touching = times[i], times[i + 1]
                 for _ in range(MAX_HALVINGS):
                     middle = 0.5 * (apart + touching)
@@ -88,10 +88,10 @@ class Landings:
                         touching = middle
                     else:
                         apart = middle
-                if touching > self.deaf[joint]:
-                    first = min(first, touching)
+                if touching > self.landed_until[joint]:
+                    onset = min(onset, touching)
                     break
-        return first if end - first > LANDING_FRACTION * (end - begin) else None
+        return onset if end - onset > LANDING_FRACTION * (end - begin) else None
 
     def land(self, begin: float, end: float, dense, z: np.ndarray) -> None:
         """Write the approach speed of joints whose gaps close at the end of a step.
@@ -108,7 +108,7 @@ class Landings:
             ):
                 place = 2 * self.p["freedoms"] + joint
                 z[place] = max(speed, self.p["least_approach"])
-                self.deaf[joint] = end + 2.0 * max(0.0, -depth) / speed
+                self.landed_until[joint] = end + 2.0 * max(0.0, -depth) / speed
 
 
 # Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
@@ -166,8 +166,8 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
     try:
         for i, phase in enumerate(phases):
             right_hand_side.phase = int(phase)
-            wanted = np.flatnonzero(owner == i)
-            segment = LoadStretch(request, right_hand_side, result, edges[i], edges[i + 1], wanted)
+            samples = np.flatnonzero(owner == i)
+            segment = LoadStretch(request, right_hand_side, result, edges[i], edges[i + 1], samples)
             z = segment.run(z)
             if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally, z):
                 result.stop_time = math.nan
@@ -275,9 +275,9 @@ class LoadStretch:
         phases = np.full(times.size, self.right_hand_side.phase)
         observe_all(times, states, phases, self.request.p, rows)
         self.check_contact(begin, end - begin, rows)
-        tally, p, apart = self.result.tally, self.request.p, np.empty(2)
-        write_gap_fractions(NODES, rows, apart)
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, apart, measured, tally, p)
+        tally, p, gap_fraction = self.result.tally, self.request.p, np.empty(2)
+        write_gap_fractions(NODES, rows, gap_fraction)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gap_fraction, measured, tally, p)
         if measured and is_featured(p) and p["sectors"]:
             wear_all(times, states, phases, (end - begin) * WEIGHTS, p, tally)
 
@@ -298,9 +298,9 @@ class LoadStretch:
     def audit(self, solver) -> None:
         """Compare the energy at the step's end with the flows up to there."""
         state, flows = solver.y[:-FLOWS].copy(), solver.y[-FLOWS:].copy()
-        hand, now = self.right_hand_side, np.array([solver.t])
-        observe_all(now, state[np.newaxis], np.array([hand.phase]), self.request.p, hand.rows)
-        tally_energy(hand.rows[0], flows, self.result.tally)
+        rhs, now = self.right_hand_side, np.array([solver.t])
+        observe_all(now, state[np.newaxis], np.array([rhs.phase]), self.request.p, rhs.rows)
+        tally_energy(rhs.rows[0], flows, self.result.tally)
 
     def check(self) -> None:
         """Raise Stop when a journal sinks in implausibly deep."""

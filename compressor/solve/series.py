@@ -1,8 +1,8 @@
 """The time series of a run, the forces on its frame, and how far apart two runs are.
 
-Two runs are compared at the same times, whatever is stored of either: `A_TURN` times a revolution.
-Their distance is a relative L2 norm over the settled part, sqrt(sum |a - b|^2 / sum |a|^2); of a
-vector its length counts.
+Two runs are compared at the same times, whatever is stored of either: `COMPARED_PER_REV` times in a
+revolution. Their distance is a relative L2 norm over the settled part,
+sqrt(sum |a - b|^2 / sum |a|^2); of a vector its length counts.
 
 Forces that the machine puts on its frame, of `physics.observe.write_frame_forces`. With F_b
 and F_s the joint forces on the rod at the big and the small end, F_load the piston force, positive
@@ -51,9 +51,9 @@ COLUMN = {
     "crank_torque": Column.CRANK_TORQUE,
     "rod_load": Column.FORCE + 2,
 }
-A_TURN = 150  # times a revolution at which two runs are compared
-OF_A_PERIOD = 24  # samples of the forces in one of the body's fastest motion
-FEWEST, MOST = 64, 20_000  # of these times over a settled part
+COMPARED_PER_REV = 150  # times a revolution at which two runs are compared
+SAMPLES_PER_PERIOD = 24  # samples of the forces in one of the body's fastest motion
+MIN_COMPARED, MAX_COMPARED = 64, 20_000  # of these times over a settled part
 
 
 def rows_of(p: np.record, run: Trajectory, columns: int = WIDE) -> np.ndarray:
@@ -73,7 +73,7 @@ def finer(case: Case) -> int:
     if body is None:
         return 1
     natural = (body.frequency_x_Hz, body.frequency_y_Hz, body.frequency_rocking_Hz)
-    rate = OF_A_PERIOD * max(natural)
+    rate = SAMPLES_PER_PERIOD * max(natural)
     if case.sensor is not None:
         from compressor.vibration import analogue_rate
 
@@ -94,20 +94,22 @@ def compared_times(case: Case) -> np.ndarray:
     In each whole revolution at the same angles, so that revolutions can be compared, too.
     """
     span = case.duration - case.settle
-    each = a_turn(case)
-    step = case.turn / each if each else span / FEWEST
+    per_rev = compared_per_rev(case)
+    step = case.turn / per_rev if per_rev else span / MIN_COMPARED
     count = max(1, int(span / step * (1 + 1e-12)))
     return case.settle + step * (np.arange(count) + 0.5)  # off the corners of the load
 
 
-def a_turn(case: Case) -> int:
+def compared_per_rev(case: Case) -> int:
     """Return how many of `compared_times` a revolution has; 0 where no whole one is settled."""
     revolutions = (case.duration - case.settle) / case.turn
-    return round(min(A_TURN, max(1.0, MOST / revolutions))) if revolutions >= 1.0 else 0
+    if revolutions < 1.0:
+        return 0
+    return round(min(COMPARED_PER_REV, max(1.0, MAX_COMPARED / revolutions)))
 
 
 def take_samples(
-    p: np.record, run: Trajectory, times: np.ndarray, kept: np.ndarray, columns: int = COLUMNS
+    p: np.record, run: Trajectory, times: np.ndarray, remaining: np.ndarray, columns: int = COLUMNS
 ) -> np.ndarray:
     """Return the observed rows at some of a run's times; the run keeps its samples at others.
 
@@ -118,15 +120,15 @@ def take_samples(
         at = np.searchsorted(run.times, times)
         run.times, run.states, run.phases = (array[at] for array in whole)
         rows = rows_of(p, run, columns)
-    if kept.size < whole[0].size:
-        stay = np.searchsorted(whole[0], kept)
-        whole = whole[0][stay], whole[1][stay], whole[2][stay]
+    if remaining.size < whole[0].size:
+        at_remaining = np.searchsorted(whole[0], remaining)
+        whole = whole[0][at_remaining], whole[1][at_remaining], whole[2][at_remaining]
     run.times, run.states, run.phases = whole
     return rows
 
 
 @cache
-def places() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
+def distance_columns() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
     """Return where `distances` finds what it sums: columns, begins of sums, and sums by name.
 
     A vector's squares are one sum; a series over joints has two.
@@ -149,12 +151,12 @@ def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
 
     ours, theirs: observed rows at the same times, (m, COLUMNS). 0 where both are 0.
     """
-    columns, starts, sums = places()
-    apart = ours - theirs
-    away = np.add.reduceat(np.einsum("ij,ij->j", apart, apart)[columns], starts)
+    columns, starts, sums = distance_columns()
+    difference = ours - theirs
+    error = np.add.reduceat(np.einsum("ij,ij->j", difference, difference)[columns], starts)
     size = np.add.reduceat(np.einsum("ij,ij->j", ours, ours)[columns], starts)
-    found = np.sqrt(np.divide(away, size, out=np.zeros_like(away), where=size > 0.0))
-    return {name: found[place] for name, place in sums.items()}
+    relative = np.sqrt(np.divide(error, size, out=np.zeros_like(error), where=size > 0.0))
+    return {name: relative[place] for name, place in sums.items()}
 
 
 def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
@@ -164,10 +166,10 @@ def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> floa
     came if that is more. 0 for ideal joints.
     """
     one, other = block("eccentricity", ours), block("eccentricity", theirs)
-    faulty = p["clearance"] > 0
-    away = np.linalg.norm(one - other, axis=2).max(axis=0)
+    has_clearance = p["clearance"] > 0
+    distance = np.linalg.norm(one - other, axis=2).max(axis=0)
     room = np.maximum(p["clearance"], np.linalg.norm(one, axis=2).max(axis=0))
-    return float((away[faulty] / room[faulty]).max(initial=0.0))
+    return float((distance[has_clearance] / room[has_clearance]).max(initial=0.0))
 
 
 # over time and these dimensions: (dimensions, unit, long name)
@@ -198,17 +200,17 @@ def features(
 
     states: (m, n); rows: observed there, (m, WIDE).
     """
-    found = {}
+    series = {}
     for name, (coordinate, unit, phrase) in FEATURES.items():
         if p["at"][coordinate] >= 0:
-            found[name] = states[:, p["at"][coordinate]].copy(), unit, phrase
+            series[name] = states[:, p["at"][coordinate]].copy(), unit, phrase
     if p["tilting"]:
         gap = rows[:, Column.GUIDE_GAP].copy()
-        found["guide_gap"] = gap, "m", "least gap of the crosshead's corners, negative in contact"
+        series["guide_gap"] = gap, "m", "least gap of the crosshead's corners, negative in contact"
     if p["driven"]:
-        found["crank_speed"] = rows[:, Column.CRANK_SPEED].copy(), "rad/s", "speed of the crank"
-        found["motor_torque"] = rows[:, Column.MOTOR_TORQUE].copy(), "N m", "torque of the motor"
-    return found
+        series["crank_speed"] = rows[:, Column.CRANK_SPEED].copy(), "rad/s", "speed of the crank"
+        series["motor_torque"] = rows[:, Column.MOTOR_TORQUE].copy(), "N m", "torque of the motor"
+    return series
 
 
 def signals(rows: np.ndarray) -> dict[str, np.ndarray]:

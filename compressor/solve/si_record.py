@@ -71,10 +71,10 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
         p |= bore_fields(worn.shape[1])
         p["worn"] = np.pad(worn, ((0, 0), (0, MAX_SECTORS - worn.shape[1])))
     complete(p, ratio, printed=case.gas.switching == "paper")
-    filled = new_record(case.chooses_laws, featured)
+    result = new_record(case.chooses_laws, featured)
     for name, value in p.items():
-        filled[name] = value
-    return filled
+        result[name] = value
+    return result
 
 
 def offsets(case: Case) -> np.ndarray:
@@ -225,20 +225,20 @@ def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -
     sizes = np.ones(len(state_names(p)))
     n = int(p["freedoms"])
     force = p["reciprocating_mass"] * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
-    each = {Coordinate(one): joints for one in range(Coordinate.BIG_X, Coordinate.GUIDE)}
+    sizes_of = {Coordinate(one): joints for one in range(Coordinate.BIG_X, Coordinate.GUIDE)}
     if p["tilting"]:
         height = _guide_sizes(p, force)
-        each[Coordinate.GUIDE] = height
-        each[Coordinate.TILT] = height[0] / p["guide_length"], height[1] / p["guide_length"]
+        sizes_of[Coordinate.GUIDE] = height
+        sizes_of[Coordinate.TILT] = height[0] / p["guide_length"], height[1] / p["guide_length"]
     for mode, (stiffness, share) in MODES.items() if p["elastic"] else ():
         bending = mode < Coordinate.STRETCH_MIDDLE
         stiffness *= p["bending_stiffness" if bending else "axial_stiffness"]
-        pressed = force
+        load = force
         if bending:  # by the rod's own inertia
-            pressed = p["rod_mass"] * p["crank_radius"] * p["omega"] ** 2
-        size = pressed / stiffness
-        each[mode] = size, size * math.sqrt(stiffness / (share * p["rod_mass"]))
-    for coordinate, (size, rate) in each.items():
+            load = p["rod_mass"] * p["crank_radius"] * p["omega"] ** 2
+        size = load / stiffness
+        sizes_of[mode] = size, size * math.sqrt(stiffness / (share * p["rod_mass"]))
+    for coordinate, (size, rate) in sizes_of.items():
         place = p["at"][coordinate]
         if place >= 0:
             sizes[place], sizes[n + place] = size, rate
@@ -248,8 +248,8 @@ def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -
         moving = p["reciprocating_mass"] + p["rod_mass"]
         inertia = p["crank_inertia"] + moving * p["crank_radius"] ** 2
         # a steep line holds the speed nearer than inertia does
-        held = inertia * p["omega"] ** 2 + p["torque_slope"] * p["omega"]
-        sizes[place] = min(1.0, force * p["crank_radius"] / held)
+        restoring = inertia * p["omega"] ** 2 + p["torque_slope"] * p["omega"]
+        sizes[place] = min(1.0, force * p["crank_radius"] / restoring)
         sizes[place - 1] = sizes[place] / p["omega"]
     if p["elastic"]:
         sizes[p["rod_loss"]] = UNCONTROLLED
@@ -313,11 +313,11 @@ def natural_sizes(p: np.record) -> np.ndarray:
     sizes = np.full(2 * n, length)
     sizes[n:] = speed
     sizes[n - 1 :: n] *= 1.0 / p["rod_length"]  # the last freedom is an angle
-    more = len(state_names(p)) - sizes.size
-    if not more:
+    carried = len(state_names(p)) - sizes.size
+    if not carried:
         return sizes
-    bent = bristle_size(p, length)
-    return np.concatenate((sizes, np.full(2, speed), np.full(2, bent)))
+    bristle = bristle_size(p, length)
+    return np.concatenate((sizes, np.full(2, speed), np.full(2, bristle)))
 
 
 def bristle_size(p: np.record, length: float) -> float:
@@ -365,14 +365,14 @@ def deflect(p: np.record, y: np.ndarray) -> None:
     modes = slice(first, first + 4)
     z = np.append(y, np.zeros(FLOWS))
     rates = np.empty_like(z)
-    answer = np.empty((4, 4))
+    response = np.empty((4, 4))
     for _ in range(DEFLECTION_ROUNDS):
         derivative_with_flows(0.0, z, 0, p, rates)
-        here = rates[n:][modes].copy()
+        unmoved = rates[n:][modes].copy()
         for mode in range(4):
             moved = z.copy()
             moved[first + mode] += MODE_SHIFT
             derivative_with_flows(0.0, moved, 0, p, rates)
-            answer[:, mode] = (rates[n:][modes] - here) / MODE_SHIFT
-        z[modes] -= np.linalg.solve(answer, here)
+            response[:, mode] = (rates[n:][modes] - unmoved) / MODE_SHIFT
+        z[modes] -= np.linalg.solve(response, unmoved)
     y[modes] = z[modes]

@@ -44,39 +44,39 @@ def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
     """
     from compressor.vibration import Forces, body_motion, listen
 
-    body, each = case.body, finer(case)
+    body, stride = case.body, finer(case)
     assert body is not None
     step = solution.trajectory.times[1]
     steady, whole = body.start == "steady", not solution.trajectory.reason
     begin = round(solution.settle / step) if steady else 0
-    known = {name: one[begin:] for name, one in signals(rows).items()}
+    forces_by_name = {name: one[begin:] for name, one in signals(rows).items()}
     forces = Forces(
-        step, known["shaking_force"], known["guide_moment"],
-        np.stack([np.zeros(len(rows) - begin), known["guide_force"]], axis=1),
-        known["bearing_force"],
+        step, forces_by_name["shaking_force"], forces_by_name["guide_moment"],
+        np.stack([np.zeros(len(rows) - begin), forces_by_name["guide_force"]], axis=1),
+        forces_by_name["bearing_force"],
     )  # fmt: skip
-    found: Variables = {}
-    samples = (len(rows) - 1) // each + 1
+    variables: Variables = {}
+    samples = (len(rows) - 1) // stride + 1
     values = {name: np.full((samples, 2)[: 1 + len(BODY[name][0])], math.nan) for name in BODY}
     if whole:
         motion = body_motion(body, forces, steady)
-        kept = slice(-begin % each, None, each)
+        grid = slice(-begin % stride, None, stride)
         for name, source in (("displacement", 0), ("velocity", 1), ("acceleration", 2)):
             both = np.stack([motion.x[source], motion.y[source]], axis=1)
-            values[f"body_{name}"][-len(both[kept]) :] = both[kept]
-        values["body_rocking"][-len(motion.x[0][kept]) :] = motion.rocking.displacement[kept]
+            values[f"body_{name}"][-len(both[grid]) :] = both[grid]
+        values["body_rocking"][-len(motion.x[0][grid]) :] = motion.rocking.displacement[grid]
     for name, (dims, unit, phrase) in BODY.items():
-        found[name] = (("time", *dims), values[name], {"units": unit, "long_name": phrase})
+        variables[name] = (("time", *dims), values[name], {"units": unit, "long_name": phrase})
     if whole:
         spectra = motion.x.velocity[:-1], motion.y.velocity[:-1]
         phrase = "bound of the relative error of the body's velocity: it is driven one way"
         attrs = {"units": "1", "long_name": phrase}
-        found["one_way_error"] = (("axis",), one_way_errors(case, spectra, step), attrs)
+        variables["one_way_error"] = (("axis",), one_way_errors(case, spectra, step), attrs)
     if whole and case.sensor is not None:
         guide = case.machine.rod_length_mm / 1e3
         record = listen(body, case.sensor, forces, case.turn, guide, motion)
-        found |= sensor_variables(record)
-    return found
+        variables |= sensor_variables(record)
+    return variables
 
 
 def sensor_variables(record: "Record") -> Variables:
@@ -102,22 +102,22 @@ def one_way_errors(case: Case, velocities: tuple, step: float) -> list[float]:
     """Return the bound by axis, from the spectrum of each velocity at equal steps (s)."""
     from compressor.vibration import line_amplitudes
 
-    found = []
+    bounds = []
     for axis, values in zip(("x", "y"), velocities, strict=True):
         if not values.any():
-            found.append(0.0)
+            bounds.append(0.0)
             continue
         amplitudes = line_amplitudes(values, values.size, "rectangular", True)
         frequencies = np.arange(amplitudes.size) / (values.size * step)
         back = np.abs(back_action(case, axis, frequencies))
         error = np.where(back < 1.0, back / np.maximum(1.0 - back, 1e-12), np.inf)
         shares = amplitudes**2 / (amplitudes**2).sum()
-        found.append(float(np.sqrt((shares * error**2).sum())))
-    return found
+        bounds.append(float(np.sqrt((shares * error**2).sum())))
+    return bounds
 
 
-MAX_KEPT = 1_000_000  # samples of a Dataset whose like is kept
-LIKE: dict[tuple, "xr.Dataset"] = {}  # the last Dataset without its values, by names and shapes
+MAX_TEMPLATE_SIZE = 1_000_000  # samples of a Dataset that is kept as a template
+TEMPLATES: dict[tuple, "xr.Dataset"] = {}  # the last Dataset without values, by its shapes
 
 
 def simulate(case: Case) -> "xr.Dataset":
@@ -167,30 +167,32 @@ def as_dataset(table: DatasetParts) -> "xr.Dataset":
 
     shape = tuple((name, one.dims, one.values.shape) for name, one in table.variables.items())
     indexes = {name: one for name, one in table.variables.items() if one.dims == (name,)}
-    like = LIKE.get(shape)
-    if like is None or not all(
-        np.array_equal(like.variables[name].values, one.values) for name, one in indexes.items()
+    template = TEMPLATES.get(shape)
+    if template is None or not all(
+        np.array_equal(template.variables[name].values, one.values) for name, one in indexes.items()
     ):
-        hollow = {
+        blank = {
             name: one._replace(values=np.broadcast_to(np.zeros((), one.values.dtype), sizes))
             for (name, _, sizes), one in zip(shape, table.variables.values(), strict=True)
         }
-        like = xr.Dataset(hollow | indexes)
-        LIKE.clear()
-        if all(size <= MAX_KEPT for size in like.sizes.values()):
-            LIKE[shape] = like
-    made = like.copy(data={str(name): table.variables[str(name)].values for name in like.data_vars})
-    for name, variable in made.variables.items():
+        template = xr.Dataset(blank | indexes)
+        TEMPLATES.clear()
+        if all(size <= MAX_TEMPLATE_SIZE for size in template.sizes.values()):
+            TEMPLATES[shape] = template
+    dataset = template.copy(
+        data={str(name): table.variables[str(name)].values for name in template.data_vars}
+    )
+    for name, variable in dataset.variables.items():
         variable.attrs = dict(table.variables[str(name)].attrs)
-    made.attrs = dict(table.attrs)
-    return made
+    dataset.attrs = dict(table.attrs)
+    return dataset
 
 
 def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, DatasetParts]:
     """Simulate one case; return its `Outcome` and what its Dataset is made of (see `simulate`)."""
     if case.problems:
-        found = refused_outcome(case)
-        return found, found.table({})
+        refused = refused_outcome(case)
+        return refused, refused.table({})
     return with_series(case, solve(case, ahead))
 
 
@@ -199,12 +201,12 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
 
     Time series are part of it with `output.keep: series`.
     """
-    kept = case.output.keep == "series"
-    found = outcome(case, solution)
-    more = series(case, solution) if kept else {}
-    if "clipped_share" in more:
-        found.numbers["clipped_fraction"] = more["clipped_share"][1]
-    return found, found.table(more)
+    has_series = case.output.keep == "series"
+    result = outcome(case, solution)
+    variables = series(case, solution) if has_series else {}
+    if "clipped_share" in variables:
+        result.numbers["clipped_fraction"] = variables["clipped_share"][1]
+    return result, result.table(variables)
 
 
 def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
@@ -220,16 +222,16 @@ def refused_outcome(case: Case) -> Outcome:
 
 def series(case: Case, solution: Solution) -> dict[str, tuple]:
     """Return the time series as xarray variables, with the signals, body and sensor of the case."""
-    p, every = solution.p, finer(case)
-    whole = rows_of(p, solution.trajectory)
-    rows, times = whole[::every], solution.trajectory.times[::every]
-    states = solution.trajectory.states[::every]
-    angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
+    p, stride = solution.p, finer(case)
+    fine_rows = rows_of(p, solution.trajectory)
+    rows, times = fine_rows[::stride], solution.trajectory.times[::stride]
+    states = solution.trajectory.states[::stride]
+    angle_attrs = {"units": "rad", "long_name": "crank angle from top dead centre"}
     time = passed_time(p, times, states)
-    turned = np.where(np.isnan(time), np.nan, p.omega * times)  # a stalled crank turns no further
+    angles = np.where(np.isnan(time), np.nan, p.omega * times)  # a stalled crank turns no further
     variables: dict[str, tuple] = {
         "time": (("time",), time, {"units": "s", "long_name": "time"}),
-        "crank_angle": (("time",), turned, angle),
+        "crank_angle": (("time",), angles, angle_attrs),
     }
     for name, (dims, unit, phrase) in SERIES.items():
         attrs = {"units": unit, "long_name": phrase}
@@ -240,22 +242,22 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     if is_featured(p):
         for name, (values, unit, phrase) in features(p, states, rows).items():
             variables[name] = (("time",), values, {"units": unit, "long_name": phrase})
-    return variables | (foundation(case, solution, whole) if case.body else {})
+    return variables | (foundation(case, solution, fine_rows) if case.body else {})
 
 
 def outcome(case: Case, solution: Solution) -> Outcome:
     """Return what is kept of a solution without its series."""
     numbers = row()
-    known = solution.metrics | ledger(solution.p, solution.trajectory)
+    values = solution.metrics | ledger(solution.p, solution.trajectory)
     errors = solution.bars | solution.series_errors
-    known |= {f"{name}_error": error for name, error in errors.items()}
-    known |= solution.statistics
-    known |= {
+    values |= {f"{name}_error": error for name, error in errors.items()}
+    values |= solution.statistics
+    values |= {
         "predictability_horizon": solution.horizon,
         "period_rev": solution.period,
         "settled_rev": solution.settled,
     }
-    for name, value in known.items():
+    for name, value in values.items():
         numbers[name] = value
     status = "failed" if solution.reason else "ok"
     return Outcome(status, str(solution.reason), numbers, attributes(case, solution))

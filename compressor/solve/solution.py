@@ -21,12 +21,12 @@ from compressor.solve.attempts import (
     Ahead,
     Solution,
     Times,
+    build_request,
     companion_rtol,
     comparison_run,
     estimate_errors,
     looser_comparison_run,
     prepare_run,
-    request,
     run_at_tolerance,
     solution_of_trajectory,
     times_of,
@@ -34,19 +34,19 @@ from compressor.solve.attempts import (
 from compressor.solve.error_bars import (
     ORDER,
     allowed_residual,
-    beyond,
     closeness,
     energy_residual,
+    missed_targets,
+    next_audit_rtol,
     ratio_of,
-    rung_below,
-    unmet,
+    relative_bar,
 )
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.march_driver import LANE_METHODS, prepare_stepper
 from compressor.solve.regime import (
     DOUBTFUL,
     HorizonSearch,
-    doubtful,
+    has_doubtful_bars,
     repeats,
     with_settle_rev,
     with_span,
@@ -75,43 +75,43 @@ def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
 
     scenes: those for which lanes are compiled. A case that cannot run in lanes has none.
     """
-    asked: dict[int, list[LaneRequest]] = {number: [] for number in scenes}
+    requests: dict[int, list[LaneRequest]] = {number: [] for number in scenes}
     for number, case in enumerate(cases):
-        if may_run_in_lanes(case) and (of := int(scene(case))) in asked:
-            asked[of] += attempts_of(number, case)
-    found: list[dict[float, Solution]] = [{} for _ in cases]
-    for attempts in asked.values():
+        if may_run_in_lanes(case) and (of := int(scene(case))) in requests:
+            requests[of] += attempts_of(number, case)
+    solutions: list[dict[float, Solution]] = [{} for _ in cases]
+    for attempts in requests.values():
         if not attempts:
             continue
         began = time.perf_counter()
-        ended = march_side_by_side([one.run for one in attempts], MAX_ATTEMPTS)
-        whole = sum(int(run.stepper["evaluations"]) for run in ended if run)
-        each = (time.perf_counter() - began) / max(whole, 1)
-        for one, run in zip(attempts, ended, strict=True):
+        runs = march_side_by_side([one.run for one in attempts], MAX_ATTEMPTS)
+        evaluations = sum(int(run.stepper["evaluations"]) for run in runs if run)
+        per_evaluation = (time.perf_counter() - began) / max(evaluations, 1)
+        for one, run in zip(attempts, runs, strict=True):
             if run:
-                found[one.case][one.rtol] = lane_solution(one, run, each)
-    return list(found)
+                solutions[one.case][one.rtol] = lane_solution(one, run, per_evaluation)
+    return list(solutions)
 
 
 def may_run_in_lanes(case: Case) -> bool:
     """Return whether a case may be simulated in lanes, by what it says of its solution."""
-    how = case.solve
-    ready = case.is_plain and not case.problems and how.method in LANE_METHODS
-    ready = ready and how.settle_rev != "auto"
-    return ready and how.timeout_s >= MIN_TIME and how.max_steps >= MAX_ATTEMPTS
+    settings = case.solve
+    fits = case.is_plain and not case.problems and settings.method in LANE_METHODS
+    fits = fits and settings.settle_rev != "auto"
+    return fits and settings.timeout_s >= MIN_TIME and settings.max_steps >= MAX_ATTEMPTS
 
 
 def attempts_of(number: int, case: Case) -> list[LaneRequest]:
     """Return what a case's first attempt needs, and its companion's."""
     case = with_settle_rev(case, float(case.solve.settle_rev), 1)
     p, sampled = record(case), case.output.keep == "series"
-    found = [lane_request(number, case, case.rtol, p, times_of(case, sampled))]
+    requests = [lane_request(number, case, case.rtol, p, times_of(case, sampled))]
     if case.wants_bars and (tighter := companion_rtol(p, case.rtol)):
         if sampled:
-            found.append(lane_request(number, case, tighter, p, times_of(case, False)))
+            requests.append(lane_request(number, case, tighter, p, times_of(case, False)))
         else:  # all but the tolerance is the same
-            found.append(with_tolerance(found[0], tighter))
-    return [one for one in found if one.times.all.size <= MAX_SAMPLES]
+            requests.append(with_tolerance(requests[0], tighter))
+    return [one for one in requests if one.times.all.size <= MAX_SAMPLES]
 
 
 def with_tolerance(one: LaneRequest, rtol: float) -> LaneRequest:
@@ -124,11 +124,11 @@ def with_tolerance(one: LaneRequest, rtol: float) -> LaneRequest:
 
 def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Times) -> LaneRequest:
     """Return an attempt of a case in the form that lanes take."""
-    wanted = request(case, rtol, p, times)
-    trajectory, edges, phases, z = prepare_run(wanted)
+    request = build_request(case, rtol, p, times)
+    trajectory, edges, phases, z = prepare_run(request)
     size = natural_sizes(p)
-    stepper = prepare_stepper(wanted, size)
-    edges, phases, stepper["settle"] = with_edge(edges, phases, wanted.settle)
+    stepper = prepare_stepper(request, size)
+    edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     run = Run(stepper, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
     return LaneRequest(number, rtol, times, run, trajectory)
 
@@ -171,13 +171,13 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
             search.within_budget(case), rtol, search.left, case.output.keep == "series"
         )
         if now.reason:
-            return cut_short(case, best, now, search)
+            return end_early(case, best, now, search)
         search.count(now.trajectory)
         best = now
         if not energy_balances(case, now):
             # error bars compare two runs: where both lack the same energy they would agree
             unsound += 1
-            tighter = rung_below(rtol, unsound)
+            tighter = next_audit_rtol(rtol, unsound)
             if tighter is None:
                 return fail_energy_audit(case, now, f"at rtol {rtol:.2g}")
             rtol = tighter
@@ -197,14 +197,14 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"
             return now
-        if looks_chaotic(now) and search.look(whole=before is not None):
+        if looks_chaotic(now) and search.twins_part(whole=before is not None):
             return now
         if other.reason or min(rtol, other.rtol) < 1.01 * TIGHTEST:
             return fail_accuracy(case, now, other.detail or "no run is tighter")
-        worse = third or other
-        before = tightest(case, now, other, worse)
+        reference = third or other
+        before = tightest(case, now, other, reference)
         rtol = max(
-            round_rtol(before.rtol / tighten_factor(excess, worse.rtol / now.rtol)), TIGHTEST
+            round_rtol(before.rtol / tighten_factor(excess, reference.rtol / now.rtol)), TIGHTEST
         )
 
 
@@ -234,8 +234,8 @@ def recheck(
         return excess, None
     search.count(third.trajectory)
     estimate_errors(now, other, third)
-    more = excess_over_promise(case, now)
-    return more, third if more > excess else None
+    larger = excess_over_promise(case, now)
+    return larger, third if larger > excess else None
 
 
 def has_promise(case: Case) -> bool:
@@ -247,7 +247,7 @@ def excess_over_promise(case: Case, solution: Solution) -> float:
     """Return the greatest estimated error over the promised one; 0 where none is promised."""
     if case.targets:
         return max(
-            beyond(solution.metrics[name], solution.bars[name]) / target
+            relative_bar(solution.metrics[name], solution.bars[name]) / target
             for name, target in case.targets
         )
     return solution.series_errors["acceleration"] / case.promise if has_promise(case) else 0.0
@@ -279,7 +279,7 @@ def energy_balances(case: Case, solution: Solution) -> bool:
     )
 
 
-def cut_short(case: Case, best: Solution | None, now: Solution, search: HorizonSearch) -> Solution:
+def end_early(case: Case, best: Solution | None, now: Solution, search: HorizonSearch) -> Solution:
     """Return what is left of a case whose present run did not reach its end."""
     if best is None or now.reason not in OUT_OF_BUDGET:
         return now
@@ -311,13 +311,13 @@ def fail_accuracy(case: Case, best: Solution, detail: str, reason: str = "") -> 
 def missed_promises(case: Case, solution: Solution) -> list[str]:
     """Return a message for each promise that a run does not keep."""
     if case.targets:
-        return unmet(case.targets, solution.metrics, solution.bars)
+        return missed_targets(case.targets, solution.metrics, solution.bars)
     error = solution.series_errors["acceleration"]
     return [f"acceleration: its error may be {error:.2g} of it, not {case.promise:g}"]
 
 
 EVALUATION = 1e-7  # s, about, of an attempt made alone: it counts against timeout_s
-UNTOLD = "the search for chaos came to its limit"
+SEARCH_ENDED = "the search for chaos came to its limit"
 CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 
 
@@ -328,8 +328,8 @@ def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
     `reason` and `detail` say why.
     """
     search = HorizonSearch(case)
-    for made in ahead.values():
-        search.began -= made.trajectory.evaluations * EVALUATION
+    for attempt in ahead.values():
+        search.began -= attempt.trajectory.evaluations * EVALUATION
     settling = with_span(case, search)
     case = search.case = settling.case
     solution = refine_until_accurate(case, search, ahead)
@@ -351,9 +351,9 @@ def find_horizon(case: Case, solution: Solution, search: HorizonSearch) -> None:
     if case.solve.horizon is True:
         search.horizon = predictability_horizon(case, search.left)
     elif case.wants_bars and is_in_doubt(case, solution):
-        search.look(whole=True)
+        search.twins_part(whole=True)
         if solution.reason and search.stopped:
-            solution.detail += f"; {UNTOLD}"
+            solution.detail += f"; {SEARCH_ENDED}"
     solution.horizon = search.horizon
 
 
@@ -367,7 +367,7 @@ def is_in_doubt(case: Case, solution: Solution) -> bool:
     return (
         bool(solution.reason)
         or looks_chaotic(solution)
-        or doubtful(solution.metrics, solution.bars)
+        or has_doubtful_bars(solution.metrics, solution.bars)
     )
 
 

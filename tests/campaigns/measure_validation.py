@@ -40,7 +40,7 @@ from published import (
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.solve import predictability_horizon, simulate
-from compressor.solve.attempts import integrate, request, times_of
+from compressor.solve.attempts import build_request, integrate, times_of
 from compressor.solve.bearing import reynolds
 
 SICONOS = "Siconos, SliderCrankMoreauJeanDirectProjectionOSI.ref, steps of 0.1 ms"
@@ -133,7 +133,7 @@ def wear():
     source = "Archard's law; friction's energy over a constant coefficient"
     for joint in ("big_end", "small_end"):
         case, p = uneven(joint)
-        tally = integrate(request(case, case.rtol, p, times_of(case, False))).tally
+        tally = integrate(build_request(case, case.rtol, p, times_of(case, False))).tally
         asked, found = tally["friction_loss"] / COEFFICIENT, tally["worn"].sum()
         what = f"∫ F ds, {joint}, over sectors"
         yield row("Wear", what, "J", asked, found, 1e-6 * asked, source)

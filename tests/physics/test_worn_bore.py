@@ -21,7 +21,7 @@ from compressor.physics.worn_bore import (
     worn_contact,
     write_overlaps,
 )
-from compressor.solve.attempts import integrate, request, times_of
+from compressor.solve.attempts import build_request, integrate, times_of
 from compressor.solve.error_bars import energy_residual
 from compressor.solve.run_metrics import metrics
 from compressor.solve.si_record import initial_state, record
@@ -153,7 +153,7 @@ def test_runs_on_worn_bores_keep_their_energy_and_agree(features):
     for method in ("TSIT5", "RODAS", "DOPRI5" if onsets else "LSODA"):
         case, p = made(lobes, **features, solve={"duration_rev": 0.2, "settle_rev": 0,
                                                  "method": method, "rtol": 1e-8})  # fmt: skip
-        run = integrate(request(case, 1e-8, p, times_of(case, False)))
+        run = integrate(build_request(case, 1e-8, p, times_of(case, False)))
         assert not run.reason
         assert energy_residual(run.tally) < 2e-5
         runs.append((metrics(p, run.tally), run.tally))
@@ -168,7 +168,7 @@ def test_runs_on_worn_bores_keep_their_energy_and_agree(features):
 def test_what_slides_is_what_friction_takes_over_its_coefficient(joint):
     """The sum over all sectors is that over time, to 1e-6, by the ledger's own quadrature."""
     case, p = uneven(joint)
-    tally = integrate(request(case, case.rtol, p, times_of(case, False))).tally
+    tally = integrate(build_request(case, case.rtol, p, times_of(case, False))).tally
     here = 0 if joint == "big_end" else 1
     assert tally["slid"][here] == pytest.approx(tally["friction_loss"] / COEFFICIENT, rel=1e-6)
     assert tally["worn"][here].sum() == pytest.approx(tally["slid"][here], rel=1e-12)
@@ -181,7 +181,7 @@ def test_what_slides_is_told_in_time_where_the_speed_gives_way():
     case, _ = uneven("big_end")
     case = replace(case, drive=Drive(flywheel_kg_m2=0.5), wear=None)
     p = record(case, np.zeros((2, 72)))
-    tally = integrate(request(case, case.rtol, p, times_of(case, False))).tally
+    tally = integrate(build_request(case, case.rtol, p, times_of(case, False))).tally
     assert tally["slid"][0] == pytest.approx(tally["friction_loss"] / COEFFICIENT, rel=1e-6)
 
 
@@ -189,7 +189,7 @@ def test_what_slides_is_found_by_another_integrator_and_quadrature():
     """SciPy's DOP853, with the integral of N |v| as one more unknown."""
     case, p = made(lobes, joint="small_end", load="none",
                    solve={"duration_rev": 0.25, "settle_rev": 0, "rtol": 1e-10})  # fmt: skip
-    ours = integrate(request(case, 1e-10, p, times_of(case, False))).tally
+    ours = integrate(build_request(case, 1e-10, p, times_of(case, False))).tally
     start, n = initial_state(case, p), len(state_names(p))
     out = np.empty(n + FLOWS)
 

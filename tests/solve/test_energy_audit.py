@@ -7,9 +7,9 @@ from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.solve import attempts
 from compressor.solve.error_bars import (
+    MAX_AUDIT_REPEATS,
     MAX_RESIDUAL,
     ROUNDING,
-    RUNGS,
     allowed_residual,
     energy_residual,
 )
@@ -72,7 +72,7 @@ def test_a_run_that_does_not_balance_is_repeated_tighter(unbalance):
 def test_a_run_that_never_balances_fails_and_its_metrics_are_not_stored(unbalance):
     asked = unbalance(5)
     found = simulate(case(rtol=1e-5))
-    assert len(asked) == RUNGS + 1
+    assert len(asked) == MAX_AUDIT_REPEATS + 1
     assert (found["status"].item(), found["reason"].item()) == ("failed", "energy_audit_failed")
     assert found.attrs["detail"] == "energy residual 0.0005, more than 0.0001; at rtol 1e-07"
     assert found.attrs["complete"] == 1
@@ -112,7 +112,7 @@ def test_a_promise_does_not_outweigh_the_audit(accuracy, unbalance):
     asked = unbalance(1e3)
     found = measure(case(accuracy=accuracy))
     assert found.reason == "energy_audit_failed"
-    assert len(asked) == RUNGS + 1
+    assert len(asked) == MAX_AUDIT_REPEATS + 1
     assert np.isnan(found.numbers["acceleration_error"])
 
 

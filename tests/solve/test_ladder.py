@@ -12,7 +12,13 @@ from compressor.cases.parameter import ACCURACY, TIGHTEST, first_rung
 from compressor.metrics import METRICS, SERIES
 from compressor.physics import Column
 from compressor.solve import attempts, solution
-from compressor.solve.error_bars import AMPLIFIED_FACTOR, ORDER, closeness, is_amplified, unmet
+from compressor.solve.error_bars import (
+    AMPLIFIED_FACTOR,
+    ORDER,
+    closeness,
+    is_amplified,
+    missed_targets,
+)
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import (
@@ -344,6 +350,6 @@ def test_ideal_joints_meet_any_number():
 def test_unmet_names_the_worst_joint():
     found = {"max_penetration": np.array([2.0, 0.0]), "impact_count": np.array([0.0, 0.0])}
     error = {"max_penetration": np.array([0.1, 0.0]), "impact_count": np.array([0.0, 1.0])}
-    assert unmet((("max_penetration", 0.1),), found, error) == []
-    (said,) = unmet((("max_penetration", 0.01),), found, error)
+    assert missed_targets((("max_penetration", 0.1),), found, error) == []
+    (said,) = missed_targets((("max_penetration", 0.01),), found, error)
     assert said == "max_penetration: its error bar is 0.05 of it, not 0.01"

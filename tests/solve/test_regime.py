@@ -28,7 +28,7 @@ from compressor.solve.regime import (
     repeats,
 )
 from compressor.solve.request import Trajectory
-from compressor.solve.series import a_turn, compared_times
+from compressor.solve.series import compared_per_rev, compared_times
 from compressor.solve.simulate import measure
 
 PAPER = {"joint": "big_end", "clearance_mm": 0.2}
@@ -80,7 +80,7 @@ def test_accuracy_by_number_is_kept_by_averages_of_chaos_alone():
 
 @pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
 def test_the_paper_s_cases_are_periodic_and_not_searched(joint, monkeypatch):
-    monkeypatch.setattr(HorizonSearch, "look", None)
+    monkeypatch.setattr(HorizonSearch, "twins_part", None)
     values = {"joint": joint} | ({} if joint == "none" else {"clearance_mm": 0.2})
     found = measure(case(values, duration_rev=8))
     assert (found.attributes["promise"], found.attributes["regime"]) == ("kept", "periodic")
@@ -143,7 +143,7 @@ def test_a_short_span_is_looked_at_first(monkeypatch):
     parted = Parting(0.1 * of.turn, True, False)
     asked = followed(monkeypatch, parted)
     search = searched(of, 600_000)
-    assert search.look(whole=True)
+    assert search.twins_part(whole=True)
     assert search.horizon == parted.time
     assert [row[:2] for row in asked] == [
         (FIRST_LOOK_REV, RTOL),
@@ -156,7 +156,7 @@ def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
     together = Parting(of.duration, False, True)
     asked = followed(monkeypatch, Parting(0.1 * of.turn, True, False), together)
     search = searched(of, 600_000)
-    assert not search.look(whole=True)
+    assert not search.twins_part(whole=True)
     assert search.horizon == math.inf
     tight = pytest.approx(RTOL / SURE_FACTOR)
     expected = [
@@ -173,9 +173,9 @@ def test_twins_that_part_at_no_two_tolerances_leave_it_open(monkeypatch):
     parted, together = Parting(0.1 * of.turn, True, False), Parting(of.duration, False, True)
     asked = followed(monkeypatch, *[parted, together] * 20)
     search = searched(of, 600_000)
-    assert not search.look(whole=False)
+    assert not search.twins_part(whole=False)
     assert math.isnan(search.horizon)
-    assert search.seen == 0.0
+    assert search.together_until == 0.0
     assert not search.stopped
     assert min(rtol for _, rtol, _ in asked) >= 0.99e-12
 
@@ -188,8 +188,8 @@ def test_the_search_takes_no_more_than_its_share(monkeypatch, needs):
     search = HorizonSearch(of)
     for _ in range(4):  # a run, and a look
         search.count(run_of(60_000))
-        search.look(whole=True)
-        assert search.of_twins <= TWINS_BUDGET * search.of_runs
+        search.twins_part(whole=True)
+        assert search.twin_evaluations <= TWINS_BUDGET * search.run_evaluations
     assert asked
     assert search.horizon == math.inf or needs > 12_000
     assert search.stopped == (needs > 12_000)
@@ -208,7 +208,7 @@ def test_runs_and_twins_have_twenty_times_the_first_run_s_work(monkeypatch):
     assert search.within_budget(of).solve.max_steps == 1
     left = WORK * 6_000_000 - 90_000_000
     assert search.work_left == left
-    search.look(whole=True)
+    search.twins_part(whole=True)
     assert asked == [(FIRST_LOOK_REV, RTOL, left // 6 // 2)]
     assert search.stopped
     assert search.work_left == 0
@@ -248,13 +248,13 @@ def test_a_search_ends_with_the_job_s_time(monkeypatch):
     now[0] += 2.5
     assert search.left == pytest.approx(0.5)
     now[0] += 0.5
-    search.look(whole=True)
+    search.twins_part(whole=True)
     assert not asked
     assert search.stopped
 
 
 def test_what_cannot_be_told_in_the_time_is_undecided(monkeypatch):
-    monkeypatch.setattr(HorizonSearch, "look", lambda self, whole: False)
+    monkeypatch.setattr(HorizonSearch, "twins_part", lambda self, whole: False)
     found = measure(case(CHAOTIC, rtol=1e-6))
     assert (found.status, found.attributes["regime"]) == ("ok", Regime.UNDECIDED)
     found = measure(case(CHAOTIC, accuracy="reference"))
@@ -293,5 +293,5 @@ def test_less_than_two_revolutions_tell_no_period(duration, settle):
     rows = samples(of, np.ones_like)
     assert repeats(of, rows, NO_ERRORS)[0] is None
     whole = replace(of, solve=replace(of.solve, duration_rev=settle + 2.0))
-    assert a_turn(whole)
+    assert compared_per_rev(whole)
     assert repeats(whole, samples(whole, np.ones_like), NO_ERRORS) == (1, settle)

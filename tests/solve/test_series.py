@@ -8,11 +8,11 @@ from compressor.metrics import NUMBERS, SERIES
 from compressor.physics import COLUMNS, Column
 from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.series import (
-    A_TURN,
-    FEWEST,
-    MOST,
-    a_turn,
+    COMPARED_PER_REV,
+    MAX_COMPARED,
+    MIN_COMPARED,
     block,
+    compared_per_rev,
     compared_times,
     distances,
     journal_distance,
@@ -31,11 +31,11 @@ def case(**solve):
 @pytest.mark.parametrize(
     ("duration", "settle", "count"),
     [
-        (4, 1, 3 * A_TURN),
-        (0.01, 0, FEWEST),
-        (0.01, 0.005, FEWEST),
-        (1000, 0, MOST),
-        (2.5, 1, 1.5 * A_TURN),
+        (4, 1, 3 * COMPARED_PER_REV),
+        (0.01, 0, MIN_COMPARED),
+        (0.01, 0.005, MIN_COMPARED),
+        (1000, 0, MAX_COMPARED),
+        (2.5, 1, 1.5 * COMPARED_PER_REV),
     ],
 )
 def test_runs_are_compared_evenly_from_settling_to_the_end(duration, settle, count):
@@ -49,7 +49,7 @@ def test_runs_are_compared_evenly_from_settling_to_the_end(duration, settle, cou
 
 def test_revolutions_are_compared_at_the_same_angles():
     of = case(duration_rev=3.7, settle_rev=0.6)
-    angles = np.mod(compared_times(of)[: 3 * a_turn(of)] / of.turn, 1.0).reshape(3, -1)
+    angles = np.mod(compared_times(of)[: 3 * compared_per_rev(of)] / of.turn, 1.0).reshape(3, -1)
     np.testing.assert_allclose(angles[1:], angles[:1].repeat(2, axis=0), atol=1e-12)
 
 

@@ -13,10 +13,10 @@ from compressor.solve.run_metrics import (
     MIN_SECTION,
     chaotic_bars,
     metrics,
-    of_peaks,
     parts,
     standard_error,
     statistics,
+    summarize_peaks,
     sure,
 )
 
@@ -73,7 +73,7 @@ def test_revolutions_to_one_percent_are_as_many_as_it_takes(record):
 def test_quantiles_and_their_errors_are_those_of_the_draw():
     """Of exponential draws: median log 2, 95 % quantile log 20, errors sqrt(q/(1-q)/n)."""
     rng = np.random.default_rng(3)
-    rows = [of_peaks("x", rng.exponential(size=(600, 2))) for _ in range(100)]
+    rows = [summarize_peaks("x", rng.exponential(size=(600, 2))) for _ in range(100)]
     expected = -np.log(1 - np.array(QUANTILES))
     errors = np.sqrt(np.array(QUANTILES) / (1 - np.array(QUANTILES)) / 600)
     mean = np.mean([row["x_quantile"] for row in rows], axis=0)
