@@ -44,6 +44,7 @@ class Deferred:
 
     @functools.cached_property
     def target(self) -> Any:
+        """Return what numba makes of the function."""
         with TARGET_LOCK:
             load_numba()
             return vars(self).get("target") or self.make_target()
@@ -94,6 +95,8 @@ def load_numba() -> None:
 
 
 def _compile(function: Function, **options: Any) -> Function:
+    """Return a function that numba compiles with these options when it is first called."""
+
     def make() -> Any:
         import numba
 
@@ -183,6 +186,7 @@ def uncompiled(function: Function) -> Function:
 
 
 def _without_refcount() -> Any:
+    """Return numba's intrinsic of `without_refcount`."""
     from numba.core import types
     from numba.extending import intrinsic
     from numba.np.arrayobj import make_array, populate_array
@@ -206,6 +210,7 @@ def _without_refcount() -> Any:
 
 
 def _fma() -> Any:
+    """Return numba's intrinsic of `fma`."""
     from numba.core import types
     from numba.extending import intrinsic
 
@@ -219,6 +224,7 @@ def _fma() -> Any:
 
 
 def _square_root() -> Any:
+    """Return numba's intrinsic of `square_root`."""
     from numba.core import types
     from numba.extending import intrinsic
 

@@ -172,7 +172,7 @@ def unload_lane(W, j, runs, job, work):
     n = runs.size.shape[1]
     steps, refused = np.int64(W[STEPS + j]), np.int64(W[REJECTED + j])
     w.evaluations += (STAGES - 1) * (steps - w.steps + refused)
-    if steps > w.steps:
+    if steps > w.steps:  # as `march.onset_ahead` does: steps in lanes land on nothing
         w.landed = 0
     w.t, w.h, w.error, w.steps = W[T + j], W[H + j], W[LAST_ERROR + j], steps
     w.rejected += refused
@@ -274,7 +274,7 @@ def march_lanes(scene, W, k, runs, lane_jobs, limit):
         if empty == k:
             return
         try_steps(scene, W, k)
-        if select_plain_steps(scene, W, k):
+        if select_plain_steps(scene, W, k):  # else two of five nodes need not be observed
             observe_nodes(scene, W, k, BETWEEN)
             exclude_onsets(scene, W, k)
         tally_lanes(scene, W, k)

@@ -39,6 +39,7 @@ _next = 0
 
 
 def _rows(count=1):
+    """Return where the next rows begin in the array of all lanes, and count them as used."""
     global _next
     first = _next * LANES
     _next += count

@@ -155,7 +155,7 @@ class WorkArrays(NamedTuple):
     dense: np.ndarray  # (5, n): the step's interpolant
     weights: np.ndarray  # (7,): of the stages, at a fraction of the step
     y: np.ndarray  # (n,)
-    rows: np.ndarray  # gauged at a step's nodes
+    rows: np.ndarray  # (5, COLUMNS): observed at a step's nodes
     gap_fraction: np.ndarray  # (2,): share of the step without contact, by joint
     row: np.ndarray
 
@@ -427,7 +427,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         if is_last_step(w.t, h, end):
             h = end - w.t
         landing = w.landing > 0.0
-        if landing:
+        if landing:  # a part of a step that was within its tolerance: it is not judged again
             h = w.landing
         base = crank_direction(w.t, p)
         error = try_step(w, base, h, z, work, atol, size, phase, p)
@@ -438,6 +438,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
                     w.status = STEP_UNDERFLOW if is_finite(work.k[0]) else NON_FINITE
                 continue
             next_h = next_step_length(w, h, error)
+            # a step that the segment's end cut short says nothing against longer ones
             w.h = max(w.h, next_h) if h < w.h else next_h
         every = observe_step(w, base, h, z, work, phase, p, tally)
         met = landing and finish_at_event(w, h, work, phase, p, tally)

@@ -151,7 +151,7 @@ def solve(motion, y, phase, p):
     """Return the mechanism `Solved` around the ideal motion, in the load's phase.
 
     Friction of ideal joints and of an ideal guide depends on their forces, and these on it: both
-    are found in rounds, of which each leaves some hundredths of the last one's error.
+    are found in rounds; each leaves some hundredths of the last one's error.
     """
     # one array of them all: to ask for memory takes longer than to use it
     memory = np.zeros((2 * ROWS + 13, ROWS))

@@ -1,9 +1,9 @@
 """When contact begins or ends within a step: no pulse is stepped over, whatever the tolerance.
 
-A journal that flies touches when its gap closes; one that is released, but
-not yet out of its bearing, is held off by the clamp and touches again when the unclamped force
-turns positive. Both are watched on the step's interpolant while F_N = 0. Where contact ends, the
-step goes on; how much of it was without contact is told to the metrics.
+A journal that flies touches when its gap closes; one that is released, but not yet out of its
+bearing, is held off by the clamp and touches again when the unclamped force turns positive. Both
+are watched on the step's interpolant while F_N = 0. Where contact ends, the step goes on; the
+metrics take the share of it that was without contact.
 """
 
 import math

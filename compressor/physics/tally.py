@@ -27,7 +27,7 @@ from compressor.physics.record import MAX_SECTORS, MECHANISM, is_featured, zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
-PEAKED = DEVIATION - ACCELERATION  # columns of which the greatest size is kept
+PEAKED = DEVIATION - ACCELERATION  # columns whose greatest size is tallied
 
 
 def lobatto(n):

@@ -4,7 +4,7 @@ A bore is divided by angle into sectors, and w is what was worn off it at each n
 In the direction u of a node the journal's circle overlaps the bore by o = e u - c - w (e: the
 eccentricity in the rod's frame, c: the clearance). Overlap spreads over an arc, as in an elastic
 foundation, and its energy is the integral S of o^2 over the angle. The penetration is that of an
-unworn bore with the same S, and the contact law is asked for the force at it. So every law works
+unworn bore with the same S, and the contact law gives the force at it. So every law works
 on every bore, an unworn one meets it by its own, and Hertz's exponent 3/2 is the foundation itself.
 
 Forces follow from the energy: those of the bore pass through the journal's centre, in the direction

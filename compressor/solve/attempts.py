@@ -147,7 +147,7 @@ TIGHTER_FACTOR = 2.5  # times: the run that errors are estimated by
 OVERRUN_RTOL = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
 MAX_SPEED_ERROR = 0.02  # the same, of the journals' speed, over friction's stiction velocity
 STIFF_TIGHTER = 10.0  # the same at loose tolerances
-LOOSER_FACTOR = 3.0  # times: the run that is asked as well where a motion enlarges errors
+LOOSER_FACTOR = 3.0  # times: the third run that is compared where a motion enlarges errors
 
 
 @dataclass
@@ -159,8 +159,8 @@ class Solution:
     where none was estimated; `samples`: observed rows at the times at which runs are compared;
     `reason` and `detail`: why the job failed, empty when it is ok; `promise`: whether what its
     accuracy promises was `kept`, or `none` was given; `horizon` (s): nan where none was looked for;
-    `settle` (s): from where metrics count; `turns`: tallies of the settled revolutions, where they
-    were asked for; `statistics`: of a chaotic motion; `regime`: of `Regime`, or "" where nothing is
+    `settle` (s): from where metrics count; `turns`: tallies of the settled revolutions, if they
+    were cut; `statistics`: of a chaotic motion; `regime`: of `Regime`, or "" where nothing is
     known; `period`, `settled` (rev): of a periodic motion, nan of others; `rows`: observed at
     `sampled_times`, none without signals.
     """

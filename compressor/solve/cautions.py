@@ -1,16 +1,16 @@
-"""What is said of a case before it runs: natural scales, slips of units, laws left behind.
+"""Cautions about a case before it runs: natural scales, slips of units, laws left behind.
 
 Natural scales of a case before it runs: depths, times and steps, from its parameters alone. Closed
 formulas, tens of microseconds a case. Forces are the sum of the greatest load and inertia, hence
-bounds; the deepest contact of the random cases (tests/random_cases.py) is 0.6 to 1.6 times as deep
-as they say in nine of ten (tests/test_scales.py).
+bounds; the deepest contact of the random cases (tests/campaigns/random_cases.py) is 0.6 to 1.6
+times as deep as they say in nine of ten (tests/solve/test_scales.py).
 
-Numbers that look as if they were given in another unit than their key's. The rule: a key is told of
-where every value that it has in a study lies outside its usual range, and another unit of the same
-quantity would bring all of them inside. A sweep that reaches into the usual range is meant as it
-stands, however odd its ends are.
+Numbers that look as if they were given in another unit than their key's. The rule: a key is
+reported where every value that it has in a study lies outside its usual range, and another unit of
+the same quantity would bring all of them inside. A sweep that reaches into the usual range is meant
+as it stands, however odd its ends are.
 
-Nothing here is refused: a case is spoken of once, before it runs, and grouped over a sweep. What
+Nothing here is refused: an oddity is reported once a study, before it runs. What
 cannot be simulated at all is refused by `compressor.cases.conflicts`.
 """
 
@@ -200,7 +200,7 @@ USUAL = {
 
 
 class Slip(NamedTuple):
-    """A key whose values look like another unit's, and what is said of it."""
+    """A key whose values look like another unit's, with its caution."""
 
     key: str
     message: str
@@ -208,7 +208,7 @@ class Slip(NamedTuple):
 
 
 def slips(cases: Sequence[Case]) -> list[Slip]:
-    """Return the keys of a study's cases of which all values look like another unit's."""
+    """Return the keys of a study's cases whose values all look like another unit's."""
     look_alikes = []
     for key, usual in USUAL.items():
         read = [values for case in cases if (values := values_of(case, key))]
@@ -256,7 +256,7 @@ def other_unit(key: str, usual: Usual, values: Iterable[float]) -> str:
 
 
 def describe_slip(key: str, usual: Usual, values: Sequence[float], other: str) -> str:
-    """Return what is said of values that look like another unit's."""
+    """Return the caution about values that look like another unit's."""
     row, factor = row_of(key), usual.units[other]
     unit = (row.unit if row else "").replace("^p", "^1.5")
     low, high = values[0], values[-1]

@@ -42,10 +42,10 @@ def energy_residual(tally: np.record) -> float:
 def allowed_residual(rtol: float, revolutions: float) -> float:
     """Return the greatest energy residual of a run that can be trusted at a tolerance.
 
-    The 200 random cases of tests/random_cases.py leave a quarter of it at most at rtol 1e-4, a
-    tenth at tighter ones (tests/results/accuracy.json). Runs beyond it, of extremes of stiffness,
-    stiction and mass ratio, mostly keep it at a tenth of the tolerance; those that never do are
-    far off (mu 0.5 at rtol 2e-8: 1.6e-4 of the acceleration).
+    The 200 random cases of tests/campaigns/random_cases.py leave a quarter of it at most at rtol
+    1e-4, a tenth at tighter ones (tests/results/accuracy.json). Runs beyond it, of extremes of
+    stiffness, stiction and mass ratio, mostly keep it at a tenth of the tolerance; those that never
+    do are far off (mu 0.5 at rtol 2e-8: 1.6e-4 of the acceleration).
     """
     return min(max(RESIDUAL_PER_REV * rtol * max(revolutions, 1.0), ROUNDING), MAX_RESIDUAL)
 

@@ -226,6 +226,7 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
     march = March(request, size, edges, phases, result.states)
     now = MarchState(stepper, z, new_work(size.size), result.tally)
+    # two: where a run stops soon after the last one, the one before begins early enough
     earlier = before = Checkpoint.of(now)
     seen = 0  # attempts at the last checkpoint
     for attempts in chunks(request, stepper):

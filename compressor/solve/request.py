@@ -33,7 +33,7 @@ SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 class Cuts:
     """Times (s) at which a run's tally is cut.
 
-    `enough`: asked at each of them with the tallies so far; once it says so, the run ends there.
+    `enough`: called at each of them with the tallies so far; once it is true, the run ends there.
     `turns`: those tallies, of what lies before each cut and after the one before it. `states`: the
     motion at each cut.
     """

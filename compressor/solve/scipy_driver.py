@@ -108,6 +108,7 @@ class Landings:
             ):
                 place = 2 * self.p["freedoms"] + joint
                 z[place] = max(speed, self.p["least_approach"])
+                # a gap that is open by a hair closes once more soon after: that is the same contact
                 self.landed_until[joint] = end + 2.0 * max(0.0, -depth) / speed
 
 

@@ -91,6 +91,7 @@ def stiffness_of(case: Case, joint: str) -> float:
 
 
 def _machine(case: Case, p: dict[str, Any]) -> None:
+    """Set the numbers of crank, rod, masses and pins."""
     machine = case.machine
     p["omega"] = case.omega
     p["crank_radius"] = to_si(machine.crank_radius_mm, "mm")
@@ -104,6 +105,7 @@ def _machine(case: Case, p: dict[str, Any]) -> None:
 
 
 def _contact(case: Case, p: dict[str, Any]) -> None:
+    """Set the contact and friction laws and their numbers."""
     contact, friction = case.contact, case.friction
     p["exponent"] = contact.exponent
     p["damping"] = to_si(contact.damping_N_s_per_mm, "N s/mm")
@@ -123,6 +125,7 @@ def _contact(case: Case, p: dict[str, Any]) -> None:
 
 
 def _gas(case: Case, p: dict[str, Any]) -> None:
+    """Set the forces of the gas on the piston, and its cycle."""
     gas = case.gas
     area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
     p["suction_force"] = to_si(gas.suction_MPa, "MPa") * area
@@ -133,6 +136,7 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
 
 
 def _spring(case: Case, p: dict[str, Any]) -> None:
+    """Set the numbers of the spring between piston and cam."""
     spring = case.spring
     p["spring_stiffness"] = to_si(spring.stiffness_N_per_mm, "N/mm")
     p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")
