@@ -248,30 +248,30 @@ def observe_step(w, base, h, z, work, phase, p, tally):
             work.rows[0, j] = work.row[j]
     else:
         observe_contact(ideal(w.t, p), z[:n], phase, p, work.rows[0])
-    every = 1 if w.stiff else MIDDLE
+    stride = 1 if w.stiff else MIDDLE
     for i in INWARD:
         if w.stiff:
             interpolate(NODES[i], work.dense, work.y)
-        elif i == MIDDLE or every == 1:
+        elif i == MIDDLE or stride == 1:
             combine(NODE_WEIGHTS[w.pair, i], h, z, work.k, work.y)
         else:
             break
         observe_contact(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
         if i == MIDDLE and not w.stiff:
             if may_change(work.rows, p):
-                every = 1
+                stride = 1
                 extend(w.pair, h, z, work.k, work.dense)
                 w.has_dense = 1
             elif w.t >= w.settle and may_beat_peaks(work.rows, MIDDLE, tally):
-                every = 1
-    if every == 1 and not w.has_dense and may_touch(work.rows, p):
+                stride = 1
+    if stride == 1 and not w.has_dense and may_touch(work.rows, p):
         extend(w.pair, h, z, work.k, work.dense)
         w.has_dense = 1
-    return every
+    return stride
 
 
 @inline_llvm
-def onset_ahead(w, h, every, work, phase, p):
+def onset_ahead(w, h, stride, work, phase, p):
     """Return whether contact begins within the step just tried, which must then end there.
 
     Searched only where the nodes of the step let it be. The step after the landing is kept within
@@ -308,7 +308,7 @@ def sample_grid(w, t_end, h, z, work, times, states):
 
 
 @inline_llvm
-def measure_gap_fractions(w, h, every, work, phase, p):
+def measure_gap_fractions(w, h, stride, work, phase, p):
     """Write the share of a step that each joint is without contact.
 
     Where contact changes between two nodes, up to where it does on the interpolant, if there is
@@ -318,9 +318,9 @@ def measure_gap_fractions(w, h, every, work, phase, p):
         gap_fraction = 0.0
         if p.clearance[joint] > 0.0:
             # F_N has a corner where contact changes, so that no quadrature over nodes is exact
-            for i in range(every, NODES.size, every):
-                low, high = NODES[i - every], NODES[i]
-                before = work.rows[i - every, NEARNESS + joint]
+            for i in range(stride, NODES.size, stride):
+                low, high = NODES[i - stride], NODES[i]
+                before = work.rows[i - stride, NEARNESS + joint]
                 after = work.rows[i, NEARNESS + joint]
                 share = gap_fraction_between(before, after)
                 if 0.0 < share < 1.0 and w.has_dense:
@@ -333,7 +333,7 @@ def measure_gap_fractions(w, h, every, work, phase, p):
 
 
 @inline_llvm
-def accumulate_metrics(w, h, every, work, phase, p, tally):
+def accumulate_metrics(w, h, stride, work, phase, p, tally):
     """Tally an accepted step that has been observed, and audit its energy."""
     last = NODES.size - 1
     for j in range(ACCELERATION, COLUMNS):
@@ -343,9 +343,9 @@ def accumulate_metrics(w, h, every, work, phase, p, tally):
     tally_energy(work.row, work.new[n:], tally)
     measured = w.t >= w.settle
     if measured:
-        measure_gap_fractions(w, h, every, work, phase, p)
-    weights = WEIGHTS if every == 1 else COARSE_WEIGHTS
-    tally_step(h, NODES, weights, work.rows, every, work.gap_fraction, measured, tally, p)
+        measure_gap_fractions(w, h, stride, work, phase, p)
+    weights = WEIGHTS if stride == 1 else COARSE_WEIGHTS
+    tally_step(h, NODES, weights, work.rows, stride, work.gap_fraction, measured, tally, p)
 
 
 @inline_llvm
@@ -440,13 +440,13 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             next_h = next_step_length(w, h, error)
             # a step that the segment's end cut short says nothing against longer ones
             w.h = max(w.h, next_h) if h < w.h else next_h
-        every = observe_step(w, base, h, z, work, phase, p, tally)
+        stride = observe_step(w, base, h, z, work, phase, p, tally)
         met = landing and finish_at_event(w, h, work, phase, p, tally)
-        if not landing and onset_ahead(w, h, every, work, phase, p):
+        if not landing and onset_ahead(w, h, stride, work, phase, p):
             continue
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h
-        accumulate_metrics(w, h, every, work, phase, p, tally)
+        accumulate_metrics(w, h, stride, work, phase, p, tally)
         wear_step(w, base, h, z, work, phase, p, tally)
         sample_grid(w, reached, h, z, work, times, states)
         w.taken = h

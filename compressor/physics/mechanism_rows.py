@@ -326,10 +326,10 @@ def beyond_model(y, p):
         return 1
     if p.tilting:
         height, tilt = y[p.at[5]], y[p.at[6]]
-        most = IMPLAUSIBLE * min(p.guide_length, p.guide_height)
+        limit = IMPLAUSIBLE * min(p.guide_length, p.guide_height)
         for end in (-1.0, 1.0):
             for side in (-1.0, 1.0):
-                if corner_depth(height, tilt, end, side, p) > most:
+                if corner_depth(height, tilt, end, side, p) > limit:
                     return 2
     if p.elastic:
         for i in range(7, COORDINATES):

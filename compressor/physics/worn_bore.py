@@ -80,12 +80,12 @@ def write_overlaps(ex, ey, joint, p, overlap):
 
     ex, ey: eccentricity in the frame of the rod's bore (m).
     """
-    most = -math.inf
+    deepest = -math.inf
     for i in range(p.sectors):
         depth = p.towards[i, 0] * ex + p.towards[i, 1] * ey - p.clearance[joint] - p.worn[joint, i]
         overlap[i] = depth
-        most = max(most, depth)
-    return most
+        deepest = max(deepest, depth)
+    return deepest
 
 
 @jit
@@ -112,14 +112,14 @@ def foundation(overlap, p):
 
 
 @jit
-def nearest_wall(overlap, most, p):
+def nearest_wall(overlap, deepest, p):
     """Return the direction of the nearest place on the bore: a parabola's vertex."""
     i = 0
-    while overlap[i] < most:
+    while overlap[i] < deepest:
         i += 1
     before = p.sectors - 1 if i == 0 else i - 1
     after = 0 if i == p.sectors - 1 else i + 1
-    bend = 2.0 * most - overlap[before] - overlap[after]
+    bend = 2.0 * deepest - overlap[before] - overlap[after]
     aside = 0.25 * (overlap[after] - overlap[before]) / bend if bend > 0.0 else 0.0
     x = p.towards[i, 0] + aside * (p.towards[after, 0] - p.towards[before, 0])
     y = p.towards[i, 1] + aside * (p.towards[after, 1] - p.towards[before, 1])
@@ -134,10 +134,10 @@ def penetration_of(ex, ey, joint, p):
     The penetration is negative in a gap.
     """
     overlap = np.empty(p.sectors)
-    most = write_overlaps(ex, ey, joint, p, overlap)
-    if most <= 0.0:
-        gx, gy = nearest_wall(overlap, most, p)
-        return most, gx, gy
+    deepest = write_overlaps(ex, ey, joint, p, overlap)
+    if deepest <= 0.0:
+        gx, gy = nearest_wall(overlap, deepest, p)
+        return deepest, gx, gy
     energy, gx, gy = foundation(overlap, p)
     depth, slope = depth_of(energy, p.clearance[joint])
     return depth, gx / slope, gy / slope
@@ -164,10 +164,10 @@ def contact_at_wall(joint, contact, eccentricity, axes, rod_spin, p):
     """
     ex, ey, vx, vy = in_rod_frame(eccentricity, axes, rod_spin)
     overlap = np.empty(p.sectors)
-    most = write_overlaps(ex, ey, joint, p, overlap)
-    x, y = nearest_wall(overlap, most, p)
+    deepest = write_overlaps(ex, ey, joint, p, overlap)
+    x, y = nearest_wall(overlap, deepest, p)
     return ContactState(
-        contact.fx, contact.fy, contact.moment, contact.normal, contact.friction, most,
+        contact.fx, contact.fy, contact.moment, contact.normal, contact.friction, deepest,
         x * vx + y * vy, contact.slip, contact.elastic, contact.unclamped,
     )  # fmt: skip
 

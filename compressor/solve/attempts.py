@@ -232,8 +232,8 @@ def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, fl
     while True:
         run, revolutions = run_at(rung)
         residual = energy_residual(run.trajectory.tally)
-        most = allowed_residual(rtol, revolutions)
-        if run.reason or residual <= most:
+        allowed = allowed_residual(rtol, revolutions)
+        if run.reason or residual <= allowed:
             return run
         failures += 1
         below = next_audit_rtol(rung, failures)
@@ -241,7 +241,7 @@ def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, fl
             break
         rung = below
     run.reason = Reason.ENERGY_AUDIT_FAILED
-    run.detail = f"energy residual {residual:.2g}, more than {most:.2g}, at rtol {rung:.2g}"
+    run.detail = f"energy residual {residual:.2g}, more than {allowed:.2g}, at rtol {rung:.2g}"
     return run
 
 

@@ -86,8 +86,8 @@ def _forces(
     bears, pressure = ~open_end, np.zeros(cell.size)
     for _ in range(MAX_LOOKS):
         pressure[:] = 0.0
-        here = np.flatnonzero(bears)
-        pressure[here] = spsolve(matrix[here][:, here].tocsc(), right[here])
+        cells = np.flatnonzero(bears)
+        pressure[cells] = spsolve(matrix[cells][:, cells].tocsc(), right[cells])
         missing = matrix @ pressure - right > 1e-12 * np.abs(right).max()
         now = np.where(bears, pressure > 0.0, missing) & ~open_end
         if (now == bears).all():

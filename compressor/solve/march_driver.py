@@ -227,12 +227,12 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     march = March(request, size, edges, phases, result.states)
     now = MarchState(stepper, z, new_work(size.size), result.tally)
     # two: where a run stops soon after the last one, the one before begins early enough
-    earlier = before = Checkpoint.of(now)
-    seen = 0  # attempts at the last checkpoint
+    previous = latest = Checkpoint.of(now)
+    checkpoint_attempts = 0  # attempts at the last checkpoint
     for attempts in chunks(request, stepper):
-        if result.steps + result.rejected >= seen + HISTORY_LENGTH:
-            earlier, before = before, Checkpoint.of(now)
-            seen = result.steps + result.rejected
+        if result.steps + result.rejected >= checkpoint_attempts + HISTORY_LENGTH:
+            previous, latest = latest, Checkpoint.of(now)
+            checkpoint_attempts = result.steps + result.rejected
         march.advance(now, attempts, ends[0] if ends else phases.size)
         result.steps, result.rejected = int(stepper.steps), int(stepper.rejected)
         result.evaluations = int(stepper.evaluations)
@@ -246,8 +246,8 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             check_march(request, stepper, z, float(result.tally.deepest), deadline)
         except Stop:
             result.stop_time, result.stop_state = float(stepper.t), z[:-FLOWS].copy()
-            enough = result.steps + result.rejected >= seen + HISTORY_LENGTH
-            result.history = retrace((before if enough else earlier).restore(), now, march)
+            enough = result.steps + result.rejected >= checkpoint_attempts + HISTORY_LENGTH
+            result.history = retrace((latest if enough else previous).restore(), now, march)
             raise
 
 

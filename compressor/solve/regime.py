@@ -204,8 +204,8 @@ def repeats(
 
     def is_same(k: int, period: int) -> bool:
         return all(
-            (apart <= 2.0 * np.asarray(errors[name]) + SAME_REVOLUTION).all()
-            for name, apart in distances(turns[k], turns[k + period]).items()
+            (distance <= 2.0 * np.asarray(errors[name]) + SAME_REVOLUTION).all()
+            for name, distance in distances(turns[k], turns[k + period]).items()
         )
 
     repetition = find_repetition(count, count // 2, is_same)
@@ -243,22 +243,22 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
         return Settling(with_settle_rev(case, float(case.solve.settle_rev), 1))
     if is_ideal(case):
         return Settling(with_settle_rev(case, 0.0, 1), 0.0)
-    most = int(case.duration / case.turn * (1 + 1e-12))
+    max_revolutions = int(case.duration / case.turn * (1 + 1e-12))
     p, within = record(case), least_promise(case)
 
     def is_settled(turns: Turns) -> bool:
         return steady([metrics(p, turn) for turn in turns], within) is not None
 
-    scout = with_settle_rev(case, 0.0, 1, float(most))
+    scout = with_settle_rev(case, 0.0, 1, float(max_revolutions))
     scout = replace(scout, solve=replace(scout.solve, error_bars=False, accuracy="standard"))
     cuts = Cuts(revolutions(0.0, scout.duration, case.turn), is_settled)
     run_at_tolerance(scout, case.rtol, search.left, False, cuts)
     per_revolution = [metrics(p, turn) for turn in cuts.turns]
     repetition = steady(per_revolution, within)
     if repetition is None:
-        half = float(most // 2)
-        text = f"in {most} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
-        return Settling(with_settle_rev(case, half, 1, float(most)), math.nan, text)
+        half = float(max_revolutions // 2)
+        text = f"in {max_revolutions} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
+        return Settling(with_settle_rev(case, half, 1, float(max_revolutions)), math.nan, text)
     first, period = repetition
     return Settling(with_settle_rev(case, float(first), period), float(first))
 

@@ -216,12 +216,12 @@ def check_state(p: np.record, state: np.ndarray) -> None:
         )
         raise Stop(Reason.CRANK_STALLED, detail)
     if beyond == 2:
-        most = IMPLAUSIBLE * 1e3 * min(p["guide_length"], p["guide_height"])
-        detail = f"a corner of the crosshead is more than {most:.3g} mm deep in its guide"
+        limit = IMPLAUSIBLE * 1e3 * min(p["guide_length"], p["guide_height"])
+        detail = f"a corner of the crosshead is more than {limit:.3g} mm deep in its guide"
         raise Stop(Reason.GUIDE_IMPLAUSIBLE, f"{detail}, a tenth of half its smaller side")
     if beyond == 3:
-        most = IMPLAUSIBLE * 1e3 * p["rod_length"]
-        detail = f"the rod is bent or pressed by more than {most:.3g} mm, a tenth of its length"
+        limit = IMPLAUSIBLE * 1e3 * p["rod_length"]
+        detail = f"the rod is bent or pressed by more than {limit:.3g} mm, a tenth of its length"
         raise Stop(Reason.ROD_IMPLAUSIBLE, detail)
 
 

@@ -142,8 +142,8 @@ def sampled_bars(rows: np.ndarray, other: Companion | None) -> Metrics:
     coarse, bars = sampled_metrics(rows[::2]), {}
     for name, value in sampled_metrics(rows).items():
         row = NUMBERS[name]
-        apart = float(np.ravel(other.apart[row.series])[row.joint])
-        path = row.bar.path * apart * abs(value)
+        distance = float(np.ravel(other.apart[row.series])[row.joint])
+        path = row.bar.path * distance * abs(value)
         by_run = other.closeness * math.hypot(row.bar.own * (value - other.metrics[name]), path)
         bars[name] = by_run + abs(value - coarse[name])
     return bars

@@ -61,7 +61,7 @@ class Landings:
 
     def __init__(self, p: np.record, phase: int):
         self.p, self.phase = p, phase
-        self.worn = [joint for joint in range(2) if p["clearance"][joint] > 0.0]
+        self.joints = [joint for joint in range(2) if p["clearance"][joint] > 0.0]
         self.landed_until = [-np.inf, -np.inf]  # s: a gap that closes before was landed on
 
     def depths(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
@@ -70,7 +70,7 @@ class Landings:
         observe_all(times, states, np.full(times.size, self.phase), self.p, rows)
         return rows[:, Column.PENETRATION : Column.PENETRATION + 2]
 
-    def within(self, begin: float, end: float, dense) -> float | None:
+    def find_onset(self, begin: float, end: float, dense) -> float | None:
         """Return when (s) a gap first closes within a step, or None; at its end none does."""
 
         def depths(times: np.ndarray) -> np.ndarray:
@@ -78,18 +78,18 @@ class Landings:
 
         times = np.linspace(begin, end, SAMPLES_IN_STEP)
         penetration, onset = depths(times), end
-        for joint in self.worn:
+        for joint in self.joints:
             closing = (penetration[:-1, joint] < 0.0) & (penetration[1:, joint] >= 0.0)
             for i in np.flatnonzero(closing & (times[1:] > self.landed_until[joint])):
-                apart, touching = times[i], times[i + 1]
+                low, high = times[i], times[i + 1]
                 for _ in range(MAX_HALVINGS):
-                    middle = 0.5 * (apart + touching)
+                    middle = 0.5 * (low + high)
                     if depths(np.array([middle]))[0, joint] >= 0.0:
-                        touching = middle
+                        high = middle
                     else:
-                        apart = middle
-                if touching > self.landed_until[joint]:
-                    onset = min(onset, touching)
+                        low = middle
+                if high > self.landed_until[joint]:
+                    onset = min(onset, high)
                     break
         return onset if end - onset > LANDING_FRACTION * (end - begin) else None
 
@@ -98,12 +98,12 @@ class Landings:
 
         Of a step that they began apart. z: motion and flows, (n + 4,), written.
         """
-        y, rates, before = z[:-FLOWS].copy(), np.empty(z.size - FLOWS), np.empty(z.size - FLOWS)
-        apart = self.depths(np.array([begin]), np.ascontiguousarray(dense([begin])[:-FLOWS].T))[0]
-        for joint in self.worn:
-            depth, speed = approach_at(joint, end, y, self.phase, self.p, rates, before)
+        y, rates, scratch = z[:-FLOWS].copy(), np.empty(z.size - FLOWS), np.empty(z.size - FLOWS)
+        depths = self.depths(np.array([begin]), np.ascontiguousarray(dense([begin])[:-FLOWS].T))[0]
+        for joint in self.joints:
+            depth, speed = approach_at(joint, end, y, self.phase, self.p, rates, scratch)
             if (
-                apart[joint] < 0.0 < speed
+                depths[joint] < 0.0 < speed
                 and abs(depth) <= LANDING_FRACTION * (end - begin) * speed
             ):
                 place = 2 * self.p["freedoms"] + joint
@@ -191,11 +191,11 @@ def scipy_method(name: str) -> Any:
 class LoadStretch:
     """One stretch between load corners, stepped by a fresh SciPy solver."""
 
-    def __init__(self, request, right_hand_side, result, begin, end, wanted):
+    def __init__(self, request, right_hand_side, result, begin, end, samples):
         self.request, self.right_hand_side, self.result = request, right_hand_side, result
         self.begin, self.end = begin, end
-        self.wanted = wanted  # indices of this segment's samples
-        self.times = np.clip(request.times[wanted], begin, end)
+        self.samples = samples  # indices of this segment's samples
+        self.times = np.clip(request.times[samples], begin, end)
         p = request.p
         self.landings = Landings(p, right_hand_side.phase) if needs_landings(p) else None
 
@@ -233,7 +233,7 @@ class LoadStretch:
                 raise Stop(Reason.NON_FINITE, "the state is no longer finite")
             dense = solver.dense_output()
             if self.landings:
-                onset = self.landings.within(solver.t_old, solver.t, dense)
+                onset = self.landings.find_onset(solver.t_old, solver.t, dense)
                 if onset is not None:
                     result.rejected += 1
                     return solver.t_old, before, onset
@@ -266,7 +266,7 @@ class LoadStretch:
             low = 0
         high = np.searchsorted(self.times, solver.t, side="right")
         if high > low:
-            self.result.states[self.wanted[low:high]] = dense(self.times[low:high])[:-FLOWS].T
+            self.result.states[self.samples[low:high]] = dense(self.times[low:high])[:-FLOWS].T
 
     def tally(self, dense, begin: float, end: float, measured: bool) -> None:
         """Observe the dense solution on [begin, end] and add it to the tally."""

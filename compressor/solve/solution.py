@@ -292,11 +292,11 @@ def end_early(case: Case, best: Solution | None, now: Solution, search: HorizonS
 def fail_energy_audit(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
     """Return a whole run as a failed job: its series and energies are kept, its metrics are not."""
     residual = energy_residual(best.trajectory.tally)
-    most = allowed_residual(case.rtol, case.duration / case.turn)
+    allowed = allowed_residual(case.rtol, case.duration / case.turn)
     best.metrics, best.bars, best.series_errors = {}, {}, {}
     timed_out = reason == Reason.BUDGET_SECONDS
     best.reason = reason if timed_out else Reason.ENERGY_AUDIT_FAILED
-    best.detail = f"energy residual {residual:.2g}, more than {most:.2g}; {detail}"
+    best.detail = f"energy residual {residual:.2g}, more than {allowed:.2g}; {detail}"
     return best
 
 
@@ -407,6 +407,6 @@ def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> S
             now.statistics = statistics(now.p, now.turns)
             now.bars |= chaotic_bars(now.statistics, now.metrics)
         if excess_over_promise(case, now) > 1.0 and case.targets:
-            what = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
-            return fail_accuracy(case, now, what)
+            reason = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
+            return fail_accuracy(case, now, reason)
     return now
