@@ -1,8 +1,8 @@
 """Run jobs in worker processes: one that crashes, hangs or eats memory costs itself only.
 
-Starting, feeding and ending processes is the work of an executor of `concurrent.futures`: loky's,
-which comes with joblib, here; on a cluster dask's client. Ours is what it cannot know: how many jobs
-make a batch, which job was at work in a process that died or took too long, and what runs again.
+Starting, feeding and ending processes is the work of loky's executor of `concurrent.futures`, which
+comes with joblib; on a cluster, of dask's client. Ours is what they cannot know: how many jobs make
+a batch, which job was at work in a process that died or took too long, and what runs again.
 """
 
 import contextlib
