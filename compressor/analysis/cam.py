@@ -22,8 +22,9 @@ ALLOWED_PRESSURE_ANGLE = math.radians(30)  # the usual limit of a translating fo
 
 
 def cam_profile(p, angles):
-    """Return the follower displacement s (m) over cam angles (rad, any shape) of the closed cam
-    (Eq. 10).
+    """Return the displacement s (m) of the closed cam's follower (Eq. 10).
+
+    angles: of the cam (rad), any shape.
     """
     turned = np.mod(angles, 2 * math.pi)
     x, _, _ = exact_motion(turned, p.crank_radius, p.rod_length, p.omega)
@@ -36,8 +37,9 @@ def cam_profile(p, angles):
 
 
 def cam_slope(p, angles):
-    """Return the ds/dphi (m/rad) of `cam_profile`: the ideal piston's speed while the follower
-    moves.
+    """Return ds/dphi (m/rad) of `cam_profile` at cam angles (rad).
+
+    It is the ideal piston's speed while the follower moves, and 0 elsewhere.
     """
     turned = np.mod(angles, 2 * math.pi)
     _, v, _ = exact_motion(turned, p.crank_radius, p.rod_length, p.omega)
@@ -68,8 +70,9 @@ def printed_profile(p, angles):
 
 
 def contour(p, angles, base_radius):
-    """Return the pitch curve (x, y) in m of the cam: base radius plus displacement, aligned
-    roller (e = 0).
+    """Return the pitch curve (x, y) of the cam, in m.
+
+    The radius is `base_radius` plus the displacement: the roller is aligned (e = 0).
     """
     radius = base_radius + cam_profile(p, angles)
     return radius * np.cos(angles), radius * np.sin(angles)
@@ -84,17 +87,17 @@ class Cam:
 
     @property
     def printed_fall(self) -> float:
-        """Cam angle (rad) at which the follower begins to fall as printed (the gas's corner)."""
+        """Return the cam angle (rad) at which the follower begins to fall as printed."""
         return float(printed_corners_of_gas(record_of(self.run))[2])
 
     @property
     def gas_corners(self) -> np.ndarray:
-        """Crank angles (rad) at which the ideal gas's phases change, (3,)."""
+        """Return the crank angles (rad) at which the ideal gas's phases change, (3,)."""
         return np.array(printed_corners_of_gas(record_of(self.run)))
 
     @property
     def printed_heights(self) -> tuple[float, float]:
-        """How far (m) the follower rises and falls by Eq. 10 taken literally."""
+        """Return how far (m) the follower rises and falls by Eq. 10 taken literally."""
         p = record_of(self.run)
         expansion, _, compression = self.gas_corners
         at = np.array([expansion, compression])
@@ -105,7 +108,7 @@ class Cam:
 
     @property
     def height(self) -> float:
-        """How far (m) the closed cam's follower rises and falls."""
+        """Return how far (m) the closed cam's follower rises and falls."""
         p = record_of(self.run)
         return float(2.0 * p.crank_radius - p.spring_stroke)
 
@@ -128,10 +131,10 @@ def pressure_angle(p, angles, base_radius):
 
 
 def least_base_radius(p, allowed, with_displacement=True):
-    """Return the least base radius (m) for an allowed pressure angle (rad): Eq. 11 with e = 0, or
-    Eq. 12.
+    """Return the least base radius (m) for an allowed pressure angle (rad).
 
-    Eq. 12 as printed drops the displacement s_c, which Eq. 11 subtracts.
+    By Eq. 11 with e = 0, or by Eq. 12 without the displacement: Eq. 12 as printed drops the
+    displacement s_c, which Eq. 11 subtracts.
     """
     angles = np.linspace(0, 2 * math.pi, 20001)
     need = np.abs(cam_slope(p, angles)) / math.tan(allowed)

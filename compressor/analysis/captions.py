@@ -221,11 +221,11 @@ def relation(runs: Runs, joint: str) -> str:
 
 
 def angle_spans(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
-    """Return the least and the greatest of each angle (degrees) over runs, in the order of the
-    first run.
+    """Return the least and greatest value of each angle (degrees) over runs.
 
-    Angles of one turn belong together that lie nearest round the circle, so that 359 and 1 degrees
-    are one change: given as (359, 361). Empty where the runs have not the same number of them.
+    In the order of the first run. Angles of one turn belong together that lie nearest round the
+    circle, so that 359 and 1 degrees are one change: given as (359, 361). Empty where the runs have
+    not the same number of them.
     """
     first = np.array(turns[0])
     if not first.size or {len(one) for one in turns} != {first.size}:
@@ -289,9 +289,7 @@ CAPTIONS: dict[int, Callable[[Runs], str]] = {
 
 
 def caption(number: int, runs: Runs) -> str:
-    """Return the caption of a figure, by its number in the paper, of the runs that it is drawn
-    from.
-    """
+    """Return the caption of a figure of the paper, by its number, for the runs it shows."""
     return CAPTIONS[number](runs)
 
 
@@ -345,7 +343,7 @@ def orbits(found: Shakings, runs: Runs) -> str:
 
 
 def angles(found: Shakings, runs: Runs) -> str:
-    """Of the crank angles at which X has its high orders: which share changes with clearance."""
+    """Describe which part of X's high orders changes with clearance, by crank angle."""
     sentences = [
         f"The part of X above order {ORDER} over crank angle. Shaded: from {BEFORE:g}° before to "
         f"{AFTER:g}° after a change of direction of the joint's force along the cylinder, at "

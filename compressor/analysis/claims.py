@@ -146,11 +146,10 @@ def horizontal_force(runs: Runs) -> Verdict:
 
 
 def across_over_up(run: xr.Dataset, joint: str) -> BarredNumber:
-    """Return the horizontal over the vertical contact force at the same times, weighted by the
-    force.
+    """Return the ratio of horizontal to vertical contact force, weighted by the force.
 
-    The mean of |F| |F_x| over that of |F| |F_y|. Its error is what the force's one allows by
-    Cauchy's inequality.
+    Both forces are at the same times: the mean of |F| |F_x| over that of |F| |F_y|. Its error is
+    what the force's one allows by Cauchy's inequality.
     """
 
     def means(part: xr.Dataset) -> tuple[float, float]:
@@ -208,9 +207,7 @@ def correlation(run: xr.Dataset, joint: str) -> BarredNumber:
 
 
 def steady_impacts(runs: Runs) -> Verdict:
-    """Return the claim 7: nearly continuous impacts at the big end, intermittent ones at the
-    small end.
-    """
+    """Return the verdict on claim 7: nearly continuous impacts at the big end alone."""
     margins = []
     for c in CLEARANCES:
         big, small = (measured_shares(runs[label(joint, c)], joint) for joint in JOINTS)
@@ -219,16 +216,12 @@ def steady_impacts(runs: Runs) -> Verdict:
 
 
 def more_continuous(big: Shares, small: Shares) -> list[Margin]:
-    """Return how far a big end is more continuous than a small end, by each share of crank
-    angle.
-    """
+    """Return how far a big end is more continuous than a small end, by each share."""
     return [exceeds(one, other, EXCESS) for one, other in zip(big, small, strict=True)]
 
 
 def impact_rows(runs: Runs) -> Iterator[tuple[str, str]]:
-    """Yield what claim 7 shows: big end and small end, settled, from the start, and as they
-    vibrate.
-    """
+    """Yield the evidence of claim 7 for both joints: settled, from the start, vibrating."""
     for begin, start_up in (("settled", False), ("from the start", True)):
         for c in CLEARANCES:
             pair = [continuity(runs[label(joint, c)], joint, start_up) for joint in JOINTS]
@@ -362,8 +355,11 @@ def claims(runs: Runs) -> list[Claim]:
 
 
 def claim_margins(runs: Runs) -> tuple[list[Margin], dict[str, Margin]]:
-    """Return how far each claim is from its threshold, as `claims` tells, all of whose runs are
-    there.
+    """Return how far each claim is from its threshold, and claim 7 by each share alone.
+
+    As `claims` judges them; all worn runs and ideal runs must be there. The second value has claim
+    7 by each of its shares, and as `active` by the share of time in which the machine vibrates
+    (`active_share`), without an error.
 
     Of claim 7 also by each of its shares alone, and by the share of time in which the machine
     vibrates (`active_share`), without an error.

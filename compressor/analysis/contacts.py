@@ -117,10 +117,10 @@ def contact_spans(series: ContactSeries) -> list[ContactSpan]:
 
 
 def flights(series: ContactSeries) -> np.ndarray:
-    """Return which samples are in flight, (m,) booleans: no contact until the next, and once off
-    the bore.
+    """Return which samples are in flight, (m,) booleans.
 
-    A contact that is lost and found again within the penetration leaves no flight.
+    A flight has no contact and is off the bore at some time. A contact that is lost and found again
+    within the penetration leaves no flight.
     """
     flying = series.normal <= 0
     edges = np.flatnonzero(np.diff(flying, prepend=False, append=False)).reshape(-1, 2)
@@ -167,8 +167,7 @@ class Impact:
 
 
 def impacts(run: xr.Dataset) -> xr.Dataset:
-    """Return the table of impacts after settling, in order of time: `COLUMNS` over the dim
-    `impact`.
+    """Return the impacts after settling, by time: `COLUMNS` over the dim `impact`.
 
     An impact is a contact (F_N > 0) that begins after the journal was off its bore, as in
     `impact_count`; one that lies between two samples is not seen. `lost_energy` is what the contact

@@ -34,8 +34,7 @@ class SaltelliDesign:
         return SaltelliDesign(self.a[:count], self.b[:count], self.mixed[:, :count])
 
     def indices(self, values: np.ndarray, resamples: int = RESAMPLES) -> dict[str, np.ndarray]:
-        """Return both indices of a quantity over k keys with their 95 % bootstrap intervals, (k,)
-        each.
+        """Return Sobol's indices of a quantity over k keys with 95 % intervals, (k,) each.
 
         values: of all points, finite and not all the same, shape (n (k + 2),). `first_order` and
         `total_order`, with `_low` and `_high`, by SciPy's sobol_indices (Saltelli et al., Computer
@@ -64,7 +63,7 @@ class SaltelliDesign:
 
 @contextlib.contextmanager
 def seed_global_draws() -> Iterator[None]:
-    """Have NumPy's global draws be the same each time: this bootstrap takes no generator."""
+    """Fix NumPy's global draws for a block, since this bootstrap takes no generator."""
     state = np.random.get_state()  # noqa: NPY002
     np.random.seed(SEED)  # noqa: NPY002
     try:
@@ -127,7 +126,7 @@ class Effects:
 
     @property
     def strength(self) -> np.ndarray:
-        """By which keys are ranked, (k,): the total effect, or the size of the correlation."""
+        """Return what ranks the keys, (k,): total effects, or sizes of correlations."""
         return abs(self.main) if self.total is None else self.total
 
 
@@ -162,8 +161,9 @@ def grid_effects(values: np.ndarray) -> Effects | None:
 
 
 def fill_unknown(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """Return the values with unknown points as the sum of their axes' main effects, which this
-    finds.
+    """Return the values with unknown points filled by the sum of their axes' main effects.
+
+    The main effects are found by iteration, since unknown points are part of the means.
     """
     if not unknown.any():
         return values
@@ -238,9 +238,7 @@ def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, f
 
 
 def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
-    """Return the correlation ratio of the ranks of values in groups, and the ends of its
-    interval.
-    """
+    """Return the correlation ratio of ranks of values in groups, and its interval."""
     from scipy.stats import kruskal, rankdata
 
     if np.unique(codes).size < 2:
@@ -262,8 +260,7 @@ def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, flo
 
 
 def trend(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...] | None:
-    """Return a parabola through points by least squares, at places: it and the ends of its 95 %
-    interval.
+    """Return a least-squares parabola at places, and the ends of its 95 % interval.
 
     x, y: (points,), nan where unknown; None of fewer than FEWEST points or three places. The
     interval is that of the mean at a place, by Student's t and the covariance HC3, which holds

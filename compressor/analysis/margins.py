@@ -40,12 +40,12 @@ class Margin(NamedTuple):
 
     @property
     def clear(self) -> bool:
-        """Whether it is known on which side of the threshold the measure lies."""
+        """Return whether it is known on which side of the threshold the measure lies."""
         return abs(self.value) > self.error
 
     @property
     def said(self) -> str:
-        """The margin in words, in percent of the threshold."""
+        """Return the margin in words, in percent of the threshold."""
         bar = "no error bar" if math.isnan(self.error) else f"± {100 * self.error:.2g} %"
         doubt = "" if self.clear or math.isnan(self.error) else ", undecided"
         return f"{100 * self.value:+.3g} % ({bar}{doubt})"
@@ -80,16 +80,12 @@ def least(margins: Sequence[Margin]) -> Margin:
 
 
 def exceeds(one: BarredNumber, other: BarredNumber, by: float) -> Margin:
-    """Return the margin, in the measures' own unit, of a measure that is to exceed another one
-    by this.
-    """
+    """Return the margin by which a measure exceeds another by more than `by`, in its unit."""
     return Margin(one.value - other.value - by, one.error + other.error)
 
 
 def is_chaotic(run: xr.Dataset) -> bool:
-    """Return whether the course of a run's motion cannot be foretold, so that averages alone
-    count.
-    """
+    """Return whether a run's motion cannot be foretold, so that only averages count."""
     return run.attrs.get("regime") == "chaotic"
 
 
@@ -137,8 +133,9 @@ def metric(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
 
 
 def series_error(run: xr.Dataset, name: str, values: np.ndarray, **where: str) -> float:
-    """Return the rms of the error of a settled time series, in its unit: its relative one times its
-    rms.
+    """Return the rms error of a settled time series, in its unit.
+
+    It is the stored relative error times the rms of the series.
 
     values: the settled series, of vectors by component; where: its joint.
     """
@@ -290,9 +287,7 @@ def compare_continuity(big: Continuity, small: Continuity) -> str:
 
 
 def hit_share(table: xr.Dataset, joint: str, revolutions: int) -> float:
-    """Return the share of windows of `WINDOW` degrees, over the revolutions, that a joint hits
-    in.
-    """
+    """Return the share of crank-angle windows (`WINDOW` degrees) in which a joint hits."""
     counts = (table["joint"].values == joint) & (table["approach_speed"].values > SLOWEST)
     angle = 360.0 * table["revolution"].values[counts] + table["crank_angle"].values[counts]
     return np.unique(angle // WINDOW).size * WINDOW / (360.0 * revolutions)

@@ -79,8 +79,10 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
 
 
 def ringing(kept: xr.Dataset, turn: float) -> float:
-    """Return the strongest frequency (Hz) of the acceleration's deviation after a turn
-    (degrees).
+    """Return the strongest frequency (Hz) in the acceleration after a turn (degrees).
+
+    Of the deviation from the ideal acceleration, without its slow drift; nan where the samples
+    are too few or no line is above order `MIN_RING`.
     """
     from scipy.signal import find_peaks, periodogram
 

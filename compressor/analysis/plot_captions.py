@@ -52,8 +52,7 @@ class SweptRow:
 
 
 def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
-    """Return the most frequent modes by joint that has clearance anywhere, (rows, bins of the
-    angle).
+    """Return the most frequent mode over rows and crank angle, by joint: (rows, bins).
 
     Integers, -1 where nothing is known; {} where no joint has clearance.
     """
@@ -201,7 +200,7 @@ def struck(run: xr.Dataset, twin: Twin) -> str:
 
 
 def waterfall(rows: Sequence[SweptRow], axis: str) -> str:
-    """Of the order spectra along an axis: where the rms above `ORDER` is least and greatest."""
+    """Describe order spectra along an axis: where the rms above `ORDER` is least and greatest."""
     known = [(row.shaking.spectrum.above, row.value) for row in rows if row.shaking]
     least, greatest = min(known), max(known)
     return (
@@ -236,7 +235,7 @@ def left_out(rows: Sequence[SweptRow]) -> str:
 
 
 def span(values: np.ndarray, form: str = ".2f") -> str:
-    """From the least to the greatest of some values."""
+    """Return the least and the greatest of some values in words."""
     return f"{values.min():{form}} to {values.max():{form}}"
 
 

@@ -84,8 +84,9 @@ def force_relation(run: xr.Dataset, joint: str) -> Relation:
 
 
 def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the displacement, velocity and acceleration (SI) of the run's ideal twin on its own
-    grid.
+    """Return displacement, velocity and acceleration (SI) of the ideal machine.
+
+    (m,) each, at the run's own crank angles.
     """
     case = case_of(run)
     lengths = case.machine.crank_radius_mm / 1000, case.machine.rod_length_mm / 1000
@@ -108,8 +109,9 @@ def load_corners(run: xr.Dataset) -> np.ndarray:
 
 
 def load_phases(run: xr.Dataset) -> np.ndarray:
-    """Return the phase of the load at each sample, integers: expansion, suction, compression,
-    discharge.
+    """Return the phase of the load at each sample as an integer.
+
+    In order: expansion, suction, compression, discharge.
     """
     times = run["time"].values
     edges, phases = segments(record_of(run), times[-1])

@@ -107,7 +107,7 @@ class Spectrum:
 
     @property
     def lines(self) -> tuple[np.ndarray, np.ndarray]:
-        """Orders and amplitudes."""
+        """Return orders and amplitudes."""
         return self.orders, self.amplitudes
 
 
@@ -170,8 +170,9 @@ def shaking(run: xr.Dataset) -> Shaking:
 
 
 def evenly(kept: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return a signal of `whole_revolutions` at an even number of equal crank angles a turn, and
-    this.
+    """Return a signal resampled at equal crank angles, and their even number a turn.
+
+    values: a signal of `whole_revolutions`.
     """
     from compressor.vibration import resample_angle
 
@@ -181,8 +182,9 @@ def evenly(kept: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.n
 
 
 def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
-    """Return the order spectrum of a signal at a_turn equal crank angles a revolution, whole
-    ones.
+    """Return the order spectrum of a signal at equal crank angles.
+
+    even: whole revolutions of `a_turn` samples each.
     """
     from compressor.vibration import line_amplitudes, rms_above
 
@@ -200,8 +202,9 @@ def deviation_spectrum(run: xr.Dataset) -> Spectrum:
 
 
 def directions_change(kept: xr.Dataset) -> tuple[float, ...]:
-    """Return the crank angles (degrees) at which forces along the cylinder change sign, of all
-    worn joints.
+    """Return the crank angles (degrees) at which forces along the cylinder change sign.
+
+    Of all joints with clearance, in rising order.
     """
     try:
         joints = joints_with_clearance(kept)

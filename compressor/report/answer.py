@@ -357,7 +357,10 @@ def finding(
 def round_robin(
     each: Sequence[tuple[str, Sequence[MetricChange]]],
 ) -> Iterator[tuple[str, Sequence[MetricChange]]]:
-    """At most so many findings in all, the first of each first."""
+    """Yield each name with its first findings, at most MAX_FINDINGS in all.
+
+    One finding of each is chosen in turn, so that no name crowds out another.
+    """
     room = MAX_FINDINGS
     counts = [0] * len(each)
     while room and any(n < len(found) for n, (_, found) in zip(counts, each, strict=True)):

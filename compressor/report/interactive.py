@@ -45,7 +45,7 @@ EVEN = 1e-6  # of a step: how far evenly spaced numbers may be off
 
 
 def publish_library(folder: Path) -> None:
-    """Put plotly.js beside the page, unless this version of it lies there. Raises StoreError."""
+    """Write plotly.js beside the page, unless it is there. Raises StoreError."""
     path = folder / LIBRARY
     source = find_spec("plotly")
     (place,) = (source.submodule_search_locations or [""])[:1] if source else [""]
@@ -182,8 +182,7 @@ def colors_of(scale: ColorScale) -> list[str]:
 
 
 def visible(trace: Trace, panel: Panel) -> Any:
-    """Return the places of the points to draw: all, or where these are many the extremes of each
-    pixel.
+    """Return the places of the points to draw: all, or of many the extremes of each pixel.
 
     Of a curve in x from left to right only what lies in the panel, and a point on either side.
     """
@@ -201,13 +200,14 @@ def visible(trace: Trace, panel: Panel) -> Any:
 
 
 def every(size: int, count: int) -> np.ndarray:
-    """Evenly chosen places."""
+    """Return at most `count` evenly chosen places below a size."""
     return np.unique(np.linspace(0, size - 1, count).astype(int))
 
 
 def extremes(y: np.ndarray, count: int) -> np.ndarray:
-    """Return the places of the least and the greatest value of each of so many parts, and of the
-    ends.
+    """Return the places of the least and greatest value of each of `count` parts.
+
+    Also the two ends, and values that are not finite.
     """
     edges = np.linspace(0, y.size, count + 1).astype(int)[:-1]
     filled = np.where(np.isfinite(y), y, 0.0)

@@ -134,22 +134,22 @@ class Plate:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the PNG in pixels."""
+        """Return width and height of the PNG in pixels."""
         return int(self.drawing.width * DPI), int(self.drawing.height * DPI)
 
     @property
     def alt(self) -> str:
-        """What is seen, in words."""
+        """Return what is seen, in words."""
         return describe_figure(self.drawing)
 
     @property
     def jobs(self) -> Iterator[str]:
-        """The keys of the jobs that its points are."""
+        """Return the keys of the jobs that its points are."""
         return (key for panel in self.drawing.panels for t in panel.traces for key in t.jobs)
 
     @property
     def texts(self) -> dict[str, str]:
-        """The files beside the page that are no pictures, by their names."""
+        """Return the files beside the page that are no pictures, by their names."""
         drawing = self.drawing
         return {f"{self.name}.csv": as_csv(drawing), f"{self.name}.js": script(self.name, drawing)}
 
@@ -167,7 +167,7 @@ class Running(NamedTuple):
 
     @property
     def left(self) -> str:
-        """How long the run will still take, in words; "" where that is not known."""
+        """Return how long the run will still take, in words; "" where that is not known."""
         if self.eta_s is None:
             return ""
         minutes = round(self.eta_s / 60)

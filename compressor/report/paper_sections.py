@@ -105,8 +105,9 @@ def find_runs(
 def paper_candidates(
     stored: Stored, studies: Sequence[StoredStudy], physics: Collection[str]
 ) -> list[str]:
-    """Return the keys of the studies' stored jobs that simulate some physics, in the studies'
-    order.
+    """Return the keys of the studies' stored jobs that simulate some physics.
+
+    In the studies' order, each once. physics: the physics keys.
     """
     keys = list(dict.fromkeys(key for study in studies for key in study.keys))
     positions = stored.rows.find(keys)
@@ -156,17 +157,17 @@ class Difference:
 
     @property
     def said(self) -> str:
-        """The difference in words."""
+        """Return the difference in words."""
         phrase = f", {self.phrase}" if self.phrase else ""
         return f"{self.key}{phrase}: {self.value} (default: {self.default})"
 
 
 def differences(case: Case, besides: tuple[str, ...] = ()) -> list[Difference]:
-    """Return the keys in which a case's physics or span differs from the default case, in a file's
-    order.
+    """Return the keys in which a case differs from the default case, in a file's order.
 
-    A value that follows from others, such as the inertia of a uniform rod, is none of its own, nor
-    is one that means the same as the default. besides: groups or keys at the top to leave out.
+    Only its physics and span count. A value that follows from others, such as the inertia of a
+    uniform rod, is none of its own, nor is one that means the same as the default. besides: groups
+    or keys at the top to leave out.
     """
     values, defaults = case.values(), Case().values()
     found = []
@@ -194,8 +195,9 @@ def leaves(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[t
 
 
 def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
-    """Return whether a case is the same without a key: it follows from the others, or is not
-    read.
+    """Return whether a case stays the same without a key.
+
+    The key then follows from the others, or is not read.
     """
     group, _, name = key.rpartition(".")
     rest: dict[str, Any] = {n: item for n, item in values.items() if n != key}
@@ -271,7 +273,7 @@ class SecondSetContent:
 
     @property
     def beside(self) -> bool:
-        """Whether any figure has a counterpart."""
+        """Return whether any figure has a counterpart."""
         return any(pair.first for pair in self.pairs)
 
 
@@ -284,8 +286,10 @@ def second_sets(
 
 
 def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSet | None:
-    """Return a study's second set: None unless it holds all nine worn cases of just one other
-    machine.
+    """Return a study's set of the paper's worn cases in another machine, or None.
+
+    None unless it holds all nine worn cases of just one other machine. They must be alike in all
+    but the fault, have ended well, and have time series that are `comparable`.
 
     They must be alike in all but the fault, have ended well, and have time series that are
     `comparable`.
@@ -352,8 +356,7 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
 
 
 def default_machine_runs(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]:
-    """Return the default machine's runs without clearance, where those of a case's machine are the
-    same.
+    """Return the default machine's ideal runs that hold for a case's machine as well.
 
     Without clearance masses, contact and friction are not read: the motion is that of equal crank,
     rod, speed and span. loads: whether the loads on the piston are to be the same, too.

@@ -214,7 +214,10 @@ def choose_axis(folder: Folder, study: StoredStudy, wanted: str) -> str:
 def select_jobs(
     folder: Folder, study: StoredStudy, over: str, at: Sequence[str]
 ) -> tuple[list[tuple[Any, str]], str]:
-    """(value, key) of the jobs along an axis in its order, and what of the others is told."""
+    """Return (value, key) of the jobs along an axis, and a sentence on the other axes.
+
+    In the order of the axis. Raises PlotError where `at` names no job, or the axis itself.
+    """
     fixed = {}
     for text in at:
         key, value = find_value(folder, study, text)

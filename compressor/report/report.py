@@ -117,7 +117,7 @@ def write_report(
 
 
 def restate(report: Folder, before: Running, now: Running) -> None:
-    """Say on the page of a report how the run stands now, without drawing anew.
+    """Write on a report's page how the run stands now, without drawing anew.
 
     Raises OSError where the page cannot be read, StoreError where it cannot be written.
     """

@@ -41,7 +41,7 @@ class Counts(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The counts in words."""
+        """Return the counts in words."""
         jobs = sum(self)
         parts = [f"{jobs} job{'s' * (jobs != 1)}: {self.ok} ok"]
         parts += [f"{self.failed} failed"] if self.failed else []
@@ -133,8 +133,7 @@ def job_counts(data: xr.Dataset) -> Counts:
 
 
 def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return what a click on the point of a job tells: where it is in the sweep, how it ended, a
-    command.
+    """Return what a click on a job's point shows: its place in the sweep, end and command.
 
     keys: of the jobs, of which the first MAX_FACTS are told of.
     """

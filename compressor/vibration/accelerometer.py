@@ -97,12 +97,12 @@ def interpolate_periodic(values: np.ndarray, step: float, times: np.ndarray) -> 
 
 
 def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: float) -> np.ndarray:
-    """Return the time (s) of the undisturbed course at which the crank is as far as at each of
-    `times`.
+    """Return the times (s) at which a steady crank is as far as the real one at `times`.
 
-    The speed's deviation is a cubic spline through a Gaussian draw of `speed_jitter` rms for each
-    revolution. Between these points it is smaller: 0.93 of that rms over all times, and 0.81 of it
-    for the mean speed of a revolution.
+    times: of the record, (m,); turn: of a steady revolution (s). The speed's deviation is a cubic
+    spline through a Gaussian draw of `speed_jitter` rms for each revolution. Between these points
+    it is smaller: 0.93 of that rms over all times, and 0.81 of it for the mean speed of a
+    revolution.
     """
     if not sensor.speed_jitter:
         return times

@@ -149,10 +149,10 @@ def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
 
 
 def casing_acceleration(body: Body, force: np.ndarray, step: float) -> np.ndarray:
-    """Return the acceleration (m/s2, (n,)) of a casing mode against the body, by the force (N) at
-    its place.
+    """Return a casing mode's acceleration (m/s2, (n,)) against the body.
 
-    A mode of some hundred Hz and more forgets its start within a revolution; it starts at rest.
+    force: at its place, in N, (n,), `step` s apart. A mode of some hundred Hz and more forgets its
+    start within a revolution; it starts at rest.
     """
     how = body.casing_frequency_Hz, body.casing_damping_ratio
     assert body.casing_mass_kg is not None  # as of a Case, which fills it in

@@ -163,8 +163,9 @@ class Shape(NamedTuple):
 
 
 def shape(values: np.ndarray) -> Shape:
-    """Return the `Shape` of samples at equal intervals, (m,). Raises SignalError as its
-    functions do.
+    """Return the `Shape` of samples at equal intervals, (m,).
+
+    Raises SignalError as its functions do.
     """
     return Shape(rms(values), crest_factor(values), kurtosis(values), gini(values))
 
@@ -187,11 +188,11 @@ def crest_factor(values: np.ndarray) -> float:
 
 
 def kurtosis(values: np.ndarray) -> float:
-    """Return Pearson's kurtosis of samples (m,): fourth central moment over the square of the
-    second.
+    """Return Pearson's kurtosis of samples (m,).
 
-    3 of Gaussian noise, 1.5 of a sine, 1 of a square wave. Moments of the samples themselves,
-    without correction of bias; nan of a constant.
+    The fourth central moment over the square of the second: 3 of Gaussian noise, 1.5 of a sine, 1
+    of a square wave. Moments of the samples themselves, without correction of bias; nan of a
+    constant.
     """
     found, _ = _scale_signal(values)
     if np.ptp(found) == 0.0:
@@ -201,11 +202,11 @@ def kurtosis(values: np.ndarray) -> float:
 
 
 def gini(values: np.ndarray) -> float:
-    """Return the Gini index of magnitudes (m,): 0 of a constant, 1 - 1/m of a single one that is
-    not zero.
+    """Return the Gini index of magnitudes (m,).
 
-    1 - 2 sum_k (x_k / sum x) (m - k + 1/2) / m, x_1 <= ... <= x_m (Hurley and Rickard, IEEE
-    Transactions on Information Theory 55, 2009, Eq. 1). For impulses pass the squared envelope
+    It is 0 for a constant and 1 - 1/m for a single value that is not zero: 1 - 2 sum_k (x_k / sum
+    x) (m - k + 1/2) / m, x_1 <= ... <= x_m (Hurley and Rickard, IEEE Transactions on Information
+    Theory 55, 2009, Eq. 1). For impulses pass the squared envelope
     (`compressor.vibration.envelope.band_envelope`).
     """
     found, size = _scale_signal(values)
@@ -256,8 +257,9 @@ def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarra
 
 
 def _scale_signal(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the checked signal over its greatest magnitude, so that no power overflows, and
-    that.
+    """Return the checked signal over its greatest magnitude, and that magnitude.
+
+    Scaled, no power of it overflows.
     """
     found = checked_signal(values)
     size = float(np.max(np.abs(found)))

@@ -116,14 +116,14 @@ def noise_bandwidth(window: str) -> float:
 
 
 def line_amplitudes(values: np.ndarray, block: int, window: str, rms: bool) -> np.ndarray:
-    """Single-sided amplitudes of the lines 0, 1, ... block // 2 cycles a block; raises SignalError.
+    """Return the single-sided amplitudes of the lines 0, 1, ... block // 2 cycles a block.
 
     values: (m,), m >= block. Welch's method (IEEE Transactions on Audio and Electroacoustics 15,
     1967): the mean squares of blocks of `block` samples are averaged, so that a line is the rms
     over blocks. Blocks overlap by half but for the rectangular window; samples after the last whole
     block are left. No mean is taken off. Amplitudes are divided by the window's coherent gain, so
     that a sine of a whole number of cycles a block has its own amplitude with any window. Each is a
-    peak value, or with `rms` a root mean square.
+    peak value, or with `rms` a root mean square. Raises SignalError for an unknown window.
     """
     kind = scipy_window(window)
     overlap = 0 if kind == "boxcar" else block // 2
@@ -155,8 +155,9 @@ class AngleWindow:
 
 
 def samples_a_turn(angle: np.ndarray) -> int:
-    """Return the samples a revolution at the median interval of angles (rad), (m,), rounded up
-    to be even.
+    """Return the even number of samples a revolution at the median step of angles.
+
+    angle: rad, (m,). The number is rounded up.
     """
     return 2 * math.ceil(round(TURN / float(np.median(np.diff(angle)))) / 2)
 
@@ -192,7 +193,7 @@ def order_spectrum(
     a_turn: int | None = None,
     rms: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Single-sided amplitude spectrum over orders of the crank speed: (orders, amplitudes).
+    """Return orders of the crank speed and their single-sided amplitudes.
 
     angle (rad) and values: (m,). turns: revolutions a block, over which mean squares are averaged;
     all of them if None. Orders are 0, 1/turns, ... up to a_turn / 2; a_turn: samples a revolution

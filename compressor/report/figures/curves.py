@@ -58,9 +58,7 @@ class Curve:
 
 
 def degrees(run: xr.Dataset) -> np.ndarray:
-    """Return the crank angle (°) of a run's samples, counted from the top dead centre before
-    they begin.
-    """
+    """Return the crank angle (°) of a run's samples from the top dead centre before them."""
     angle = np.degrees(run["crank_angle"].values)
     return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9)
 
@@ -142,8 +140,7 @@ def plot_enlarged(
 
 
 def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:
-    """Return the samples of the window in which a quantity differs most, and whether it differs at
-    all.
+    """Return the window's samples in which a quantity differs most, and whether it does.
 
     The window lies around the greatest distance between the outermost curves; for a steep
     quantity it is the one with the greatest mean distance over the height that it needs. Where all
@@ -170,8 +167,9 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
 
 
 def first_peak(score: np.ndarray, nearly: float, reach: int) -> int:
-    """Return where the first maximum that is nearly the greatest lies: equal turns give one
-    place.
+    """Return where the first maximum lies that is nearly the greatest.
+
+    Revolutions that are nearly equal then give the same place.
     """
     first = int(np.argmax(score >= nearly * score.max()))
     return first + int(np.argmax(score[first : first + reach + 1]))

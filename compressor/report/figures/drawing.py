@@ -75,7 +75,7 @@ class Trace:
 
     @property
     def is_points(self) -> bool:
-        """Whether it is marks without a line."""
+        """Return whether it is marks without a line."""
         return self.kind == "line" and self.style.linestyle == "none"
 
     def extent(self, way: Way) -> np.ndarray:
@@ -179,7 +179,7 @@ class Note:
 
     @property
     def is_line(self) -> bool:
-        """Whether it is a straight line across the panel."""
+        """Return whether it is a straight line across the panel."""
         return not self.text and self.tail is None
 
 
@@ -211,7 +211,7 @@ class Scale:
         self.high = self.high if math.isnan(high) else float(high)
 
     def name(self, words: Sequence[str]) -> None:
-        """Put words at 0, 1, 2 and so on."""
+        """Set words as ticks at 0, 1, 2 and so on."""
         self.words = {float(place): word for place, word in enumerate(words)}
 
 
@@ -246,7 +246,7 @@ class Panel:
 
     @property
     def ordered(self) -> list[Trace]:
-        """The traces as the page and the table have them: bars first, then the lowest."""
+        """Return the traces as the page and the table have them: bars first, then the lowest."""
         first = {"bars", "columns"}
         return sorted(
             self.traces, key=lambda t: (t.kind not in first and t.errors is None, t.style.zorder)
@@ -284,9 +284,9 @@ def shared_limits(panels: Sequence[Panel], way: Way) -> tuple[float, float]:
 
 
 def share_scales(panels: Iterable[Panel], *ways: Way) -> None:
-    """Give panels one scale along `x`, `y` or both, that of the first; the outermost have numbers.
+    """Set one scale along `x`, `y` or both for panels: that of the first.
 
-    Of x these are the lowest of a column, of y the first of a row.
+    Only the outermost have numbers: of x these are the lowest of a column, of y the first of a row.
     """
     panels = list(panels)
     for way in ways:

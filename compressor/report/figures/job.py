@@ -62,9 +62,7 @@ MICROMETRE = 1e6
 
 
 def draw_orbits(run: xr.Dataset) -> Drawing:
-    """Return the journal's centre in the bore of each joint with clearance, over the last
-    revolution.
-    """
+    """Return the journal's orbit in each bore with clearance over the last revolution."""
     joints = joints_with_clearance(run)
     figure, panels = make_grid(1, len(joints), 5.4)
     for panel, joint in zip(panels.flat, joints, strict=True):
@@ -210,9 +208,7 @@ SIGNALS = (
 
 
 def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
-    """Return the last settled revolution of a run, and of its machine without clearance, six
-    panels.
-    """
+    """Return six panels of a run's last settled revolution, with the ideal machine's."""
     figure, panels = make_grid(3, 2, 8.6)
     for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
         if one is None:

@@ -246,8 +246,9 @@ def name_phases(panel: Panel, run: xr.Dataset, volume: np.ndarray, pressure: np.
 
 
 def draw_cam(runs: Runs) -> Drawing:
-    """Return the figure 4: the cam's contour, and its follower's displacement beside the printed
-    one.
+    """Return figure 4: the cam's contour, and its follower's displacement.
+
+    Beside the displacement stands the one that Eq. 10 gives as printed.
     """
     cam = Cam(runs["design"])
     angles = np.radians(np.linspace(0, 360, 1441))

@@ -65,9 +65,7 @@ STYLE: dict[str, Any] = {
 
 
 def render(drawing: Drawing, kind: str) -> bytes:
-    """Return a drawing as the bytes of a `png` or `svg` file, which tell nothing of when they were
-    made.
-    """
+    """Return a drawing as the bytes of a `png` or `svg` file, without a time stamp."""
     (picture,) = render_kinds(drawing, [kind])
     return picture
 
@@ -305,7 +303,7 @@ def by_two(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict
     pool = ProcessPoolExecutor(1, context, signal.signal, (signal.SIGINT, signal.SIG_DFL))
 
     def send(_: object = None) -> None:
-        """Give the copy the next drawing, when it has made one."""
+        """Submit the next drawing to the copy as soon as it has finished one."""
         with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
             name = waiting.popleft()
             sent[name] = pool.submit(draw_reported, drawings[name], headings[name])

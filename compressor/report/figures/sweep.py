@@ -68,10 +68,10 @@ def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
 def several(
     sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
-    """Yield a grid of two or more axes: a ranking, all metrics, and of three or more axes some
-    closer.
+    """Yield the figures of a grid of two or more axes.
 
-    Two axes of numbers, or of words, are a map.
+    A ranking, an overview of all metrics, and from three axes on some of them in more detail. Two
+    axes of numbers, or of words, are a map.
     """
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
@@ -102,8 +102,9 @@ def several(
 def draw_sampled(
     sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
-    """Yield a list of jobs: a ranking, each metric against its strongest key, and some against
-    all.
+    """Yield the figures of a list of jobs that are no grid.
+
+    A ranking, each metric against its strongest key, and some metrics against all keys.
     """
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)

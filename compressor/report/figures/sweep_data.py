@@ -33,7 +33,10 @@ class Measure:
 
     @property
     def is_relative(self) -> bool:
-        """Whether its error bar is a part of it; that of a share or a count is in its own unit."""
+        """Return whether its error bar is a part of its value.
+
+        The bar of a share or a count is in its own unit.
+        """
         return METRICS[self.variable].bar.relative
 
     def of(self, data: xr.Dataset) -> xr.DataArray:
@@ -91,8 +94,9 @@ def swept_axes(study: xr.Dataset) -> list[str]:
 
 
 def positions(data: xr.Dataset, axis: str) -> np.ndarray:
-    """Return where the values of an axis stand: at their numbers, different words one after the
-    other.
+    """Return the positions of an axis' values along it.
+
+    Numbers stand at themselves, different words one after the other.
     """
     values = data[axis].values
     if values.dtype.kind in "fiu":
@@ -123,17 +127,20 @@ class PlottedAxis:
 
     @property
     def is_words(self) -> bool:
-        """Whether its values are categories."""
+        """Return whether its values are categories."""
         return self.values.dtype.kind not in "fiu"
 
     @property
     def words(self) -> list[str]:
-        """Its different values as words, in their order."""
+        """Return its different values as words, in their order."""
         return [format_swept(value) for value in dict.fromkeys(self.values.tolist())]
 
     @property
     def places(self) -> np.ndarray:
-        """Where its values stand: at their numbers, different words one after the other."""
+        """Return the positions of its values along it.
+
+        Numbers stand at themselves, different words one after the other.
+        """
         if not self.is_words:
             return self.values.astype(float)
         found = {word: float(n) for n, word in enumerate(dict.fromkeys(self.values.tolist()))}
@@ -141,12 +148,12 @@ class PlottedAxis:
 
     @property
     def is_log(self) -> bool:
-        """Whether it is drawn on a log scale."""
+        """Return whether it is drawn on a log scale."""
         return not self.is_words and spans_decades(self.places)
 
     @property
     def title(self) -> str:
-        """What stands along it."""
+        """Return the text along it: phrase and unit."""
         return f"{self.phrase} ({self.unit})" if self.unit not in ("", "1") else self.phrase
 
     def told(self, number: int) -> str:
@@ -204,19 +211,19 @@ class PlottedSweep:
 
     @cached_property
     def status(self) -> np.ndarray:
-        """How each point's job ended."""
+        """Return how each point's job ended."""
         return np.where(self.place < 0, OUTSIDE, self.of(self.data["status"]))
 
     @cached_property
     def chaotic(self) -> np.ndarray:
-        """Whether each point's job is chaotic."""
+        """Return whether each point's job is chaotic."""
         if "regime" not in self.data:
             return np.zeros(self.place.shape, bool)
         return self.of(self.data["regime"]) == "chaotic"
 
     @cached_property
     def keys(self) -> np.ndarray:
-        """The key of each point's job."""
+        """Return the key of each point's job."""
         return self.of(self.data["key"])
 
 
@@ -312,8 +319,10 @@ def levels(axis: PlottedAxis) -> tuple[np.ndarray, np.ndarray]:
 
 
 def advance_together(one: np.ndarray, other: np.ndarray, has_words: bool) -> bool:
-    """Return whether each value of a column has one of another's, and of numbers the order is
-    the same.
+    """Return whether the values of two columns come in pairs, and in order for numbers.
+
+    Each value of one then stands beside one value of the other. Of words any order will do; numbers
+    rise or fall together.
     """
     pairs = np.unique(np.stack([one, other]), axis=1)
     size = pairs.shape[1]
@@ -329,9 +338,7 @@ def spans_decades(values: np.ndarray) -> bool:
 
 
 def name_value(phrase: str, word: str) -> str:
-    """Return a word with what it is a value of, unless it says that: `load design`, but `both
-    joints`.
-    """
+    """Return a word after what it is a value of: `load design`, but `both joints`."""
     return word if phrase in word else f"{phrase} {word}"
 
 

@@ -50,8 +50,9 @@ NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
 
 
 def across(sweep: PlottedSweep) -> tuple[int, int]:
-    """Return which of two axes lies in x and which in y: words in y, else the one with fewer
-    values.
+    """Return which of two axes lies along x and which along y.
+
+    Words lie along y, else the axis with fewer values.
     """
     first, second = sweep.axes
     rank = [(not axis.is_words, axis.values.size) for axis in (first, second)]
@@ -67,8 +68,9 @@ class Cells(NamedTuple):
 
 
 def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
-    """Return every measure over both axes of a grid, a cell a job, at most MAX_CELLS along an
-    axis.
+    """Return a map of every measure over both axes of a grid, a cell a job.
+
+    At most MAX_CELLS along an axis.
     """
     in_x, in_y = across(sweep)
     x, y = sweep.axes[in_x], sweep.axes[in_y]
@@ -113,8 +115,9 @@ def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) ->
 
 
 def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
-    """Return whether lines of equal value tell something: over numbers, and not around a few
-    cells.
+    """Return whether lines of equal value are worth drawing.
+
+    They are over numbers, unless they would go round a few cells.
     """
     rising = np.nansum(table > np.nanmin(table)) >= MIN_RISEN * table.size
     return min(table.shape) >= 3 and not any(axis.is_words for axis in axes) and bool(rising)
@@ -130,7 +133,7 @@ def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarr
 
 
 def scale_map(scale: Scale, axis: PlottedAxis, words: Sequence[str]) -> None:
-    """Put words at ticks, or a log scale, of the x or the y axis of a map."""
+    """Set words at ticks, or a log scale, of the x or the y axis of a map."""
     scale.name(words)
     scale.log = axis.is_log
 
@@ -184,9 +187,7 @@ def leading(sweep: PlottedSweep, measures: Sequence[Measure], most: int) -> list
 
 
 def overall(found: Ranking) -> list[int]:
-    """Return the numbers of the axes, the one that is strongest on the mean of the measures
-    first.
-    """
+    """Return the axes' numbers, the strongest on the mean of the measures first."""
     strengths = [np.nan_to_num(effects.strength) for effects in found.values()]
     return np.argsort(-np.mean(strengths, axis=0), kind="stable").tolist()
 

@@ -95,7 +95,7 @@ def marks_shown(status: np.ndarray, chaotic: np.ndarray) -> list[Trace]:
 
 
 def scale_x(panel: Panel, axis: PlottedAxis) -> None:
-    """Put words at ticks, and a log scale where numbers span decades."""
+    """Set words at ticks, and a log scale where numbers span decades."""
     if axis.is_words:
         panel.x.name(in_lines(axis.words))
         panel.x.span(-0.3, len(axis.words) - 0.7)
@@ -146,7 +146,7 @@ def lines_for(axis: PlottedAxis, chosen: Iterable[int]) -> list[LineStyle]:
 
 
 def thin_places(size: int, most: int) -> np.ndarray:
-    """Evenly chosen numbers below a size, the ends among them."""
+    """Return at most `most` evenly chosen numbers below a size, with both ends."""
     return (
         np.arange(size) if size <= most else np.unique(np.linspace(0, size - 1, most).astype(int))
     )
@@ -204,7 +204,7 @@ class MeasuredPoints:
 
     @property
     def is_jobs(self) -> bool:
-        """Whether each point is one job."""
+        """Return whether each point is one job."""
         return self.values.shape[1] == 1
 
 

@@ -94,13 +94,13 @@ def claims(
 
 
 def say_unless(quiet: bool, text: str) -> None:
-    """Say something on stderr, unless quiet is wanted."""
+    """Write text on stderr, unless quiet is wanted."""
     if not quiet:
         say(text)
 
 
 def report_machines(found: "list[xr.Dataset]", as_json: bool) -> None:
-    """Files of judged machines on stdout, with what they say."""
+    """Write files of judged machines on stdout, each with its findings."""
     told = {one.encoding["source"]: [*sentences(one)] for one in found}
     if as_json:
         print_text(json.dumps(told, indent=1))

@@ -60,9 +60,7 @@ def is_mass_plane(found: xr.Dataset) -> bool:
 
 
 def count_claims(found: xr.Dataset) -> tuple[int, dict[int, int], int]:
-    """Return how many machines were judged, in how many each claim holds, and in how many all
-    do.
-    """
+    """Return the numbers of machines: judged, by claim that holds, and with all holding."""
     held = found["held"].transpose("claim", ...).values.reshape(len(CLAIMS), -1)
     judged = held[:, (held >= 0).all(axis=0)]
     each = dict(zip(CLAIMS, (judged == 1).sum(axis=1).tolist(), strict=True))
@@ -125,11 +123,10 @@ class Consistent(NamedTuple):
 
 
 def most_consistent(found: xr.Dataset) -> Consistent:
-    """Return where on a mass plane most claims hold by the greatest least margin, at all neighbours
-    too.
+    """Return the place on the mass plane at which most claims hold, at its neighbours too.
 
-    Claims 1 and 2, which do not depend on masses, are left aside, and so are claims that hold at
-    no machine. Machines at the plane's edge are not chosen.
+    The place has the greatest least margin. Claims 1 and 2, which do not depend on masses, are left
+    aside, and so are claims that hold at no machine. Machines at the plane's edge are not chosen.
     """
     rod, mass = (
         next(str(dim) for dim in found["status"].dims if found[dim].attrs["case_key"] == key)

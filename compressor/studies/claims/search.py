@@ -53,7 +53,7 @@ class AssumptionRange(NamedTuple):
 
     @property
     def home(self) -> float:
-        """The share of the range at which the default lies; the nearest end where it is outside."""
+        """Return the default's share of the range, or the nearest end beyond it."""
         return self.share(self.default)
 
     def share(self, value: float) -> float:
@@ -113,12 +113,12 @@ class MachineSearch:
 
     @property
     def name(self) -> str:
-        """What the study of the search's machines is called."""
+        """Return the name of the study of the search's machines."""
         return f"{self.study.name}-search{NAMES[self.longer]}"
 
     @property
     def home(self) -> np.ndarray:
-        """The defaults as shares of their ranges, (k,)."""
+        """Return the defaults as shares of their ranges, (k,)."""
         return np.array([span.home for span in self.spans])
 
     def values(self, shares: Sequence[float]) -> tuple[float, ...]:
@@ -180,10 +180,10 @@ class MachineSearch:
 
 
 def cost(verdict: Judged, distance: float, sure: bool = False) -> float:
-    """Return what a search makes small: 1 and what the least margin lacks, or else the distance
-    below 1.
+    """Return the cost that a search minimizes: above 1 while a claim fails, else the distance.
 
-    distance: over its greatest. sure: a margin counts less its error.
+    Above 1 it is 1 and what the least margin lacks. distance: over its greatest. sure: a margin
+    counts less its error.
     """
     pairs = zip(verdict.margin, verdict.error, strict=True)
     least = min(margin - error if sure else margin for margin, error in pairs)
@@ -199,13 +199,12 @@ def least_change(
     generations: int,
     progress: Progress = no_progress,
 ) -> xr.Dataset:
-    """Return the machine nearest to the defaults at which all claims hold, or the one that lacks
-    least.
+    """Return the machine nearest to the defaults at which all claims hold.
 
-    As `judge_machines` gives it, alone, and stored in FOLDER/NAME-best.nc. The attribute `distance`
-    is how far it is from the defaults, the sum of changes, each as a share of its range; `looked`
-    how many machines were judged in all; `least` is 1 where its changes were taken back as far as
-    the claims go on holding.
+    Or else the one that lacks least. As `judge_machines` gives it, alone, and stored in
+    FOLDER/NAME-best.nc. The attribute `distance` is how far it is from the defaults, the sum of
+    changes, each as a share of its range; `looked` how many machines were judged in all; `least` is
+    1 where its changes were taken back as far as the claims go on holding.
 
     study: whose axes are all drawn by a design, in whose ranges is looked; all machines are stored,
     in FOLDER/NAME-search.nc and -longer, -longest, and the same call goes on from them. It begins
@@ -250,8 +249,10 @@ def least_change(
 
 
 def beginning(search: MachineSearch) -> np.ndarray:
-    """Return the first generation: the defaults, the study's best machines, and draws where these
-    are few.
+    """Return the first generation of machines, (machines, k), as shares of the ranges.
+
+    It has the defaults, the study's best machines, and draws where these are few; no machines of
+    earlier searches, so that the same call takes the same way.
 
     (machines, k), shares of the ranges. No machines of earlier searches, so that the same call
     takes the same way.

@@ -48,7 +48,7 @@ class Judged(NamedTuple):
 
 
 def judge(machine: Case) -> Judged:
-    """Simulate the paper's nine worn cases of a machine and measure every claim on them.
+    """Return how far a machine is from each claim's threshold, by its nine worn cases.
 
     machine: a case without clearance, whose machine, contact, friction, loads and solver settings
     count. Runs stay in memory. A machine with a failed case has no margins.
@@ -89,8 +89,9 @@ def simulate_quietly(case: Case) -> xr.Dataset:
 
 
 def ideal_text(machine: Case) -> str:
-    """Return what the ideal machines' motion and load depend on: not the masses, nor what joints
-    do.
+    """Return the keys, as JSON, on which the ideal machines' motion and load depend.
+
+    Masses and what joints do are not among them.
     """
     values: dict[str, Any] = machine.values()
     kept = {key: values[key] for key in ("gas", "spring", "solve")}
@@ -122,8 +123,9 @@ class ClaimsError(CompsimError, ValueError):
 
 
 def machines(study: Study) -> list[Case]:
-    """Return the machines of a study. Raises ClaimsError where it gives what the paper's cases
-    decide.
+    """Return the machines of a study.
+
+    Raises ClaimsError where it gives what the paper's cases decide.
     """
     swept = [axis.key for axis in study.axes if axis.key.partition(".")[0] in ROLES]
     given = swept or [key for key in ROLES if is_given(study.cases[0], key)]
@@ -136,9 +138,7 @@ def machines(study: Study) -> list[Case]:
 
 
 def is_given(case: Case, key: str) -> bool:
-    """Return whether a case says something else of a key than an ideal machine with its default
-    load.
-    """
+    """Return whether a case has another value of a key than the default."""
     default = Case.from_values({})
     return getattr(case, key) != getattr(default, key)
 
@@ -149,7 +149,7 @@ def judge_machines(
     workers: int,
     progress: Progress = no_progress,
 ) -> xr.Dataset:
-    """Judge the machines of a study that FOLDER/NAME.nc does not hold yet; gives all of them.
+    """Return all machines of a study, and run those that FOLDER/NAME.nc does not hold.
 
     As `machines_dataset` makes it. Whatever ends the run early, what was finished is stored, but
     for the last seconds. Raises ClaimsError, WorkersFailed, and StoreError also where the file
@@ -197,12 +197,12 @@ def judge_end(end: JobResult | JobLost) -> Judged:
 
 
 def machines_dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judged]) -> xr.Dataset:
-    """Return the machines of a study by their assumptions: `margin`, `held` and more over (claim,
-    ...).
+    """Return the machines of a study by their assumptions, with `margin` and `held`.
 
-    A grid has a dimension for each swept key, any other study the dimension machine; the keys are
-    coordinates, in the case file's unit. `margin` and `error` are relative to the threshold; `held`
-    is 1, 0, or -1 where the machine was not judged. `status` is ok, failed (see `failed`) or "".
+    Both are over (claim, ...). A grid has a dimension for each swept key, any other study the
+    dimension machine; the keys are coordinates, in the case file's unit. `margin` and `error` are
+    relative to the threshold; `held` is 1, 0, or -1 where the machine was not judged. `status` is
+    ok, failed (see `failed`) or "".
     """
     names = coordinate_names([axis.key for axis in study.axes])
     on_grid = study.is_grid and bool(study.axes)

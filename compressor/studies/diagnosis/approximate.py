@@ -36,9 +36,7 @@ class KernelRidge:
 
     @classmethod
     def fit(cls, points: np.ndarray, targets: np.ndarray) -> "KernelRidge":
-        """Return the regression of the width and ridge with the least squares of errors left
-        out.
-        """
+        """Return the regression whose width and ridge have the least leave-one-out errors."""
         some = slice(None, None, -(-len(points) // SAMPLE))
         scale = targets.var(axis=0) + 1e-300
         width, ridge = _chosen(points[some], targets[some] / np.sqrt(scale))
@@ -86,7 +84,10 @@ class Logistic:
 
     @classmethod
     def fit(cls, points: np.ndarray, labels: np.ndarray) -> "Logistic":
-        """By the greatest likelihood with a small ridge, which keeps separable classes finite."""
+        """Return the classifier of greatest likelihood, with a small ridge.
+
+        The ridge keeps separable classes finite.
+        """
         design = np.column_stack([points, np.ones(len(points))])
         wanted = np.eye(int(labels.max()) + 1)[labels]
         shape = design.shape[1], wanted.shape[1]
@@ -102,7 +103,7 @@ class Logistic:
         return cls(found.x.reshape(shape))
 
     def probabilities(self, points: np.ndarray) -> np.ndarray:
-        """Of each label at points (m, s): (m, c)."""
+        """Return the probability of each label at points (m, s): (m, c)."""
         return softmax(np.column_stack([points, np.ones(len(points))]) @ self.weights, axis=1)
 
 
@@ -184,8 +185,9 @@ class Strangeness:
         return int(cdist(((point - self.middle) @ self.turn)[None], self.white)[0].argmin())
 
     def off(self, point: np.ndarray) -> np.ndarray:
-        """Return how far each feature is from what others foretell, in standard deviations,
-        (F,).
+        """Return how far each feature is from what others predict, (F,).
+
+        In standard deviations.
         """
         left = self._left((point - self.middle) @ self.turn)
         return left @ self.back[-left.size :] / self.spread
@@ -237,7 +239,7 @@ class Posterior:
 
     @classmethod
     def fit(cls, points: np.ndarray, clearances: np.ndarray) -> "Posterior":
-        """points: scaled features, (n, F); clearances: mm, (n, k), above 0."""
+        """Return the posterior of log clearances, calibrated on the jobs themselves."""
         logs = np.log(clearances)
         regression = KernelRidge.fit(points, logs)
         summaries = regression.left_out
@@ -270,10 +272,10 @@ class Posterior:
 
 
 def quantiles(summary: np.ndarray, summaries: np.ndarray, logs: np.ndarray) -> np.ndarray:
-    """Return the lower end, median and upper end of each log clearance, (k, 3), by rejection and
-    adjustment.
+    """Return the lower end, median and upper end of each log clearance, (k, 3).
 
-    summary: the record's, (k,); summaries, logs: the jobs', (n, k).
+    By rejection and linear adjustment. summary: the record's, (k,); summaries, logs: the jobs', (n,
+    k).
     """
     scale = np.maximum((summaries - logs).std(axis=0), 1e-12)
     away = (summaries - summary) / scale
@@ -312,8 +314,9 @@ def misses(told: np.ndarray, logs: np.ndarray) -> np.ndarray:
 
 
 def widening(beyond: np.ndarray) -> np.ndarray:
-    """Return the least widening, (k,), by which as many of `misses` (n, k) are held as LEVEL
-    asks.
+    """Return the least widening, (k,), by which the fraction LEVEL of intervals hold.
+
+    beyond: `misses` of n jobs, (n, k).
     """
     count = len(beyond)
     rank = min(count, int(np.ceil((count + 1) * LEVEL)))

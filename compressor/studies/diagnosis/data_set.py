@@ -106,8 +106,9 @@ class Window:
     tacho: np.ndarray
 
     def slim(self, signals: bool) -> "Window":
-        """Return what a data set keeps: no view of the record, two times, and samples where
-        asked for.
+        """Return the part that a data set keeps, without a view of the record.
+
+        Two times, the tacho, and the samples with `signals`.
         """
         values = self.values.astype(np.float32) if signals else np.empty(0, np.float32)
         return Window(self.first, self.times[:2].copy(), values, self.tacho.copy())
@@ -128,8 +129,9 @@ def windows(record: dict[str, np.ndarray], revolutions: int, hop: int) -> Iterat
 
 
 def machine_of(case: Case) -> str:
-    """Return a name for the machine of a case, 12 hexadecimal digits: the same at any load and
-    speed.
+    """Return a name for the machine of a case, 12 hexadecimal digits.
+
+    It is the same at any load and speed.
     """
     built = {name: value for name, value in case.values().items() if name not in NOT_BUILT}
     built["machine"] = {k: v for k, v in built["machine"].items() if k != "speed_rpm"}
@@ -137,11 +139,11 @@ def machine_of(case: Case) -> str:
 
 
 def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
-    """Return a window's samples (m/s2, (n,)) with white noise, by numpy's default generator of a
-    seed.
+    """Return a window's samples (m/s2, (n,)) with white noise of an rms and a seed.
 
-    In a data set the seed is [its seed, the job's key as a number, the window's first pulse, the
-    number of the noise level], so that anyone can add the same noise to the stored samples.
+    By numpy's default generator. In a data set the seed is [its seed, the job's key as a number,
+    the window's first pulse, the number of the noise level], so that anyone can add the same noise
+    to the stored samples.
     """
     if not rms:
         return values

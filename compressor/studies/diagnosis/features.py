@@ -136,8 +136,9 @@ def check_record(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> in
 
 
 def turns_at(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
-    """Return the revolutions since the first pulse at each time, at the nearest one's pace
-    beyond pulses.
+    """Return the revolutions since the first pulse at each time.
+
+    Beyond the pulses the nearest revolution's pace counts.
     """
     turns = np.interp(times, tacho, np.arange(len(tacho)))
     turns += np.minimum(times - tacho[0], 0.0) / (tacho[1] - tacho[0])

@@ -102,7 +102,10 @@ class Identifier:
 
     @classmethod
     def fit(cls, library: Library) -> "Identifier":
-        """Raises StudyError where there are too few jobs."""
+        """Return the identifier of a library's jobs.
+
+        Raises StudyError where there are too few.
+        """
         counts = {joint: int((library.joints == joint).sum()) for joint in SHARES}
         joints = tuple(joint for joint, count in counts.items() if count >= MIN_JOBS)
         library = library.only(np.isin(library.joints, joints))

@@ -78,7 +78,7 @@ def write_data_set(folder: Folder, dataset: "xr.Dataset") -> Written:
 
 
 def refuse_foreign(folder: Folder) -> None:
-    """Raises DataSetError where a folder has a README.md that is no data set's card."""
+    """Raise DataSetError where a folder has a README.md that is no data set's card."""
     place = Path(folder)
     if (place / CARD).exists() and not (place / WINDOWS).exists():
         text = f"{place} has a {CARD} of something else, which the card would replace"
@@ -86,8 +86,9 @@ def refuse_foreign(folder: Folder) -> None:
 
 
 def columns(dataset: "xr.Dataset") -> dict[str, np.ndarray]:
-    """Return a data set as a table by column: a row for each window and noise level, labels
-    first.
+    """Return a data set as columns, with a row for each window and noise level.
+
+    Labels come first.
     """
     levels = dataset.sizes["noise"]
     found: dict[str, np.ndarray] = {

@@ -28,7 +28,7 @@ class SeenValue(NamedTuple):
 
     @property
     def parts(self) -> bool:
-        """Whether close motions part: an exponent above 0 by more than its error."""
+        """Return whether close motions part: an exponent above 0 by more than its error."""
         return self.exponent - self.error > 0.0
 
 
@@ -101,9 +101,7 @@ def course(seen: Sequence[SeenValue], unit: str) -> str:
 
 
 def parting(seen: Sequence[SeenValue], unit: str) -> str:
-    """Return where the largest exponent is first above 0 by more than its error, or how near it
-    came.
-    """
+    """Describe where the largest exponent is first surely above 0, or how near it came."""
     known = [one for one in seen if np.isfinite(one.exponent)]
     if not known:
         return "No Lyapunov exponent is known."

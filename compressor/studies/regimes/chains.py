@@ -49,13 +49,13 @@ class Chain:
 
     @property
     def values(self) -> list[float]:
-        """What the followed key is, in the order of running."""
+        """Return the values of the followed key, in the order of running."""
         up = self.asked.values
         return up if self.direction == "up" else up[::-1]
 
     @cached_property
     def key(self) -> str:
-        """Hash of what decides the numbers: cases, their start, what is asked for, the model."""
+        """Return the hash of what decides the numbers: cases, start, request, model."""
         what = [case.key for case in self.cases], self.asked.plain(), self.direction
         model = model_of(self.cases[0].values())
         text = json.dumps([what, model, SCHEMA], sort_keys=True)

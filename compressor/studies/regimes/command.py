@@ -76,7 +76,7 @@ def regimes_of(folder: str, study: str) -> str:
 
 
 def report_chains(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
-    """Say what there is now, and what failed."""
+    """Write what there is now, and what failed."""
     for count in summary.counts:
         where = os.path.join(folder, "regimes", count.study)
         chains = f"{plural(count.chains, 'chain')} x {plural(count.values, 'value')}"

@@ -182,8 +182,9 @@ def confirm(doubt: Doubt) -> Verdict:
 
 
 def later(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSignature:
-    """Return the motion after many more revolutions from a state on, or from the case's own
-    start.
+    """Return the motion after many more revolutions.
+
+    state: where it goes on, or None to begin at the case's own start.
     """
     clock = Clock(case.solve.timeout_s)
     run = follow_revolutions(case, state, span_of(chain.asked, FURTHER, clock))
@@ -193,8 +194,9 @@ def later(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSignature
 
 
 def other_starts(case: Case) -> list[Case]:
-    """Return the case with its journals starting elsewhere: evenly over a disk within each
-    clearance.
+    """Return the case with its journals starting elsewhere, several times.
+
+    The places are evenly drawn from a disk within each clearance.
     """
     rng = np.random.default_rng(SEED)
     found = []
@@ -278,6 +280,6 @@ class VerdictBook:
         self.written = time.monotonic()
 
     def count(self) -> tuple[int, int]:
-        """At how many values the chains differ, and how many of these are confirmed."""
+        """Return at how many values the chains differ, and how many of these are confirmed."""
         found: Sequence[Verdict] = [*self.known.values()]
         return len(self.numbers), sum(one.confirmed for one in found)

@@ -99,9 +99,7 @@ def read_stored(path: Path) -> xr.Dataset | None:
 def layout(
     manifest: dict[str, Any], names: dict[str, str]
 ) -> tuple[dict[str, tuple], tuple[int, ...]]:
-    """Return the coordinates of a study's own axes, and the shape that its machines are laid out
-    in.
-    """
+    """Return the coordinates of a study's own axes, and the shape of its machines."""
     found: dict[str, tuple] = {}
     for axis in manifest["axes"]:
         name = names[axis["key"]]

@@ -142,10 +142,10 @@ def plot_shares(panel: Panel, pair: xr.Dataset, joint: str) -> None:
 
 
 def draw_sections(shown: xr.Dataset) -> Drawing:
-    """Return the Poincaré sections, one panel a value: the journal's place along the cylinder, and
-    its rate.
+    """Return the Poincaré sections, one panel a value.
 
-    shown: as for `draw_bifurcation`, at the values that are to be drawn.
+    Each has the journal's place along the cylinder and its rate. shown: as for `draw_bifurcation`,
+    at the values that are to be drawn.
     """
     over, joints, unit = shown.attrs["over"], joints_with_points(shown), unit_of(shown)
     rows = -(-shown.sizes[over] // COLUMNS)

@@ -129,8 +129,7 @@ def growths(
 
 
 def mean_with_error(values: np.ndarray) -> tuple[float, float]:
-    """Return the mean of values that follow on each other, (n,), and its 95 % half-length by batch
-    means.
+    """Return the mean of successive values, (n,), and its 95 % half-length by batch means.
 
     Of values that too few batches hold, the first are left out; inf where there is one batch.
     """

@@ -140,7 +140,7 @@ def check_any(part: xr.Dataset, study: str) -> None:
 
 
 def chosen_values(pair: xr.Dataset) -> list[int]:
-    """Up to `MAX_SECTIONS` values with Poincaré points, evenly among the regimes found."""
+    """Return up to `MAX_SECTIONS` values with Poincaré points, evenly among the regimes."""
     over = pair.attrs["over"]
     chain = pair.isel(direction=0)
     others = [dim for dim in chain["section"].dims if dim != over]

@@ -134,9 +134,7 @@ def run_with_series(
 
 
 def bare_case(case: Case, count: int) -> Case:
-    """Return a case over so many revolutions, all of them measured, of which nothing else is
-    wanted.
-    """
+    """Return a case over `count` revolutions, all measured, without any other output."""
     of = with_settle_rev(case, 0.0, 1, float(count))
     how = replace(of.solve, error_bars=False, accuracy="standard", horizon=False)
     return replace(of, solve=how, output=replace(of.output, keep="series", signals=False))
@@ -158,7 +156,10 @@ class PoincareRecorder:
         self.points: list[np.ndarray] = []
 
     def at_cut(self, turns: Turns) -> bool:
-        """Record the point at the section; return whether that is enough at a revolution's end."""
+        """Record the point at the section; return whether the points suffice.
+
+        Within a revolution they do not.
+        """
         count = len(turns)
         if (count - 1) % self.step == 0:
             at = float(self.cuts.times[count - 1])

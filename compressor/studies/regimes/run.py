@@ -46,7 +46,7 @@ class FollowedMachine:
 
     @property
     def pair(self) -> ChainPair | None:
-        """Up and down, where both are followed."""
+        """Return the chains up and down, where both are followed, else None."""
         return ChainPair(*self.chains) if len(self.chains) == 2 else None
 
 
@@ -166,11 +166,11 @@ class ChainWatch:
         self.look()
 
     def remark(self, text: str) -> None:
-        """Tell a remark."""
+        """Report a remark as progress."""
         self.progress(sum(self.counts.values()), self.total, text)
 
     def pulse(self) -> None:
-        """Look again, now and then."""
+        """Look again, if the last look is more than `LOOK` seconds ago."""
         if time.monotonic() - self.looked > LOOK:
             self.look()
 

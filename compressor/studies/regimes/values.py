@@ -228,8 +228,9 @@ def span_of(asked: Regimes, revolutions: int, clock: Clock) -> RevolutionSpan:
 
 
 def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> SettledMotion:
-    """Return the motion from a settled state on, followed until its Poincaré points repeat or
-    suffice.
+    """Return the motion from a settled state on.
+
+    It is followed until its Poincaré points repeat, or there are enough of them.
     """
     within, clearance = tolerance(case), record(case)["clearance"].copy()
 

@@ -104,8 +104,9 @@ def interval(points: Sequence[Point], holds: Holds) -> SearchResult:
 
 
 def sections(answer: SearchResult, tolerance: float, at_once: int) -> list[float]:
-    """Return the shares that narrow an interval: of it, or of what is left and right of blind
-    points.
+    """Return the shares of the range at which to look next, so that the interval narrows.
+
+    They divide the interval, or what is left and right of blind points.
     """
     if answer.high is None or answer.kind == "at_low":
         return []
@@ -154,8 +155,7 @@ def extremum(
 
 
 def around(known: Iterable[Point], factor: float) -> SearchResult:
-    """Return the best of some points, those that may be as good, and the surely worse ones around
-    them.
+    """Return the best of some points, those that may be as good, and the worse ones around.
 
     factor: 1 where the least is best, -1 where the greatest is.
     """
@@ -187,10 +187,11 @@ def find(
     workers: int = 2,
     progress: Progress = no_progress,
 ) -> SearchResult:
-    """Answer a question by jobs in a folder's store; those that it holds are not run again.
+    """Return the answer to a question, by jobs in a folder's store.
 
-    The study is called after the file and the key. It keeps the points of earlier questions that
-    are of the same case. Raises QuestionError, CaseFileError, StoreError and WorkersFailed.
+    Jobs that it holds are not run again. The study is called after the file and the key. It keeps
+    the points of earlier questions that are of the same case. Raises QuestionError, CaseFileError,
+    StoreError and WorkersFailed.
     """
     question.checked()
     jobs = SearchJobs(question, folder, workers, progress)

@@ -66,7 +66,7 @@ class Goal:
 
     @property
     def unit(self) -> str:
-        """The SI unit, "" for a share or a count."""
+        """Return the SI unit, "" for a share or a count."""
         return "" if BARRED[self.metric].unit == "1" else BARRED[self.metric].unit
 
     def holds(self, told: JobReading) -> bool | None:
@@ -159,10 +159,10 @@ class Question:
     def written(
         cls, path: str, over: str, goal: str, which: str = "first", **more: Any
     ) -> "Question":
-        """Return the question of texts: over KEY=LOW:HIGH, a comparison or, of greatest | least, a
-        metric.
+        """Return the question that texts ask.
 
-        more: other fields. Raises QuestionError.
+        over: KEY=LOW:HIGH; goal: a comparison, or with `which` greatest or least a metric; more:
+        other fields. Raises QuestionError.
         """
         parts = OVER.fullmatch(over)
         ends = [_number(text) for text in parts.groups()[1:]] if parts else [math.nan]
@@ -174,7 +174,7 @@ class Question:
 
     @property
     def shares(self) -> list[float]:
-        """Where on the range to look first: 0 to 1, evenly."""
+        """Return the shares of the range at which to look first: 0 to 1, evenly."""
         return [number / (self.scan - 1) for number in range(self.scan)]
 
     def argument(self, share: float) -> float:

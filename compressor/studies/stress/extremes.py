@@ -25,9 +25,7 @@ Span = tuple[float, float]
 
 
 def _supported(key: str, factor: float = 1.0) -> Span:
-    """Return the supported range of a key: the one that the table of parameters has, times a
-    factor.
-    """
+    """Return the supported range of a key, as in the table of parameters, times a factor."""
     low, high = judged_range(key)
     return low * factor, high * factor
 
@@ -165,9 +163,7 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
 
 
 def choose_law(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
-    """Return a law of contact or friction, and all that any law reads beside the default one's
-    numbers.
-    """
+    """Return a law of contact or friction, with the parameters that any law reads."""
     found: dict[str, Any] = {"law": draw.choice(table()[f"{group}.law"].choices)}
     for key, (whole, narrow) in OF_LAWS.items():
         low, high = narrow if inside else whole
@@ -203,7 +199,10 @@ def place(case: Case) -> dict[str, float]:
 
 @cache
 def _points(seed: int, kind: int, count: int) -> list[list[float]]:
-    """At least `count` points of a kind of scene; the first ones do not depend on the count."""
+    """Return at least `count` points of a kind of scene.
+
+    The first ones do not depend on the count.
+    """
     return design("sobol", count, len(SPANS) + OTHER_DRAWS, 2 * seed + kind)
 
 
@@ -232,9 +231,7 @@ def _which(point: Iterator[float]) -> int:
 def _start(
     joint: str, drawn: tuple[float, float, float], clearance: float, deepest: float
 ) -> dict[str, float]:
-    """Return a journal's initial offset (mm): none, within the clearance, or sunk into the
-    bearing.
-    """
+    """Return a journal's initial offset (mm): none, within the clearance, or in the bearing."""
     kind, size, turn = drawn
     if kind < 1 / 3:
         return {}

@@ -147,9 +147,7 @@ def by_statistics(case: Case, result: StressFinding) -> None:
 def agreed_verdict(
     claim: Case, found: Solution, measured: Compare, result: StressFinding
 ) -> tuple[str, Excess, Solution | None]:
-    """Return what the judges of a run say together, by how much, and the run of the one that
-    counts.
-    """
+    """Return the verdict of a run's judges, by how much, and the run of the one that counts."""
     agreed: list[tuple[Excess, Solution]] = []
     dissent: list[tuple[Excess, Solution]] = []
     statistics = measured is compare_statistics
@@ -218,10 +216,10 @@ def compare_statistics(found: Solution, other: Solution) -> Excess:
 
 
 def excess(name: str, found: Solution, other: Solution, least: float) -> Excess:
-    """Return how far a metric is from a judge's, over ten bars or the least that counts if that is
-    more.
+    """Return how far a metric is from a judge's, in multiples of what is allowed.
 
-    Error and bar are relative to the judge's size of the metric.
+    Allowed are ten bars, or the least that counts if that is more. Error and bar are relative to
+    the judge's size of the metric.
     """
     one = size(name, other.metrics)
     error = float(np.abs(found.metrics[name] - np.asarray(other.metrics[name])).max()) / one

@@ -128,8 +128,7 @@ def campaign(
     progress: Progress = no_progress,
     budget: Budget = FULL_BUDGET,
 ) -> xr.Dataset:
-    """Return the first `count` scenes of a seed, of which those are run that the folder does not
-    hold.
+    """Return the first `count` scenes of a seed, and run those that the folder lacks.
 
     Raises StoreError where it holds other scenes.
     """
@@ -239,8 +238,9 @@ def read_kept_rows(path: Path, seed: int, budget: Budget) -> list[Row]:
 
 
 def counts(study: xr.Dataset) -> dict[str, dict[str, int]]:
-    """Return how many scenes ended how, in the supported range and in the whole: by verdict or
-    reason.
+    """Return the number of scenes by end, in the supported range and in the whole.
+
+    An end is a verdict, or the reason of a failed one.
     """
     table = {}
     for kind, inside in (("supported", 1), ("whole", 0)):
@@ -253,9 +253,7 @@ def counts(study: xr.Dataset) -> dict[str, dict[str, int]]:
 
 
 def worst(study: xr.Dataset, most: int = 10) -> xr.Dataset:
-    """Return the scenes of which most is wrong: wrong or unjudged ones, then ok ones by their
-    excess.
-    """
+    """Return the scenes that are most wrong: by verdict, then by excess."""
     study = study.isel(scene=study["verdict"].values != "failed")
     ranks = {"silent_wrong": 2.0, "unjudged": 1.0, "ok": 0.0}
     rank = np.array([ranks[verdict] for verdict in study["verdict"].values])

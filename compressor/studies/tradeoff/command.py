@@ -349,9 +349,7 @@ def cost_lines(told: "Explanation") -> Iterator[str]:
 
 
 def describe_advice(told: "Explanation", number: int) -> str:
-    """Return what leaving a feature out does, and whether it is worth while: of one of the
-    advice.
-    """
+    """Return the sentence on what leaving a feature out does, and whether to."""
     advice = told.advice[number]
     effect = advice.effect
     if effect.reason:

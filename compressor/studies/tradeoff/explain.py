@@ -96,7 +96,7 @@ def explain(
     repeats: int = 5,
     progress: Progress = no_progress,
 ) -> Explanation:
-    """Explain the first job of a study by running it, and it again without each of its features.
+    """Return the explanation of a study's first job, by running it without each feature.
 
     Times are medians of `repeats`; a job above `bench.SLOW_SECONDS` is timed once. progress: is
     told how many features have been tried, of how many.
@@ -138,8 +138,9 @@ def explain(
 
 
 def unknown_names(case: Case) -> tuple[str, ...]:
-    """Return the names of what is integrated: freedoms, bristles where friction has them, the
-    crank's own.
+    """Return the names of the unknowns that are integrated.
+
+    They are freedoms, bristles where friction has them, and the crank's own.
     """
     p = record(case)
     names, n = state_names(p), int(p["freedoms"])

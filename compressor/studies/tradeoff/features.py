@@ -374,8 +374,9 @@ def compare(base: Case, other: Case, repeats: int, known: xr.Dataset | None = No
 def changes(
     values: Mapping[str, np.ndarray], others: Mapping[str, np.ndarray]
 ) -> tuple[float, float, float]:
-    """Return the relative changes of peak acceleration and contact force, signed, and L2 of
-    acceleration.
+    """Return the relative changes of peak acceleration, contact force and acceleration.
+
+    The first two are signed, of peaks; the last one is in L2.
     """
     peak = others["peak_acceleration"] / values["peak_acceleration"] - 1
     forces = others["peak_contact_force"] / values["peak_contact_force"] - 1

@@ -261,7 +261,7 @@ def tabulate(every: Sequence[Choice], runs: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 def tell_part(progress: Progress, before: int, total: int, done: int, of: int, remark: str) -> None:
-    """Tell progress of a part as progress of the whole: `before` were done of `total`."""
+    """Report progress of a part as progress of the whole: `before` were done of `total`."""
     progress(before + done, total, remark)
 
 

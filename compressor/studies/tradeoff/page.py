@@ -77,7 +77,7 @@ class ModelTable:
 
     @property
     def span_texts(self) -> tuple[str, ...]:
-        """The spans in words, `-66 to +93 %`."""
+        """Return the spans in words, `-66 to +93 %`."""
         return tuple(span_text(m, *span) for m, span in zip(self.measures, self.spans, strict=True))
 
 

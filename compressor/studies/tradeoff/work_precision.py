@@ -76,8 +76,9 @@ def faulty(case: Case) -> list[str]:
 
 
 def stored_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return what errors are taken of: the acceleration, (m,), and metrics of the dense
-    solution.
+    """Return the values of which errors are taken, as the run has stored them.
+
+    The acceleration, (m,), and metrics of the dense solution.
     """
     forces = run["peak_contact_force"].sel(joint=list(joints)).values
     scalars = {name: run[name].values for name in ("peak_acceleration", "rms_acceleration")}
@@ -85,8 +86,7 @@ def stored_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarra
 
 
 def grid_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return `stored_values` as a reader of the output grid finds them, between whose samples peaks
-    hide.
+    """Return `stored_values` as the output grid has them, which hides peaks between samples.
 
     Includes the acceleration over the whole run; peaks and rms are those after `settle_rev`.
     """
@@ -176,8 +176,9 @@ COMPILE = "what the first call of the compiled solver takes beyond a second: com
 
 
 def seconds_compile(case: Case) -> float:
-    """Return what the first call of the compiled solver in this process takes beyond the second
-    (s).
+    """Return the compile time (s) of the compiled solver in this process.
+
+    It is what the first call takes beyond the second.
     """
     began = time.perf_counter()
     simulate(case)
@@ -226,7 +227,10 @@ def compare_references(study: xr.Dataset, name: str, truth: Mapping[str, Mapping
 
 
 def judge_paper(study: xr.Dataset, name: str, case: Case, truth: Mapping[str, Mapping]) -> None:
-    """The paper's own numerics: BDF at 1e-5, read from the output grid (0.1 ms in the paper)."""
+    """Write into a study the errors of the paper's own numerics.
+
+    BDF at 1e-5, read from the output grid (0.1 ms in the paper).
+    """
     rtol = PAPER_RTOL / LOCAL.get(PAPER_METHOD, 1.0)  # so that SciPy's own tolerance is 1e-5
     run = simulate(solve_by_method(case, PAPER_METHOD, rtol))
     if complete(run):
@@ -258,7 +262,7 @@ def measure(study: xr.Dataset, point: Point, case: Case, truth: Mapping, budget:
 
 
 def fastest(study: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """For each scene and each decade of error, the point that gets below it in the least time.
+    """Yield the fastest point below each decade of error, for each scene.
 
     Decades that no point reaches, or that are below what the references know, have no row.
     """

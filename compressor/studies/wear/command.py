@@ -84,7 +84,7 @@ def wear(
 
 
 def check(studies: "list[Study]") -> None:
-    """Each case wears, and its motions end where they begin: at top dead centre."""
+    """Raise click.UsageError unless each case wears, and its motions end at top dead centre."""
     for study in studies:
         for case in study.cases:
             if case.joint == "none":
@@ -153,7 +153,7 @@ def jsonable_wear(one: "WornMachine", folder: str) -> dict[str, Any]:
 
 
 def report_wear(summary: "WearSummary", folder: str, drawn: list[str]) -> None:
-    """Say what was done, and where figures are."""
+    """Write what was done, and where figures are."""
     total = len(summary.machines)
     done = f"{plural(total - summary.done_before, 'machine')} in {duration(summary.seconds)}"
     done += stored_before(summary.done_before)
@@ -179,7 +179,7 @@ def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
 
 
 def fail(one: "WornMachine") -> None:
-    """Say why a machine ended early, and what to do."""
+    """Write why a machine ended early, and what to do."""
     from compressor.reasons import remedy
 
     point = "".join(f" {key}={value}" for key, value in one.point.items())

@@ -22,8 +22,10 @@ MAX_PROFILES = 5
 
 
 def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Drawing:
-    """Return the clearance at the deepest place, greatest force, and what is worn off by place on
-    the bore.
+    """Return three panels of wear: clearance and force by hours, and the worn profiles.
+
+    The clearance is at the deepest place, the force is the greatest, profiles are by place on the
+    bore.
 
     stages: of `stages.open_wear`; limit_mm: of the clearance; factor: by which the coefficient may
     be smaller or greater, whose hours are shaded. Profiles are of the joint that is worn the most.

@@ -51,7 +51,7 @@ class WearSummary:
 
     @property
     def failed(self) -> list[WornMachine]:
-        """Those that ended early."""
+        """Return the machines that ended early."""
         return [machine for machine in self.machines if machine.reason]
 
 

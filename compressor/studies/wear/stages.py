@@ -58,36 +58,39 @@ class Worn:
 
     @property
     def how(self) -> Wear:
-        """What its wear goes by."""
+        """Return the keys by which it wears."""
         assert self.case.wear
         return self.case.wear
 
     @cached_property
     def key(self) -> str:
-        """Hash of what decides the numbers."""
+        """Return the hash of what decides the numbers."""
         values = self.case.values()
         what = [self.case.key, values["wear"], model_of(values), SCHEMA]
         return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:20]
 
     @property
     def clearances(self) -> np.ndarray:
-        """Of both joints, unworn (m)."""
+        """Return the clearances of both joints, unworn (m)."""
         given = self.case.clearance_mm
         return np.array([to_si(getattr(given, joint), "mm") for joint in JOINTS])
 
     @property
     def limit(self) -> float:
-        """The clearance (m) of a joint that is worn out."""
+        """Return the clearance (m) of a joint that is worn out."""
         return to_si(self.how.limit_mm or math.inf, "mm")
 
     @property
     def most_hours(self) -> float:
-        """Hours after which it ends: those that the greatest coefficient wears as much in."""
+        """Return the hours after which it ends.
+
+        In `hours` the greatest coefficient wears as much as the nominal one does in these.
+        """
         return self.how.hours * self.how.coefficient_factor
 
     @property
     def sector_area(self) -> np.ndarray:
-        """Of a bore, by joint (m^2)."""
+        """Return the area of a bore's sector, by joint (m^2)."""
         pins = [to_si(self.case.machine.pin_radius(joint), "mm") for joint in JOINTS]
         radius = np.array(pins) + self.clearances
         width = 2.0 * math.pi / self.how.sectors * radius
@@ -95,7 +98,7 @@ class Worn:
 
     @property
     def depth_per_work(self) -> np.ndarray:
-        """What each J wears off a sector (m), by joint: Archard's law."""
+        """Return the depth (m) that 1 J wears off a sector, by joint: Archard's law."""
         return to_si(self.how.coefficient_mm3_per_N_m, "mm3/(N m)") / self.sector_area
 
     def path(self, folder: Folder) -> Path:
