@@ -53,8 +53,8 @@ def pressure_volume(runs: Runs) -> str:
     """Describe the gas cycle, and the angles at which it changes."""
     cam = Cam(runs["typical"])
     used, exact = np.degrees(load_corners(runs["typical"])), np.degrees(cam.gas_corners)
-    away = float(np.abs(used - exact).max())
-    which = f", up to {away:.1g}° off the exact ones" if away > MIN_ANGLE else ""
+    offset = float(np.abs(used - exact).max())
+    which = f", up to {offset:.1g}° off the exact ones" if offset > MIN_ANGLE else ""
     return (
         "Cylinder pressure over gas volume in the typical model, made from the stored piston force "
         "and displacement; arrows point in the direction of time. Suction and discharge keep their "
@@ -114,26 +114,26 @@ def in_degrees(found: np.ndarray) -> str:
 
 def response(runs: Runs, fault: str) -> str:
     """Describe displacement, velocity and acceleration with one fault at three clearances."""
-    of = [runs[label(fault, c)] for c in CLEARANCES]
-    sentences = [ENLARGED_VIEWS, deviations(of)]
+    worn_runs = [runs[label(fault, c)] for c in CLEARANCES]
+    sentences = [ENLARGED_VIEWS, deviations(worn_runs)]
     for joint in faulty_joints(fault):
-        courses = [course(run, joint) for run in of]
+        courses = [course(run, joint) for run in worn_runs]
         sentences.append(motion(courses))
         if fault != "both":  # of two joints the acceleration does not tell which one rings
             sentences += rings(courses)
-    sentences.append(peaks(of))
+    sentences.append(peaks(worn_runs))
     return " ".join(sentences)
 
 
-def deviations(of: Sequence[xr.Dataset]) -> str:
+def deviations(worn_runs: Sequence[xr.Dataset]) -> str:
     """Return how far the motion leaves that of the machine without clearance."""
     greatest = np.zeros(3)
-    for run in of:
-        kept = settled_part(run)
-        ideal = ideal_motion(kept)
+    for run in worn_runs:
+        settled = settled_part(run)
+        ideal = ideal_motion(settled)
         for number, name in enumerate(SERIES):
-            away = np.abs(kept[name].values - ideal[number]).max() / np.ptp(ideal[number])
-            greatest[number] = max(greatest[number], away)
+            difference = np.abs(settled[name].values - ideal[number]).max() / np.ptp(ideal[number])
+            greatest[number] = max(greatest[number], difference)
     shares = [percent(share) for share in greatest]
     return (
         f"From the machine without clearance displacement differs by at most {shares[0]} of its "
@@ -144,24 +144,24 @@ def deviations(of: Sequence[xr.Dataset]) -> str:
 def motion(courses: Sequence[JournalMotion]) -> str:
     """Return how the journal moves in its bearing."""
     joint = SPOKEN[courses[0].joint]
-    apart = [one.apart for one in courses]
+    gap_fractions = [one.gap_fraction for one in courses]
     spans = angle_spans([one.turns for one in courses])
     if any(one.turns for one in courses):
-        near = spans and max(high - low for low, high in spans) <= SAME_TURN_DEGREES
-        at = " and ".join(map(format_span, spans)) if near else apart_from_each_other(courses)
+        at_same_angles = spans and max(high - low for low, high in spans) <= SAME_TURN_DEGREES
+        at = " and ".join(map(format_span, spans)) if at_same_angles else list_turns_by_run(courses)
         reverses = f"The horizontal force at the {joint} changes its sign near {at}."
     else:
         reverses = f"The horizontal force at the {joint} does not change its sign."
-    if max(apart) == 0.0:
+    if max(gap_fractions) == 0.0:
         least = min(one.least for one in courses)
         runs_round = all(abs(abs(one.laps) - 1.0) < 0.05 for one in courses)
-        how = "goes round on its wall once a revolution" if runs_round else "moves along its wall"
+        path = "goes round on its wall once a revolution" if runs_round else "moves along its wall"
         stays = (
-            f"The journal never leaves its bearing there: it {how}, always pressed in by "
+            f"The journal never leaves its bearing there: it {path}, always pressed in by "
             f"{two_digits(1e6 * least)} µm or more."
         )
     else:
-        shares = ", ".join(map(percent, apart))
+        shares = ", ".join(map(percent, gap_fractions))
         stays = f"The journal is without dry contact for {shares} of the time."
     return f"{reverses} {stays}"
 
@@ -179,12 +179,12 @@ def rings(courses: Sequence[JournalMotion]) -> list[str]:
     return [f"After the first change acceleration rings at {list_by_clearance(found, 0)} Hz."]
 
 
-def peaks(of: Sequence[xr.Dataset]) -> str:
+def peaks(worn_runs: Sequence[xr.Dataset]) -> str:
     """Return the greatest accelerations, and whether they grow with clearance."""
-    found = [float(run["peak_acceleration"]) for run in of]
-    grows = all(b > a for a, b in itertools.pairwise(found))
-    how = "grows with clearance" if grows else "does not always grow with clearance"
-    return f"The greatest acceleration {how}: {list_by_clearance(found, 0)} m/s²."
+    greatest = [float(run["peak_acceleration"]) for run in worn_runs]
+    grows = all(b > a for a, b in itertools.pairwise(greatest))
+    trend = "grows with clearance" if grows else "does not always grow with clearance"
+    return f"The greatest acceleration {trend}: {list_by_clearance(greatest, 0)} m/s²."
 
 
 def contact_force(runs: Runs, fault: str, joint: str) -> str:
@@ -230,11 +230,11 @@ def angle_spans(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     first = np.array(turns[0])
     if not first.size or {len(one) for one in turns} != {first.size}:
         return []
-    away = []
+    gaps = []
     for one in turns:
         rotated = (np.roll(one, n) - first for n in range(first.size))
-        away.append(min(((d + 180.0) % 360.0 - 180.0 for d in rotated), key=lambda d: (d**2).sum()))
-    return [*zip(first + np.min(away, axis=0), first + np.max(away, axis=0), strict=True)]
+        gaps.append(min(((d + 180.0) % 360.0 - 180.0 for d in rotated), key=lambda d: (d**2).sum()))
+    return [*zip(first + np.min(gaps, axis=0), first + np.max(gaps, axis=0), strict=True)]
 
 
 def format_span(span: tuple[float, float]) -> str:
@@ -243,10 +243,10 @@ def format_span(span: tuple[float, float]) -> str:
     return f"{low}°" if low == high else f"{low}–{high}°"
 
 
-def apart_from_each_other(courses: Sequence[JournalMotion]) -> str:
+def list_turns_by_run(courses: Sequence[JournalMotion]) -> str:
     """Return the angles of each run, where they are not the same few."""
-    of = [", ".join(f"{turn:.0f}°" for turn in one.turns) or "no angle" for one in courses]
-    return ", ".join(f"{at} at {c:g} mm" for at, c in zip(of, CLEARANCES, strict=True))
+    turns = [", ".join(f"{turn:.0f}°" for turn in one.turns) or "no angle" for one in courses]
+    return ", ".join(f"{at} at {c:g} mm" for at, c in zip(turns, CLEARANCES, strict=True))
 
 
 def percent(share: float) -> str:
@@ -350,24 +350,26 @@ def angles(found: Shakings, runs: Runs) -> str:
         f"{CLEARANCES[-1]:g} mm."
     ]
     for joint in SINGLE_FAULTS:
-        of = [found[label(joint, c)] for c in CLEARANCES]
-        if not all(one.turns for one in of):
+        forces = [found[label(joint, c)] for c in CLEARANCES]
+        if not all(one.turns for one in forces):
             continue
-        near, rest = ([getattr(one, name) for one in of] for name in ("near_turns", "elsewhere"))
-        turns = " and ".join(f"{turn:.0f}°" for turn in of[-1].turns)
+        near, rest = (
+            [getattr(one, name) for one in forces] for name in ("near_turns", "elsewhere")
+        )
+        turns = " and ".join(f"{turn:.0f}°" for turn in forces[-1].turns)
         sentences.append(
             f"At the {SPOKEN[joint]} the force turns at {turns}. From {SPAN} the rms share near "
             f"these angles {course_of(near)}, the one elsewhere {course_of(rest)}. "
-            + why(of, near, rest)
+            + why(forces, near, rest)
         )
         if rest[-1] < rest[0]:
-            sentences += friction(of, runs[label(joint, CLEARANCES[0])])
+            sentences += friction(forces, runs[label(joint, CLEARANCES[0])])
     return " ".join([*sentences, flights(runs)])
 
 
-def why(of: list[Shaking], near: list[float], rest: list[float]) -> str:
+def why(forces: list[Shaking], near: list[float], rest: list[float]) -> str:
     """Return what decides whether the whole rises or falls."""
-    whole = [one.spectrum.above for one in of]
+    whole = [one.spectrum.above for one in forces]
     bigger = "larger" if near[-1] > rest[-1] else "smaller"
     if near[-1] > near[0] and whole[-1] > whole[0]:
         longer = " It also rings on for longer, beyond these angles." if rest[-1] > rest[0] else ""
@@ -383,9 +385,9 @@ def why(of: list[Shaking], near: list[float], rest: list[float]) -> str:
     return "Neither share explains the whole by itself."
 
 
-def friction(of: list[Shaking], run) -> list[str]:
+def friction(forces: list[Shaking], run) -> list[str]:
     """Describe the share elsewhere that falls: the order at which it rings, and what feeds it."""
-    first, last = of[0].ring, of[-1].ring
+    first, last = forces[0].ring, forces[-1].ring
     if not np.isfinite([first, last]).all() or case_of(run).friction is None:
         return []
     return [
@@ -401,9 +403,9 @@ def flights(runs: Runs) -> str:
     for joint in SINGLE_FAULTS:
         for clearance in CLEARANCES:
             shares = mode_shares(contact_modes(runs[label(joint, clearance)]))["share"]
-            of = shares.sel(joint=joint)
-            following &= float(of.sel(mode="following")) == 1.0
-            most = max(most, float(of.sel(mode=MODES[0])))
+            own_shares = shares.sel(joint=joint)
+            following &= float(own_shares.sel(mode="following")) == 1.0
+            most = max(most, float(own_shares.sel(mode=MODES[0])))
     if following:
         return "Below: all contact is following; there is no flight and no impact."
     return f"Below: contact modes; flight takes up to {100 * most:.2g} % of the time."
@@ -414,13 +416,13 @@ def course_of(values: list[float]) -> str:
     first, *_, last = values
     steps = np.diff(values)
     if (steps > 0).all():
-        how = "rises"
+        verb = "rises"
     elif (steps < 0).all():
-        how = "falls"
+        verb = "falls"
     else:
         middle = ", ".join(newtons(value) for value in values[1:-1])
         return f"goes from {newtons(first)} over {middle} to {newtons(last)}"
-    return f"{how} from {newtons(first)} to {newtons(last)}"
+    return f"{verb} from {newtons(first)} to {newtons(last)}"
 
 
 DIAGNOSIS_CAPTIONS: dict[str, Callable[[Shakings, Runs], str]] = {

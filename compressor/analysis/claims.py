@@ -71,9 +71,9 @@ def same_motion(runs: Runs) -> Verdict:
     rows, margins = [], []
     for name in MOTION:
         one, other = runs["design"][name].values, runs["typical"][name].values
-        apart = float(np.abs(one - other).max() / np.abs(other).max())
-        margins.append(at_most(BarredNumber(apart), 1e-12))
-        rows.append((name, f"{apart:.1e}"))
+        difference = float(np.abs(one - other).max() / np.abs(other).max())
+        margins.append(at_most(BarredNumber(difference), 1e-12))
+        rows.append((name, f"{difference:.1e}"))
     return margins, rows
 
 
@@ -81,35 +81,35 @@ def design_force(runs: Runs) -> Verdict:
     """Return the claim 2: the spring load peaks higher, and its corners lie elsewhere."""
     peaks = {load: float(runs[load]["piston_force"].max()) for load in ("design", "typical")}
     corners = {load: np.degrees(load_corners(runs[load])) for load in peaks}
-    apart = np.abs(corners["design"] - corners["typical"])[[0, 2]]
+    shifts = np.abs(corners["design"] - corners["typical"])[[0, 2]]
     rows = [(f"peak, {load}", f"{peak:.1f} N") for load, peak in peaks.items()]
     rows += [
         (f"corners, {load}", ", ".join(f"{angle:.2f}°" for angle in angles))
         for load, angles in corners.items()
     ]
     ratio = BarredNumber(peaks["design"] / peaks["typical"])
-    return [at_least(ratio, 1.01), at_least(BarredNumber(float(apart.min())), 1.0)], rows
+    return [at_least(ratio, 1.01), at_least(BarredNumber(float(shifts.min())), 1.0)], rows
 
 
 def acceleration_alone(runs: Runs) -> Verdict:
     """Return claim 3: displacement and velocity hardly change with clearance, acceleration does."""
     rows, margins = [], []
     for name in FAULT_LABELS:
-        kept = settled_part(runs[name])
+        settled = settled_part(runs[name])
         changes = []
-        for series, ideal in zip(MOTION, ideal_motion(kept), strict=True):
+        for series, ideal in zip(MOTION, ideal_motion(settled), strict=True):
             spread = float(np.std(ideal))
-            error = series_error(kept, series, kept[series].values) / spread
+            error = series_error(settled, series, settled[series].values) / spread
 
             def away(part: xr.Dataset, series: str = series, spread: float = spread) -> float:
                 motion = dict(zip(MOTION, ideal_motion(part), strict=True))[series]
                 return float(np.sqrt(np.mean((part[series].values - motion) ** 2))) / spread
 
-            changes.append(measure(kept, away, error))
+            changes.append(measure(settled, away, error))
         margins += [at_most(changes[0], 0.01), at_most(changes[1], 0.05)]
         margins.append(at_least(changes[2], 0.10))
-        said = "x {:.2%}, v {:.2%}, a {:.1%}".format(*(change.value for change in changes))
-        rows.append((name, said))
+        text = "x {:.2%}, v {:.2%}, a {:.1%}".format(*(change.value for change in changes))
+        rows.append((name, text))
     return margins, rows
 
 
@@ -122,10 +122,10 @@ def growing_peaks(runs: Runs) -> Verdict:
         for joint in faulty_joints(fault):
             forces = [peak(run, "peak_contact_force", joint=joint) for run in line]
             peaks[f"F {SPOKEN[joint]}, N"] = forces
-        for what, values in peaks.items():
+        for quantity, values in peaks.items():
             margins += [at_least(b.over(a), 1.01) for a, b in itertools.pairwise(values)]
-            said = " → ".join(f"{one.value:.0f}" for one in values)
-            rows.append((f"{SPOKEN[fault]}, {what}", said))
+            text = " → ".join(f"{one.value:.0f}" for one in values)
+            rows.append((f"{SPOKEN[fault]}, {quantity}", text))
     return margins, rows
 
 
@@ -140,8 +140,8 @@ def horizontal_force(runs: Runs) -> Verdict:
             where = SPOKEN[fault] if fault != "both" else f"both, {SPOKEN[joint]}"
             peaks = (run["peak_contact_force_axis"].sel(joint=joint).values for run in line)
             beside = ", ".join(f"{across / up:.1f}" for across, up in peaks)
-            said = ", ".join(f"{ratio.value:.1f}" for ratio in ratios)
-            rows.append((where, f"{said} (ratio of the peaks: {beside})"))
+            text = ", ".join(f"{ratio.value:.1f}" for ratio in ratios)
+            rows.append((where, f"{text} (ratio of the peaks: {beside})"))
     return margins, rows
 
 
@@ -161,16 +161,16 @@ def across_over_up(run: xr.Dataset, joint: str) -> BarredNumber:
         across, up = means(part)
         return across / up if up else math.inf
 
-    kept = settled_part(run)
-    force = kept["contact_force"].sel(joint=joint).values
-    error = series_error(kept, "contact_force", force, joint=joint)
+    settled = settled_part(run)
+    force = settled["contact_force"].sel(joint=joint).values
+    error = series_error(settled, "contact_force", force, joint=joint)
     sizes = [math.sqrt(float(np.mean(part**2))) for part in force.T]
     both = math.hypot(*sizes)
     parts = [
         BarredNumber(mean, error * (size + both))
-        for mean, size in zip(means(kept), sizes, strict=True)
+        for mean, size in zip(means(settled), sizes, strict=True)
     ]
-    return measure(kept, ratio, parts[0].over(parts[1]).error)
+    return measure(settled, ratio, parts[0].over(parts[1]).error)
 
 
 def proportional_force(runs: Runs) -> Verdict:
@@ -199,11 +199,11 @@ def correlation(run: xr.Dataset, joint: str) -> BarredNumber:
 
     A correlation changes by at most the sum of the errors' shares of the standard deviations.
     """
-    kept = settled_part(run)
-    a, force = kept["acceleration"].values, kept["contact_force"].sel(joint=joint).values
-    away = series_error(run, "acceleration", a) / float(np.std(a))
-    away += series_error(run, "contact_force", force, joint=joint) / float(np.std(force[:, 0]))
-    return measure(kept, lambda part: force_relation(part, joint).r2, 2.0 * away)
+    settled = settled_part(run)
+    a, force = settled["acceleration"].values, settled["contact_force"].sel(joint=joint).values
+    error = series_error(run, "acceleration", a) / float(np.std(a))
+    error += series_error(run, "contact_force", force, joint=joint) / float(np.std(force[:, 0]))
+    return measure(settled, lambda part: force_relation(part, joint).r2, 2.0 * error)
 
 
 def steady_impacts(runs: Runs) -> Verdict:
@@ -259,8 +259,8 @@ def two_are_worse(runs: Runs) -> Verdict:
             measure = peak if unit == "peak" else metric
             big, small, both = (measure(runs[label(fault, c)], name) for fault in FAULTS)
             margins += [above(both.over(one), 1.0) for one in (big, small)]
-            said = f"big {big.value:.0f}, small {small.value:.0f}, both {both.value:.0f} m/s²"
-            rows.append((f"{c:g} mm, {unit}", said))
+            text = f"big {big.value:.0f}, small {small.value:.0f}, both {both.value:.0f} m/s²"
+            rows.append((f"{c:g} mm, {unit}", text))
     return margins, rows
 
 
@@ -344,13 +344,13 @@ def claims(runs: Runs) -> list[Claim]:
     found = []
     for number, rule in enumerate(RULES, 1):
         missing = [name for name in rule.needs if name not in runs]
-        said = (number, rule.statement, rule.threshold)
+        heading = (number, rule.statement, rule.threshold)
         if missing:
-            found.append(Claim(*said, None, [("missing", ", ".join(missing))], rule.note))
+            found.append(Claim(*heading, None, [("missing", ", ".join(missing))], rule.note))
             continue
         margins, rows = rule.judge(runs)
         margin = least(margins)
-        found.append(Claim(*said, margin.value >= 0.0, [*rows], rule.note, margin))
+        found.append(Claim(*heading, margin.value >= 0.0, [*rows], rule.note, margin))
     return found
 
 
@@ -360,12 +360,9 @@ def claim_margins(runs: Runs) -> tuple[list[Margin], dict[str, Margin]]:
     As `claims` judges them; all worn runs and ideal runs must be there. The second value has claim
     7 by each of its shares, and as `active` by the share of time in which the machine vibrates
     (`active_share`), without an error.
-
-    Of claim 7 also by each of its shares alone, and by the share of time in which the machine
-    vibrates (`active_share`), without an error.
     """
-    kept = {name: settled_part(run) for name, run in runs.items()}
-    each = [rule.judge(kept)[0] for rule in RULES]
+    settled = {name: settled_part(run) for name, run in runs.items()}
+    each = [rule.judge(settled)[0] for rule in RULES]
     shares = Shares._fields
     alone = {name: least(each[6][n :: len(shares)]) for n, name in enumerate(shares)}
-    return [least(margins) for margins in each], alone | {"active": vibrating(kept)}
+    return [least(margins) for margins in each], alone | {"active": vibrating(settled)}

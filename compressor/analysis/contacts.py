@@ -83,23 +83,23 @@ def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
     """Return a joint's samples, up to where the run stopped."""
     # arrays one by one: cutting the whole Dataset takes ten times as long
     depth = run["penetration"].sel(joint=joint).values.astype(float)
-    there = np.isfinite(depth)
+    valid = np.isfinite(depth)
     place, force = (
-        run[name].sel(joint=joint).transpose("time", "axis").values[there]
+        run[name].sel(joint=joint).transpose("time", "axis").values[valid]
         for name in ("eccentricity", "contact_force")
     )
     place = place.astype(float)
     distance = np.linalg.norm(place, axis=1)
     along = (force * place).sum(axis=1)
     normal = np.divide(along, distance, out=np.zeros_like(distance), where=distance > 0)
-    normal[depth[there] < 0] = 0.0  # what acts across a gap is a film of oil
+    normal[depth[valid] < 0] = 0.0  # what acts across a gap is a film of oil
     return ContactSeries(
         joint,
         clearance_of(run, joint),
-        run["time"].values[there],
-        run["crank_angle"].values[there],
+        run["time"].values[valid],
+        run["crank_angle"].values[valid],
         place,
-        depth[there],
+        depth[valid],
         normal,
     )
 
@@ -412,15 +412,17 @@ def mode_map(modes: xr.Dataset, width_deg: float = 1.0) -> xr.Dataset:
     count = round(360.0 / width_deg) if width_deg > 0 else 0
     if count < 1 or abs(count * width_deg - 360.0) > 1e-6:
         raise ValueError(f"width_deg = {width_deg:g} is no whole part of 360")
-    kept = modes.isel(time=slice(None, -1))
+    samples = modes.isel(time=slice(None, -1))
     # a sample on an edge belongs to the bin that begins there, whatever its rounding
-    place = np.floor(np.degrees(kept["crank_angle"].values) / width_deg + 1e-6).astype(int) % count
-    samples = np.bincount(place, minlength=count)
-    mode = kept["mode"].values
+    place = (
+        np.floor(np.degrees(samples["crank_angle"].values) / width_deg + 1e-6).astype(int) % count
+    )
+    counts = np.bincount(place, minlength=count)
+    mode = samples["mode"].values
     shares = np.full((count, mode.shape[1], len(MODES)), np.nan)
     for joint, number in np.ndindex(shares.shape[1:]):
         found = np.bincount(place, mode[:, joint] == number, minlength=count)
-        np.divide(found, samples, out=shares[:, joint, number], where=samples > 0)
+        np.divide(found, counts, out=shares[:, joint, number], where=counts > 0)
     majority = np.where(np.isnan(shares[:, :, 0]), UNKNOWN, np.argmax(shares, axis=2))
     flags = modes["mode"].attrs | {"long_name": "contact mode that is most frequent"}
     share = {"units": "1", "long_name": "share of time in a contact mode"}

@@ -149,13 +149,13 @@ def grid_effects(values: np.ndarray) -> Effects | None:
         return None
     values = fill_unknown(values, unknown)
     axes = range(values.ndim)
-    apart = [tuple(n for n in axes if n != axis) for axis in axes]
+    other_axes = [tuple(n for n in axes if n != axis) for axis in axes]
     scaled = (values - values.mean()) / (np.ptp(values) or 1.0)
     whole = scaled.var()
     if not whole:
         nothing = np.full(values.ndim, math.nan)
         return Effects("grid", nothing, nothing, filled=int(unknown.sum()))
-    main = np.array([scaled.mean(axis=others).var() for others in apart]) / whole
+    main = np.array([scaled.mean(axis=others).var() for others in other_axes]) / whole
     total = np.array([scaled.var(axis=axis).mean() for axis in axes]) / whole
     return Effects("grid", main, total, filled=int(unknown.sum()))
 
@@ -209,8 +209,8 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
             "saltelli", found["first_order"], found["total_order"], ends["first_order"],
             ends["total_order"], int((~good).sum()), MAX_BASE if design.a.size > MAX_BASE else 0,
         )  # fmt: skip
-    there = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
-    rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, there, strict=True)])
+    known = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
+    rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, known, strict=True)])
     return Effects("rank", rows[:, 0], main_ends=rows[:, 1:].T, filled=int((~good).sum()))
 
 

@@ -28,8 +28,8 @@ class BarredNumber(NamedTuple):
     def over(self, other: "BarredNumber") -> "BarredNumber":
         """Return the ratio of two measures; relative errors add, as errors of one model may."""
         ratio = self.value / other.value if other.value else math.inf
-        away = self.error / abs(self.value) if self.value else 0.0
-        return BarredNumber(ratio, ratio * (away + other.error / abs(other.value or math.inf)))
+        own_error = self.error / abs(self.value) if self.value else 0.0
+        return BarredNumber(ratio, ratio * (own_error + other.error / abs(other.value or math.inf)))
 
 
 class Margin(NamedTuple):
@@ -91,11 +91,11 @@ def is_chaotic(run: xr.Dataset) -> bool:
 
 def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
     """Yield the whole settled revolutions of a run, both ends included."""
-    kept = settled_part(run)
-    turns = (kept["crank_angle"].values - kept["crank_angle"].values[0]) / (2.0 * math.pi)
+    settled = settled_part(run)
+    turns = (settled["crank_angle"].values - settled["crank_angle"].values[0]) / (2.0 * math.pi)
     for number in range(int(turns[-1] + 1e-6)):
         inside = (turns >= number - 1e-6) & (turns <= number + 1 + 1e-6)
-        yield kept.isel(time=inside)
+        yield settled.isel(time=inside)
 
 
 def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> float:
@@ -108,8 +108,8 @@ def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> floa
 
 def measure(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> BarredNumber:
     """Return a value of a run's settled part with an error; of a chaotic run by its revolutions."""
-    kept = settled_part(run)
-    return BarredNumber(value(kept), by_revolution(kept, value) if is_chaotic(run) else error)
+    settled = settled_part(run)
+    return BarredNumber(value(settled), by_revolution(settled, value) if is_chaotic(run) else error)
 
 
 def peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
@@ -177,7 +177,7 @@ class Shares(NamedTuple):
 class Evidence(NamedTuple):
     """What is looked at: whole revolutions of a run, a joint's impacts, its force above `ORDER`."""
 
-    kept: xr.Dataset
+    settled: xr.Dataset
     revolutions: int
     table: xr.Dataset
     high: np.ndarray  # (m,), N, along the cylinder
@@ -187,10 +187,10 @@ def evidence(run: xr.Dataset, joint: str) -> Evidence:
     """Return the `Evidence` of a joint. Raises as `continuity`."""
     from compressor.vibration import high_pass_orders
 
-    kept, count = whole_revolutions(run)
-    force = kept["contact_force"].sel(joint=joint, axis="x").values
+    settled, count = whole_revolutions(run)
+    force = settled["contact_force"].sel(joint=joint, axis="x").values
     return Evidence(
-        kept, count, impacts(kept), high_pass_orders(*evenly(kept, count, force), ORDER)
+        settled, count, impacts(settled), high_pass_orders(*evenly(settled, count, force), ORDER)
     )
 
 
@@ -200,14 +200,14 @@ def continuity(run: xr.Dataset, joint: str, start_up: bool = False) -> Continuit
     `start_up`: over whole revolutions from the run's begin. Raises NoSeriesError where there is
     none, ValueError where the joint has no clearance.
     """
-    return told_by(evidence(run.assign_attrs(settle=0.0) if start_up else run, joint), joint)
+    return continuity_of(evidence(run.assign_attrs(settle=0.0) if start_up else run, joint), joint)
 
 
-def told_by(found: Evidence, joint: str) -> Continuity:
+def continuity_of(found: Evidence, joint: str) -> Continuity:
     """Return the `Continuity` of a joint by its evidence."""
     from compressor.vibration import energy_angle, shape
 
-    modes = contact_modes(found.kept)["mode"].sel(joint=joint).values[:-1]
+    modes = contact_modes(found.settled)["mode"].sel(joint=joint).values[:-1]
     return Continuity(
         float((modes != FOLLOWING).mean()),
         hit_share(found.table, joint, found.revolutions),
@@ -228,13 +228,13 @@ def measured_shares(run: xr.Dataset, joint: str) -> Shares:
     `continuity`.
     """
     by = evidence(run, joint)
-    found = told_by(by, joint)
+    found = continuity_of(by, joint)
     if is_chaotic(run):
 
         def share(name: str) -> Callable[[xr.Dataset], float]:
             return lambda turn: getattr(continuity(turn, joint), name)
 
-        errors = [by_revolution(by.kept, share(name)) for name in Shares._fields]
+        errors = [by_revolution(by.settled, share(name)) for name in Shares._fields]
     else:
         errors = [apart_error(by, joint), hit_error(by, joint), angle_error(by, joint)]
     values = (getattr(found, name) for name in Shares._fields)
@@ -244,18 +244,18 @@ def measured_shares(run: xr.Dataset, joint: str) -> Shares:
 def apart_error(by: Evidence, joint: str) -> float:
     """Return the error of the share of crank angle in flight or impact."""
     count = int((by.table["joint"].values == joint).sum())
-    told = float(by.kept["contact_loss_fraction_error"].sel(joint=joint))
-    return told + 2.0 * count / (by.kept.sizes["time"] - 1)
+    stored_error = float(by.settled["contact_loss_fraction_error"].sel(joint=joint))
+    return stored_error + 2.0 * count / (by.settled.sizes["time"] - 1)
 
 
 def hit_error(by: Evidence, joint: str) -> float:
     """Return the error of the share of windows that are hit."""
     mine = by.table["joint"].values == joint
     speed, angle = (by.table[name].values[mine] for name in ("approach_speed", "crank_angle"))
-    doubt = series_error(by.kept, "velocity", by.kept["velocity"].values)
+    doubt = series_error(by.settled, "velocity", by.settled["velocity"].values)
     if math.isnan(doubt):
         return math.nan
-    sample = math.degrees(float(by.kept["crank_angle"][1] - by.kept["crank_angle"][0]))
+    sample = math.degrees(float(by.settled["crank_angle"][1] - by.settled["crank_angle"][0]))
     unsure = np.abs(angle - WINDOW * np.round(angle / WINDOW)) < sample
     unsure = (unsure & (speed > SLOWEST - doubt)) | (np.abs(speed - SLOWEST) < doubt)
     return float(unsure.sum()) * WINDOW / (360.0 * by.revolutions)
@@ -265,13 +265,13 @@ def angle_error(by: Evidence, joint: str) -> float:
     """Return the error of the share of crank angle that holds `ENERGY` of the energy."""
     from compressor.vibration import energy_angle
 
-    force = by.kept["contact_force"].sel(joint=joint).values
-    error = series_error(by.kept, "contact_force", force, joint=joint)
+    force = by.settled["contact_force"].sel(joint=joint).values
+    error = series_error(by.settled, "contact_force", force, joint=joint)
     size = math.sqrt(float(np.mean(by.high**2)))
     if math.isnan(error) or not size:
         return error
-    away = min(2.0 * error / size, 0.5 * ENERGY)
-    shares = (ENERGY - away, ENERGY, min(ENERGY + away, 1.0))
+    share_error = min(2.0 * error / size, 0.5 * ENERGY)
+    shares = (ENERGY - share_error, ENERGY, min(ENERGY + share_error, 1.0))
     low, found, high = (energy_angle(by.high, share) for share in shares)
     return max(high - found, found - low)
 

@@ -25,7 +25,7 @@ MIN_RING = 12.0  # of the crank's frequency: below it a motion is the machine's
 class JournalMotion:
     """A journal's motion in its bearing after settling.
 
-    `apart`: share of time without contact; `least`: least penetration (m) of the samples,
+    `gap_fraction`: share of time without contact; `least`: least penetration (m) of the samples,
     negative where there is a gap; `laps`: how often the journal goes round its bearing in a
     revolution, counter-clockwise positive; `turns`: crank angles (degrees) at which the horizontal
     force changes its sign; `rings` (Hz): the strongest frequency of the acceleration's deviation
@@ -33,7 +33,7 @@ class JournalMotion:
     """
 
     joint: str
-    apart: float
+    gap_fraction: float
     least: float
     laps: float
     turns: tuple[float, ...]
@@ -42,12 +42,12 @@ class JournalMotion:
 
 def course(run: xr.Dataset, joint: str) -> JournalMotion:
     """Return the course of a joint with clearance, from a run with time series."""
-    kept = settled_part(run)
-    angle = np.degrees(kept["crank_angle"].values)
-    place = kept["eccentricity"].sel(joint=joint).values
+    settled = settled_part(run)
+    angle = np.degrees(settled["crank_angle"].values)
+    place = settled["eccentricity"].sel(joint=joint).values
     contact = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))
-    depth = kept["penetration"].sel(joint=joint).values
-    force = kept["contact_force"].sel(joint=joint, axis="x").values
+    depth = settled["penetration"].sel(joint=joint).values
+    force = settled["contact_force"].sel(joint=joint, axis="x").values
     turns = turning_points(angle, force)
     return JournalMotion(
         joint,
@@ -55,7 +55,7 @@ def course(run: xr.Dataset, joint: str) -> JournalMotion:
         float(depth.min()),
         float((contact[-1] - contact[0]) / np.radians(angle[-1] - angle[0])),
         turns,
-        ringing(kept, turns[0]) if turns else float("nan"),
+        ringing(settled, turns[0]) if turns else float("nan"),
     )
 
 
@@ -78,7 +78,7 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
     return tuple(sorted(float(np.mean(group)) % 360.0 for group in groups))
 
 
-def ringing(kept: xr.Dataset, turn: float) -> float:
+def ringing(settled: xr.Dataset, turn: float) -> float:
     """Return the strongest frequency (Hz) in the acceleration after a turn (degrees).
 
     Of the deviation from the ideal acceleration, without its slow drift; nan where the samples
@@ -86,20 +86,20 @@ def ringing(kept: xr.Dataset, turn: float) -> float:
     """
     from scipy.signal import find_peaks, periodogram
 
-    angle = np.degrees(kept["crank_angle"].values)
+    angle = np.degrees(settled["crank_angle"].values)
     begin = angle[0] + (turn + AFTER - angle[0]) % 360.0
-    seen = (angle >= begin) & (angle < begin + SPAN)
-    rest = (kept["acceleration"].values - ideal_motion(kept)[2])[seen]
+    inside = (angle >= begin) & (angle < begin + SPAN)
+    rest = (settled["acceleration"].values - ideal_motion(settled)[2])[inside]
     if rest.size < 2 * DRIFT:
         return float("nan")
     count = np.linspace(-1.0, 1.0, rest.size)
     rest = rest - np.polyval(np.polyfit(count, rest, DRIFT), count)
-    time = kept["time"].values
+    time = settled["time"].values
     rate = 1.0 / (time[1] - time[0])
-    how = {"nfft": PADDED * rest.size, "detrend": False}
-    frequency, power = periodogram(rest, rate, np.hanning(rest.size), **how)
+    padding = {"nfft": PADDED * rest.size, "detrend": False}
+    frequency, power = periodogram(rest, rate, np.hanning(rest.size), **padding)
     lines, _ = find_peaks(power)  # an end of the spectrum is no line, but a slower motion's foot
-    lines = lines[frequency[lines] >= MIN_RING * case_of(kept).omega / (2.0 * np.pi)]
+    lines = lines[frequency[lines] >= MIN_RING * case_of(settled).omega / (2.0 * np.pi)]
     return float(frequency[lines[np.argmax(power[lines])]]) if lines.size else float("nan")
 
 
@@ -128,9 +128,9 @@ def orbit(run: xr.Dataset) -> xr.Dataset:
     series or clearance.
     """
     joints = [*joints_with_clearance(run)]
-    kept = settled_part(run)
-    found = [orbit_of(contact_series(kept, joint)) for joint in joints]
-    one = contact_series(kept, joints[0])
+    settled = settled_part(run)
+    found = [orbit_of(contact_series(settled, joint)) for joint in joints]
+    one = contact_series(settled, joints[0])
     angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
     coordinates = {
         "time": ("time", one.time, {"units": "s", "long_name": "time"}),

@@ -89,12 +89,12 @@ def film(run: xr.Dataset) -> str:
 
 def signals(run: xr.Dataset, twin: Twin) -> str:
     """Describe the last revolution: the greatest and least of what is drawn."""
-    _, kept = last_revolution(run)
+    _, revolution = last_revolution(run)
     _, count = whole_revolutions(run)
-    forces = frame_forces(kept)
+    forces = frame_forces(revolution)
     x, y = 1e-3 * forces["shaking_force"].T
     torque, rod = forces["crank_torque"], 1e-3 * forces["rod_load"]
-    peak = np.abs(kept["acceleration"].values).max()
+    peak = np.abs(revolution["acceleration"].values).max()
     beside, ideal_joints = "", " No joint has clearance: there is no contact to draw."
     if twin is not None:
         ideal_joints = ""
@@ -138,10 +138,10 @@ def spectra(run: xr.Dataset, twin: Twin) -> str:
 def orbits(run: xr.Dataset, twin: Twin) -> str:
     """Describe the orbits: how far out the journals are, and whether they leave the wall."""
     found = orbit(run)
-    _, kept = last_revolution(run)
+    _, revolution = last_revolution(run)
     sentences = ["Journal centres in their bores to scale, last revolution."]
     for joint in joints_with_clearance(run):
-        depth = 1e6 * float(kept["penetration"].sel(joint=joint).max())
+        depth = 1e6 * float(revolution["penetration"].sel(joint=joint).max())
         one = found.sel(joint=joint)
         off = 100.0 * float(one["off_wall_share"])
         leaves = f"is off its wall for {off:.3g} % of the time" if off else "never leaves its wall"
@@ -164,10 +164,10 @@ def modes(run: xr.Dataset, twin: Twin) -> str:
     for joint in joints_with_clearance(run):
         each = [100.0 * float(shares.sel(joint=joint, mode=mode)) for mode in MODES]
         if each[MODES.index("following")] == 100.0:
-            said = "following contact throughout, no flight and no impact"
+            text = "following contact throughout, no flight and no impact"
         else:
-            said = ", ".join(f"{mode} {x:.3g} %" for mode, x in zip(MODES, each, strict=True))
-        sentences.append(f"At the {SPOKEN[joint]}: {said}.")
+            text = ", ".join(f"{mode} {x:.3g} %" for mode, x in zip(MODES, each, strict=True))
+        sentences.append(f"At the {SPOKEN[joint]}: {text}.")
     return " ".join(["Shares of the settled time.", *sentences]) + film(run) + caution(run)
 
 

@@ -76,9 +76,9 @@ class Relation:
 
 def force_relation(run: xr.Dataset, joint: str) -> Relation:
     """Return `Relation` of a run's settled series at one joint (force on the rod)."""
-    kept = settled_part(run)
-    a = kept["acceleration"].values
-    force = kept["contact_force"].sel(joint=joint, axis="x").values
+    settled = settled_part(run)
+    a = settled["acceleration"].values
+    force = settled["contact_force"].sel(joint=joint, axis="x").values
     slope, intercept = np.polyfit(a, force, 1)
     return Relation(float(slope), float(intercept), float(np.corrcoef(a, force)[0, 1] ** 2))
 
@@ -134,10 +134,10 @@ def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = ACTIVE
     It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation
     from the ideal motion exceeds `level` times the ideal peak acceleration.
     """
-    kept = settled_part(run)
-    _, _, ideal = ideal_motion(kept)
-    angle = kept["crank_angle"].values
+    settled = settled_part(run)
+    _, _, ideal = ideal_motion(settled)
+    angle = settled["crank_angle"].values
     width = max(1, round(np.radians(window_deg) / (angle[1] - angle[0])))
-    square = (kept["acceleration"].values - ideal) ** 2
+    square = (settled["acceleration"].values - ideal) ** 2
     rms = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
     return float((rms > level * np.abs(ideal).max()).mean())

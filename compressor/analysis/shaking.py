@@ -57,12 +57,12 @@ def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:
     """
     if "time" not in run.dims or "crank_angle" not in run:
         raise NoSeriesError("the run has no time series (output.keep: series)")
-    kept = settled_part(run)
-    turns = (kept["crank_angle"].values - kept["crank_angle"].values[0]) / (2.0 * np.pi)
+    settled = settled_part(run)
+    turns = (settled["crank_angle"].values - settled["crank_angle"].values[0]) / (2.0 * np.pi)
     count = int(np.floor(turns[-1] + 1e-6))
     if count < 1:
         raise NoSeriesError("the run has no whole settled revolution (solve.duration_rev)")
-    return kept.isel(time=turns <= count + 1e-6), count
+    return settled.isel(time=turns <= count + 1e-6), count
 
 
 def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
@@ -70,11 +70,11 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
 
     The first angle lies from 0 to 360. Raises NoSeriesError as `whole_revolutions`.
     """
-    kept, count = whole_revolutions(run)
-    angle = np.degrees(kept["crank_angle"].values)
+    settled, count = whole_revolutions(run)
+    angle = np.degrees(settled["crank_angle"].values)
     inside = angle >= angle[0] + 360.0 * (count - 1) - 1e-6
     angle = angle[inside]
-    return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9), kept.isel(time=inside)
+    return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9), settled.isel(time=inside)
 
 
 def healthy_twin(run: xr.Dataset) -> xr.Dataset:
@@ -131,7 +131,7 @@ class Shaking:
     elsewhere: float
     ring: float
 
-    def near(self, angle: np.ndarray) -> np.ndarray:
+    def is_near_turn(self, angle: np.ndarray) -> np.ndarray:
         """Return which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn."""
         return near_a_turn(angle, self.turns)
 
@@ -144,16 +144,16 @@ def shaking(run: xr.Dataset) -> Shaking:
     """
     from compressor.vibration import high_pass_orders, line_amplitudes
 
-    kept, revolutions = whole_revolutions(run)
-    crank = kept["crank_angle"].values
-    force = frame_forces(kept)["shaking_force"][:, 0]
-    even, a_turn = evenly(kept, revolutions, force)
+    settled, revolutions = whole_revolutions(run)
+    crank = settled["crank_angle"].values
+    force = frame_forces(settled)["shaking_force"][:, 0]
+    even, a_turn = evenly(settled, revolutions, force)
     high = high_pass_orders(even, a_turn, ORDER)
     angle = (np.degrees(crank[0]) + 360.0 * np.arange(a_turn) / a_turn) % 360.0
     mean_square = (high.reshape(-1, a_turn) ** 2).mean(axis=0)
-    turns = directions_change(kept)
-    near = near_a_turn(angle, turns)
-    rest = np.where(np.tile(near, high.size // a_turn), 0.0, high)
+    turns = directions_change(settled)
+    is_near = near_a_turn(angle, turns)
+    rest = np.where(np.tile(is_near, high.size // a_turn), 0.0, high)
     lines = line_amplitudes(rest, a_turn, "rectangular", True)
     lines[: ORDER + 1] = 0.0
     rings = lines.max() > SILENT_SHARE * np.abs(force).max()
@@ -163,20 +163,20 @@ def shaking(run: xr.Dataset) -> Shaking:
         turns,
         angle,
         mean_square,
-        math.sqrt(float(mean_square[near].sum()) / a_turn),
-        math.sqrt(float(mean_square[~near].sum()) / a_turn),
+        math.sqrt(float(mean_square[is_near].sum()) / a_turn),
+        math.sqrt(float(mean_square[~is_near].sum()) / a_turn),
         float(np.argmax(lines)) if rings else math.nan,
     )
 
 
-def evenly(kept: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
+def evenly(settled: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
     """Return a signal resampled at equal crank angles, and their even number a turn.
 
     values: a signal of `whole_revolutions`.
     """
     from compressor.vibration import resample_angle
 
-    crank = kept["crank_angle"].values
+    crank = settled["crank_angle"].values
     a_turn = (crank.size - 1) // revolutions // 2 * 2
     return resample_angle(crank, values, a_turn)[: revolutions * a_turn], a_turn
 
@@ -196,31 +196,31 @@ def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
 
 def deviation_spectrum(run: xr.Dataset) -> Spectrum:
     """Return the order spectrum of the crosshead's acceleration less the ideal machine's, m/s2."""
-    kept, revolutions = whole_revolutions(run)
-    deviation = kept["acceleration"].values - ideal_motion(kept)[2]
-    return order_lines(*evenly(kept, revolutions, deviation))
+    settled, revolutions = whole_revolutions(run)
+    deviation = settled["acceleration"].values - ideal_motion(settled)[2]
+    return order_lines(*evenly(settled, revolutions, deviation))
 
 
-def directions_change(kept: xr.Dataset) -> tuple[float, ...]:
+def directions_change(settled: xr.Dataset) -> tuple[float, ...]:
     """Return the crank angles (degrees) at which forces along the cylinder change sign.
 
     Of all joints with clearance, in rising order.
     """
     try:
-        joints = joints_with_clearance(kept)
+        joints = joints_with_clearance(settled)
     except ValueError:
         return ()
-    crank = np.degrees(kept["crank_angle"].values)
-    forces = (kept["contact_force"].sel(joint=joint, axis="x").values for joint in joints)
+    crank = np.degrees(settled["crank_angle"].values)
+    forces = (settled["contact_force"].sel(joint=joint, axis="x").values for joint in joints)
     return tuple(sorted(turn for force in forces for turn in turning_points(crank, force)))
 
 
 def near_a_turn(angle: np.ndarray, turns: tuple[float, ...]) -> np.ndarray:
     """Return which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` one of the turns."""
-    near = np.zeros(angle.size, bool)
+    is_near = np.zeros(angle.size, bool)
     for turn in turns:
-        near |= (angle - turn + BEFORE) % 360.0 < BEFORE + AFTER
-    return near
+        is_near |= (angle - turn + BEFORE) % 360.0 < BEFORE + AFTER
+    return is_near
 
 
 @dataclass(frozen=True)
@@ -255,9 +255,9 @@ def sensor_envelope(run: xr.Dataset) -> SensorEnvelope | None:
     power = line_amplitudes(values, values.size, "rectangular", True) ** 2
     lines = np.arange(power.size) * rate / values.size
     edges = found.frequency - found.bandwidth / 2, found.frequency + found.bandwidth / 2
-    held = np.append(0.0, np.cumsum(power))
+    cumulative = np.append(0.0, np.cumsum(power))
     low, high = (np.searchsorted(lines, edge) for edge in edges)
-    strong = held[high] - held[low] >= MIN_SHARE * power.sum()
+    strong = cumulative[high] - cumulative[low] >= MIN_SHARE * power.sum()
     best = int(np.nanargmax(np.where(strong, found.kurtosis, np.nan)))
     band = float(edges[0][best]), float(edges[1][best])
     speed = 1.0 / case_of(run).turn

@@ -103,7 +103,7 @@ class Mechanism:
     """
 
     title: str
-    said: str
+    caption: str
     height: float
     origin: tuple[float, float]
     big: tuple[float, float]
@@ -140,11 +140,11 @@ def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
     )  # fmt: skip
     where = " and ".join(f"{SPOKEN[joint]} ({size:g} mm)" for joint, size in worn.items())
     title = f"Slider-crank mechanism, {angle:g}° after top dead centre"
-    said = f"{title}: crank {crank:g} mm, rod {rod:g} mm, drawn to scale. " + (
+    caption = f"{title}: crank {crank:g} mm, rod {rod:g} mm, drawn to scale. " + (
         f"Clearance at the {where}, enlarged below." if worn else "No joint has clearance."
     )
     return Mechanism(
-        title, said, height + rows, (x, y), (x + pin[0] * scale, y - pin[1] * scale),
+        title, caption, height + rows, (x, y), (x + pin[0] * scale, y - pin[1] * scale),
         (x + crosshead * scale, y), crank * scale, max(5.0, min(18.0, 0.12 * crank * scale)),
         tuple(worn), insets,
     )  # fmt: skip
@@ -338,20 +338,20 @@ def finding(
         return None
     low, high = (pick(sure, key=lambda n: values[n]) for pick in (min, max))
 
-    def told(n: int) -> str:
+    def text(n: int) -> str:
         return (
             f"{format_measure(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
         )
 
     title = measure.title[0].upper() + measure.title[1:]
     if len(values) == 1:
-        return MetricChange(title, "", "", told(high), "", "", 0.0)
+        return MetricChange(title, "", "", text(high), "", "", 0.0)
     if values[high] - values[low] <= np.nansum([bars[high], bars[low]]):
         return None
     ratio = values[high] / values[low] if values[low] > 0.0 else math.inf
     rank = min(math.log(ratio), FROM_ZERO) if values[low] > 0.0 else FROM_ZERO
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
-    return MetricChange(title, told(low), names[low], told(high), names[high], change, rank)
+    return MetricChange(title, text(low), names[low], text(high), names[high], change, rank)
 
 
 def round_robin(

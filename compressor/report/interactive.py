@@ -213,9 +213,9 @@ def extremes(y: np.ndarray, count: int) -> np.ndarray:
     filled = np.where(np.isfinite(y), y, 0.0)
     least, greatest = np.minimum.reduceat(filled, edges), np.maximum.reduceat(filled, edges)
     part = np.repeat(np.arange(count), np.diff([*edges, y.size]))
-    wanted = (filled == least[part]) | (filled == greatest[part]) | ~np.isfinite(y)
-    wanted[[0, -1]] = True
-    places = np.flatnonzero(wanted)
+    is_shown = (filled == least[part]) | (filled == greatest[part]) | ~np.isfinite(y)
+    is_shown[[0, -1]] = True
+    places = np.flatnonzero(is_shown)
     return places if places.size <= 4 * count else every(y.size, 2 * count)
 
 
@@ -232,15 +232,15 @@ def numbers(values: np.ndarray) -> Any:
 
 def describe_figure(drawing: Drawing) -> str:
     """Return what is seen in a figure, in words: its panels, their axes and curves."""
-    told = []
+    texts = []
     for panel in drawing.panels:
         names = [t.name or (t.scale.title if t.scale else "") for t in panel.ordered]
         curves = ", ".join(name for name in dict.fromkeys(names) if name)
         titles = [axis_title(drawing, panel, way) for way in WAYS[::-1]]
         axes = " over ".join(title for title in titles if title)
-        told.append(": ".join(part for part in (one_line(panel.title) or axes, curves) if part))
-    several = f"{len(told)} panels. " if len(told) > 1 else ""
-    return several + "; ".join(dict.fromkeys(told))
+        texts.append(": ".join(part for part in (one_line(panel.title) or axes, curves) if part))
+    several = f"{len(texts)} panels. " if len(texts) > 1 else ""
+    return several + "; ".join(dict.fromkeys(texts))
 
 
 MAX_SERIES = 60  # jobs of a study whose time series lie beside the page

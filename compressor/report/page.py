@@ -101,8 +101,8 @@ def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "")
 
 def status_text(status: object, reason: object, regime: object = "") -> str:
     """Return how a job ended, in words, and how its motion goes, if it is known."""
-    said = reason or regime
-    return f"{status}: {said}" if said else str(status)
+    cause = reason or regime
+    return f"{status}: {cause}" if cause else str(status)
 
 
 def column_title(measure: Measure) -> str:

@@ -72,9 +72,9 @@ def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns
 
 def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
     """Return whether all stored jobs of a study, and at least one, are cases of the paper."""
-    there = sum(at >= 0 for at in stored.rows.find([*study.keys]))
+    count = sum(at >= 0 for at in stored.rows.find([*study.keys]))
     labels = {case.physics_key for case in paper_cases().values()}
-    return 0 < there == len(paper_candidates(stored, [study], labels))
+    return 0 < count == len(paper_candidates(stored, [study], labels))
 
 
 def find_runs(
@@ -111,8 +111,8 @@ def paper_candidates(
     """
     keys = list(dict.fromkeys(key for study in studies for key in study.keys))
     positions = stored.rows.find(keys)
-    wanted = np.array([*physics], "S")
-    same = np.isin(stored.rows.columns["physics_key"], wanted)
+    physics_keys = np.array([*physics], "S")
+    same = np.isin(stored.rows.columns["physics_key"], physics_keys)
     return [key for key, at in zip(keys, positions, strict=True) if at >= 0 and same[at]]
 
 
@@ -290,9 +290,6 @@ def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSe
 
     None unless it holds all nine worn cases of just one other machine. They must be alike in all
     but the fault, have ended well, and have time series that are `comparable`.
-
-    They must be alike in all but the fault, have ended well, and have time series that are
-    `comparable`.
     """
     machines = [*itertools.islice(other_machines(stored, study), 2)]
     if len(machines) != 1:
@@ -315,8 +312,8 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
     if not swept >= {*FAULTS, *CLEARANCES}:
         return
     positions = stored.rows.find(study.keys)
-    held = {*stored.rows.columns["physics_key"][positions[positions >= 0]].tolist()}
-    seen = set()
+    stored_keys = {*stored.rows.columns["physics_key"][positions[positions >= 0]].tolist()}
+    ideals = set()
     for position, point in zip(positions, points(study), strict=True):
         # the first of the nine stands for all
         if position < 0 or not {FAULTS[0], CLEARANCES[0]} <= {*point.values()}:
@@ -327,10 +324,10 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
             continue  # of another version of compsim
         cases = cases_of(case)
         ideal = cases["design"].physics_key
-        if ideal in seen or not is_other(case):
+        if ideal in ideals or not is_other(case):
             continue
-        seen.add(ideal)
-        if all(cases[name].physics_key.encode() in held for name in WORN_LABELS):
+        ideals.add(ideal)
+        if all(cases[name].physics_key.encode() in stored_keys for name in WORN_LABELS):
             yield cases
 
 
@@ -411,8 +408,8 @@ def second_section(
     ]
     lacking = [item for name, item in names.items() if name not in {p.name for p in plates}]
     notes = [NO_IDEAL.format(number_figures(lacking))] if lacking else []
-    said = [one.said for one in differences(found.case, ("name", "load", "joint", "clearance_mm"))]
-    content = SecondSetContent(found.study, table, said, notes, pairs, claims(found.judged))
+    texts = [one.said for one in differences(found.case, ("name", "load", "joint", "clearance_mm"))]
+    content = SecondSetContent(found.study, table, texts, notes, pairs, claims(found.judged))
     title = f"{found.study}: Figures 8 to 16 of another machine"
     return Section(second_anchor(found.study), title, "second_set.html", content)
 

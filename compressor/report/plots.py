@@ -124,7 +124,7 @@ def job_figures(
     stored: Stored, studies: Sequence[StoredStudy], key: str, choice: PlotChoice
 ) -> Iterator[tuple[str, str, Drawing]]:
     """Yield the names, captions and drawings of a job that has time series."""
-    wanted = choose_figures(choice.what, [*JOB], f"job {key}")
+    figures = choose_figures(choice.what, [*JOB], f"job {key}")
     if choice.over or choice.at:
         raise PlotError(f"{key} is one job: --over and --at are for studies")
     run = drawable(stored, studies, key)
@@ -132,11 +132,11 @@ def job_figures(
         worn = joints_with_clearance(run)
     except ValueError:
         worn = {}
-    for name in (one for one in wanted if one in OF_CONTACT and choice.what and not worn):
+    for name in (one for one in figures if one in OF_CONTACT and choice.what and not worn):
         raise PlotError(f"job {key} has ideal joints, so that there is no figure {name!r} of it")
     twin = healthy_twin(run) if worn else None
     try:
-        for name in wanted:
+        for name in figures:
             if name in OF_CONTACT and not worn:
                 continue
             if name in OF_CONTACT:
@@ -171,7 +171,7 @@ def study_figures(
         raise PlotError(
             f"{study.name} is a study: for {choice.what[0]} name a job, such as {first}"
         )
-    wanted = choose_figures(choice.what, [*STUDY], f"study {study.name}")
+    figures = choose_figures(choice.what, [*STUDY], f"study {study.name}")
     over = choose_axis(stored.folder, study, choice.over)
     jobs, where = select_jobs(stored.folder, study, over, choice.at)
     if len(jobs) > MAX_ROWS:
@@ -180,7 +180,7 @@ def study_figures(
     rows = [swept_row(stored, value, key) for value, key in jobs]
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
-    for name in wanted:
+    for name in figures:
         if name == "map" and not any(row.modes is not None for row in rows):
             if choice.what:
                 raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
@@ -198,14 +198,14 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
         "no series": KEEP,
         "too short": "run it with a longer solve.duration_rev",
     }
-    told = "; ".join(f"{problem}: {cures[problem]}" for problem in sorted(problems))
-    return f"no job of {study.name} can be drawn: {told}"
+    text = "; ".join(f"{problem}: {cures[problem]}" for problem in sorted(problems))
+    return f"no job of {study.name} can be drawn: {text}"
 
 
-def choose_axis(folder: Folder, study: StoredStudy, wanted: str) -> str:
+def choose_axis(folder: Folder, study: StoredStudy, name: str) -> str:
     """Return the key of the axis that is meant: by default a clearance, the speed, or the first."""
-    if wanted:
-        return find_axis(folder, study, wanted).key
+    if name:
+        return find_axis(folder, study, name).key
     keys = [axis.key for axis in study.axes]
     ranked = [key for word in ("clearance", "speed") for key in keys if word in key]
     return (ranked or keys or ["job"])[0]
@@ -236,8 +236,8 @@ def select_jobs(
         raise PlotError(f"no job of {study.name} has {', '.join(at)}")
     numbers = all(isinstance(value, int | float) for value, _ in jobs)
     jobs.sort(key=lambda job: job[0] if numbers else 0)
-    told = ", ".join(f"{name} {format_swept_value(value)}" for name, value in fixed.items())
-    where = f" Here {told}." if told else ""
+    values = ", ".join(f"{name} {format_swept_value(value)}" for name, value in fixed.items())
+    where = f" Here {values}." if values else ""
     varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
     return jobs, where + (f" Along with it vary {', '.join(varied)}." if varied else "")
 

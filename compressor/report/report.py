@@ -98,21 +98,21 @@ def write_report(
 
     Raises StoreError where there are no results, or the report's folder cannot be written.
     """
-    made = compose(results, command, add, running)
+    contents = build_report(results, command, add, running)
     folder = Path(report)
     files = pictures(
-        {plate.name: plate.drawing for plate in made.plates},
-        {plate.name: plate.heading for plate in made.plates},
+        {plate.name: plate.drawing for plate in contents.plates},
+        {plate.name: plate.heading for plate in contents.plates},
     )
-    for plate in made.plates:
+    for plate in contents.plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
     for name, content in files.items():
         publish(folder / name, content)
-    for key, text in made.series.items():
+    for key, text in contents.series.items():
         publish(folder / f"{series_name(key)}.js", text.encode())
     publish_library(folder)
-    publish(folder / "index.html", made.page.encode(errors="backslashreplace"))
-    remove_stale(folder, made)
+    publish(folder / "index.html", contents.page.encode(errors="backslashreplace"))
+    remove_stale(folder, contents)
     return folder / "index.html"
 
 
@@ -126,7 +126,7 @@ def restate(report: Folder, before: Running, now: Running) -> None:
     publish(path, text.encode(errors="backslashreplace"))
 
 
-class Made(NamedTuple):
+class ReportContent(NamedTuple):
     """A report that is drawn: its figures, the names of its studies, series by job, its page."""
 
     plates: list[Plate]
@@ -135,9 +135,9 @@ class Made(NamedTuple):
     page: str
 
 
-def compose(
+def build_report(
     results: Folder, command: str, add: Sequence[Add] = (), running: Running | None = None
-) -> Made:
+) -> ReportContent:
     """Return everything of a report, in memory."""
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
@@ -178,12 +178,12 @@ def compose(
     ]
     plates = [*chain(of_paper, *of_others.values(), of_faults, *(one.plates for one in drawn))]
     plates += [plate for chapter in chapters for plate in chapter.plates]
-    jobs = {key: told for one in drawn for key, told in one.jobs.items()}
+    jobs = {key: facts for one in drawn for key, facts in one.jobs.items()}
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs)}
     for key in series:
         jobs[key]["series"] = series_name(key)
     page = document(sections, jobs, running)
-    return Made(plates, [study.name for study in studies], series, page)
+    return ReportContent(plates, [study.name for study in studies], series, page)
 
 
 def notes_on(study: str, added: Sequence[Additions]) -> list[StudyNote]:
@@ -237,8 +237,8 @@ def summarise(
     ]
     if paper.stored:
         failed = [n for n, run in paper.stored.items() if str(run["status"].item()) != "ok"]
-        said = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")
-        lines.append(StudyLine("The paper's cases", "cases", said, bool(failed)))
+        counts = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")
+        lines.append(StudyLine("The paper's cases", "cases", counts, bool(failed)))
         worn = (
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )
@@ -256,15 +256,15 @@ def summarise(
     return FirstScreen(lines, [*round_robin(each)], found, pictures)
 
 
-def remove_stale(report: Path, made: Made) -> None:
+def remove_stale(report: Path, contents: ReportContent) -> None:
     """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
-    drawn = {plate.name for plate in made.plates}
+    plates = {plate.name for plate in contents.plates}
     names = {f"figure-{item.number:02d}" for item in FIGURES}
-    names |= {second_name(study, item) for study in made.studies for item in SET}
-    names = (names | {f"diagnosis-{name}" for name in TITLES}) - drawn
+    names |= {second_name(study, item) for study in contents.studies for item in SET}
+    names = (names | {f"diagnosis-{name}" for name in TITLES}) - plates
     stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
-    kept = {f"{series_name(key)}.js" for key in made.series}
-    stale += [path for path in report.glob(f"{series_name('*')}.js") if path.name not in kept]
+    scripts = {f"{series_name(key)}.js" for key in contents.series}
+    stale += [path for path in report.glob(f"{series_name('*')}.js") if path.name not in scripts]
     for path in stale:
         with contextlib.suppress(OSError):
             path.unlink()

@@ -105,9 +105,9 @@ def study_sections(
         second_set=second_set,
         notes=notes,
     )
-    seen = [name for name in Regime if (data["regime"].values == name).any()]
+    regimes = [name for name in Regime if (data["regime"].values == name).any()]
     table = JobsContent(
-        study.name, data["status"].size, jobs_table(data), [*map(regime_words, seen)]
+        study.name, data["status"].size, jobs_table(data), [*map(regime_words, regimes)]
     )
     return (
         Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),
@@ -156,14 +156,14 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
     """Return where in the sweep jobs failed, and what is known of each; the first of many."""
     failed = np.flatnonzero(data["status"].values == "failed")
     swept = swept_values(data)
-    told = []
+    rows = []
     for place in failed[:MAX_DETAILS]:
         job = stored.status(str(data["key"].values.flat[place]))
         point = [f"{name} {value_cell(values[place]).text}" for name, values in swept.items()]
-        told.append(f"{', '.join(point)}: {status_text(job.reason, job.detail) if job else 'gone'}")
+        rows.append(f"{', '.join(point)}: {status_text(job.reason, job.detail) if job else 'gone'}")
     if len(failed) > MAX_DETAILS:
-        told.append(f"and {len(failed) - MAX_DETAILS} more")
-    return told
+        rows.append(f"and {len(failed) - MAX_DETAILS} more")
+    return rows
 
 
 def jobs_table(data: xr.Dataset) -> PageTable:

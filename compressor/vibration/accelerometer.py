@@ -80,13 +80,13 @@ def listen(
     times = forces.step * np.arange(count + 1) - before
     pace = paces(sensor, rng, times, turn)
     rigid = motion or body_motion(body, forces, steady)
-    heard = rigid.acceleration(sensor.direction, point_of(body, sensor, guide))
-    heard = interpolate_periodic(heard, forces.step, pace) if steady else heard
+    acceleration = rigid.acceleration(sensor.direction, point_of(body, sensor, guide))
+    acceleration = interpolate_periodic(acceleration, forces.step, pace) if steady else acceleration
     if body.casing and sensor.place != "body":
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
         force = interpolate_periodic(force, forces.step, pace) if steady else force
-        heard = heard + casing_acceleration(body, force, forces.step)
-    return record_signal(sensor, heard, times, pace / turn, rng)
+        acceleration = acceleration + casing_acceleration(body, force, forces.step)
+    return record_signal(sensor, acceleration, times, pace / turn, rng)
 
 
 def interpolate_periodic(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
@@ -107,26 +107,27 @@ def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: flo
     if not sensor.speed_jitter:
         return times
     knots = np.arange(np.floor(times[0] / turn) - 1, np.ceil(times[-1] / turn) + 2)
-    drawn = rng.normal(0.0, sensor.speed_jitter, knots.size)
-    course = CubicSpline(knots * turn, drawn).antiderivative()
+    deviations = rng.normal(0.0, sensor.speed_jitter, knots.size)
+    course = CubicSpline(knots * turn, deviations).antiderivative()
     return times + course(times) - course(0.0)
 
 
 def record_signal(
     sensor: Sensor,
-    heard: np.ndarray,
+    acceleration: np.ndarray,
     times: np.ndarray,
     turns: np.ndarray,
     rng: np.random.Generator,
 ) -> Record:
     """Return the chain from the acceleration at a sensor's foot to its samples.
 
-    heard: m/s2 at `times`, s, (n,), the record being what is not before 0; turns: revolutions.
+    acceleration: m/s2 at `times`, s, (n,), the record being what is not before 0; turns:
+    revolutions.
     """
     step = times[1] - times[0]
     omega = 2.0 * np.pi * sensor.mounting_Hz
-    how = sensor.mounting_Hz, sensor.mounting_damping_ratio
-    mounted = omega**2 * oscillate(heard, step, *how).displacement
+    mounting = sensor.mounting_Hz, sensor.mounting_damping_ratio
+    mounted = omega**2 * oscillate(acceleration, step, *mounting).displacement
     corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
     filtered = sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), mounted)
     taken = np.arange(int(times[-1] * sensor.rate_Hz * (1 + 1e-12))) / sensor.rate_Hz

@@ -50,9 +50,9 @@ def oscillate(
         raise ValueError(f"{len(force)} samples of a force are too few: at least {DEGREE + 1}")
     omega = 2.0 * np.pi * frequency
     root = omega * complex(-damping_ratio, np.sqrt(1.0 - damping_ratio**2))
-    held = pieces(force, step, steady)
+    cubics = pieces(force, step, steady)
     whole, shares = one_step(root, step)
-    driven = shares.real @ held + 1j * (shares.imag @ held)
+    driven = shares.real @ cubics + 1j * (shares.imag @ cubics)
     start = 0.0j
     if steady:
         start = final(whole, driven) / (1.0 - np.exp(root * step * (len(force) - 1)))
@@ -154,6 +154,6 @@ def casing_acceleration(body: Body, force: np.ndarray, step: float) -> np.ndarra
     force: at its place, in N, (n,), `step` s apart. A mode of some hundred Hz and more forgets its
     start within a revolution; it starts at rest.
     """
-    how = body.casing_frequency_Hz, body.casing_damping_ratio
+    mode = body.casing_frequency_Hz, body.casing_damping_ratio
     assert body.casing_mass_kg is not None  # as of a Case, which fills it in
-    return oscillate(force / body.casing_mass_kg, step, *how).acceleration
+    return oscillate(force / body.casing_mass_kg, step, *mode).acceleration

@@ -64,11 +64,11 @@ def band_envelope(values: np.ndarray, rate: float, band: tuple[float, float]) ->
         raise SignalError(f"{edges}: choose another, or sample faster")
     lines = rfft(found)
     frequency = np.arange(lines.size) * rate / found.size
-    kept = (frequency >= low) & (frequency <= high)
-    if not kept.any():
+    inside = (frequency >= low) & (frequency <= high)
+    if not inside.any():
         text = f"no line lies between {low} and {high}, which are {rate / found.size:g} apart"
         raise SignalError(f"{text}: choose a wider band, or pass a longer signal")
-    return np.abs(hilbert(irfft(np.where(kept, lines, 0.0), found.size)))
+    return np.abs(hilbert(irfft(np.where(inside, lines, 0.0), found.size)))
 
 
 def envelope_spectrum(
@@ -231,11 +231,11 @@ def energy_angle(values: np.ndarray, share: float = 0.9) -> float:
     if not size:
         return math.nan
     energy = np.sort(found**2)[::-1]
-    held = np.cumsum(energy)
-    wanted = share * held[-1]
-    whole = int(np.searchsorted(held, wanted))  # samples that hold less than is wanted
-    before = held[whole - 1] if whole else 0.0
-    return float((whole + (wanted - before) / energy[whole]) / found.size)
+    cumulative = np.cumsum(energy)
+    target = share * cumulative[-1]
+    whole = int(np.searchsorted(cumulative, target))  # samples that hold less than is wanted
+    before = cumulative[whole - 1] if whole else 0.0
+    return float((whole + (target - before) / energy[whole]) / found.size)
 
 
 def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarray:

@@ -277,15 +277,15 @@ def angle_window(angle: np.ndarray, values: np.ndarray, begin: float, end: float
     if count < 1:
         text = f"no window from {begin} to {end} degrees is wholly sampled"
         raise SignalError(f"{text}: pass more revolutions, or a narrower window")
-    inside = np.where((place < width / 360.0) & (turn >= first) & (turn <= last), turn - first, -1)
-    inside = inside.astype(int)
-    kept = inside >= 0
-    seen, squares, peak = inside[kept], found[kept] ** 2, np.zeros(count)
-    if np.unique(seen).size < count:
+    numbers = np.where((place < width / 360.0) & (turn >= first) & (turn <= last), turn - first, -1)
+    numbers = numbers.astype(int)
+    inside = numbers >= 0
+    window, squares, peak = numbers[inside], found[inside] ** 2, np.zeros(count)
+    if np.unique(window).size < count:
         raise SignalError(f"{width:g} degrees hold no sample: choose a wider window")
-    mean = np.bincount(seen, weight[kept] * squares) / np.bincount(seen, weight[kept])
-    np.maximum.at(peak, seen, np.abs(found[kept]))
-    return AngleWindow(np.sqrt(mean), peak, inside)
+    mean = np.bincount(window, weight[inside] * squares) / np.bincount(window, weight[inside])
+    np.maximum.at(peak, window, np.abs(found[inside]))
+    return AngleWindow(np.sqrt(mean), peak, numbers)
 
 
 MIN_PULSES = 3  # with two, there is one revolution time and no change of it
@@ -328,5 +328,5 @@ def smooth_pulses(pulses: np.ndarray, within: np.ndarray) -> np.ndarray:
         unlikely = 2.0 * np.log(factor[0]).sum() + changes @ weighed
         if unlikely < least:
             found, least = weighed, unlikely
-    moved = variance * np.convolve(found, (1.0, -2.0, 1.0))  # D' of the weighed changes
-    return pulses - np.clip(moved, -within, within)
+    corrections = variance * np.convolve(found, (1.0, -2.0, 1.0))  # D' of the weighed changes
+    return pulses - np.clip(corrections, -within, within)

@@ -62,7 +62,7 @@ def test_a_slow_motion_s_foot_does_not_ring(rpm):
 def test_the_paper_s_journals_run_round_their_bearings(paper_runs, joint, clearance):
     run = paper_runs[label(joint, clearance)]
     found = course(run, joint)
-    assert found.apart == 0.0
+    assert found.gap_fraction == 0.0
     assert 5e-6 < found.least < 20e-6
     assert found.laps == pytest.approx(1.0 if joint == "big_end" else -1.0, abs=0.02)
     assert len(found.turns) == 2
@@ -89,7 +89,7 @@ def test_a_journal_that_leaves_its_bearing_is_told():
     light = {"joint": "big_end", "clearance_mm": 0.3, "machine": {"rod_mass_kg": 1},
              "contact": {"damping_N_s_per_mm": 0.3}}  # fmt: skip
     found = course(simulate(Case.from_values(light)), "big_end")
-    assert found.apart > 0.01
+    assert found.gap_fraction > 0.01
     assert found.least < 0
 
 

@@ -21,7 +21,7 @@ def test_numbers_of_a_grid_are_sorted_and_words_are_not():
     assert sweep.values(PEAK) == pytest.approx(np.array([[10, 11], [20, 21], [30, 31]]))
     assert sweep.keys.tolist() == [["k2", "k3"], ["k4", "k5"], ["k0", "k1"]]
     assert sweep.axes[0].title == "clearance (mm)"
-    assert sweep.axes[0].told(1) == "clearance 0.2 mm"
+    assert sweep.axes[0].value_text(1) == "clearance 0.2 mm"
 
 
 def test_a_list_that_fills_a_grid_is_one():

@@ -141,10 +141,10 @@ def plot_profiles(panel: Panel, found: Shakings, joint: str) -> None:
 def mark_turns(panel: Panel, one: Shaking) -> None:
     """Draw where the joint's force turns."""
     fine = np.arange(0.0, 360.0, 0.5)
-    near = one.near(fine)
-    ends = np.flatnonzero(np.diff(near)) + 1
+    is_near = one.is_near_turn(fine)
+    ends = np.flatnonzero(np.diff(is_near)) + 1
     low, high = panel.limits("y")
     for part in np.split(np.arange(fine.size), ends):
-        if near[part[0]]:
+        if is_near[part[0]]:
             flat = np.ones(part.size)
             panel.traces.append(band(fine[part], low * flat, high * flat, NEAR))

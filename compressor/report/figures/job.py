@@ -73,8 +73,10 @@ def draw_orbits(run: xr.Dataset) -> Drawing:
 
 def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
     """Draw one orbit, to scale, in its clearance circle; marks stand at every quarter turn."""
-    degrees, kept = last_revolution(run)
-    place = kept["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
+    degrees, revolution = last_revolution(run)
+    place = (
+        revolution["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
+    )
     clearance = joints_with_clearance(run)[joint] * MICROMETRE
     panel.traces.append(circle(clearance, LineStyle(BLACK, linewidth=1.0, zorder=1.0), "line"))
     panel.plot(place[:, 0], place[:, 1], PATH, "path of the journal's centre")
@@ -99,8 +101,8 @@ def draw_modes(run: xr.Dataset) -> Drawing:
     figure, panels = make_grid(rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints))
     for joint, strip, depth in zip(joints, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_strip(strip, shares, joint)
-        degrees, kept = last_revolution(run)
-        values = kept["penetration"].sel(joint=joint).values * MICROMETRE
+        degrees, revolution = last_revolution(run)
+        values = revolution["penetration"].sel(joint=joint).values * MICROMETRE
         order = np.argsort(degrees % 360.0, kind="stable")
         depth.plot((degrees % 360.0)[order], values[order], PATH)
         depth.notes.append(Note(y=0.0, style=ZERO))
@@ -213,10 +215,10 @@ def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
         if one is None:
             continue
-        degrees, kept = last_revolution(one)
-        forces = frame_forces(kept)
+        degrees, revolution = last_revolution(one)
+        forces = frame_forces(revolution)
         for panel, signal in zip(panels.flat, SIGNALS, strict=True):
-            panel.plot(degrees, signal.values(kept, forces), line, name)
+            panel.plot(degrees, signal.values(revolution, forces), line, name)
             panel.title, panel.y.title = signal.title, signal.axis
         panels[0, 0].x.span(degrees[0], degrees[-1])
     panels[0, 0].x.step = 90.0

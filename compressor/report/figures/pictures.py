@@ -274,11 +274,11 @@ def pictures(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> di
     Where threads run, whose locks a fork may copy, or the system has no fork, all is done here.
     """
     alone = len(drawings) < MIN_FIGURES_FOR_TWO or threading.active_count() > 1 or not can_fork()
-    made = one_by_one(drawings, headings) if alone else by_two(drawings, headings)
+    files = one_by_one(drawings, headings) if alone else by_two(drawings, headings)
     return {
         f"{name}.{kind}": picture
         for name in drawings
-        for kind, picture in zip(KINDS, made[name], strict=True)
+        for kind, picture in zip(KINDS, files[name], strict=True)
     }
 
 
@@ -298,7 +298,7 @@ def one_by_one(
 
 def by_two(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict[str, list[bytes]]:
     """Return the pictures of all drawings, made in this process and a copy of it."""
-    made, sent, waiting = {}, {}, deque(drawings)
+    files, futures, waiting = {}, {}, deque(drawings)
     context = multiprocessing.get_context("fork")
     pool = ProcessPoolExecutor(1, context, signal.signal, (signal.SIGINT, signal.SIG_DFL))
 
@@ -306,22 +306,22 @@ def by_two(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict
         """Submit the next drawing to the copy as soon as it has finished one."""
         with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
             name = waiting.popleft()
-            sent[name] = pool.submit(draw_reported, drawings[name], headings[name])
-            sent[name].add_done_callback(send)
+            futures[name] = pool.submit(draw_reported, drawings[name], headings[name])
+            futures[name].add_done_callback(send)
 
     try:
         send()
         while waiting:
             with contextlib.suppress(IndexError):
                 name = waiting.pop()
-                made[name] = draw_reported(drawings[name], headings[name])
-        for name in drawings.keys() - made.keys():
+                files[name] = draw_reported(drawings[name], headings[name])
+        for name in drawings.keys() - files.keys():
             with contextlib.suppress(KeyError, OSError, RuntimeError):  # it has died
-                made[name] = sent[name].result()
+                files[name] = futures[name].result()
     finally:
         pool.shutdown(cancel_futures=True)
-    lost = {name: drawing for name, drawing in drawings.items() if name not in made}
-    return made | one_by_one(lost, headings)
+    lost = {name: drawing for name, drawing in drawings.items() if name not in files}
+    return files | one_by_one(lost, headings)
 
 
 def draw_reported(drawing: Drawing, heading: str) -> list[bytes]:

@@ -54,7 +54,7 @@ def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
     shown, same = captions.split_measures(sweep, known)
     if not shown:
         shown, same = known, []
-    marks = captions.marks_told(sweep), captions.same_told(sweep, same)
+    marks = captions.describe_marks(sweep), captions.describe_unchanged(sweep, same)
     if not sweep.is_grid:
         return [*draw_sampled(sweep, shown, marks)]
     if len(sweep.axes) == 1:

@@ -55,13 +55,13 @@ def split_measures(
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
 
 
-def marks_told(sweep: PlottedSweep) -> str:
+def describe_marks(sweep: PlottedSweep) -> str:
     """Return what marks mean, where there are any."""
     status, chaotic = sweep.status, sweep.chaotic
     return MARKS if chaotic.any() or np.isin(status, ("failed", "missing")).any() else ""
 
 
-def same_told(sweep: PlottedSweep, same: Sequence[Measure]) -> str:
+def describe_unchanged(sweep: PlottedSweep, same: Sequence[Measure]) -> str:
     """Return the measures that are the same at every job, with their values."""
     if not same:
         return ""
@@ -77,7 +77,7 @@ def curves(sweep: PlottedSweep) -> str:
     return join_sentences(
         f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
         "is long enough to be seen.",
-        thinned_told(sweep.axes[0], MAX_JOBS),
+        describe_thinning(sweep.axes[0], MAX_JOBS),
     )
 
 
@@ -85,21 +85,21 @@ def maps(sweep: PlottedSweep) -> str:
     """Return a sweep along two axes."""
     return join_sentences(
         "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
-        *(thinned_told(axis, MAX_CELLS) for axis in sweep.axes),
+        *(describe_thinning(axis, MAX_CELLS) for axis in sweep.axes),
     )
 
 
-def thinned_told(axis: PlottedAxis, most: int) -> str:
+def describe_thinning(axis: PlottedAxis, most: int) -> str:
     """Return how many of an axis' values are shown, if not all are."""
     count = axis.values.size
     return "" if count <= most else f"Of {count} values of {axis.phrase} {most} are shown."
 
 
-def points_told(sweep: PlottedSweep, role: Roles) -> str:
+def describe_points(sweep: PlottedSweep, role: Roles) -> str:
     """Return what a point is: a job, with what its marks mean, or a mean over which axes."""
     others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
     if not others:
-        return join_sentences("A point a job.", marks_told(sweep))
+        return join_sentences("A point a job.", describe_marks(sweep))
     whole = (sweep.status == "ok") & ~sweep.chaotic
     left = "" if whole.all() else (
         f"Up to {int((~whole).sum())} of {whole.size} jobs lack a value that is known within its "
@@ -116,9 +116,9 @@ def overview(sweep: PlottedSweep, role: Roles) -> str:
         f"{color.phrase}: the axes that matter most on the mean of all metrics."
         if len(sweep.axes) > 2
         else f"Every metric over {sweep.axes[role.x].phrase}, a colour for each {color.phrase}.",
-        points_told(sweep, role),
-        thinned_told(sweep.axes[role.x], MAX_PLACES),
-        thinned_told(color, MAX_LINES),
+        describe_points(sweep, role),
+        describe_thinning(sweep.axes[role.x], MAX_PLACES),
+        describe_thinning(color, MAX_LINES),
     )
 
 
@@ -129,8 +129,8 @@ def multiples(sweep: PlottedSweep, role: Roles) -> str:
     return join_sentences(
         f"A panel for each {' and '.join(places)}, a colour for each value of "
         f"{sweep.axes[role.color].phrase}.",
-        points_told(sweep, role),
-        *(thinned_told(sweep.axes[n], most) for n, most in limits if n >= 0),
+        describe_points(sweep, role),
+        *(describe_thinning(sweep.axes[n], most) for n, most in limits if n >= 0),
     )
 
 

@@ -78,8 +78,8 @@ MEASURES = tuple(measure for name in METRICS for measure in shown_variables(name
 
 def measures(data: xr.Dataset) -> list[Measure]:
     """Return the measures of which a dataset has any value."""
-    there = (measure for measure in MEASURES if measure.variable in data)
-    return [measure for measure in there if measure.of(data).notnull().any()]
+    stored = (measure for measure in MEASURES if measure.variable in data)
+    return [measure for measure in stored if measure.of(data).notnull().any()]
 
 
 def swept_axes(study: xr.Dataset) -> list[str]:
@@ -156,7 +156,7 @@ class PlottedAxis:
         """Return the text along it: phrase and unit."""
         return f"{self.phrase} ({self.unit})" if self.unit not in ("", "1") else self.phrase
 
-    def told(self, number: int) -> str:
+    def value_text(self, number: int) -> str:
         """Return one of its values in words, such as `rod mass 3 kg`."""
         value = self.values[number]
         if self.is_words:

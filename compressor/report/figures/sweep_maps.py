@@ -253,7 +253,7 @@ def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
     """
     groups: dict[tuple[int, ...], list[str]] = {}
     for measure, effects in found.items():
-        words = f"{measure.title} ({strength_told(effects)})"
+        words = f"{measure.title} ({describe_strength(effects)})"
         groups.setdefault(tuple(first_ones(effects)), []).append(words)
     parts = []
     for axes, metrics in groups.items():
@@ -279,7 +279,7 @@ def reaches(effects: Effects, weaker: int, stronger: int) -> bool:
     return bool(abs(ends[:, weaker]).max() >= least)
 
 
-def strength_told(effects: Effects) -> str:
+def describe_strength(effects: Effects) -> str:
     """Return the strongest axis' share of the variance, or its correlation, in words."""
     first = order_of(effects)[0]
     if effects.total is None:

@@ -271,7 +271,7 @@ def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]
             parts = [line_part(whole, role, at | {role.color: int(n)}) for n in colors]
             plot_parts(panel, sweep, role, parts, whole)
             words = [] if has_rows else [measure.title]
-            words += [sweep.axes[axis].told(n) for axis, n in at.items()]
+            words += [sweep.axes[axis].value_text(n) for axis, n in at.items()]
             panel.title, panel.title_size = "\n".join(words), 9.0
         line[0].y.title = measure.unit
     share_scales(figure.panels, "x")
@@ -324,7 +324,7 @@ def plot_parts(
         marker = MARKERS[int(n) % len(MARKERS)] if color.is_words else "o"
         style = replace(line, marker=marker, markersize=3.4)
         style = replace(style, linestyle="none") if axis.is_words else style
-        plot_part(panel, x, part, color.told(int(n)), style, span)
+        plot_part(panel, x, part, color.value_text(int(n)), style, span)
     if not parts[0].is_jobs:
         return
     places = np.repeat(x, sum(part.values.shape[1] for part in parts))
@@ -424,10 +424,10 @@ def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) 
 def plot_trend(panel: Panel, x: np.ndarray, y: np.ndarray, color: str, name: str) -> None:
     """Draw a parabola through points and the 95 % interval of its mean, on the panel's scales."""
     logs = panel.x.log, panel.y.log
-    there = x[np.isfinite(x) & np.isfinite(y)]
-    if not there.size or not np.ptp(there):
+    known = x[np.isfinite(x) & np.isfinite(y)]
+    if not known.size or not np.ptp(known):
         return
-    low, high = there.min(), there.max()
+    low, high = known.min(), known.max()
     at = np.geomspace(low, high, PLACES) if logs[0] else np.linspace(low, high, PLACES)
     found = trend(
         np.log(x) if logs[0] else x, np.log(y) if logs[1] else y, np.log(at) if logs[0] else at

@@ -71,8 +71,8 @@ def claims(
     studies = load_studies(
         *paths, overrides=overrides, max_jobs=max_jobs, follow=False, variants=cases_judged
     )
-    drawn = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
-    if generations and not drawn:
+    searchable = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
+    if generations and not searchable:
         raise click.UsageError(
             "--search needs a CONFIG whose keys are drawn from ranges, such as {saltelli: [2, 9]}"
         )
@@ -82,7 +82,7 @@ def claims(
         say_unless(quiet, f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
         with ProgressReporter(quiet, "machines", alike=False) as progress:
             found.append(judge_machines(study, output, workers, progress))
-    for study in drawn if generations else ():
+    for study in searchable if generations else ():
         say_unless(quiet, f"{study.name}: {plural(generations, 'generation')} of a search")
         with ProgressReporter(quiet, "machines", alike=False) as progress:
             found.append(least_change(study, output, workers, generations, progress))
@@ -101,13 +101,13 @@ def say_unless(quiet: bool, text: str) -> None:
 
 def report_machines(found: "list[xr.Dataset]", as_json: bool) -> None:
     """Write files of judged machines on stdout, each with its findings."""
-    told = {one.encoding["source"]: [*sentences(one)] for one in found}
+    findings = {one.encoding["source"]: [*sentences(one)] for one in found}
     if as_json:
-        print_text(json.dumps(told, indent=1))
+        print_text(json.dumps(findings, indent=1))
         return
-    for path, said in told.items():
+    for path, texts in findings.items():
         print_text(path)
-        print_text("\n".join(f"  {text}" for text in said))
+        print_text("\n".join(f"  {text}" for text in texts))
 
 
 def sentences(found: "xr.Dataset") -> Iterator[str]:

@@ -44,9 +44,9 @@ def flips(found: xr.Dataset, claim: int) -> Flips:
         ea, eb = (error.isel({dim: part}).values for part in (slice(None, -1), slice(1, None)))
         known = ~(np.isnan(a) | np.isnan(b))
         turned = known & ((a >= 0.0) != (b >= 0.0))
-        near = turned & ((np.abs(a) <= ea) | (np.abs(b) <= eb))
+        doubtful = turned & ((np.abs(a) <= ea) | (np.abs(b) <= eb))
         counts = [
-            n + int(more.sum()) for n, more in zip(counts, (known, turned, near), strict=True)
+            n + int(more.sum()) for n, more in zip(counts, (known, turned, doubtful), strict=True)
         ]
         jumps.append(np.abs(a - b)[known])
     pairs, turned_over, within = counts
@@ -95,15 +95,15 @@ def region(found: xr.Dataset) -> Iterator[str]:
     """Yield where all claims hold, or all but claim 7, as ranges of what is swept."""
     held = found["held"] == 1
     for name, claims in (("All eight", CLAIMS), ("All but claim 7", (1, 2, 3, 4, 5, 6, 8))):
-        there = held.sel(claim=[*claims]).all("claim")
-        count = int(there.sum())
+        all_hold = held.sel(claim=[*claims]).all("claim")
+        count = int(all_hold.sum())
         if not count:
             continue
         ranges = []
         for key, coordinate in found.variables.items():  # in the order in which they were swept
             if "case_key" not in coordinate.attrs or coordinate.dtype == object:
                 continue
-            inside = found[key].where(there)
+            inside = found[key].where(all_hold)
             unit = coordinate.attrs.get("units", "").removeprefix("1")
             low, high = float(inside.min()), float(inside.max())
             ranges.append(
@@ -165,13 +165,13 @@ def deciding(table: xr.Dataset) -> Iterator[str]:
             continue
         order = np.argsort(-total)
         top = int(order[0])
-        said = f"{names[top]}, {share(one, top)}"
+        strongest = f"{names[top]}, {share(one, top)}"
         rivals = [
             names[n] for n in order[1:].tolist()
             if one["total_order_high"].values[n] >= one["total_order_low"].values[top]
         ]  # fmt: skip
         tail = f"; not told from {', '.join(rivals)}" if rivals else ""
-        yield f"Claim {claim}: most by {said}{tail}."
+        yield f"Claim {claim}: most by {strongest}{tail}."
 
 
 def share(one: xr.Dataset, place: int) -> str:
@@ -205,11 +205,11 @@ def change(found: xr.Dataset) -> Iterator[str]:
             f"{machines} that a directed search looked at. The one that lacks least: "
             f"{changes(best)}; there {holding} claims hold, {known} of them beyond their errors."
         )
-    said = ", ".join(
+    margins = ", ".join(
         f"{claim} {100 * m:+.3g} % ± {100 * e:.2g} %"
         for claim, m, e in zip(CLAIMS, margin.tolist(), best["error"].values.tolist(), strict=True)
     )
-    yield f"Its margins: {said}."
+    yield f"Its margins: {margins}."
 
 
 def changes(machine: xr.Dataset) -> str:
@@ -288,6 +288,6 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
 def phrase(name: str) -> str:
     """Return what an index or an end of its interval is, in words."""
     order, _, end = name.partition("_order")
-    how = {"first": "by this assumption alone", "total": "with this assumption's interactions"}
-    text = f"share of the margin's variance {how[order]}"
+    meanings = {"first": "by this assumption alone", "total": "with this assumption's interactions"}
+    text = f"share of the margin's variance {meanings[order]}"
     return text + (f", {end[1:]} end of its 95 % interval" if end else "")

@@ -93,7 +93,7 @@ class MachineSearch:
                 "such as {saltelli: [2, 9]}, no blocks, and nothing else that is swept"
             )
         self.points = self.stored()
-        self.asked: list[tuple[float, ...]] = []  # in this search
+        self.requested: list[tuple[float, ...]] = []  # in this search
 
     def stored(self) -> dict[tuple[float, ...], Judged]:
         """Return the machines of earlier searches in this folder. Raises StoreError."""
@@ -133,17 +133,17 @@ class MachineSearch:
 
     def judge(self, many: Sequence[Sequence[float]]) -> list[Judged]:
         """Return the verdicts of machines at shares of the ranges."""
-        return self.ask([self.values(shares) for shares in many])
+        return self.verdicts_at([self.values(shares) for shares in many])
 
-    def ask(self, wanted: Sequence[tuple[float, ...]]) -> list[Judged]:
+    def verdicts_at(self, points: Sequence[tuple[float, ...]]) -> list[Judged]:
         """Return the verdicts of machines with these values of the assumptions."""
-        self.asked += wanted
-        new = [point for point in dict.fromkeys(wanted) if point not in self.points]
+        self.requested += points
+        new = [point for point in dict.fromkeys(points) if point not in self.points]
         if new:
             found = self.judged(new)
             rows = rows_of(found)
             self.points |= {point: rows[machine_key(self.case(point))] for point in new}
-        return [self.points[point] for point in wanted]
+        return [self.points[point] for point in points]
 
     def judged(self, new: Sequence[tuple[float, ...]] = ()) -> xr.Dataset:
         """Return all machines that are known, and new ones behind them."""
@@ -225,20 +225,20 @@ def least_change(
         return np.array([search.cost(search.values(point)) for point in many])
 
     differential_evolution(
-        costs, [(0.0, 1.0)] * len(search.spans), maxiter=generations, init=beginning(search),
+        costs, [(0.0, 1.0)] * len(search.spans), maxiter=generations, init=first_generation(search),
         tol=0.0, vectorized=True, updating="deferred", polish=False,
         rng=np.random.default_rng(SEED),
     )  # fmt: skip
-    near = descend(search, min(search.asked, key=search.cost), STEP)
+    first_best = descend(search, min(search.requested, key=search.cost), STEP)
     longer = MachineSearch(study, folder, workers, progress, LONGER)
-    best = descend(longer, near, STEP / 2.0)
+    best = descend(longer, first_best, STEP / 2.0)
     if holds := longer.cost(best) < 1.0:
-        taken_back(longer, best)
+        take_back_changes(longer, best)
     best = min(longer.points, key=longer.cost)
     looked, last = len(search.points) + len(longer.points), longer
     if not holds and min(longer.points[best].margin) >= 0.0:
         last = MachineSearch(study, folder, workers, progress, LONGEST)
-        last.ask([best])
+        last.verdicts_at([best])
         looked += 1
     found = last.judged().isel(machine=[[*last.points].index(best)])
     found.attrs |= {"distance": last.distance(best), "looked": looked, "least": int(holds)}
@@ -248,14 +248,11 @@ def least_change(
     return found
 
 
-def beginning(search: MachineSearch) -> np.ndarray:
+def first_generation(search: MachineSearch) -> np.ndarray:
     """Return the first generation of machines, (machines, k), as shares of the ranges.
 
     It has the defaults, the study's best machines, and draws where these are few; no machines of
     earlier searches, so that the same call takes the same way.
-
-    (machines, k), shares of the ranges. No machines of earlier searches, so that the same call
-    takes the same way.
     """
     study, spans = search.study, search.spans
     known = read_kept_machines(Path(search.folder) / f"{study.name}.nc")
@@ -267,8 +264,8 @@ def beginning(search: MachineSearch) -> np.ndarray:
             shares = [span.share(value) for span, value in zip(spans, point, strict=True)]
             found.append((cost(verdict, search.distance(point) / len(spans)), shares))
     best = [shares for _, shares in sorted(found)][: POPULATION - 1]
-    drawn = design("lhs", POPULATION - 1 - len(best), len(spans), SEED)
-    return np.array([search.home.tolist(), *best, *drawn])
+    draws = design("lhs", POPULATION - 1 - len(best), len(spans), SEED)
+    return np.array([search.home.tolist(), *best, *draws])
 
 
 def descend(search: MachineSearch, best: tuple[float, ...], step: float) -> tuple[float, ...]:
@@ -279,7 +276,7 @@ def descend(search: MachineSearch, best: tuple[float, ...], step: float) -> tupl
     All neighbours of a round, one up and one down in each assumption, are judged side by side
     (Kolda, Lewis and Torczon, SIAM Review 45, 2003, 385-482).
     """
-    search.ask([best])
+    search.verdicts_at([best])
     while step >= MIN_STEP and search.cost(best) >= 1.0:
         shares = np.array([s.share(value) for s, value in zip(search.spans, best, strict=True)])
         moves = step * np.vstack([np.eye(shares.size), -np.eye(shares.size)])
@@ -293,7 +290,7 @@ def descend(search: MachineSearch, best: tuple[float, ...], step: float) -> tupl
     return best
 
 
-def taken_back(search: MachineSearch, best: tuple[float, ...]) -> None:
+def take_back_changes(search: MachineSearch, best: tuple[float, ...]) -> None:
     """Take back each change of a machine at which all claims hold, as far as they go on to.
 
     The smallest change first; a whole one if that goes, else by bisection.
@@ -306,11 +303,11 @@ def taken_back(search: MachineSearch, best: tuple[float, ...]) -> None:
             continue
         for tried in [outside, *[None] * HALVINGS]:
             share = 0.5 * (inside + outside) if tried is None else tried
-            moved = shares.copy()
-            moved[number] = share
-            search.judge([moved.tolist()])
-            if search.cost(search.values(moved.tolist())) < 1.0:
-                inside, shares = share, moved
+            trial = shares.copy()
+            trial[number] = share
+            search.judge([trial.tolist()])
+            if search.cost(search.values(trial.tolist())) < 1.0:
+                inside, shares = share, trial
                 if share == home[number]:
                     break
             else:

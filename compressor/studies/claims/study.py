@@ -94,10 +94,10 @@ def ideal_text(machine: Case) -> str:
     Masses and what joints do are not among them.
     """
     values: dict[str, Any] = machine.values()
-    kept = {key: values[key] for key in ("gas", "spring", "solve")}
+    read_values = {key: values[key] for key in ("gas", "spring", "solve")}
     lengths = ("crank_radius_mm", "rod_length_mm", "speed_rpm")
-    kept["machine"] = {key: values["machine"][key] for key in lengths}
-    return json.dumps(kept, sort_keys=True)
+    read_values["machine"] = {key: values["machine"][key] for key in lengths}
+    return json.dumps(read_values, sort_keys=True)
 
 
 @lru_cache(maxsize=8)
@@ -128,10 +128,10 @@ def machines(study: Study) -> list[Case]:
     Raises ClaimsError where it gives what the paper's cases decide.
     """
     swept = [axis.key for axis in study.axes if axis.key.partition(".")[0] in ROLES]
-    given = swept or [key for key in ROLES if is_given(study.cases[0], key)]
-    if given:
+    decided = swept or [key for key in ROLES if is_given(study.cases[0], key)]
+    if decided:
         raise ClaimsError(
-            f"{study.path}: {given[0]}: the paper's cases decide it, by which every machine is "
+            f"{study.path}: {decided[0]}: the paper's cases decide it, by which every machine is "
             "judged: leave it out"
         )
     return [*study.cases]

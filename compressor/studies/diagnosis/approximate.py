@@ -37,9 +37,9 @@ class KernelRidge:
     @classmethod
     def fit(cls, points: np.ndarray, targets: np.ndarray) -> "KernelRidge":
         """Return the regression whose width and ridge have the least leave-one-out errors."""
-        some = slice(None, None, -(-len(points) // SAMPLE))
+        sample = slice(None, None, -(-len(points) // SAMPLE))
         scale = targets.var(axis=0) + 1e-300
-        width, ridge = _chosen(points[some], targets[some] / np.sqrt(scale))
+        width, ridge = _choose_kernel(points[sample], targets[sample] / np.sqrt(scale))
         gram = np.exp(-_squares(points, points) / (2.0 * width**2))
         gram[np.diag_indices_from(gram)] += ridge
         inverse = cho_solve(cho_factor(gram, lower=True), np.eye(len(points)))
@@ -59,7 +59,7 @@ def _squares(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return cdist(one, other, "sqeuclidean") / one.shape[1]
 
 
-def _chosen(points: np.ndarray, targets: np.ndarray) -> tuple[float, float]:
+def _choose_kernel(points: np.ndarray, targets: np.ndarray) -> tuple[float, float]:
     """Return the width and ridge with the least squares of errors left out."""
     squares = _squares(points, points)
     centred = targets - targets.mean(axis=0)
@@ -89,14 +89,14 @@ class Logistic:
         The ridge keeps separable classes finite.
         """
         design = np.column_stack([points, np.ones(len(points))])
-        wanted = np.eye(int(labels.max()) + 1)[labels]
-        shape = design.shape[1], wanted.shape[1]
+        one_hot = np.eye(int(labels.max()) + 1)[labels]
+        shape = design.shape[1], one_hot.shape[1]
 
         def loss(flat: np.ndarray) -> tuple[float, np.ndarray]:
             weights = flat.reshape(shape)
             scores = design @ weights
-            value = (logsumexp(scores, axis=1) - (scores * wanted).sum(axis=1)).sum()
-            slope = design.T @ (softmax(scores, axis=1) - wanted)
+            value = (logsumexp(scores, axis=1) - (scores * one_hot).sum(axis=1)).sum()
+            slope = design.T @ (softmax(scores, axis=1) - one_hot)
             return value + PENALTY * (flat**2).sum(), slope.ravel() + 2.0 * PENALTY * flat
 
         found = minimize(loss, np.zeros(np.prod(shape)), jac=True, method="L-BFGS-B")
@@ -144,16 +144,16 @@ class Strangeness:
     def fit(cls, points: np.ndarray) -> "Strangeness":
         middle = points.mean(axis=0)
         values, vectors = np.linalg.eigh(np.cov(points.T))
-        kept = np.flatnonzero(values > WEAKEST * values.max())[::-1]
+        axes = np.flatnonzero(values > WEAKEST * values.max())[::-1]
         turn, back = (
-            vectors[:, kept] / np.sqrt(values[kept]),
-            vectors[:, kept] * np.sqrt(values[kept]),
+            vectors[:, axes] / np.sqrt(values[axes]),
+            vectors[:, axes] * np.sqrt(values[axes]),
         )
         white = (points - middle) @ turn
         gaps = cdist(white, white)
         np.fill_diagonal(gaps, np.inf)
         near = np.sort(np.partition(gaps, NEAREST, axis=1)[:, :NEAREST].mean(axis=1))
-        strong = min(STRONGEST, len(kept) // 2)
+        strong = min(STRONGEST, len(axes) // 2)
         regression = KernelRidge.fit(white[:, :strong], white[:, strong:])
         left = white[:, strong:] - regression.left_out
         apart = np.empty(len(points))
@@ -175,7 +175,7 @@ class Strangeness:
         white = (point - self.middle) @ self.turn
         gaps = cdist(white[None], self.white)[0]
         near = float(np.partition(gaps, NEAREST)[:NEAREST].mean())
-        apart = float(np.linalg.norm(self._left(white) @ self.metric))
+        apart = float(np.linalg.norm(self._residuals(white) @ self.metric))
         chance = min(_share(near, self.near), _share(apart, self.apart))
         usual = [float(np.median(each)) for each in (self.near, self.apart)]
         return min(1.0, 2.0 * chance), Distance(near, usual[0]), Distance(apart, usual[1])
@@ -189,10 +189,10 @@ class Strangeness:
 
         In standard deviations.
         """
-        left = self._left((point - self.middle) @ self.turn)
+        left = self._residuals((point - self.middle) @ self.turn)
         return left @ self.back[-left.size :] / self.spread
 
-    def _left(self, white: np.ndarray) -> np.ndarray:
+    def _residuals(self, white: np.ndarray) -> np.ndarray:
         """Return what the strongest components do not foretell of the others."""
         strong = self.regression.points.shape[1]
         return white[strong:] - self.regression.predict(white[None, :strong])[0]
@@ -244,10 +244,10 @@ class Posterior:
         regression = KernelRidge.fit(points, logs)
         summaries = regression.left_out
         number = np.arange(len(points))
-        told = np.array(
+        intervals = np.array(
             [quantiles(summaries[i], summaries[number != i], logs[number != i]) for i in number]
         )
-        beyond = misses(told, logs)
+        beyond = misses(intervals, logs)
         even = number % 2 == 0
         halves = [(widening(beyond[a]), beyond[~a]) for a in (even, ~even)]
         covered = np.concatenate([judged <= width for width, judged in halves]).mean(axis=0)
@@ -278,18 +278,18 @@ def quantiles(summary: np.ndarray, summaries: np.ndarray, logs: np.ndarray) -> n
     k).
     """
     scale = np.maximum((summaries - logs).std(axis=0), 1e-12)
-    away = (summaries - summary) / scale
-    distance = np.sqrt((away**2).sum(axis=1))
+    offsets = (summaries - summary) / scale
+    distance = np.sqrt((offsets**2).sum(axis=1))
     count = min(len(distance), max(MIN_ACCEPTED, round(ACCEPTED_SHARE * len(distance))))
     accepted = np.argpartition(distance, count - 1)[:count]
     reach = distance[accepted].max() * (1.0 + 1e-9) + 1e-12
     weights = 1.0 - (distance[accepted] / reach) ** 2
-    design = np.column_stack([np.ones(count), away[accepted]])
+    design = np.column_stack([np.ones(count), offsets[accepted]])
     root = np.sqrt(weights)[:, None]
     slopes = np.linalg.lstsq(root * design, root * logs[accepted], rcond=None)[0]
-    moved = logs[accepted] - design[:, 1:] @ slopes[1:]
-    wanted = (1.0 - LEVEL) / 2.0, 0.5, (1.0 + LEVEL) / 2.0
-    return np.array([weighted_quantiles(one, weights, wanted) for one in moved.T])
+    adjusted = logs[accepted] - design[:, 1:] @ slopes[1:]
+    levels = (1.0 - LEVEL) / 2.0, 0.5, (1.0 + LEVEL) / 2.0
+    return np.array([weighted_quantiles(one, weights, levels) for one in adjusted.T])
 
 
 def weighted_quantiles(
@@ -302,12 +302,12 @@ def weighted_quantiles(
     return np.interp(shares, middles, values[order])
 
 
-def misses(told: np.ndarray, logs: np.ndarray) -> np.ndarray:
+def misses(intervals: np.ndarray, logs: np.ndarray) -> np.ndarray:
     """Return how many times as wide an interval's half would have to be to hold the truth, (n, k).
 
-    told: (n, k, 3) of `quantiles`; logs: the true log clearances, (n, k).
+    intervals: (n, k, 3) of `quantiles`; logs: the true log clearances, (n, k).
     """
-    low, median, high = np.moveaxis(told, 2, 0)
+    low, median, high = np.moveaxis(intervals, 2, 0)
     above = logs > median
     half = np.where(above, high - median, median - low)
     return np.abs(logs - median) / np.maximum(half, 1e-12)

@@ -85,18 +85,18 @@ def dataset(
     return DONE
 
 
-def describe_dataset(made: "xr.Dataset") -> list[str]:
-    """Return what was made: windows and machines by joint and split, and what was left out."""
+def describe_dataset(data_set: "xr.Dataset") -> list[str]:
+    """Return the numbers of windows and machines by joint and split, and what was left out."""
     from compressor.studies.diagnosis.data_card import counts
 
-    rows = counts(made)
+    rows = counts(data_set)
     width = max(len(joint) for joint, *_ in rows)
     lines = [f"{'joint':<{width}}  {'split':<5}  {'machines':>8}  {'windows':>8}"]
     lines += [f"{j:<{width}}  {s:<5}  {m:>8,}  {w:>8,}" for j, s, m, w in rows]
     alone = [joint for joint, split, machines, _ in rows if split == "test" and not machines]
     if alone:
         lines.append(f"too few machines to test on: {', '.join(alone)}")
-    for reason, count in json.loads(made.attrs["left_out"]).items():
+    for reason, count in json.loads(data_set.attrs["left_out"]).items():
         lines.append(f"left out: {count:,} {reason}")
     return lines
 
@@ -189,9 +189,9 @@ def grounds(fitted: "Identifier", answer: "Identification", folder: str) -> Iter
            f"{answer.near.usual:.3g}), of features from what others foretell "
            f"{answer.apart.record:.3g} (usual {answer.apart.usual:.3g}); "
            f"as strange are {answer.p_value:.0%} of its own jobs")  # fmt: skip
-    held = [value for ends in fitted.covered.values() for value in ends.values()]
-    told = f", clearance within its interval in {sum(held) / len(held):.0%}" if held else ""
-    yield f"on these jobs, each left out in turn: joint right in {fitted.right:.0%}{told}"
+    shares = [value for ends in fitted.covered.values() for value in ends.values()]
+    tail = f", clearance within its interval in {sum(shares) / len(shares):.0%}" if shares else ""
+    yield f"on these jobs, each left out in turn: joint right in {fitted.right:.0%}{tail}"
     left = [
         joint for joint in ("none", "big_end", "small_end", "both") if joint not in fitted.joints
     ]

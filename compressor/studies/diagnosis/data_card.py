@@ -44,7 +44,7 @@ def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
     fixed, models = (json.loads(dataset.attrs[name]) for name in ("fixed", "models"))
     parts = [
         f"# {dataset.attrs['title'].removeprefix('compsim: ').capitalize()}",
-        made_by(dataset),
+        describe_origin(dataset),
         "## What was simulated", describe_simulation(dataset, fixed),
         "The model of these jobs, by part:",
         table(("part", "kind, and how many jobs have it"), model_rows(models)),
@@ -70,10 +70,10 @@ def escape_cell(cell: Any) -> str:
     return str(cell).replace("|", r"\|").replace("\n", " ")
 
 
-def made_by(dataset: "xr.Dataset") -> str:
+def describe_origin(dataset: "xr.Dataset") -> str:
     """Return the program, versions and case file."""
-    told = json.loads(dataset.attrs["versions"])
-    versions = ", ".join(f"{name} {version}" for name, version in told.items())
+    versions_by_name = json.loads(dataset.attrs["versions"])
+    versions = ", ".join(f"{name} {version}" for name, version in versions_by_name.items())
     return (
         f"Made by {dataset.attrs['program']} from the study `{dataset.attrs['study']}` of "
         f"`{dataset.attrs['case_file']}`. The study was run by: {versions}."
@@ -92,13 +92,13 @@ def describe_simulation(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
     rows = []
     for key, units, reach, count in json.loads(dataset.attrs["axes"]):
         numbers = reach and not isinstance(reach[0], str)
-        what = f"{reach[0]:g} to {reach[1]:g}" if numbers else ", ".join(reach)
-        rows.append((f"`{key}`", units if units != "1" else "", what, f"{count:,}"))
+        values = f"{reach[0]:g} to {reach[1]:g}" if numbers else ", ".join(reach)
+        rows.append((f"`{key}`", units if units != "1" else "", values, f"{count:,}"))
     swept = table(("swept key", "unit", "values", "different ones"), rows)
     regimes = Counter(
         dict(zip(dataset["key"].values, dataset["regime"].values, strict=True)).values()
     )
-    told = "; ".join(
+    kinds = "; ".join(
         f"{count:,} {regime_words(name) or 'not told'}" for name, count in regimes.most_common()
     )
     left = json.loads(dataset.attrs["left_out"])
@@ -117,7 +117,7 @@ def describe_simulation(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
     )  # fmt: skip
     return "\n\n".join([
         first, swept,
-        f"Motions: {told}. Chaotic ones stay, with the label `regime`. Numerics of the first job: "
+        f"Motions: {kinds}. Chaotic ones stay, with the label `regime`. Numerics of the first job: "
         f"{others}.", record, out,
     ])  # fmt: skip
 
@@ -130,10 +130,10 @@ def describe_cuts(dataset: "xr.Dataset") -> str:
     """Return how records were cut, disturbed and split."""
     attrs = dataset.attrs
     levels = ", ".join(f"{rms:g}" for rms in dataset["noise"].values)
-    apart = "one after the other" if attrs["hop"] >= attrs["revolutions"] else "overlapping"
+    hops = "one after the other" if attrs["hop"] >= attrs["revolutions"] else "overlapping"
     text = (
         f"A window has {attrs['revolutions']} whole revolutions, from tacho pulse to tacho pulse; "
-        f"the next begins {attrs['hop']} later ({apart}). Features are given at each noise level: "
+        f"the next begins {attrs['hop']} later ({hops}). Features are given at each noise level: "
         f"{levels} m/s² rms of white noise over half the sampling rate, added to the window's "
         "samples beside the noise that the sensor itself has. Its seed is [seed, key as a number, "
         f"first pulse, number of the level], by numpy's default generator; the seed is "
@@ -226,12 +226,12 @@ def unmodelled_parts(models: dict[str, dict[str, int]]) -> Iterator[str]:
         return "" if count == every else f" This is said of {count:,} of {every:,} jobs."
 
     laws = {*models["contact"]}, {*models["friction"]} - {"none"}
-    told = " and ".join(
+    laws_text = " and ".join(
         f"one law of {name}" for name, known in zip(("contact", "friction"), laws, strict=True)
         if len(known) == 1
     )  # fmt: skip
-    if told:
-        yield f"**Other laws.** The joints have {told} (see the table above)."
+    if laws_text:
+        yield f"**Other laws.** The joints have {laws_text} (see the table above)."
     stiff = "Crank, crosshead and guide are rigid, the rod" + (
         f" too.{of_jobs('rod', 'rigid')}" if "rigid" in models["rod"] else " is elastic."
     )

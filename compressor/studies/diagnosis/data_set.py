@@ -160,13 +160,13 @@ def split_by_machine(
     does not matter.
     """
     rng = np.random.default_rng(seed)
-    of = dict(zip(machines, strata, strict=True))
-    drawn: set[str] = set()
+    stratum_of = dict(zip(machines, strata, strict=True))
+    tested: set[str] = set()
     for stratum in sorted({*strata}):
-        mine = sorted(machine for machine, its in of.items() if its == stratum)
+        mine = sorted(machine for machine, its in stratum_of.items() if its == stratum)
         count = min(max(round(share * len(mine)), 1), len(mine) - 1)
-        drawn |= {mine[i] for i in rng.permutation(len(mine))[:count]}
-    return np.array([machine in drawn for machine in machines], bool)
+        tested |= {mine[i] for i in rng.permutation(len(mine))[:count]}
+    return np.array([machine in tested for machine in machines], bool)
 
 
 def make_data_set(
@@ -188,14 +188,14 @@ def make_data_set(
     DataSetError where nothing is left, StoreError where the store cannot be read.
     """
     options = options or DataSetOptions()
-    of = find_study(folder, study)
+    source = find_study(folder, study)
     stored = read_store(folder).warned()
-    if of.is_grid and of.fixed.get("sensor") is None:
-        raise without_sensor(of)
+    if source.is_grid and source.fixed.get("sensor") is None:
+        raise without_sensor(source)
     rows: list[dict[str, Any]] = []
     left: Counter[str] = Counter()
     models: dict[str, Counter[str]] = {part: Counter() for part in MODELS}
-    keys = list(dict.fromkeys(of.keys))
+    keys = list(dict.fromkeys(source.keys))
     for number, key in enumerate(keys):
         progress(number, len(keys), "")
         found = job_rows(stored, key, options)
@@ -207,19 +207,20 @@ def make_data_set(
             models[part][kind] += 1
     progress(len(keys), len(keys), "")
     if not rows and {*left} == {"without_record"}:
-        raise without_sensor(of)
+        raise without_sensor(source)
     if not rows:
-        told = ", ".join(f"{count} {reason}" for reason, count in left.items())
-        text = f"study {of.name} has no record to cut windows of: {told}"
+        reasons = ", ".join(f"{count} {reason}" for reason, count in left.items())
+        text = f"study {source.name} has no record to cut windows of: {reasons}"
         more = f"sensor.length_rev: {options.revolutions + 1} or more"
         raise DataSetError(f"{text}; run what is missing, or with {more}")
     clipped = [*{row["key"]: row["clipped"] for row in rows}.values()]
     return label_rows(rows, options).assign_attrs(
         clipped_records=sum(share >= Sensor.REPORTED for share in clipped),
         clipped_most=float(np.nanmax([0.0, *clipped])),
-        title=f"compsim: labelled windows of {of.name}", program=PROGRAM, study=of.name,
-        case_file=of.case_file, fixed=json.dumps(of.fixed), versions=json.dumps(of.versions),
-        axes=json.dumps([[a.key, a.units, *_reach(a.values)] for a in of.axes]),
+        title=f"compsim: labelled windows of {source.name}", program=PROGRAM,
+        study=source.name, case_file=source.case_file, fixed=json.dumps(source.fixed),
+        versions=json.dumps(source.versions),
+        axes=json.dumps([[a.key, a.units, *_reach(a.values)] for a in source.axes]),
         jobs=len(keys), left_out=json.dumps(left), models=json.dumps(models),
         revolutions=options.revolutions,
         hop=options.hop or options.revolutions, test_share=options.test_share, seed=options.seed,

@@ -110,8 +110,8 @@ class Identifier:
         joints = tuple(joint for joint, count in counts.items() if count >= MIN_JOBS)
         library = library.only(np.isin(library.joints, joints))
         if len(library.keys) < MIN_IN_ALL:
-            told = ", ".join(f"{joint} {count}" for joint, count in counts.items())
-            problem = f"study {library.study} has too few jobs with a sensor's record: {told}"
+            numbers = ", ".join(f"{joint} {count}" for joint, count in counts.items())
+            problem = f"study {library.study} has too few jobs with a sensor's record: {numbers}"
             least = f"{MIN_JOBS} of each joint and {MIN_IN_ALL} in all, better thousands"
             raise StudyError(f"{problem}; draw at least {least}")
         middle = np.nan_to_num(np.nanmedian(library.features, axis=0))

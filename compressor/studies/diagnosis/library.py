@@ -32,7 +32,7 @@ from compressor.vibration import Record
 SERIES = ("sensor_time", "sensor_acceleration", "tacho_time")
 SIDES = ("big_end", "small_end")
 
-TOLD = ("joint", "clearance_mm")  # keys of what is asked for; all others are cautions
+IDENTIFIED_KEYS = ("joint", "clearance_mm")  # keys of what is asked for; all others are cautions
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,10 @@ class Library:
         """Return the same but for a job, since a job must not explain itself."""
         return self.only(self.keys != key)
 
-    def only(self, kept: np.ndarray) -> "Library":
+    def only(self, mask: np.ndarray) -> "Library":
         """Return the jobs that a mask (n,) keeps."""
-        swept = {name: values[kept] for name, values in self.swept.items()}
-        own = {n: getattr(self, n)[kept] for n in ("keys", "joints", "clearances", "features")}
+        swept = {name: values[mask] for name, values in self.swept.items()}
+        own = {n: getattr(self, n)[mask] for n in ("keys", "joints", "clearances", "features")}
         return replace(self, swept=swept, **own)
 
 
@@ -73,20 +73,20 @@ def open_library(folder: Folder, name: str, progress: Progress = no_progress) ->
     positions = {key: place for key in study.keys if (place := _place(stored, key)) is not None}
     made_of = _digest(stored, positions)
     path = Path(folder) / "features" / f"{name}.nc"
-    kept = _kept(path, made_of)
-    if kept is None:
-        kept = _made(stored, positions, progress).assign_attrs(made_of=made_of)
+    rows = _read_features(path, made_of)
+    if rows is None:
+        rows = _compute_features(stored, positions, progress).assign_attrs(made_of=made_of)
         try:
-            write_dataset(path, kept)
+            write_dataset(path, rows)
         except StoreError as error:
             warnings.warn(f"features are not kept: {error}", StoreWarning, stacklevel=2)
-    if not kept.sizes["job"]:
+    if not rows.sizes["job"]:
         remedy = "run it with body: true, sensor: true and output.keep: series"
         raise StoreError(folder, f"study {name!r} has no sensor's record", remedy)
-    keys = kept["key"].values.astype(str)
+    keys = rows["key"].values.astype(str)
     return Library(
-        name, keys, kept["joint"].values.astype(str), kept["clearance"].values,
-        kept["feature"].values, study.jobs, _swept(study, keys),
+        name, keys, rows["joint"].values.astype(str), rows["clearance"].values,
+        rows["feature"].values, study.jobs, _swept(study, keys),
     )  # fmt: skip
 
 
@@ -121,7 +121,7 @@ def _digest(stored: Stored, positions: dict[str, int]) -> str:
     return hashlib.sha256("\n".join([inspect.getsource(table), *names]).encode()).hexdigest()
 
 
-def _kept(path: Path, made_of: str) -> xr.Dataset | None:
+def _read_features(path: Path, made_of: str) -> xr.Dataset | None:
     """Return the features that are kept, unless they are stale, damaged or absent."""
     try:
         found = read_dataset(path)
@@ -130,7 +130,7 @@ def _kept(path: Path, made_of: str) -> xr.Dataset | None:
         return None
 
 
-def _made(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.Dataset:
+def _compute_features(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.Dataset:
     """Return the features of all jobs with a record.
 
     Those whose record tells nothing are left out.
@@ -162,7 +162,7 @@ def _made(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.D
 def _swept(study: StoredStudy, keys: np.ndarray) -> dict[str, np.ndarray]:
     """Return the values of the swept keys other than joint and clearance, by key, (n,) each."""
     own: dict[str, dict[str, Any]] = dict(zip(study.keys, points(study), strict=True))
-    others = [axis.key for axis in study.axes if axis.key.partition(".")[0] not in TOLD]
+    others = [axis.key for axis in study.axes if axis.key.partition(".")[0] not in IDENTIFIED_KEYS]
     return {name: np.array([own[key].get(name) for key in keys.tolist()]) for name in others}
 
 

@@ -111,8 +111,8 @@ def parquet(table: dict[str, np.ndarray]) -> bytes | None:
     except ImportError:
         return None
     file = io.BytesIO()
-    made: Any = pyarrow.table(table).replace_schema_metadata({"program": PROGRAM})
-    format_.write_table(made, file)
+    columns: Any = pyarrow.table(table).replace_schema_metadata({"program": PROGRAM})
+    format_.write_table(columns, file)
     return file.getvalue()
 
 
@@ -154,9 +154,9 @@ def read_record(path: str | Path, steady: SteadySpeed | None = None) -> Record:
     """
     columns = _columns(Path(path), [TIME, VALUE], [TACHO])
     if (TACHO in columns) == (steady is not None):
-        told = "has a tacho column: leave --rpm and --tdc out"
+        surplus = "has a tacho column: leave --rpm and --tdc out"
         lacks = f"has no column {TACHO}: add it, or give --rpm and --tdc for a steady speed"
-        raise RecordError(f"{path}: {lacks if steady is None else told}")
+        raise RecordError(f"{path}: {lacks if steady is None else surplus}")
     times = _even(path, columns[TIME])
     within = None
     if steady is None:
@@ -182,11 +182,11 @@ def _columns(path: Path, needed: list[str], also: list[str]) -> dict[str, np.nda
                     has = ", ".join(header) or "nothing"
                     text = f"{path}:1: no column {name}, only {has}"
                     raise RecordError(f"{text}; begin the file with the line {HEADER}")
-            wanted = {name: header.index(name) for name in [*needed, *also] if name in header}
-            found: dict[str, list[float]] = {name: [] for name in wanted}
+            places = {name: header.index(name) for name in [*needed, *also] if name in header}
+            found: dict[str, list[float]] = {name: [] for name in places}
             blank = 0  # the first line without these cells: beyond the end of the record
             for cells in lines:
-                texts = {name: "".join(cells[at : at + 1]) for name, at in wanted.items()}
+                texts = {name: "".join(cells[at : at + 1]) for name, at in places.items()}
                 if not "".join(texts.values()).strip():
                     blank = blank or lines.line_num
                     continue
@@ -194,7 +194,7 @@ def _columns(path: Path, needed: list[str], also: list[str]) -> dict[str, np.nda
                     problem = "the cells are empty, and the record goes on below"
                     raise RecordError(f"{path}:{blank}: {problem}; cut it, or fill the gap")
                 for name, text in texts.items():
-                    where = f"{path}:{lines.line_num}:{wanted[name] + 1}: {name}"
+                    where = f"{path}:{lines.line_num}:{places[name] + 1}: {name}"
                     found[name].append(_number(text, where))
     except OSError as error:
         remedy = f"give a CSV file with the columns {HEADER}, or a job's key"
@@ -225,9 +225,9 @@ def _even(path: str | Path, times: np.ndarray) -> np.ndarray:
     bad = np.flatnonzero(~(np.abs(steps - step) <= UNEVEN * abs(step)) | (steps <= 0.0))
     if bad.size:
         line = int(bad[0]) + 3  # after the header, the second sample of the step
-        told = f"a step of {steps[bad[0]]:g} s, where the mean one is {step:g} s"
+        text = f"a step of {steps[bad[0]]:g} s, where the mean one is {step:g} s"
         remedy = "resample to equal steps, or write times with more digits"
-        raise RecordError(f"{path}:{line}: {TIME}: {told}; {remedy}")
+        raise RecordError(f"{path}:{line}: {TIME}: {text}; {remedy}")
     return times[0] + step * np.arange(times.size)
 
 
@@ -259,6 +259,6 @@ def _pulses(
             within.append(jump * step / 2.0)
     gaps = np.diff(found)
     if gaps.size and gaps.max() > MAX_PULSE_RATIO * gaps.min():
-        told = f"pulses {gaps.min():g} to {gaps.max():g} s apart"
-        raise RecordError(f"{path}: {TACHO}: {told}; one a revolution, none missed, none doubled")
+        text = f"pulses {gaps.min():g} to {gaps.max():g} s apart"
+        raise RecordError(f"{path}: {TACHO}: {text}; one a revolution, none missed, none doubled")
     return np.array(found), np.array(within)

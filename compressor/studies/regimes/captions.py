@@ -74,35 +74,35 @@ def bifurcation(pair: xr.Dataset) -> str:
     return " ".join([*sentences, *directions(pair), *failures(pair)])
 
 
-def course(seen: Sequence[SeenValue], unit: str) -> str:
+def course(values: Sequence[SeenValue], unit: str) -> str:
     """Return where period 1 is lost and comes back, and how often each regime was found."""
-    regimes = [one.regime for one in seen]
-    if not seen:
+    regimes = [one.regime for one in values]
+    if not values:
         return "no value has a result."
     if {*regimes} == {PERIOD_1}:
-        return f"period 1 at all {plural(len(seen), 'value')}."
+        return f"period 1 at all {plural(len(values), 'value')}."
     first = regimes.index(PERIOD_1) if PERIOD_1 in regimes else None
-    changes = [i for i in range(1, len(seen)) if regimes[i - 1] == PERIOD_1 != regimes[i]]
+    changes = [i for i in range(1, len(values)) if regimes[i - 1] == PERIOD_1 != regimes[i]]
     counts = (f"{regime} at {count}" for regime, count in Counter(regimes).most_common())
-    told = f"of {plural(len(seen), 'value')} {', '.join(counts)}"
+    counted = f"of {plural(len(values), 'value')} {', '.join(counts)}"
     if first is None:
-        return f"nowhere period 1; {told}."
-    begins = "" if first == 0 else f"period 1 first at {number(seen[first].value)}{unit}; "
+        return f"nowhere period 1; {counted}."
+    begins = "" if first == 0 else f"period 1 first at {number(values[first].value)}{unit}; "
     if not changes:
-        return f"{begins}it is kept to the end; {told}."
-    lost = seen[changes[0]]
+        return f"{begins}it is kept to the end; {counted}."
+    lost = values[changes[0]]
     back = PERIOD_1 in regimes[changes[0] :]
-    later = seen[changes[0] + regimes[changes[0] :].index(PERIOD_1)].value if back else 0.0
+    later = values[changes[0] + regimes[changes[0] :].index(PERIOD_1)].value if back else 0.0
     returns = f", found again at {number(later)}{unit}" if back else " and not found again"
     return (
         f"{begins}period 1 is lost at {number(lost.value)}{unit}, to {lost.regime}{returns}; "
-        f"{told}."
+        f"{counted}."
     )
 
 
-def parting(seen: Sequence[SeenValue], unit: str) -> str:
+def parting(values: Sequence[SeenValue], unit: str) -> str:
     """Describe where the largest exponent is first surely above 0, or how near it came."""
-    known = [one for one in seen if np.isfinite(one.exponent)]
+    known = [one for one in values if np.isfinite(one.exponent)]
     if not known:
         return "No Lyapunov exponent is known."
     for one in known:
@@ -125,19 +125,19 @@ def directions(pair: xr.Dataset) -> list[str]:
     if not differs.any():
         return [f"Up and down agree at all {plural(int(both.sum()), 'value')} that both reached."]
     sure, unsure = differs & confirmed, differs & ~confirmed
-    said, reached = [], plural(int(both.sum()), "value")
+    texts, reached = [], plural(int(both.sum()), "value")
     if sure.any():
-        said.append(
+        texts.append(
             f"Up and down end in different motions at {int(sure.sum())} of {reached} that both "
             f"reached, {spans(pair[over].values, sure)}{unit}: a second attractor, confirmed by "
             "direct simulation."
         )
     if unsure.any():
-        said.append(
+        texts.append(
             f"At {int(unsure.sum())} of {reached}, {spans(pair[over].values, unsure)}{unit}, their "
             "numbers differ, but further simulation reached no second motion."
         )
-    return said
+    return texts
 
 
 def failures(pair: xr.Dataset) -> list[str]:
@@ -146,14 +146,14 @@ def failures(pair: xr.Dataset) -> list[str]:
     if not failed.any():
         return []
     reasons = Counter(map(str, pair["reason"].values[failed])).most_common()
-    told = ", ".join(f"{reason} ({count})" for reason, count in reasons)
-    return [f"{plural(int(failed.sum()), 'run')} failed: {told}."]
+    text = ", ".join(f"{reason} ({count})" for reason, count in reasons)
+    return [f"{plural(int(failed.sum()), 'run')} failed: {text}."]
 
 
 def sections(shown: xr.Dataset, count: int) -> str:
     """Describe Poincaré sections at some of `count` values: the regime at each."""
     over, unit = shown.attrs["over"], unit_of(shown)
-    told = []
+    texts = []
     for i in range(shown.sizes[over]):
         one = shown.isel({over: i})
         each = {str(d): regime_of(one.sel(direction=d)) for d in one["direction"].values}
@@ -161,11 +161,11 @@ def sections(shown: xr.Dataset, count: int) -> str:
         text = words.pop() if len(words) == 1 else ", ".join(
             f"{word} {direction}" for direction, word in each.items() if word
         )  # fmt: skip
-        told.append(f"{number(float(one[over]))}{unit} {text}")
+        texts.append(f"{number(float(one[over]))}{unit} {text}")
     return (
         f"Once a revolution, at {shown.attrs['section_deg']:g}° of the crank: the journal's place "
-        f"along the cylinder and its rate, at {len(told)} of {count} values of "
-        f"{said_of(shown, over)}, evenly among the regimes found: {'; '.join(told)}."
+        f"along the cylinder and its rate, at {len(texts)} of {count} values of "
+        f"{said_of(shown, over)}, evenly among the regimes found: {'; '.join(texts)}."
     )
 
 
@@ -181,12 +181,12 @@ def periods(plane: xr.Dataset, other: str) -> str:
         chain = plane.sel(direction=direction)
         places = [(i, j) for i in range(plane.sizes[over]) for j in range(plane.sizes[other])]
         found = Counter(regime_of(chain.isel({over: i, other: j})) for i, j in places)
-        told = [f"{regime} at {n}" for regime, n in found.most_common() if regime]
+        texts = [f"{regime} at {n}" for regime, n in found.most_common() if regime]
         failed = int((chain["status"] == "failed").sum())
-        told += [f"failed at {failed}"] if failed else []
+        texts += [f"failed at {failed}"] if failed else []
         unseen = cells - failed - sum(n for regime, n in found.items() if regime)
-        told += [f"not run at {unseen}"] if unseen else []
-        sentences.append(f"{str(direction).capitalize()}, of {cells}: {', '.join(told)}.")
+        texts += [f"not run at {unseen}"] if unseen else []
+        sentences.append(f"{str(direction).capitalize()}, of {cells}: {', '.join(texts)}.")
     return " ".join(sentences)
 
 

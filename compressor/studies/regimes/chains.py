@@ -56,9 +56,9 @@ class Chain:
     @cached_property
     def key(self) -> str:
         """Return the hash of what decides the numbers: cases, start, request, model."""
-        what = [case.key for case in self.cases], self.asked.plain(), self.direction
+        identity = [case.key for case in self.cases], self.asked.plain(), self.direction
         model = model_of(self.cases[0].values())
-        text = json.dumps([what, model, SCHEMA], sort_keys=True)
+        text = json.dumps([identity, model, SCHEMA], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:

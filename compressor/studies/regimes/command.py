@@ -70,9 +70,9 @@ def regimes_of(folder: str, study: str) -> str:
     found = open_regimes(folder, study)
     words = [word for word in found["regime"].values.ravel().tolist() if word]
     periods = [period for period in found["period"].values.ravel().tolist() if period == period]
-    told = [f"{number} {word}" for word, number in sorted(Counter(words).items())]
+    texts = [f"{number} {word}" for word, number in sorted(Counter(words).items())]
     of = [f"{n} of {p:g} rev" for p, n in sorted(Counter(periods).items())]
-    return ", ".join(told) + (f"; periods: {', '.join(of)}" if of else "")
+    return ", ".join(texts) + (f"; periods: {', '.join(of)}" if of else "")
 
 
 def report_chains(summary: "RegimesSummary", folder: str, quiet: bool) -> None:

@@ -114,8 +114,8 @@ class ChainPair:
 
     @cached_property
     def key(self) -> str:
-        what = f"{self.up.key} {self.down.key} {FURTHER} {START_COUNT} {SEED}"
-        return hashlib.sha256(what.encode()).hexdigest()[:20]
+        identity = f"{self.up.key} {self.down.key} {FURTHER} {START_COUNT} {SEED}"
+        return hashlib.sha256(identity.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
         """Return where its verdicts are stored."""

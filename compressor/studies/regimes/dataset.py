@@ -32,17 +32,17 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     """
     folder = Path(results) / FOLDER / study
     manifest = read_manifest(folder)
-    asked = Regimes(**manifest["regimes"])
+    request = Regimes(**manifest["regimes"])
     chains = [[read_stored(folder / f"{key}.nc") for key in keys] for keys in manifest["chains"]]
     axes = {axis["key"]: axis["values"] for axis in manifest["axes"]}
-    names = coordinate_names([*axes, asked.over])
-    over = names[asked.over]
+    names = coordinate_names([*axes, request.over])
+    over, ways = names[request.over], [*request.directions]
     outer, shape = layout(manifest, names)
-    values, said = swept_column(asked.over, asked.values)
-    said["long_name"] += of_joint(asked.over, chains)
+    values, attrs_of_over = swept_column(request.over, request.values)
+    attrs_of_over["long_name"] += of_joint(request.over, chains)
     coordinates = outer | {
-        "direction": ("direction", [*asked.directions], {"long_name": "which way it is followed"}),
-        over: (over, values, said),
+        "direction": ("direction", ways, {"long_name": "which way it is followed"}),
+        over: (over, values, attrs_of_over),
         **labels(),
     }
     dims = (*[name for name, (dim, *_) in outer.items() if name == dim], "direction", over)
@@ -50,20 +50,20 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
         dims = ("job", "direction", over)
     variables: dict[str, tuple] = {}
     for name, phrase in TEXTS.items():
-        values = stack_chains(chains, asked, name).reshape(*shape, len(asked.directions), asked.n)
+        values = stack_chains(chains, request, name).reshape(*shape, len(ways), request.n)
         variables[name] = dims, values, {"long_name": phrase}
     for name, (inner, unit, phrase) in NUMBERS.items():
-        values = stack_chains(chains, asked, name, inner)
-        values = values.reshape(*shape, len(asked.directions), asked.n, *values.shape[3:])
+        values = stack_chains(chains, request, name, inner)
+        values = values.reshape(*shape, len(ways), request.n, *values.shape[3:])
         variables[name] = (*dims, *inner), values, {"units": unit, "long_name": phrase}
     if manifest["pairs"]:
         every = [read_stored(folder / f"pair-{key}.nc") for key in manifest["pairs"]]
-        variables |= verdicts(every, (*dims[:-2], over), (*shape, asked.n))
+        variables |= verdicts(every, (*dims[:-2], over), (*shape, request.n))
     turns = variables["section"][1].shape[len(dims)]
     number = {"long_name": "Poincaré point, one a revolution", "units": "1"}
     coordinates["revolution"] = "revolution", np.arange(1, turns + 1), number
-    attrs = {"study": study, "over": over, "over_key": asked.over, "log": int(asked.log)}
-    attrs |= {name: getattr(asked, name) for name in ("section_deg", "settle_rev", "measure_rev")}
+    attrs = {"study": study, "over": over, "over_key": request.over, "log": int(request.log)}
+    attrs |= {name: getattr(request, name) for name in ("section_deg", "settle_rev", "measure_rev")}
     return xr.Dataset(variables, coordinates, attrs)
 
 
@@ -112,7 +112,7 @@ def layout(
 
 def stack_chains(
     chains: Sequence[Sequence[xr.Dataset | None]],
-    asked: Regimes,
+    request: Regimes,
     name: str,
     inner: tuple[str, ...] = (),
 ) -> np.ndarray:
@@ -121,11 +121,11 @@ def stack_chains(
     Missing values are nan, or of texts empty; where states have other lengths, so are their ends.
     """
     known = [chain[name].values for pair in chains for chain in pair if chain is not None]
-    sizes = {"revolution": asked.measure_rev, "joint": len(JOINTS),
+    sizes = {"revolution": request.measure_rev, "joint": len(JOINTS),
              "coordinate": len(COORDINATES), "mode": 3, "number": 0}  # fmt: skip
     shape = tuple(max([values.shape[1 + n] for values in known], default=sizes[dim])
                   for n, dim in enumerate(inner))  # fmt: skip
-    whole = (len(chains), len(asked.directions), asked.n)
+    whole = (len(chains), len(request.directions), request.n)
     if name in TEXTS:
         found = np.full(whole, MISSING if name == "status" else "", object)
     else:
@@ -135,7 +135,7 @@ def stack_chains(
             if chain is not None:
                 values = chain[name].values
                 at = np.arange(len(values))
-                at = at if asked.directions[way] == "up" else asked.n - 1 - at
+                at = at if request.directions[way] == "up" else request.n - 1 - at
                 inside: Any = tuple(slice(0, n) for n in values.shape[1:])
                 found[(machine, way, at, *inside)] = values
     return found

@@ -152,18 +152,18 @@ def draw_sections(shown: xr.Dataset) -> Drawing:
     figure, grid = make_grid(rows * len(joints), COLUMNS, 2.9 * rows * len(joints) + 0.7)
     figure.panels = []
     for joint, part in zip(joints, np.split(grid, len(joints)), strict=True):
-        drawn = [*part.flat][: shown.sizes[over]]
-        figure.panels += drawn
-        for i, panel in enumerate(drawn):
+        used = [*part.flat][: shown.sizes[over]]
+        figure.panels += used
+        for i, panel in enumerate(used):
             one = shown.isel({over: i}).sel(joint=joint)
             plot_section(panel, one)
             where = f", {SPOKEN[joint]}" if len(joints) > 1 else ""
             panel.title = f"{float(one[over]):.4g}{unit}{where}: {regimes_of(one)}"
-        spread_alike(drawn)
-        for number, panel in enumerate(drawn):
+        spread_alike(used)
+        for number, panel in enumerate(used):
             if number % COLUMNS == 0:
                 panel.y.title = "rate of $e_x$ (mm/s)"
-            if number + COLUMNS >= len(drawn):
+            if number + COLUMNS >= len(used):
                 panel.x.title = "$e_x$ (µm), along the cylinder"
     figure.legend = direction_entries(shown)
     return figure
@@ -217,8 +217,8 @@ def regimes_of(one: xr.Dataset) -> str:
 def joints_with_points(data: xr.Dataset) -> list[str]:
     """Return the joints that have Poincaré points."""
     others = [dim for dim in data["section"].dims if dim != "joint"]
-    there = data["section"].notnull().any(others).values
-    return [str(joint) for joint, seen in zip(data["joint"].values, there, strict=True) if seen]
+    known = data["section"].notnull().any(others).values
+    return [str(joint) for joint, some in zip(data["joint"].values, known, strict=True) if some]
 
 
 def looks(data: xr.Dataset, times: float = 1.0) -> dict[str, LineStyle]:

@@ -42,13 +42,13 @@ def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[st
     where there is none. Raises PlotError where there is nothing to draw.
     """
     study = f"study {dataset.attrs.get('study', '')} of regimes".replace("  ", " ")
-    wanted = choose_figures(choice.what, [*CAPTIONS], study)
+    figures = choose_figures(choice.what, [*CAPTIONS], study)
     over, axes = dataset.attrs["over"], other_axes(dataset)
     fixed = fixed_values(dataset, axes, choice.at)
     if choice.over:
         axis_of(dataset, [over, *axes], choice.over)
     pair = at(dataset, fixed)
-    for name in wanted:
+    for name in figures:
         if name == "periods":
             if not axes and not choice.what:
                 continue
@@ -76,14 +76,12 @@ def other_axes(dataset: xr.Dataset) -> list[str]:
     return [str(dim) for dim in dataset["status"].dims if dim not in own]
 
 
-def axis_of(dataset: xr.Dataset, axes: Sequence[str], wanted: str) -> str:
+def axis_of(dataset: xr.Dataset, axes: Sequence[str], name: str) -> str:
     """Return the dim of an axis that is meant by its name, key, or the end of its key."""
     keys = {axis: str(dataset[axis].attrs.get("case_key", axis)) for axis in axes}
-    found = [
-        axis for axis, key in keys.items() if wanted in (axis, key) or key.endswith(f".{wanted}")
-    ]
+    found = [axis for axis, key in keys.items() if name in (axis, key) or key.endswith(f".{name}")]
     if len(found) != 1:
-        problem = f"no axis {wanted!r}" if not found else f"several axes {wanted!r}"
+        problem = f"no axis {name!r}" if not found else f"several axes {name!r}"
         listed = ", ".join(keys.values()) or "none"
         raise PlotError(f"the study has {problem} to choose: its axes are {listed}")
     return found[0]
@@ -144,9 +142,9 @@ def chosen_values(pair: xr.Dataset) -> list[int]:
     over = pair.attrs["over"]
     chain = pair.isel(direction=0)
     others = [dim for dim in chain["section"].dims if dim != over]
-    there = chain["section"].notnull().any(others).values & (chain["status"].values == "ok")
+    has_points = chain["section"].notnull().any(others).values & (chain["status"].values == "ok")
     by_regime: dict[tuple[str, float], list[int]] = {}
-    for i in np.flatnonzero(there):
+    for i in np.flatnonzero(has_points):
         word, period = str(chain["regime"].values[i]), float(chain["period"].values[i])
         label = (word, period if word == "periodic" else 0.0)
         by_regime.setdefault(label, []).append(int(i))

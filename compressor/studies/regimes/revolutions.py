@@ -135,9 +135,9 @@ def run_with_series(
 
 def bare_case(case: Case, count: int) -> Case:
     """Return a case over `count` revolutions, all measured, without any other output."""
-    of = with_settle_rev(case, 0.0, 1, float(count))
-    how = replace(of.solve, error_bars=False, accuracy="standard", horizon=False)
-    return replace(of, solve=how, output=replace(of.output, keep="series", signals=False))
+    whole = with_settle_rev(case, 0.0, 1, float(count))
+    solve = replace(whole.solve, error_bars=False, accuracy="standard", horizon=False)
+    return replace(whole, solve=solve, output=replace(whole.output, keep="series", signals=False))
 
 
 class PoincareRecorder:

@@ -122,21 +122,21 @@ def machines_of(study: Study) -> list[FollowedMachine]:
 
 def chains_of(study: Study, number: int) -> tuple[Chain, ...]:
     """Return the chains of one case of a study."""
-    asked = study.regimes
-    assert asked
+    request = study.regimes
+    assert request
     cases = study.chains[number]
-    return tuple(Chain.of(study.name, asked, way, cases) for way in asked.directions)
+    return tuple(Chain.of(study.name, request, way, cases) for way in request.directions)
 
 
 def write_manifest(folder: Path, study: Study) -> None:
     """Store which chains a study has."""
-    asked = study.regimes
-    assert asked
+    request = study.regimes
+    assert request
     every = [chains_of(study, number) for number in range(study.jobs)]
     plain = {
         "name": study.name,
         "case_file": os.path.abspath(study.path),
-        "regimes": asked.plain(),
+        "regimes": request.plain(),
         "axes": [{"key": axis.key, "values": axis.values} for axis in study.axes],
         "is_grid": study.is_grid,
         "chains": [[chain.key for chain in chains] for chains in every],
@@ -278,8 +278,10 @@ def describe_progress(
         chains = [chain for machine in own for chain in machine.chains]
         bad = [failure for machine in own for failure in failed_values(machine, ends)]
         finished = [end for c in chains if isinstance(end := ends[c.key], ChainEnd)]
-        kept = [books[pair.key].count() for m in own if (pair := m.pair) and pair.key in books]
-        differ, confirmed = (sum(column) for column in zip(*kept, strict=True)) if kept else (0, 0)
+        pairs = [books[pair.key].count() for m in own if (pair := m.pair) and pair.key in books]
+        differ, confirmed = (
+            (sum(column) for column in zip(*pairs, strict=True)) if pairs else (0, 0)
+        )
         values = study.regimes.n if study.regimes else 0
         complete = sum(end.values for end in finished)
         counts.append(

@@ -84,14 +84,14 @@ def period_of(found: np.ndarray, within: float) -> int | None:
 
 def distances(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the distance of every place from every other, (k, l), at the worse joint."""
-    away = one[:, None] - other[None, :]
-    return np.linalg.norm(away, axis=-1).max(axis=-1)
+    differences = one[:, None] - other[None, :]
+    return np.linalg.norm(differences, axis=-1).max(axis=-1)
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
     """Return the Hausdorff distance of two sets of places, (k, joint, 2) and (l, joint, 2)."""
-    away = distances(one, other)
-    return float(max(away.min(axis=1).max(), away.min(axis=0).max()))
+    matrix = distances(one, other)
+    return float(max(matrix.min(axis=1).max(), matrix.min(axis=0).max()))
 
 
 COORDINATES = (*AXES, *(f"{axis}_rate" for axis in AXES))
@@ -161,10 +161,10 @@ class Clock:
         return max(self.deadline - time.monotonic(), 0.0)
 
 
-def sizes(asked: Regimes, case: Case) -> dict[str, int]:
+def sizes(request: Regimes, case: Case) -> dict[str, int]:
     """Return the lengths of the dimensions of a chain's variables."""
     return {
-        "revolution": asked.measure_rev,
+        "revolution": request.measure_rev,
         "joint": len(JOINTS),
         "coordinate": len(COORDINATES),
         "mode": len(MODES),
@@ -172,33 +172,33 @@ def sizes(asked: Regimes, case: Case) -> dict[str, int]:
     }
 
 
-def empty(asked: Regimes, case: Case) -> Row:
+def empty(request: Regimes, case: Case) -> Row:
     """Return a row of which nothing is known."""
-    lengths = sizes(asked, case)
+    lengths = sizes(request, case)
     row: Row = dict.fromkeys(TEXTS, "")
     for name, (dims, _, _) in NUMBERS.items():
         row[name] = np.full([lengths[dim] for dim in dims], math.nan)
     return row
 
 
-def run_value(case: Case, state: np.ndarray | None, asked: Regimes) -> Row:
+def run_value(case: Case, state: np.ndarray | None, request: Regimes) -> Row:
     """Follow a case from a state on, or from its own start, until it settles, and measure it.
 
     What is found, by the names of `TEXTS` and `NUMBERS`. A run that stops is a row too, with its
     reason and the state that it began from, so that the chain can go on from there. The wall time
     is the case's own. Nothing in a row depends on how long it took.
     """
-    row, clock = empty(asked, case), Clock(case.solve.timeout_s)
+    row, clock = empty(request, case), Clock(case.solve.timeout_s)
     if state is not None:
         row["end_state"] = state
-    settled, since = settle_motion(case, state, span_of(asked, asked.settle_rev, clock))
+    settled, since = settle_motion(case, state, span_of(request, request.settle_rev, clock))
     if settled.reason:
         return failed_row(row, settled.reason, settled.detail)
     row["settled_rev"] = np.asarray(since)
-    motion = measure_motion(case, settled.state, asked, clock)
+    motion = measure_motion(case, settled.state, request, clock)
     if motion.reason:
         return failed_row(row, motion.run.reason, motion.run.detail)
-    reason, detail = contacts(case, motion, asked, clock, row)
+    reason, detail = contacts(case, motion, request, clock, row)
     if reason:
         return failed_row(row, reason, detail)
     end, found = motion.run.state, motion.run.numbers(motion.count)
@@ -222,12 +222,12 @@ def failed_row(row: Row, reason: str, detail: str) -> Row:
     return row | {"status": "failed", "reason": str(reason), "detail": detail}
 
 
-def span_of(asked: Regimes, revolutions: int, clock: Clock) -> RevolutionSpan:
+def span_of(request: Regimes, revolutions: int, clock: Clock) -> RevolutionSpan:
     """Return a span of so many revolutions, at most, within the time that is left."""
-    return RevolutionSpan(revolutions, math.radians(asked.section_deg), clock.left)
+    return RevolutionSpan(revolutions, math.radians(request.section_deg), clock.left)
 
 
-def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) -> SettledMotion:
+def measure_motion(case: Case, state: np.ndarray, request: Regimes, clock: Clock) -> SettledMotion:
     """Return the motion from a settled state on.
 
     It is followed until its Poincaré points repeat, or there are enough of them.
@@ -238,15 +238,15 @@ def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) 
         return period_of(places(points, clearance), within)
 
     run = follow_revolutions(
-        case, state, span_of(asked, asked.measure_rev, clock),
+        case, state, span_of(request, request.measure_rev, clock),
         lambda turns, points: period(points) is not None,
     )  # fmt: skip
     found = None if run.reason else period(run.points)
     if run.reason:
         return SettledMotion("", math.nan, run.points[:0], run, 0)
     exponents = math.nan, math.nan
-    if asked.exponent:
-        exponents = exponent(case, run.state, found is not None, asked.measure_rev, clock.left)
+    if request.exponent:
+        exponents = exponent(case, run.state, found is not None, request.measure_rev, clock.left)
     parts = exponents[0] - exponents[1] > 0.0  # close motions part, as far as is known
     if found:
         count = found * ((2 * found + MORE) // found)
@@ -258,7 +258,7 @@ def measure_motion(case: Case, state: np.ndarray, asked: Regimes, clock: Clock) 
 
 
 def contacts(
-    case: Case, motion: SettledMotion, asked: Regimes, clock: Clock, row: Row
+    case: Case, motion: SettledMotion, request: Regimes, clock: Clock, row: Row
 ) -> tuple[str, str]:
     """Write contact modes and impacts of the revolutions that follow into a row.
 
@@ -266,7 +266,7 @@ def contacts(
     begun. The reason and detail of a run that stopped, empty otherwise.
     """
     count = min(motion.count, SAMPLED) if math.isnan(motion.period) else int(motion.period)
-    span = span_of(asked, count + 1, clock)
+    span = span_of(request, count + 1, clock)
     table, reason, detail = run_with_series(case, motion.run.state, span)
     if reason:
         return reason, detail

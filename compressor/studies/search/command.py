@@ -52,7 +52,7 @@ UNBARRED = " (no error bar was made)"
 @as_json
 @click.option("--quiet", is_flag=True, help="No progress.")
 def find(
-    config: str, output: str, jobs: int | None, as_json: bool, quiet: bool, **asked: Any
+    config: str, output: str, jobs: int | None, as_json: bool, quiet: bool, **options: Any
 ) -> int:
     """Search one key of a case for where a metric passes a value, or is greatest or least.
 
@@ -73,7 +73,7 @@ def find(
     not run again. Exit code 3 if any point's job failed.
     """
     one_thread_each()  # before numpy loads
-    question = asked_for(config, asked)
+    question = question_of(config, options)
     study = question.checked()
     if not quiet:
         caution([study])
@@ -90,21 +90,21 @@ def find(
     return SOME_FAILED if answer.failed else DONE
 
 
-def asked_for(config: str, asked: dict[str, Any]) -> "Question":
+def question_of(config: str, options: dict[str, Any]) -> "Question":
     """Return the question of the options; a usage error where it is none, or more than one."""
     from compressor.studies.search.question import Question
 
-    given = [kind for kind in KINDS if asked[kind] is not None]
-    if len(given) != 1:
+    kinds = [kind for kind in KINDS if options[kind] is not None]
+    if len(kinds) != 1:
         raise click.UsageError("give one of --first, --greatest and --least")
-    more = {name: asked[name] for name in ("tolerance", "scan", "logarithmic", "overrides")}
-    return Question.written(config, asked["over"], asked[given[0]], given[0], **more)
+    more = {name: options[name] for name in ("tolerance", "scan", "logarithmic", "overrides")}
+    return Question.written(config, options["over"], options[kinds[0]], kinds[0], **more)
 
 
 def lines(question: "Question", answer: "SearchResult", folder: str) -> Iterator[str]:
     """Yield an answer as it is printed."""
-    told = comparison_lines if answer.best is None else extremum_lines
-    yield from told(question, answer)
+    kind_lines = comparison_lines if answer.best is None else extremum_lines
+    yield from kind_lines(question, answer)
     for point in answer.blind[:MAX_TOLD]:
         yield f"  {at(question, point)}: {why_undecided(question, point)}  job {point.key[:8]}"
     if len(answer.blind) > MAX_TOLD:
@@ -171,10 +171,10 @@ def number(question: "Question", point: Any) -> str:
     """Return a point's number with its error bar."""
     from compressor.digits import by_bar
 
-    told = point.told
-    text = by_bar(told.value, told.bar if told.barred else math.nan, False)
-    return (f"{text} {question.goal.unit}".rstrip() + AVERAGED * told.averaged
-            + UNBARRED * (not told.barred))  # fmt: skip
+    reading = point.told
+    text = by_bar(reading.value, reading.bar if reading.barred else math.nan, False)
+    return (f"{text} {question.goal.unit}".rstrip() + AVERAGED * reading.averaged
+            + UNBARRED * (not reading.barred))  # fmt: skip
 
 
 def why_undecided(question: "Question", point: Any) -> str:
@@ -193,5 +193,5 @@ def spacing(question: "Question") -> str:
 
 def jsonable_answer(question: "Question", answer: "SearchResult") -> dict[str, Any]:
     """Return a question and its answer as JSON says them."""
-    asked = dataclasses.asdict(question)
-    return sayable(asked | {"unit": question.goal.unit} | dataclasses.asdict(answer))
+    fields = dataclasses.asdict(question)
+    return sayable(fields | {"unit": question.goal.unit} | dataclasses.asdict(answer))

@@ -77,11 +77,11 @@ def first(
     points between them that are not decided. at_once: points of one call to evaluate.
     """
     points: list[Point] = []
-    wanted: Sequence[float] = shares
-    while wanted and len(points) < len(shares) + MAX_POINTS:
-        points = sorted([*points, *evaluate(wanted)], key=lambda point: point.share)
+    next_shares: Sequence[float] = shares
+    while next_shares and len(points) < len(shares) + MAX_POINTS:
+        points = sorted([*points, *evaluate(next_shares)], key=lambda point: point.share)
         answer = interval(points, holds)
-        wanted = sections(answer, tolerance, at_once)
+        next_shares = sections(answer, tolerance, at_once)
     return answer
 
 
@@ -144,8 +144,8 @@ def extremum(
         share = float(share)
         if share not in known:
             (known[share],) = evaluate([share])
-        told = known[share].told
-        return worst if told.reason else factor * told.value
+        reading = known[share].told
+        return worst if reading.reason else factor * reading.value
 
     at = points.index(min(usable, key=lambda point: factor * point.told.value))
     bounds = (points[max(at - 1, 0)].share, points[min(at + 1, len(points) - 1)].share)
@@ -228,8 +228,8 @@ class SearchJobs:
     def __call__(self, shares: Sequence[float]) -> list[Point]:
         """Return the points of some shares of the range, each a stored job."""
         question = self.question
-        wanted = {share: question.argument(share) for share in shares}
-        self.values |= {*wanted.values()}
+        arguments = {share: question.argument(share) for share in shares}
+        self.values |= {*arguments.values()}
         values = sorted(self.values)
         study = question.study(values)
         words = ["compsim", "run", question.path, "-o", str(self.folder)]
@@ -240,15 +240,15 @@ class SearchJobs:
         keys = dict(zip(values, study.keys, strict=True))
         store = read_store(self.folder)
         found = []
-        for share, value in wanted.items():
+        for share, value in arguments.items():
             key = keys[value]
             position = store.position(key)
             if position is None:
                 raise StoreError(self.folder, f"job {key} is gone", "ask again")
             end = store.status_at(position)
             if end.status != "ok":
-                told = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
+                reading = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
             else:
-                told = question.goal.read(end.numbers, str(store.rows.words["regime"][position]))
-            found.append(Point(share, value, told, key, end.status != "ok"))
+                reading = question.goal.read(end.numbers, str(store.rows.words["regime"][position]))
+            found.append(Point(share, value, reading, key, end.status != "ok"))
         return found

@@ -69,14 +69,16 @@ class Goal:
         """Return the SI unit, "" for a share or a count."""
         return "" if BARRED[self.metric].unit == "1" else BARRED[self.metric].unit
 
-    def holds(self, told: JobReading) -> bool | None:
+    def holds(self, reading: JobReading) -> bool | None:
         """Return whether the comparison holds.
 
         None where the error bar does not let that be told.
         """
         compare = SIGNS[self.sign]
-        ends = {bool(compare(told.value + side, self.limit)) for side in (-told.bar, told.bar)}
-        return ends.pop() if not told.reason and len(ends) == 1 else None
+        ends = {
+            bool(compare(reading.value + side, self.limit)) for side in (-reading.bar, reading.bar)
+        }
+        return ends.pop() if not reading.reason and len(ends) == 1 else None
 
     def read(self, numbers: np.void, regime: str) -> JobReading:
         """Return what the numbers (dtype ROW) of a job that is ok say, moving in a regime.
@@ -169,8 +171,8 @@ class Question:
         if parts is None or any(map(math.isnan, ends)):
             raise QuestionError(f"{over!r} is no range: write KEY=LOW:HIGH, such as "
                                 "clearance_mm=0.01:0.3")  # fmt: skip
-        asked = comparison(goal) if which == "first" else goal_of(goal, which)
-        return cls(path, parts[1], ends[0], ends[1], asked, **more)
+        question_goal = comparison(goal) if which == "first" else goal_of(goal, which)
+        return cls(path, parts[1], ends[0], ends[1], question_goal, **more)
 
     @property
     def shares(self) -> list[float]:

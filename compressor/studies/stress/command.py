@@ -91,8 +91,8 @@ def write_scene(number: int, seed: int, drawn: str) -> Iterator[str]:
     """Yield a scene as a case file, and below it, as comments, how it ends."""
     from compressor.studies.stress.stress import repeat
 
-    made, row = repeat(number, seed, drawn)
-    yield from (f"{key}: {json.dumps(value)}" for key, value in made.items())
+    values, row = repeat(number, seed, drawn)
+    yield from (f"{key}: {json.dumps(value)}" for key, value in values.items())
     for key, value in row.items():
         if key not in ("load", "joint") and value != "":
             yield f"# {key}: {value:.3g}" if isinstance(value, float) else f"# {key}: {value}"

@@ -113,12 +113,12 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
     worn = [one for one in JOINTS if joint in (one, "both")]
     offset: dict[str, float] = {}
     for one in JOINTS:
-        drawn = next(point), next(point), next(point)
+        draws = next(point), next(point), next(point)
         if one in worn:
             deepest = min(depth, DEEPEST_START * found["pin_radius"])
-            offset |= _start(one, drawn, found[f"clearance_{one}"], deepest)
+            offset |= _start(one, draws, found[f"clearance_{one}"], deepest)
     stiction = 1e3 * found["stiction_velocity"]
-    made: dict[str, Any] = {
+    scene: dict[str, Any] = {
         "name": f"stress-{seed}-{number}",
         "load": load,
         "joint": joint,
@@ -145,10 +145,10 @@ def values(number: int, seed: int, budget: Budget = Budget()) -> dict[str, Any]:
     if budget.drawn:
         draw = random.Random(f"{seed} {number}")
         for group in ("contact", "friction"):
-            made[group] |= choose_law(group, draw, is_supported(number))
+            scene[group] |= choose_law(group, draw, is_supported(number))
         if budget.drawn == FEATURES:
-            made |= features(made, draw, is_supported(number))
-    return _round_numbers(made) | {
+            scene |= features(scene, draw, is_supported(number))
+    return _round_numbers(scene) | {
         "output": {"keep": "series"},
         "solve": {
             "duration_rev": budget.revolutions,
@@ -229,10 +229,10 @@ def _which(point: Iterator[float]) -> int:
 
 
 def _start(
-    joint: str, drawn: tuple[float, float, float], clearance: float, deepest: float
+    joint: str, draws: tuple[float, float, float], clearance: float, deepest: float
 ) -> dict[str, float]:
     """Return a journal's initial offset (mm): none, within the clearance, or in the bearing."""
-    kind, size, turn = drawn
+    kind, size, turn = draws
     if kind < 1 / 3:
         return {}
     depth = deepest * 10.0 ** (-3.0 * size)
@@ -241,11 +241,11 @@ def _start(
     return {f"{joint}_x": radius * math.cos(angle), f"{joint}_y": radius * math.sin(angle)}
 
 
-def _round_numbers(made: Any) -> Any:
+def _round_numbers(value: Any) -> Any:
     """Return the numbers to five digits, so that a case can be written into a file."""
-    if isinstance(made, dict):
-        return {key: _round_numbers(value) for key, value in made.items()}
-    return float(f"{made:.5g}") if isinstance(made, float) else made
+    if isinstance(value, dict):
+        return {key: _round_numbers(item) for key, item in value.items()}
+    return float(f"{value:.5g}") if isinstance(value, float) else value
 
 
 FEATURE_SHARE = 0.3  # of the scenes that have each feature
@@ -277,26 +277,26 @@ LENGTHS = ((0.15, 0.99), (0.4, 0.99))  # of a bearing over its diameter
 LUGRE = "lugre"
 
 
-def features(made: dict[str, Any], draw: random.Random, inside: bool) -> dict[str, Any]:
+def features(scene: dict[str, Any], draw: random.Random, inside: bool) -> dict[str, Any]:
     """Return the groups that a scene has besides, as far as they are drawn.
 
-    made: the scene so far.
+    scene: the scene so far.
     """
     found: dict[str, Any] = {}
     for group, keys in RANGES.items():
         if draw.random() < FEATURE_SHARE:
-            found[group] = {key: _drawn(spans, draw, inside) for key, spans in keys.items()}
+            found[group] = {key: _draw_number(spans, draw, inside) for key, spans in keys.items()}
     if "guide" in found and draw.random() < 0.3:  # ideal, with friction
         found["guide"]["clearance_mm"] = 0.0
     if "lubricant" in found:
-        length = _drawn(LENGTHS, draw, inside) * 2.0 * made["machine"]["pin_radius_mm"]
+        length = _draw_number(LENGTHS, draw, inside) * 2.0 * scene["machine"]["pin_radius_mm"]
         found["lubricant"]["bearing_length_mm"] = length
-    if draw.random() < FEATURE_SHARE and made["friction"]["law"] != LUGRE:
-        found["friction"] = made["friction"] | {"ideal_joints": True}
+    if draw.random() < FEATURE_SHARE and scene["friction"]["law"] != LUGRE:
+        found["friction"] = scene["friction"] | {"ideal_joints": True}
     return found
 
 
-def _drawn(
+def _draw_number(
     spans: tuple[tuple[float, float], tuple[float, float]], draw: random.Random, inside: bool
 ) -> float:
     """Return a number, evenly in its logarithm."""

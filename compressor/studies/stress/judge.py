@@ -188,11 +188,11 @@ def tolerance(rtol: float, share: float = TIGHTER) -> float:
 def run_judge(case: Case, method: str, rtol: float, result: StressFinding) -> Solution | None:
     """Return a judge's run of a case, if it reaches its end."""
     seconds = SECONDS if method in COMPILED else SCIPY_SECONDS
-    how = replace(
+    settings = replace(
         case.solve, method=method, rtol=rtol, accuracy="standard",
         max_steps=MORE_STEPS * case.solve.max_steps,
     )  # fmt: skip
-    other = run_at_tolerance(replace(case, solve=how), rtol, seconds, True)
+    other = run_at_tolerance(replace(case, solve=settings), rtol, seconds, True)
     result.by.append(f"({method})" if other.reason else method)
     return None if other.reason else other
 

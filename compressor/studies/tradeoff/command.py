@@ -71,8 +71,8 @@ def align_rows(rows: Sequence[Sequence[str]], notes: Sequence[str]) -> Iterator[
     """Yield rows with their first cell to the left, the others to the right, a note behind."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for (first, *cells), note in zip(rows, notes, strict=True):
-        told = (f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
-        yield "  ".join([f"  {first:<{widths[0]}}", *told, note]).rstrip()
+        aligned = (f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
+        yield "  ".join([f"  {first:<{widths[0]}}", *aligned, note]).rstrip()
 
 
 @click.command()
@@ -287,30 +287,30 @@ def heading(word: str, text: str) -> str:
     return f"  {word:<{INDENT}}{text}"
 
 
-def lines(told: "Explanation") -> Iterator[str]:
+def lines(facts: "Explanation") -> Iterator[str]:
     """Yield an explanation as it is printed."""
-    point = ", ".join(f"{key} = {value}" for key, value in told.point.items())
-    yield f"{told.study}: {plural(told.jobs)}" + (f"; explained: {point}" if point else "")
-    count = len(told.unknowns)
+    point = ", ".join(f"{key} = {value}" for key, value in facts.point.items())
+    yield f"{facts.study}: {plural(facts.jobs)}" + (f"; explained: {point}" if point else "")
+    count = len(facts.unknowns)
     solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
-    yield heading("scene", f"{told.scene}: {solved}")
+    yield heading("scene", f"{facts.scene}: {solved}")
     if count:
-        yield heading("", "; ".join(name.rpartition(",")[0] for name in told.unknowns))
-    for number, (term, words) in enumerate(told.active.items()):
+        yield heading("", "; ".join(name.rpartition(",")[0] for name in facts.unknowns))
+    for number, (term, words) in enumerate(facts.active.items()):
         yield heading("" if number else "active", f"{term}: {words}")
-    if told.absent:
-        yield heading("absent", f"{', '.join(told.absent)}: cost nothing")
-    for number, text in enumerate(text for joint in told.scales for text in scale_lines(joint)):
+    if facts.absent:
+        yield heading("absent", f"{', '.join(facts.absent)}: cost nothing")
+    for number, text in enumerate(text for joint in facts.scales for text in scale_lines(joint)):
         yield heading("" if number else "scales", text)
-    word = told.accuracy or "given"
-    yield heading("tolerance", f"{word}: rtol {told.rtol:g}, {told.method}, "
-                  f"for errors below {percent(told.promise)}")  # fmt: skip
-    if told.reason:
-        yield heading("cost", f"unknown: the job failed, {told.reason}: {told.detail}")
+    word = facts.accuracy or "given"
+    yield heading("tolerance", f"{word}: rtol {facts.rtol:g}, {facts.method}, "
+                  f"for errors below {percent(facts.promise)}")  # fmt: skip
+    if facts.reason:
+        yield heading("cost", f"unknown: the job failed, {facts.reason}: {facts.detail}")
         return
-    yield from cost_lines(told)
-    for number in range(len(told.advice)):
-        yield heading("" if number else "without", describe_advice(told, number))
+    yield from cost_lines(facts)
+    for number in range(len(facts.advice)):
+        yield heading("" if number else "without", describe_advice(facts, number))
 
 
 def scale_lines(joint: "JointScales") -> Iterator[str]:
@@ -332,25 +332,25 @@ def scale_lines(joint: "JointScales") -> Iterator[str]:
     )
 
 
-def cost_lines(told: "Explanation") -> Iterator[str]:
+def cost_lines(facts: "Explanation") -> Iterator[str]:
     """Yield what a job and the sweep cost."""
-    work = f" ({told.steps} steps, {told.evaluations} evaluations)" if told.steps else ""
-    yield heading("cost", f"{1e3 * told.seconds:.3g} ms a job{work}")
-    solved = f"{1e3 * told.solution_seconds:.3g} ms of it for the solution (`seconds` in show)"
-    rest = f", the rest for {', '.join(told.other_work)}" if told.other_work else ""
+    work = f" ({facts.steps} steps, {facts.evaluations} evaluations)" if facts.steps else ""
+    yield heading("cost", f"{1e3 * facts.seconds:.3g} ms a job{work}")
+    solved = f"{1e3 * facts.solution_seconds:.3g} ms of it for the solution (`seconds` in show)"
+    rest = f", the rest for {', '.join(facts.other_work)}" if facts.other_work else ""
     yield heading("", solved + rest)
-    if told.expected_steps:
-        yield heading("", f"by the scales alone about {told.expected_steps:.1g} steps, "
-                      f"{1e3 * told.expected_seconds:.1g} ms")  # fmt: skip
-    if told.jobs > 1:
-        workers = plural(told.workers, "worker")
-        yield heading("", f"{told.sweep_seconds:.2g} s for {plural(told.jobs)} with {workers}, "
+    if facts.expected_steps:
+        yield heading("", f"by the scales alone about {facts.expected_steps:.1g} steps, "
+                      f"{1e3 * facts.expected_seconds:.1g} ms")  # fmt: skip
+    if facts.jobs > 1:
+        workers = plural(facts.workers, "worker")
+        yield heading("", f"{facts.sweep_seconds:.2g} s for {plural(facts.jobs)} with {workers}, "
                       "if all cost the same")  # fmt: skip
 
 
-def describe_advice(told: "Explanation", number: int) -> str:
+def describe_advice(facts: "Explanation", number: int) -> str:
     """Return the sentence on what leaving a feature out does, and whether to."""
-    advice = told.advice[number]
+    advice = facts.advice[number]
     effect = advice.effect
     if effect.reason:
         return f"{advice.name}: the run failed, {effect.reason}"
@@ -363,7 +363,7 @@ def describe_advice(told: "Explanation", number: int) -> str:
         f"contact force {percent(effect.change_peak_contact_force, '+')}, {told_time}"
     )
     if advice.removable:
-        return f"{text}; less than {percent(told.promise)}: leave it out ({advice.neutral})"
+        return f"{text}; less than {percent(facts.promise)}: leave it out ({advice.neutral})"
     return f"{text}; needed for {' and '.join(advice.needed_for)}"
 
 

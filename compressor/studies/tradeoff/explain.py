@@ -189,15 +189,15 @@ def promise(case: Case) -> float:
     """
     if case.targets:
         return min(target for _, target in case.targets)
-    kept = [tier.promise for tier in ACCURACY.values() if case.rtol <= tier.rtol]
-    return min(kept, default=ACCURACY["draft"].promise)
+    promises = [tier.promise for tier in ACCURACY.values() if case.rtol <= tier.rtol]
+    return min(promises, default=ACCURACY["draft"].promise)
 
 
 def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     """Return what a case computes, in words by term, and what it leaves out at no cost."""
     ideal = not faulty(case)
-    told = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
-    shown = [feature for feature in FEATURES if not feature.key.startswith(told)]
+    own_keys = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
+    shown = [feature for feature in FEATURES if not feature.key.startswith(own_keys)]
     used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
     active = {feature.name: paid_value(case, feature) for feature in used}
     absent = tuple(feature.name for feature in shown if feature not in used)
@@ -247,8 +247,8 @@ def paid_value(case: Case, feature: ModelFeature) -> str:
         return f"{law}static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
     value = getattr(getattr(case, group), name) if dot else getattr(case, group)
     if not dot and hasattr(value, "__dataclass_fields__"):
-        given = {key: one for key, one in vars(value).items() if one is not None}
-        value = ", ".join(f"{key} {shown_words(one)}" for key, one in given.items())
+        fields = {key: one for key, one in vars(value).items() if one is not None}
+        value = ", ".join(f"{key} {shown_words(one)}" for key, one in fields.items())
     return f"{feature.key} = {value}"
 
 
@@ -277,5 +277,5 @@ def advise(case: Case, repeats: int, progress: Progress) -> Iterator[Advice]:
             "peak acceleration": effect.change_peak_acceleration,
             "contact force": effect.change_peak_contact_force,
         }
-        kept = tuple(name for name, change in needed.items() if not abs(change) < allowed)
-        yield Advice(feature.key, feature.name, feature.neutral, effect, kept, not kept)
+        needed_for = tuple(name for name, change in needed.items() if not abs(change) < allowed)
+        yield Advice(feature.key, feature.name, feature.neutral, effect, needed_for, not needed_for)

@@ -367,8 +367,8 @@ def compare(base: Case, other: Case, repeats: int, known: xr.Dataset | None = No
         if not complete(run):
             return Effect(reason=run["reason"].item())
     joints = faulty(base) or [*JOINTS]
-    peak, force, apart = changes(*[stored_values(run, joints) for run in runs])
-    return Effect(peak, force, apart, statistics.median(ratios))
+    peak, force, difference = changes(*[stored_values(run, joints) for run in runs])
+    return Effect(peak, force, difference, statistics.median(ratios))
 
 
 def changes(

@@ -89,11 +89,11 @@ def model_table(data: xr.Dataset) -> ModelTable:
     first = data.isel(choice=0)
     shown = [m for m in measures(first) if METRICS[m.variable].kind != "count"]
     known = [m for m in shown if has_number(m, float(m.of(first)), float(m.bar(first)))]
-    there = data.isel(choice=(data["status"] != "missing") | (data["note"] != ""))
-    columns = [(m, m.of(there).values, m.bar(there).values) for m in known]
+    listed = data.isel(choice=(data["status"] != "missing") | (data["note"] != ""))
+    columns = [(m, m.of(listed).values, m.bar(listed).values) for m in known]
     rows = []
-    for n in range(1, there.sizes["choice"]):
-        one = there.isel(choice=n)
+    for n in range(1, listed.sizes["choice"]):
+        one = listed.isel(choice=n)
         found = [change(m, values[[0, n]], bars[[0, n]], one) for m, values, bars in columns]
         ratio = float(one["seconds"]) / float(first["seconds"])
         rows.append(
@@ -137,10 +137,10 @@ def change(
         return ("chaotic" if chaotic else "unknown"), math.nan
     if relative and values[1] <= 0.0:  # a penetration
         return "no contact", math.nan
-    apart = values[1] - values[0]
-    if abs(apart) <= bars.sum():
+    difference = values[1] - values[0]
+    if abs(difference) <= bars.sum():
         return NONE_SEEN, 0.0
-    size = float(apart / values[0] if relative else apart)
+    size = float(difference / values[0] if relative else difference)
     return change_text(measure, size), size
 
 
@@ -195,17 +195,17 @@ def headline(table: ModelTable) -> str:
     error = f"below {100 * MIN_ERROR:g}" if share < MIN_ERROR else f"{100 * share:.1g}"
     word = "peak" if peaks else "number"
     span = table.span_texts[n]
-    moved = f"choices of the model move this {word} by {span}"
+    text = f"choices of the model move this {word} by {span}"
     if span == NONE_SEEN:
-        moved = f"no choice of the model is seen to move this {word}"
+        text = f"no choice of the model is seen to move this {word}"
     blank = [row.cells[n] for row in table.rows if math.isnan(row.changes[n])]
     if blank:
         words = ", ".join(dict.fromkeys("impossible" if b == NO_VALUE else b for b in blank))
         verb = "gives" if len(blank) == 1 else "give"
-        moved += f"; {len(blank)} of {len(table.rows)} choices {verb} no number ({words})"
+        text += f"; {len(blank)} of {len(table.rows)} choices {verb} no number ({words})"
     start = "" if peaks else "no peak of the case is known; "
     title = f"{start}{measure.title}"
-    return f"{title[0].upper()}{title[1:]}: {number.rstrip()}; numerical error {error} %; {moved}"
+    return f"{title[0].upper()}{title[1:]}: {number.rstrip()}; numerical error {error} %; {text}"
 
 
 def place_text(study: Study | StoredStudy, key: str) -> str:

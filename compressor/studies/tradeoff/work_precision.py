@@ -90,9 +90,11 @@ def grid_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]
 
     Includes the acceleration over the whole run; peaks and rms are those after `settle_rev`.
     """
-    kept = settled_part(run)
-    a = kept["acceleration"].values
-    sizes = np.hypot(*kept["contact_force"].sel(joint=list(joints)).transpose("axis", ...).values)
+    settled = settled_part(run)
+    a = settled["acceleration"].values
+    sizes = np.hypot(
+        *settled["contact_force"].sel(joint=list(joints)).transpose("axis", ...).values
+    )
     return {
         "acceleration": run["acceleration"].values,
         "peak_acceleration": np.abs(a).max(),
@@ -208,9 +210,9 @@ def empty(scenes: list[str], methods: Sequence[str], tolerances: Sequence[float]
     variables["paper_seconds"] = ("scene", np.full(len(scenes), np.nan), about)
     for name in COUNTS:
         variables[name] = (dims, np.zeros(shape, np.int64), {"units": "1", "long_name": name})
-    apart = {"units": "1", "long_name": "relative distance of two references"}
+    distance = {"units": "1", "long_name": "relative distance of two references"}
     uncertainty = np.full((len(scenes), len(ERRORS)), np.nan)
-    variables["reference_uncertainty"] = (("scene", "quantity"), uncertainty, apart)
+    variables["reference_uncertainty"] = (("scene", "quantity"), uncertainty, distance)
     coordinates = {
         "scene": ("scene", np.array(scenes, object), {"long_name": "case"}),
         "method": ("method", np.array(methods, object), {"long_name": "solve.method"}),
@@ -222,8 +224,8 @@ def empty(scenes: list[str], methods: Sequence[str], tolerances: Sequence[float]
 
 def compare_references(study: xr.Dataset, name: str, truth: Mapping[str, Mapping]) -> None:
     """Return how far the references of a case lie apart, by quantity."""
-    apart = errors(truth[REFERENCES[1]], truth[REFERENCES[0]])
-    study["reference_uncertainty"].loc[name] = [apart[quantity] for quantity in ERRORS]
+    distances = errors(truth[REFERENCES[1]], truth[REFERENCES[0]])
+    study["reference_uncertainty"].loc[name] = [distances[quantity] for quantity in ERRORS]
 
 
 def judge_paper(study: xr.Dataset, name: str, case: Case, truth: Mapping[str, Mapping]) -> None:

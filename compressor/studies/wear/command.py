@@ -119,10 +119,10 @@ def table(machines: "tuple[WornMachine, ...]") -> Iterator[str]:
 
 def wear_ending(one: "WornMachine") -> str:
     """Return how a machine ended, in a line."""
-    found, how = one.life, one.case.wear
-    if not found or not how:
+    found, wear_keys = one.life, one.case.wear
+    if not found or not wear_keys:
         return f"failed: {one.reason}"
-    most = hours(how.hours, "> ")
+    most = hours(wear_keys.hours, "> ")
     low, mid, high = (
         most if math.isnan(value) else hours(value)
         for value in (found.low, found.hours, found.high)
@@ -171,9 +171,9 @@ def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
 
     for one in [one for one in summary.machines if one.life][:MAX_DRAWN]:
         path = wear_file(folder, one.case).with_suffix(".png")
-        how = one.case.wear
-        assert how
-        bounds = how.limit_mm or math.nan, how.coefficient_factor
+        wear_keys = one.case.wear
+        assert wear_keys
+        bounds = wear_keys.limit_mm or math.nan, wear_keys.coefficient_factor
         publish(path, render(draw_wear(open_wear(folder, one.case), *bounds), "png"))
         yield os.fspath(path)
 

@@ -57,7 +57,7 @@ class Worn:
     case: Case
 
     @property
-    def how(self) -> Wear:
+    def wear(self) -> Wear:
         """Return the keys by which it wears."""
         assert self.case.wear
         return self.case.wear
@@ -66,19 +66,19 @@ class Worn:
     def key(self) -> str:
         """Return the hash of what decides the numbers."""
         values = self.case.values()
-        what = [self.case.key, values["wear"], model_of(values), SCHEMA]
-        return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()[:20]
+        identity = [self.case.key, values["wear"], model_of(values), SCHEMA]
+        return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:20]
 
     @property
     def clearances(self) -> np.ndarray:
         """Return the clearances of both joints, unworn (m)."""
-        given = self.case.clearance_mm
-        return np.array([to_si(getattr(given, joint), "mm") for joint in JOINTS])
+        unworn = self.case.clearance_mm
+        return np.array([to_si(getattr(unworn, joint), "mm") for joint in JOINTS])
 
     @property
     def limit(self) -> float:
         """Return the clearance (m) of a joint that is worn out."""
-        return to_si(self.how.limit_mm or math.inf, "mm")
+        return to_si(self.wear.limit_mm or math.inf, "mm")
 
     @property
     def most_hours(self) -> float:
@@ -86,20 +86,20 @@ class Worn:
 
         In `hours` the greatest coefficient wears as much as the nominal one does in these.
         """
-        return self.how.hours * self.how.coefficient_factor
+        return self.wear.hours * self.wear.coefficient_factor
 
     @property
     def sector_area(self) -> np.ndarray:
         """Return the area of a bore's sector, by joint (m^2)."""
         pins = [to_si(self.case.machine.pin_radius(joint), "mm") for joint in JOINTS]
         radius = np.array(pins) + self.clearances
-        width = 2.0 * math.pi / self.how.sectors * radius
-        return np.asarray(width * to_si(self.how.bore_length_mm, "mm"))
+        width = 2.0 * math.pi / self.wear.sectors * radius
+        return np.asarray(width * to_si(self.wear.bore_length_mm, "mm"))
 
     @property
     def depth_per_work(self) -> np.ndarray:
         """Return the depth (m) that 1 J wears off a sector, by joint: Archard's law."""
-        return to_si(self.how.coefficient_mm3_per_N_m, "mm3/(N m)") / self.sector_area
+        return to_si(self.wear.coefficient_mm3_per_N_m, "mm3/(N m)") / self.sector_area
 
     def path(self, folder: Folder) -> Path:
         """Return where it is stored."""
@@ -158,10 +158,10 @@ def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> WearRu
     return WearRun(work, slid.std(axis=0), turn, metrics(p, whole), states[-1])
 
 
-def first(of: Worn) -> Stage:
+def first(machine: Worn) -> Stage:
     """Return the stage of unworn bores."""
-    unworn = np.zeros((len(JOINTS), of.how.sectors))
-    return new_stage(0.0, unworn, wear_bores(of.case, unworn, None))
+    unworn = np.zeros((len(JOINTS), machine.wear.sectors))
+    return new_stage(0.0, unworn, wear_bores(machine.case, unworn, None))
 
 
 def new_stage(hours: float, worn: np.ndarray, motion: WearRun) -> Stage:
@@ -176,23 +176,23 @@ def new_stage(hours: float, worn: np.ndarray, motion: WearRun) -> Stage:
     }  # fmt: skip
 
 
-def following(of: Worn, stage: Stage) -> Stage:
+def following(machine: Worn, stage: Stage) -> Stage:
     """Return the stage after one that is not the last; by the midpoint rule."""
-    rate = of.depth_per_work[:, np.newaxis] * stage["rubbing_work"]  # m a revolution
-    left = (of.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
+    rate = machine.depth_per_work[:, np.newaxis] * stage["rubbing_work"]  # m a revolution
+    left = (machine.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
     fastest = float(rate.max())
-    step = to_si(of.how.step_mm, "mm")
+    step = to_si(machine.wear.step_mm, "mm")
     span = min(step / fastest, left) if fastest > 0.0 else left  # revolutions
-    midway = wear_bores(of.case, stage["worn_depth"] + 0.5 * span * rate, stage["end_state"])
+    midway = wear_bores(machine.case, stage["worn_depth"] + 0.5 * span * rate, stage["end_state"])
     if midway.reason:
         return stage | {"reason": midway.reason, "detail": midway.detail}
     hours = stage["hours"] + span * midway.turn / 3600.0
-    hours = of.most_hours if span == left else hours
-    worn = stage["worn_depth"] + span * of.depth_per_work[:, np.newaxis] * midway.work
-    return new_stage(hours, worn, wear_bores(of.case, worn, midway.state))
+    hours = machine.most_hours if span == left else hours
+    worn = stage["worn_depth"] + span * machine.depth_per_work[:, np.newaxis] * midway.work
+    return new_stage(hours, worn, wear_bores(machine.case, worn, midway.state))
 
 
-def stages_dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
+def stages_dataset(machine: Worn, stages: list[Stage]) -> xr.Dataset:
     """Return the stages of a machine, with the dimension `stage`."""
     found: dict[str, tuple] = {}
     for name, phrase in (("reason", "why it ended early"), ("detail", "what is known of that")):
@@ -202,30 +202,30 @@ def stages_dataset(of: Worn, stages: list[Stage]) -> xr.Dataset:
         values = np.array([stage[name] for stage in stages], float)
         found[name] = ("stage", *dims), values, {"units": unit, "long_name": phrase}
     worn = found["worn_depth"][1]
-    deepest = of.clearances + worn.max(axis=2)
-    told = {"units": "m", "long_name": "clearance at the deepest place"}
-    found["clearance"] = ("stage", "joint"), np.where(of.clearances > 0.0, deepest, 0.0), told
-    told = {"units": "m3", "long_name": "volume that is worn off"}
-    found["worn_volume"] = ("stage", "joint"), worn.sum(axis=2) * of.sector_area, told
-    angles = 2.0 * math.pi / of.how.sectors * np.arange(of.how.sectors)
-    told = {"units": "rad", "long_name": "of a place on the bore from the rod's axis, towards the "
+    deepest = machine.clearances + worn.max(axis=2)
+    about = {"units": "m", "long_name": "clearance at the deepest place"}
+    found["clearance"] = ("stage", "joint"), np.where(machine.clearances > 0.0, deepest, 0.0), about
+    about = {"units": "m3", "long_name": "volume that is worn off"}
+    found["worn_volume"] = ("stage", "joint"), worn.sum(axis=2) * machine.sector_area, about
+    angles = 2.0 * math.pi / machine.wear.sectors * np.arange(machine.wear.sectors)
+    about = {"units": "rad", "long_name": "of a place on the bore from the rod's axis, towards the "
             "small end, counter-clockwise"}  # fmt: skip
     where = {
-        "angle": ("angle", angles, told),
+        "angle": ("angle", angles, about),
         "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
     }
-    attrs = {"key": of.key, "program": PROGRAM, "model_version": MODEL}
-    attrs["case"] = of.case.attributes()["case"]
+    attrs = {"key": machine.key, "program": PROGRAM, "model_version": MODEL}
+    attrs["case"] = machine.case.attributes()["case"]
     return xr.Dataset(found, where, attrs)
 
 
-def read_kept_stages(of: Worn, path: Path) -> list[Stage]:
+def read_kept_stages(machine: Worn, path: Path) -> list[Stage]:
     """Return the stages of an earlier run, none where there is no file. Raises StoreError."""
     if not path.exists():
         return []
     found = read_dataset(path, REMEDY)
     names = {*NUMBERS, "reason", "detail"}
-    if found.attrs.get("key") != of.key or not names <= {*found.variables}:
+    if found.attrs.get("key") != machine.key or not names <= {*found.variables}:
         raise StoreError(path, "does not hold the machine that its name says", REMEDY)
     columns = {name: found[name].values for name in names}
     stages = [
@@ -236,9 +236,9 @@ def read_kept_stages(of: Worn, path: Path) -> list[Stage]:
     return stages
 
 
-def write(of: Worn, folder: Folder, stages: list[Stage]) -> None:
+def write(machine: Worn, folder: Folder, stages: list[Stage]) -> None:
     """Store the stages of a machine. Raises StoreError."""
-    write_dataset(of.path(folder), stages_dataset(of, stages))
+    write_dataset(machine.path(folder), stages_dataset(machine, stages))
 
 
 def wear_file(folder: Folder, case: Case) -> Path:
@@ -273,13 +273,13 @@ class Life(NamedTuple):
     angle: float
 
 
-def life(of: Worn, stages: xr.Dataset) -> Life:
+def life(machine: Worn, stages: xr.Dataset) -> Life:
     """Return how long a machine lasts, by straight lines between its stages."""
     opened = stages["clearance"].transpose("stage", "joint").values
     hours = stages["hours"].values
-    reached = [when(hours, opened[:, joint], of.limit) for joint in range(opened.shape[1])]
+    reached = [when(hours, opened[:, joint], machine.limit) for joint in range(opened.shape[1])]
     worst = int(np.nanargmin(reached)) if np.isfinite(reached).any() else int(opened[-1].argmax())
-    found, factor, most = reached[worst], of.how.coefficient_factor, of.how.hours
+    found, factor, most = reached[worst], machine.wear.coefficient_factor, machine.wear.hours
     deepest = stages["worn_depth"].isel(stage=-1, joint=worst)
     return Life(
         found if found <= most else math.nan,
