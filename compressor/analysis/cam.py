@@ -126,7 +126,10 @@ class Cam:
 
 
 def pressure_angle(p, angles, base_radius):
-    """Return pressure angle (rad) of the aligned roller follower: tan = (ds/dphi) / (r0 + s)."""
+    """Return the pressure angle (rad) of the aligned roller follower.
+
+    Its tangent is (ds/dphi) / (r0 + s).
+    """
     return np.arctan(cam_slope(p, angles) / (base_radius + cam_profile(p, angles)))
 
 

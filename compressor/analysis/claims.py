@@ -67,7 +67,7 @@ class Rule:
 
 
 def same_motion(runs: Runs) -> Verdict:
-    """Return the claim 1: both ideal machines move alike."""
+    """Return the verdict on claim 1: both ideal machines move alike."""
     rows, margins = [], []
     for name in MOTION:
         one, other = runs["design"][name].values, runs["typical"][name].values
@@ -78,7 +78,7 @@ def same_motion(runs: Runs) -> Verdict:
 
 
 def design_force(runs: Runs) -> Verdict:
-    """Return the claim 2: the spring load peaks higher, and its corners lie elsewhere."""
+    """Return the verdict on claim 2: the spring load peaks higher, with other corners."""
     peaks = {load: float(runs[load]["piston_force"].max()) for load in ("design", "typical")}
     corners = {load: np.degrees(load_corners(runs[load])) for load in peaks}
     shifts = np.abs(corners["design"] - corners["typical"])[[0, 2]]
@@ -92,7 +92,7 @@ def design_force(runs: Runs) -> Verdict:
 
 
 def acceleration_alone(runs: Runs) -> Verdict:
-    """Return claim 3: displacement and velocity hardly change with clearance, acceleration does."""
+    """Return the verdict on claim 3: clearance changes acceleration, and hardly v or x."""
     rows, margins = [], []
     for name in FAULT_LABELS:
         settled = settled_part(runs[name])
@@ -114,7 +114,7 @@ def acceleration_alone(runs: Runs) -> Verdict:
 
 
 def growing_peaks(runs: Runs) -> Verdict:
-    """Return the claim 4: peaks of acceleration and contact force grow with clearance."""
+    """Return the verdict on claim 4: acceleration and contact force peak higher with clearance."""
     rows, margins = [], []
     for fault in FAULTS:
         line = [runs[label(fault, c)] for c in CLEARANCES]
@@ -130,7 +130,7 @@ def growing_peaks(runs: Runs) -> Verdict:
 
 
 def horizontal_force(runs: Runs) -> Verdict:
-    """Return the claim 5: the horizontal contact force far exceeds the vertical one."""
+    """Return the verdict on claim 5: the horizontal contact force far exceeds the vertical."""
     rows, margins = [], []
     for fault in FAULTS:
         for joint in faulty_joints(fault):
@@ -174,7 +174,7 @@ def across_over_up(run: xr.Dataset, joint: str) -> BarredNumber:
 
 
 def proportional_force(runs: Runs) -> Verdict:
-    """Return the claim 6: acceleration is proportional to the horizontal contact force."""
+    """Return the verdict on claim 6: acceleration is proportional to horizontal force."""
     rows, margins = [], []
     for name in FAULT_LABELS:
         fault = name.split()[0]
@@ -246,13 +246,13 @@ def per_revolution(run: xr.Dataset, count: str, joint: str) -> float:
 
 
 def vibrating(runs: Runs) -> Margin:
-    """Return the claim 7 by the share of time in which the machine vibrates, beside its verdict."""
+    """Return the margin of claim 7 by the share of time in which the machine vibrates."""
     pairs = ([active_share(runs[label(joint, c)]) for joint in JOINTS] for c in CLEARANCES)
     return least([exceeds(BarredNumber(big), BarredNumber(small), EXCESS) for big, small in pairs])
 
 
 def two_are_worse(runs: Runs) -> Verdict:
-    """Return the claim 8: two clearances are worse than one of the same size."""
+    """Return the verdict on claim 8: two clearances are worse than one of the same size."""
     rows, margins = [], []
     for c in CLEARANCES:
         for name, unit in (("peak_acceleration", "peak"), ("rms_acceleration_deviation", "rms")):
@@ -340,7 +340,11 @@ class Claim:
 
 
 def claims(runs: Runs) -> list[Claim]:
-    """Measure every claim on the runs at hand, complete ones by label (see `paper_cases`)."""
+    """Return every claim with its margin, measured on the runs at hand.
+
+    runs: by label (see `paper_cases`), complete ones. A claim whose runs are not there has `held`
+    None.
+    """
     found = []
     for number, rule in enumerate(RULES, 1):
         missing = [name for name in rule.needs if name not in runs]

@@ -372,7 +372,7 @@ def modes_of(run: xr.Dataset, joint: str) -> np.ndarray:
 
 
 def mode_shares(modes: xr.Dataset) -> xr.Dataset:
-    """Return the shares of time of what `contact_modes` gives.
+    """Return the shares of time in each contact mode, from `contact_modes`.
 
     `share` over (joint, mode), and with two joints `combination_share` over (big_end_mode,
     small_end_mode), nine numbers. Samples stand for the step that they begin.
@@ -402,12 +402,12 @@ def angle_modes(run: xr.Dataset) -> xr.Dataset:
 
 
 def mode_map(modes: xr.Dataset, width_deg: float = 1.0) -> xr.Dataset:
-    """Return what `contact_modes` gives over the crank angle, all revolutions together.
+    """Return the shares of each contact mode over the crank angle, all revolutions together.
 
-    Over bins of `width_deg`, with `angle` (deg, 0 to 360) the middle of each: `share` over (angle,
-    joint, mode), and `majority` over (angle, joint), the mode with the greatest share, the first
-    of equals. A bin without samples has shares of nan and the majority -1. Raises ValueError where
-    the width is no whole part of a revolution.
+    modes: of `contact_modes`. Over bins of `width_deg`, with `angle` (deg, 0 to 360) the middle of
+    each: `share` over (angle, joint, mode), and `majority` over (angle, joint), the mode with the
+    greatest share, the first of equals. A bin without samples has shares of nan and the majority
+    -1. Raises ValueError where the width is no whole part of a revolution.
     """
     count = round(360.0 / width_deg) if width_deg > 0 else 0
     if count < 1 or abs(count * width_deg - 360.0) > 1e-6:

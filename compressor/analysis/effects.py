@@ -262,7 +262,7 @@ def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, flo
 def trend(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...] | None:
     """Return a least-squares parabola at places, and the ends of its 95 % interval.
 
-    x, y: (points,), nan where unknown; None of fewer than FEWEST points or three places. The
+    x, y: (points,), nan where unknown; None of fewer than MIN_POINTS points or three places. The
     interval is that of the mean at a place, by Student's t and the covariance HC3, which holds
     where the scatter differs along x, too (MacKinnon and White, Journal of Econometrics 29, 1985,
     305-325).

@@ -204,7 +204,7 @@ def continuity(run: xr.Dataset, joint: str, start_up: bool = False) -> Continuit
 
 
 def continuity_of(found: Evidence, joint: str) -> Continuity:
-    """Return the `Continuity` of a joint by its evidence."""
+    """Return the `Continuity` of a joint from its evidence."""
     from compressor.vibration import energy_angle, shape
 
     modes = contact_modes(found.settled)["mode"].sel(joint=joint).values[:-1]

@@ -55,13 +55,13 @@ ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibra
 
 
 def settled_part(run: xr.Dataset) -> xr.Dataset:
-    """Return the samples from `settle_rev` on: start-up is not the machine."""
+    """Return the samples from `settle_rev` on, since start-up is not the machine."""
     time, begin = run["time"].values, run.attrs["settle"] * (1 - 1e-12)
     return run if time[0] >= begin else run.isel(time=time >= begin)
 
 
 def settled_revolutions(run: xr.Dataset) -> float:
-    """Return the revolutions that a run's metrics are taken over."""
+    """Return the number of revolutions over which a run's metrics are taken."""
     return float(np.ptp(settled_part(run)["crank_angle"].values)) / math.tau
 
 
@@ -75,7 +75,7 @@ class Relation:
 
 
 def force_relation(run: xr.Dataset, joint: str) -> Relation:
-    """Return `Relation` of a run's settled series at one joint (force on the rod)."""
+    """Return `Relation` of a joint's settled horizontal force (N, on the rod) to acceleration."""
     settled = settled_part(run)
     a = settled["acceleration"].values
     force = settled["contact_force"].sel(joint=joint, axis="x").values

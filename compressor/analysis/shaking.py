@@ -78,7 +78,10 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
 
 
 def healthy_twin(run: xr.Dataset) -> xr.Dataset:
-    """Return the same machine with ideal joints, on the run's output grid, from closed forms."""
+    """Return the run of the same machine with ideal joints, on the run's output grid.
+
+    From closed forms, without body, sensor and error bars.
+    """
     values = replace(with_ideal_joints(case_of(run)), body=None, sensor=None).values()
     values["solve"]["error_bars"] = False
     values["output"] = {"keep": "series"}
@@ -137,7 +140,7 @@ class Shaking:
 
 
 def shaking(run: xr.Dataset) -> Shaking:
-    """Return what `Shaking` says of a run with time series; of ideal joints there are no turns.
+    """Return the `Shaking` of a run with time series; of ideal joints there are no turns.
 
     Raises NoSeriesError where the series hold no whole settled revolution, SignalError where they
     are too coarse for `ORDER`.
@@ -195,7 +198,10 @@ def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
 
 
 def deviation_spectrum(run: xr.Dataset) -> Spectrum:
-    """Return the order spectrum of the crosshead's acceleration less the ideal machine's, m/s2."""
+    """Return the order spectrum of the acceleration less the ideal machine's, m/s2.
+
+    Of the crosshead, over whole settled revolutions. Raises NoSeriesError where there is none.
+    """
     settled, revolutions = whole_revolutions(run)
     deviation = settled["acceleration"].values - ideal_motion(settled)[2]
     return order_lines(*evenly(settled, revolutions, deviation))

@@ -216,6 +216,7 @@ def extremes(y: np.ndarray, count: int) -> np.ndarray:
     is_shown = (filled == least[part]) | (filled == greatest[part]) | ~np.isfinite(y)
     is_shown[[0, -1]] = True
     places = np.flatnonzero(is_shown)
+    # where a part's values are equal, all of them are its extremes
     return places if places.size <= 4 * count else every(y.size, 2 * count)
 
 

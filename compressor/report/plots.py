@@ -73,7 +73,10 @@ class Plotted:
 
 
 def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
-    """Return the figures that are wanted; PlotError where one is none of this thing."""
+    """Return the figures to draw: those that are asked for, by default all.
+
+    known: the names that `thing` has. Raises PlotError for another one.
+    """
     wrong = [name for name in what if name not in known]
     if wrong:
         raise PlotError(f"{thing} has no figure {wrong[0]!r}: it has {', '.join(known)}")

@@ -39,7 +39,7 @@ class Record:
 
 
 def analogue_rate(body: Body, sensor: Sensor) -> float:
-    """Return the least rate (Hz) at which forces are to be known for a record."""
+    """Return the least rate (Hz) at which forces must be known for a sensor's record."""
     casing = body.casing_frequency_Hz if body.casing else 0.0
     return ANALOGUE_RATE_FACTOR * max(sensor.rate_Hz, sensor.mounting_Hz, casing)
 
@@ -61,7 +61,7 @@ def listen(
     guide: float,
     motion: BodyMotion | None = None,
 ) -> Record:
-    """Return the record of a sensor.
+    """Return the record of a sensor on a body under forces.
 
     forces: with a first and last sample a whole number of revolutions of `turn` s apart where the
     body is steady, in any case from top dead centre on; guide: mid-stroke from the crank, m;
@@ -119,8 +119,9 @@ def record_signal(
     turns: np.ndarray,
     rng: np.random.Generator,
 ) -> Record:
-    """Return the chain from the acceleration at a sensor's foot to its samples.
+    """Return the record of the acceleration at a sensor's foot.
 
+    The chain is the mounting's resonance, a low-pass filter, sampling, noise and clipping.
     acceleration: m/s2 at `times`, s, (n,), the record being what is not before 0; turns:
     revolutions.
     """

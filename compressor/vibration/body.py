@@ -52,9 +52,10 @@ def oscillate(
     root = omega * complex(-damping_ratio, np.sqrt(1.0 - damping_ratio**2))
     cubics = pieces(force, step, steady)
     whole, shares = one_step(root, step)
+    # products of real matrices: the cubics have no imaginary part
     driven = shares.real @ cubics + 1j * (shares.imag @ cubics)
     start = 0.0j
-    if steady:
+    if steady:  # z0 = final + exp(s T) z0: the motion ends a period as it began it
         start = final(whole, driven) / (1.0 - np.exp(root * step * (len(force) - 1)))
     z = np.empty(len(force), complex)
     z[0] = start
@@ -75,7 +76,7 @@ def pieces(force: np.ndarray, step: float, periodic: bool) -> np.ndarray:
 
 
 def one_step(root: complex, step: float) -> tuple[complex, np.ndarray]:
-    """Return the exp(s h), and the integrals of exp(s (h - t)) t^j over a step, (4,)."""
+    """Return exp(s h), and the integrals of exp(s (h - t)) t^j over a step, (4,)."""
     matrix = np.zeros((DEGREE + 2, DEGREE + 2), complex)
     matrix[0, 0], matrix[0, 1] = root * step, step
     for power in range(1, DEGREE + 1):
@@ -128,7 +129,10 @@ def centre(body: Body) -> tuple[float, float]:
 
 
 def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
-    """Return the rigid body's motion under forces, from rest or `steady` (`oscillate`)."""
+    """Return the rigid body's motion under forces, from rest or `steady` (`oscillate`).
+
+    Raises ValueError as `oscillate`.
+    """
     x, y = centre(body)
     shaking = forces.shaking
     moment = forces.moment - x * shaking[:, 1] + y * shaking[:, 0]

@@ -106,7 +106,7 @@ def scipy_window(window: str) -> str:
 
 
 def noise_bandwidth(window: str) -> float:
-    """Return equivalent noise bandwidth of a window, in lines of the spectrum; raises SignalError.
+    """Return the equivalent noise bandwidth of a window, in lines; raises SignalError.
 
     n sum(w^2) / sum(w)^2: 1 for rectangular, 1.5 for hann, 3.77 for flattop (Harris, Proceedings
     of the IEEE 66, 1978, Eq. 11). White noise raises each line of a mean square by as much.
@@ -220,12 +220,12 @@ def order_spectrum(
 def rms_above(
     orders: np.ndarray, rms_amplitudes: np.ndarray, order: float, window: str = "rectangular"
 ) -> float:
-    """Return root mean square of what lies above an order, the order itself left out (Parseval).
+    """Return the root mean square of what lies above an order (Parseval).
 
-    orders and rms_amplitudes: (k,), of a spectrum with `rms` set and this window, whose noise
-    bandwidth the sum of squares is divided by. That is exact without leakage for the rectangular
-    window, and for others where lines are not cut by the order. 0 if nothing lies above.
-    Raises SignalError if the shapes differ or values are not finite.
+    The order itself is left out. orders and rms_amplitudes: (k,), of a spectrum with `rms` set and
+    this window, whose noise bandwidth the sum of squares is divided by. That is exact without
+    leakage for the rectangular window, and for others where lines are not cut by the order. 0 if
+    nothing lies above. Raises SignalError if the shapes differ or values are not finite.
     """
     at, found = checked_signal(orders, "the order"), checked_signal(rms_amplitudes, "the spectrum")
     if at.size != found.size:

@@ -12,14 +12,14 @@ Outlines = tuple[np.ndarray, np.ndarray]
 
 
 def contour_lines(x: np.ndarray, y: np.ndarray, z: np.ndarray, levels: Sequence[float]) -> Outlines:
-    """Return the lines of z, shape (y, x), at some levels, with nan between two lines."""
+    """Return x and y of the lines of z, shape (y, x), at some levels, nan between two."""
     generator = contour_generator(x, y, np.ma.masked_invalid(z), line_type=LineType.Separate)
     lines: list[Any] = [line for level in levels for line in generator.lines(level)]
     return join_with_gaps(lines)
 
 
 def contour_area(x: np.ndarray, y: np.ndarray, z: np.ndarray, low: float, high: float) -> Outlines:
-    """Return the outlines of where z, shape (y, x), lies between two values."""
+    """Return x and y of the outlines of where z, shape (y, x), lies between two values."""
     generator = contour_generator(x, y, np.ma.masked_invalid(z), fill_type=FillType.OuterOffset)
     found: Any = generator.filled(low, high)
     rings = [ring for polygon, ends in zip(*found, strict=True)

@@ -57,7 +57,7 @@ MOTION = (
 
 
 def draw_load_response(runs: Runs) -> Drawing:
-    """Return the figure 6: the design and the typical model without clearance."""
+    """Return figure 6: the design and the typical model without clearance."""
     curves = load_curves(runs)
     figure, panels = make_grid(3, 2, 9.6)
     for (full, enlarged), quantity, letters in zip(panels, MOTION, ("ab", "cd", "ef"), strict=True):
@@ -67,7 +67,7 @@ def draw_load_response(runs: Runs) -> Drawing:
 
 
 def draw_fault_response(runs: Runs, fault: str) -> Drawing:
-    """Return the figures 8, 11, 14: no clearance and three clearances of one fault.
+    """Return figure 8, 11 or 14: no clearance, and three clearances of one fault.
 
     Acceleration oscillates fast: it has a row a clearance.
     """
@@ -117,7 +117,7 @@ PISTON = Quantity("piston_force", "", "force on the piston, towards the crank (k
 
 
 def draw_piston_force(runs: Runs) -> Drawing:
-    """Return the figure 7: the piston force of the design and the typical model."""
+    """Return figure 7: the piston force of the design and the typical model."""
     figure, panels = make_grid(1, 1, 4.2)
     plot(panels[0, 0], load_curves(runs), PISTON)
     panels[0, 0].y.span(low=0)
@@ -125,7 +125,9 @@ def draw_piston_force(runs: Runs) -> Drawing:
 
 
 def draw_contact_force(runs: Runs, fault: str, joint: str) -> Drawing:
-    """Return the figures 9, 12, 15, 16: contact force at one joint, both ways, a row a clearance.
+    """Return figure 9, 12, 15 or 16: contact force at one joint, a row a clearance.
+
+    Both ways in each row: along the cylinder and across it.
 
     All enlarged views show the window in which the horizontal forces at the fault's first joint
     differ most, so that those of both joints show the same angles.
@@ -204,7 +206,7 @@ BASE = LineStyle("#707070", (0, (1, 1.2)), 1.2, 2.1)
 
 
 def draw_pressure_volume(runs: Runs) -> Drawing:
-    """Return the figure 3: cylinder pressure over volume, phases named, with their direction."""
+    """Return figure 3: cylinder pressure over volume, with phases and direction."""
     run = settled_part(runs["typical"])
     volume, pressure = gas_state(run)
     figure, panels = make_grid(1, 1, 5.2)

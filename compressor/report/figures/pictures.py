@@ -305,6 +305,7 @@ def by_two(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict
     def send(_: object = None) -> None:
         """Submit the next drawing to the copy as soon as it has finished one."""
         with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
+            # in the pool's own thread, but a deque gives each name to one side only
             name = waiting.popleft()
             futures[name] = pool.submit(draw_reported, drawings[name], headings[name])
             futures[name].add_done_callback(send)

@@ -116,9 +116,9 @@ def in_lines(words: Sequence[str]) -> list[str]:
 
 
 def scale_y(panel: Panel, values: np.ndarray) -> float:
-    """Return room at the foot for marks, and a log scale over decades; gives the span of the panel.
+    """Set the y axis for values, with room at the foot for marks; return the panel's span.
 
-    Values that are all the same stand in the middle.
+    Logarithmic over decades. Values that are all the same stand in the middle.
     """
     values = values[np.isfinite(values)]
     low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)

@@ -221,7 +221,7 @@ def least_change(
 
     def costs(shares: np.ndarray) -> np.ndarray:
         many = np.atleast_2d(shares.T).tolist()
-        search.judge(many)
+        search.judge(many)  # a whole generation, so that workers run it side by side
         return np.array([search.cost(search.values(point)) for point in many])
 
     differential_evolution(

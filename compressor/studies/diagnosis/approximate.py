@@ -45,6 +45,7 @@ class KernelRidge:
         inverse = cho_solve(cho_factor(gram, lower=True), np.eye(len(points)))
         mean = targets.mean(axis=0)
         weights = inverse @ (targets - mean)
+        # closed form of the n fits without one point each, but for the mean, which is of all
         left_out = targets - weights / np.diag(inverse)[:, None]
         return cls(points, width, ridge, mean, weights, left_out)
 
@@ -60,7 +61,7 @@ def _squares(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _choose_kernel(points: np.ndarray, targets: np.ndarray) -> tuple[float, float]:
-    """Return the width and ridge with the least squares of errors left out."""
+    """Return the width and ridge with the least squares of leave-one-out errors."""
     squares = _squares(points, points)
     centred = targets - targets.mean(axis=0)
     least, best = np.inf, (WIDTHS[0], RIDGES[0])
@@ -142,6 +143,7 @@ class Strangeness:
 
     @classmethod
     def fit(cls, points: np.ndarray) -> "Strangeness":
+        """Return the judge of records whose features should be like those of n jobs, (n, F)."""
         middle = points.mean(axis=0)
         values, vectors = np.linalg.eigh(np.cov(points.T))
         axes = np.flatnonzero(values > WEAKEST * values.max())[::-1]
@@ -160,6 +162,7 @@ class Strangeness:
         fold = np.arange(len(points)) % FOLDS
         for number in range(FOLDS):
             mine = fold == number
+            # by the spread of the other folds: a job must not narrow its own distance
             apart[mine] = np.linalg.norm(left[mine] @ _whitening(left[~mine]), axis=1)
         spread = np.maximum((left @ back.T[strong:]).std(axis=0), 1e-12)
         return cls(
@@ -193,7 +196,7 @@ class Strangeness:
         return left @ self.back[-left.size :] / self.spread
 
     def _residuals(self, white: np.ndarray) -> np.ndarray:
-        """Return what the strongest components do not foretell of the others."""
+        """Return what the strongest components do not predict of the others."""
         strong = self.regression.points.shape[1]
         return white[strong:] - self.regression.predict(white[None, :strong])[0]
 

@@ -152,6 +152,7 @@ def doubts(pair: ChainPair, folder: Folder) -> list[Doubt]:
     if min(len(up), len(down)) < len(pair.up.cases):
         return []
     found = []
+    # rows are in the order of running, so that those of `down` begin at the last value
     for number, (one, other) in enumerate(zip(up, down[::-1], strict=False)):
         case = pair.up.cases[number]
         if differ(seen_in_row(one, case), seen_in_row(other, case), tolerance(case)):
@@ -269,7 +270,7 @@ class VerdictBook:
             self.write()
 
     def add(self, number: int, verdict: Verdict) -> None:
-        """Take note of a verdict."""
+        """Record a verdict; store all that is known if the last time is long ago."""
         self.known[number] = verdict
         if time.monotonic() - self.written > self.flush:
             self.write()

@@ -117,7 +117,7 @@ def sections(answer: SearchResult, tolerance: float, at_once: int) -> list[float
     found = []
     for left, right in gaps:
         width = right.share - left.share
-        # not more than bring the gap below the tolerance
+        # not more than bring the gap below the tolerance, nor one more by rounding
         enough = math.ceil(width / tolerance * (1.0 - 1e-9)) - 1
         count = min(max(1, at_once // len(gaps)), enough)
         found += [left.share + width * (n + 1) / (count + 1) for n in range(count)]

@@ -158,6 +158,7 @@ def agreed_verdict(
             continue
         excess = measured(found, other)
         (agreed if excess.ratio <= 1.0 else dissent).append((excess, other))
+        # the first judge decides if it agrees; against one that dissents it takes two
         if len(agreed) > min(len(dissent), 1):
             return ("ok", *agreed[0])
         if len(dissent) == 2:

@@ -67,7 +67,7 @@ class ModelFeature:
 
 
 def without_clearance(case: Case, joint: str) -> Case:
-    """Return a case of two faulty joints with one of them ideal, and concentric at the start."""
+    """Return a case with one of two faulty joints ideal, and concentric at the start."""
     other = next(name for name in JOINTS if name != joint)
     centred = {f"{joint}_x": 0.0, f"{joint}_y": 0.0}
     return replace(case, joint=other, initial_offset_mm=replace(case.initial_offset_mm, **centred))

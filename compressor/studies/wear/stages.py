@@ -187,6 +187,7 @@ def following(machine: Worn, stage: Stage) -> Stage:
     if midway.reason:
         return stage | {"reason": midway.reason, "detail": midway.detail}
     hours = stage["hours"] + span * midway.turn / 3600.0
+    # midway a turn may take another time, but the last stage must not end short of most_hours
     hours = machine.most_hours if span == left else hours
     worn = stage["worn_depth"] + span * machine.depth_per_work[:, np.newaxis] * midway.work
     return new_stage(hours, worn, wear_bores(machine.case, worn, midway.state))
