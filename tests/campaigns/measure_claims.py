@@ -29,9 +29,9 @@ from compressor.studies.claims.findings import (
     consistency,
     coordinate_in_words,
     count_claims,
-    deciding,
     flips,
     most_consistent,
+    rank_assumptions,
     sensitivity,
     summary,
 )
@@ -78,7 +78,7 @@ def main(target):
     table = sensitivity(judged)
     found["assumptions"] = {
         **told(judged),
-        "deciding": [*deciding(table)], "unknown": table["unknown"].item(),
+        "deciding": [*rank_assumptions(table)], "unknown": table["unknown"].item(),
         "names": [coordinate_in_words(str(name)) for name in table["assumption"].values],
         **{name: table[name].values.round(4).tolist() for name in table if table[name].ndim == 2},
     }  # fmt: skip

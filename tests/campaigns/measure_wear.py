@@ -15,7 +15,7 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
-from compressor.studies.wear.stages import Worn, first, following, life, stages_dataset
+from compressor.studies.wear.stages import Worn, first_stage, life, next_stage, stages_dataset
 
 ONE = {"joint": "big_end", "clearance_mm": 0.2}
 LIMIT = 1.5  # clearances, at which it ends
@@ -27,9 +27,9 @@ SEED, COUNT = 1601, 40
 def followed(values, **wear):
     """Hours to the limit, the profiles of the stage nearest below it (m), and why it failed."""
     of = Worn(Case.from_values({**values, "wear": {"hours": 1e8, **wear}}))
-    stages = [first(of)]
+    stages = [first_stage(of)]
     while not of.over(stages[-1]):
-        stages.append(following(of, stages[-1]))
+        stages.append(next_stage(of, stages[-1]))
     reached = life(of, stages_dataset(of, stages))
     return reached.hours, at_limit(of, stages), stages[-1]["reason"]
 

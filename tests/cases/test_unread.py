@@ -13,7 +13,7 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.table import table
 from compressor.solve import simulate
 from compressor.store.series_file import series_image
-from compressor.studies.wear.stages import Worn, first, following, life, stages_dataset
+from compressor.studies.wear.stages import Worn, first_stage, life, next_stage, stages_dataset
 
 SHORT = {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 5,
          "error_bars": False, "horizon": False}  # fmt: skip
@@ -209,8 +209,8 @@ def stored(text: str) -> dict[str, str]:
     found["file"] = str(len(series_image(run, case.output)) // 1000)
     if case.wear:
         worn = Worn(case)
-        begun = first(worn)
-        stages = stages_dataset(worn, [begun, following(worn, begun)])
+        begun = first_stage(worn)
+        stages = stages_dataset(worn, [begun, next_stage(worn, begun)])
         found |= {name: repr(item.values.tolist()) for name, item in stages.variables.items()}
         found["life"] = repr((life(worn, stages), worn.limit))
     return found

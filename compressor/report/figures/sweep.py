@@ -13,8 +13,8 @@ from compressor.report.figures.sweep_maps import (
     draw_maps,
     draw_ranking,
     leading,
+    order_by_mean_strength,
     order_of,
-    overall,
     ranking,
 )
 from compressor.report.figures.sweep_panels import (
@@ -62,10 +62,10 @@ def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
         title = f"metrics against {axis.phrase}"
         caption = captions.join_sentences(captions.curves(sweep), *marks)
         return [SweepFigure(axis.name, title, caption, draw_curves(sweep, shown))]
-    return [*several(sweep, shown, marks)]
+    return [*draw_grid(sweep, shown, marks)]
 
 
-def several(
+def draw_grid(
     sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
 ) -> Iterator[SweepFigure]:
     """Yield the figures of a grid of two or more axes.
@@ -75,7 +75,7 @@ def several(
     """
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
-    order = overall(found) if found else [*range(len(sweep.axes))]
+    order = order_by_mean_strength(found) if found else [*range(len(sweep.axes))]
     first, second = (sweep.axes[n] for n in order[:2])
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
@@ -108,7 +108,7 @@ def draw_sampled(
     """
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
-    order = overall(found) if found else [*range(len(sweep.axes))]
+    order = order_by_mean_strength(found) if found else [*range(len(sweep.axes))]
     numbers = [n for n in order if not sweep.axes[n].is_words] or order
     strongest = []
     for measure in shown:

@@ -49,7 +49,7 @@ MIN_RISEN = 0.2  # of the cells, above the least value
 NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
 
 
-def across(sweep: PlottedSweep) -> tuple[int, int]:
+def orient_axes(sweep: PlottedSweep) -> tuple[int, int]:
     """Return which of two axes lies along x and which along y.
 
     Words lie along y, else the axis with fewer values.
@@ -72,7 +72,7 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
 
     At most MAX_CELLS along an axis.
     """
-    in_x, in_y = across(sweep)
+    in_x, in_y = orient_axes(sweep)
     x, y = sweep.axes[in_x], sweep.axes[in_y]
     chosen = [thin_places(axis.values.size, MAX_CELLS) for axis in (y, x)]
 
@@ -186,7 +186,7 @@ def leading(sweep: PlottedSweep, measures: Sequence[Measure], most: int) -> list
     return [*chosen.values()][:most] or list(measures[:1])
 
 
-def overall(found: Ranking) -> list[int]:
+def order_by_mean_strength(found: Ranking) -> list[int]:
     """Return the axes' numbers, the strongest on the mean of the measures first."""
     strengths = [np.nan_to_num(effects.strength) for effects in found.values()]
     return np.argsort(-np.mean(strengths, axis=0), kind="stable").tolist()
@@ -197,7 +197,7 @@ def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Drawing:
 
     Bars with 95 % intervals.
     """
-    order = overall(found)
+    order = order_by_mean_strength(found)
     rows, columns = math.ceil(len(order) / COLUMNS), min(COLUMNS, len(order))
     each = 0.26 * len(found) + 0.75
     figure, _ = make_grid(rows, columns, rows * each + 0.7, len(order))

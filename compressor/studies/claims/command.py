@@ -115,8 +115,8 @@ def sentences(found: "xr.Dataset") -> Iterator[str]:
     from compressor.studies.claims.findings import (
         change,
         consistency,
-        deciding,
         is_mass_plane,
+        rank_assumptions,
         sensitivity,
         summary,
     )
@@ -129,4 +129,4 @@ def sentences(found: "xr.Dataset") -> Iterator[str]:
         yield consistency(found)
     table = sensitivity(found)
     if table is not None:
-        yield from deciding(table)
+        yield from rank_assumptions(table)

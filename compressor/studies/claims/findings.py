@@ -154,7 +154,7 @@ def consistency(found: xr.Dataset) -> str:
     )
 
 
-def deciding(table: xr.Dataset) -> Iterator[str]:
+def rank_assumptions(table: xr.Dataset) -> Iterator[str]:
     """Yield which assumption has most of each margin's variance, of `sensitivity`."""
     names = [coordinate_in_words(str(name)) for name in table["assumption"].values]
     for claim in table["claim"].values.tolist():

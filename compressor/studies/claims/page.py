@@ -15,9 +15,9 @@ from compressor.studies.claims.findings import (
     consistency,
     coordinate_in_words,
     count_claims,
-    deciding,
     flips,
     is_mass_plane,
+    rank_assumptions,
     sensitivity,
     summary,
 )
@@ -75,7 +75,7 @@ def machine_drawings(
             else:
                 names = [coordinate_in_words(str(one)) for one in table["assumption"].values]
                 heading = "Which assumption decides which claim"
-                sentences = [*summary(found), *deciding(table)]
+                sentences = [*summary(found), *rank_assumptions(table)]
                 yield name, sentences, heading, BARS, draw_sensitivity(table, names)
 
 

@@ -187,7 +187,7 @@ class Strangeness:
         """Return the index of the nearest job."""
         return int(cdist(((point - self.middle) @ self.turn)[None], self.white)[0].argmin())
 
-    def off(self, point: np.ndarray) -> np.ndarray:
+    def deviations(self, point: np.ndarray) -> np.ndarray:
         """Return how far each feature is from what others predict, (F,).
 
         In standard deviations.

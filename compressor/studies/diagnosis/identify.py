@@ -154,7 +154,7 @@ class Identifier:
             ends = dict(zip(_sides(joint), intervals, strict=True))
             found.append(Candidate(joint, float(chances[place]), ends))
         chance, near, apart = self.strangeness.judge(plain)
-        off = self.strangeness.off(plain)
+        off = self.strangeness.deviations(plain)
         odd = {list(FEATURES)[k]: float(off[k]) for k in np.argsort(-np.abs(off))[:ODD]}
         nearest = str(self.library.keys[self.strangeness.nearest(plain)])
         return Identification(tuple(found), chance >= LIMIT, chance, near, apart, nearest, odd)

@@ -32,7 +32,7 @@ class SeenValue(NamedTuple):
         return self.exponent - self.error > 0.0
 
 
-def way(chain: xr.Dataset) -> list[SeenValue]:
+def seen_values(chain: xr.Dataset) -> list[SeenValue]:
     """Return what one direction saw, in the order it went; values that failed are left out."""
     over, found = chain.attrs["over"], []
     for i in np.argsort(chain[over].values, kind="stable"):
@@ -65,12 +65,13 @@ def bifurcation(pair: xr.Dataset) -> str:
     values, unit = pair[over].values, unit_of(pair)
     sentences = [
         f"Poincaré points at {pair.attrs['section_deg']:g}° of the crank over "
-        f"{said_of(pair, over)}, {values.size} values from {number(values.min())} to "
+        f"{phrase_of(pair, over)}, {values.size} values from {number(values.min())} to "
         f"{number(values.max())}{unit}."
     ]
     for direction in pair["direction"].values:
-        seen = way(pair.sel(direction=direction))
-        sentences += [f"{str(direction).capitalize()}: {course(seen, unit)}", parting(seen, unit)]
+        seen = seen_values(pair.sel(direction=direction))
+        way = str(direction).capitalize()
+        sentences += [f"{way}: {course(seen, unit)}", describe_exponent(seen, unit)]
     return " ".join([*sentences, *directions(pair), *failures(pair)])
 
 
@@ -100,7 +101,7 @@ def course(values: Sequence[SeenValue], unit: str) -> str:
     )
 
 
-def parting(values: Sequence[SeenValue], unit: str) -> str:
+def describe_exponent(values: Sequence[SeenValue], unit: str) -> str:
     """Describe where the largest exponent is first surely above 0, or how near it came."""
     known = [one for one in values if np.isfinite(one.exponent)]
     if not known:
@@ -165,7 +166,7 @@ def sections(shown: xr.Dataset, count: int) -> str:
     return (
         f"Once a revolution, at {shown.attrs['section_deg']:g}° of the crank: the journal's place "
         f"along the cylinder and its rate, at {len(texts)} of {count} values of "
-        f"{said_of(shown, over)}, evenly among the regimes found: {'; '.join(texts)}."
+        f"{phrase_of(shown, over)}, evenly among the regimes found: {'; '.join(texts)}."
     )
 
 
@@ -173,8 +174,8 @@ def periods(plane: xr.Dataset, other: str) -> str:
     """Describe a period map over the followed parameter and another: the share of each regime."""
     over = plane.attrs["over"]
     sentences = [
-        f"Regimes over {said_of(plane, over)} ({plane.sizes[over]} values, followed) and "
-        f"{said_of(plane, other)} ({plane.sizes[other]})."
+        f"Regimes over {phrase_of(plane, over)} ({plane.sizes[over]} values, followed) and "
+        f"{phrase_of(plane, other)} ({plane.sizes[other]})."
     ]
     cells = plane.sizes[over] * plane.sizes[other]
     for direction in plane["direction"].values:
@@ -211,7 +212,7 @@ def rate(one: SeenValue) -> str:
     return f"{one.exponent:.{places}f} ± {one.error:.{places}f} a revolution"
 
 
-def said_of(data: xr.Dataset, name: str) -> str:
+def phrase_of(data: xr.Dataset, name: str) -> str:
     """Return what a coordinate is called in a sentence."""
     return str(data[name].attrs.get("long_name") or data[name].attrs.get("case_key", name))
 

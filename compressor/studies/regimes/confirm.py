@@ -31,7 +31,7 @@ from compressor.studies.regimes.values import (
     Clock,
     Row,
     SettledMotion,
-    apart,
+    hausdorff_distance,
     measure_motion,
     places,
     span_of,
@@ -78,14 +78,14 @@ def differ(one: MotionSignature, other: MotionSignature, within: float) -> bool:
     """
     regimes = {one.regime, other.regime}
     if regimes == {Regime.PERIODIC}:
-        return apart(one.places, other.places) > APART_TOLERANCES * within
+        return hausdorff_distance(one.places, other.places) > APART_TOLERANCES * within
     if regimes == {Regime.CHAOTIC}:
         error = math.hypot(one.rms_error, other.rms_error)
         return abs(one.rms - other.rms) > APART_STANDARD_ERRORS * error
     return regimes == {Regime.PERIODIC, Regime.CHAOTIC}
 
 
-def seen_in_row(row: Row, case: Case) -> MotionSignature:
+def signature_of_row(row: Row, case: Case) -> MotionSignature:
     """Return what a stored value says of its motion."""
     count = 0 if row["status"] != "ok" else int(row["revolutions"])
     period = float(row["period"])
@@ -95,7 +95,7 @@ def seen_in_row(row: Row, case: Case) -> MotionSignature:
     return MotionSignature(row["regime"], period, found, float(row["rms_acceleration"]), error)
 
 
-def seen_in_motion(motion: SettledMotion, case: Case) -> MotionSignature:
+def signature_of_motion(motion: SettledMotion, case: Case) -> MotionSignature:
     """Return the same of a motion that was followed now."""
     found = places(motion.points, record(case)["clearance"])
     if motion.reason:
@@ -155,7 +155,7 @@ def doubts(pair: ChainPair, folder: Folder) -> list[Doubt]:
     # rows are in the order of running, so that those of `down` begin at the last value
     for number, (one, other) in enumerate(zip(up, down[::-1], strict=False)):
         case = pair.up.cases[number]
-        if differ(seen_in_row(one, case), seen_in_row(other, case), tolerance(case)):
+        if differ(signature_of_row(one, case), signature_of_row(other, case), tolerance(case)):
             found.append(Doubt(number, case, one["end_state"], other["end_state"], pair))
     return found
 
@@ -167,8 +167,8 @@ def confirm(doubt: Doubt) -> Verdict:
     each. The starts are drawn within the clearance, always the same ones.
     """
     case = doubt.case
-    of_ends = [later(case, state, doubt.pair.up) for state in (doubt.up, doubt.down)]
-    of_starts = [later(start, None, doubt.pair.up) for start in other_starts(case)]
+    of_ends = [follow_on(case, state, doubt.pair.up) for state in (doubt.up, doubt.down)]
+    of_starts = [follow_on(start, None, doubt.pair.up) for start in other_starts(case)]
     within = tolerance(case)
     different: list[MotionSignature] = []
     for one in (*of_ends, *of_starts):
@@ -182,7 +182,7 @@ def confirm(doubt: Doubt) -> Verdict:
     return Verdict(1, int(len(different) > 1), len(different), up, down)
 
 
-def later(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSignature:
+def follow_on(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSignature:
     """Return the motion after many more revolutions.
 
     state: where it goes on, or None to begin at the case's own start.
@@ -191,7 +191,7 @@ def later(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSignature
     run = follow_revolutions(case, state, span_of(chain.asked, FURTHER, clock))
     if run.reason:
         return MotionSignature("", math.nan, run.points[:0, :, :2], math.nan, math.nan)
-    return seen_in_motion(measure_motion(case, run.state, chain.asked, clock), case)
+    return signature_of_motion(measure_motion(case, run.state, chain.asked, clock), case)
 
 
 def other_starts(case: Case) -> list[Case]:

@@ -81,7 +81,7 @@ def draw_bifurcation(pair: xr.Dataset) -> Drawing:
 def plot_places(panel: Panel, pair: xr.Dataset, joint: str) -> None:
     """Draw the journal's place along the cylinder, once a revolution, at each value."""
     over = pair.attrs["over"]
-    for direction, look in looks(pair, 0.7).items():
+    for direction, look in direction_styles(pair, 0.7).items():
         points = pair["section"].sel(direction=direction, joint=joint, coordinate="x")
         points = points.transpose(over, "revolution")
         x = np.repeat(positions(pair, over), points.sizes["revolution"])
@@ -97,7 +97,7 @@ def plot_places(panel: Panel, pair: xr.Dataset, joint: str) -> None:
 def plot_periods(panel: Panel, pair: xr.Dataset) -> None:
     """Draw the period at each value; above it where there is none."""
     x = positions(pair, pair.attrs["over"])
-    for direction, look in looks(pair, 1.2).items():
+    for direction, look in direction_styles(pair, 1.2).items():
         panel.plot(x, period_rows(pair.sel(direction=direction)), look, direction)
     panel.y.words = {row: str(word) for word, row in (PERIODS | ROWS_OF).items()}
     panel.y.span(-1.3, max(ROWS_OF.values()) + 0.6)
@@ -118,7 +118,7 @@ def period_rows(chain: xr.Dataset) -> np.ndarray:
 def plot_exponents(panel: Panel, pair: xr.Dataset) -> None:
     """Draw the largest Lyapunov exponent with its error at each value."""
     x = positions(pair, pair.attrs["over"])
-    for direction, look in looks(pair).items():
+    for direction, look in direction_styles(pair).items():
         chain = pair.sel(direction=direction)
         bars = chain["lyapunov_exponent_error"].values
         bars = np.where(np.isfinite(bars), bars, np.nan)
@@ -171,7 +171,7 @@ def draw_sections(shown: xr.Dataset) -> Drawing:
 
 def plot_section(panel: Panel, one: xr.Dataset) -> None:
     """Draw the Poincaré points of one value and one joint."""
-    for direction, look in looks(one, 1.5).items():
+    for direction, look in direction_styles(one, 1.5).items():
         points = one["section"].sel(direction=direction)
         x, rate = (points.sel(coordinate=name).values for name in ("x", "x_rate"))
         panel.plot(x * MICRO, rate * MILLI, look, direction)
@@ -221,7 +221,7 @@ def joints_with_points(data: xr.Dataset) -> list[str]:
     return [str(joint) for joint, some in zip(data["joint"].values, known, strict=True) if some]
 
 
-def looks(data: xr.Dataset, times: float = 1.0) -> dict[str, LineStyle]:
+def direction_styles(data: xr.Dataset, times: float = 1.0) -> dict[str, LineStyle]:
     """Return the marks of the directions that a dataset has, so many times their size."""
     found = {str(name): BY_DIRECTION[str(name)] for name in data["direction"].values}
     return {
@@ -262,7 +262,7 @@ def failed_entries(pair: xr.Dataset) -> list[Trace]:
 
 def direction_entries(data: xr.Dataset) -> list[Trace]:
     """Return the directions' colours, for a legend."""
-    return [entry(name, look) for name, look in looks(data, 1.6).items()]
+    return [entry(name, look) for name, look in direction_styles(data, 1.6).items()]
 
 
 def axis_words(data: xr.Dataset, name: str) -> str:

@@ -106,7 +106,7 @@ def run_regimes(
     before = sum(done(chain, folder) for chain in chains)
     tasks = [ChainTask(str(folder), chain, rerun) for chain in chains]
     ends = run_chains(tasks, workers, ChainWatch(chains, folder, total, progress))
-    books = look_again(machines, ends, folder, workers, progress)
+    books = confirm_doubts(machines, ends, folder, workers, progress)
     counts, failures = describe_progress(studies, machines, ends, books)
     return RegimesSummary(total, before, counts, failures, time.monotonic() - began)
 
@@ -224,7 +224,7 @@ def result(end: JobResult | JobLost) -> Any:
     return end.result if isinstance(end, JobResult) else end
 
 
-def look_again(
+def confirm_doubts(
     machines: Sequence[FollowedMachine],
     ends: dict[str, ChainEnd | JobLost],
     folder: Path,

@@ -88,7 +88,7 @@ def distances(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.linalg.norm(differences, axis=-1).max(axis=-1)
 
 
-def apart(one: np.ndarray, other: np.ndarray) -> float:
+def hausdorff_distance(one: np.ndarray, other: np.ndarray) -> float:
     """Return the Hausdorff distance of two sets of places, (k, joint, 2) and (l, joint, 2)."""
     matrix = distances(one, other)
     return float(max(matrix.min(axis=1).max(), matrix.min(axis=0).max()))

@@ -68,7 +68,7 @@ class SearchResult:
         return [point for point in self.points if point.failed]
 
 
-def first(
+def find_first(
     evaluate: Evaluate, holds: Holds, shares: Sequence[float], tolerance: float, at_once: int = 1
 ) -> SearchResult:
     """Return the interval in which a comparison first becomes true, going up from share 0.
@@ -124,7 +124,7 @@ def sections(answer: SearchResult, tolerance: float, at_once: int) -> list[float
     return found
 
 
-def extremum(
+def find_extremum(
     evaluate: Evaluate, greatest: bool, shares: Sequence[float], tolerance: float
 ) -> SearchResult:
     """Return where a metric is greatest or least: near the best of the points at `shares`.
@@ -151,10 +151,10 @@ def extremum(
     bounds = (points[max(at - 1, 0)].share, points[min(at + 1, len(points) - 1)].share)
     minimize_scalar(cost, bounds=bounds, method="bounded",
                     options={"xatol": tolerance, "maxiter": MAX_POINTS})  # fmt: skip
-    return around(known.values(), factor)
+    return bracket_best(known.values(), factor)
 
 
-def around(known: Iterable[Point], factor: float) -> SearchResult:
+def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
     """Return the best of some points, those that may be as good, and the worse ones around.
 
     factor: 1 where the least is best, -1 where the greatest is.
@@ -197,9 +197,9 @@ def find(
     jobs = SearchJobs(question, folder, workers, progress)
     goal, shares, tolerance = question.goal, question.shares, question.tolerance
     if goal.sign in ("greatest", "least"):
-        answer = extremum(jobs, goal.sign == "greatest", shares, tolerance)
+        answer = find_extremum(jobs, goal.sign == "greatest", shares, tolerance)
     else:
-        answer = first(jobs, goal.holds, shares, tolerance, workers)
+        answer = find_first(jobs, goal.holds, shares, tolerance, workers)
     return replace(answer, run_now=jobs.run_now, study=jobs.name)
 
 

@@ -13,9 +13,9 @@ from compressor.studies.wear.stages import (
     Life,
     Stage,
     Worn,
-    first,
-    following,
+    first_stage,
     life,
+    next_stage,
     read_kept_stages,
     stages_dataset,
     write,
@@ -133,10 +133,10 @@ def follow_wear(task: WearTask) -> WearEnd | StoreError:
     try:
         stages = stored_stages(task)
         if not stages:
-            stages = [first(worn)]
+            stages = [first_stage(worn)]
             write(worn, task.folder, stages)
         while not worn.over(stages[-1]):
-            stages.append(following(worn, stages[-1]))
+            stages.append(next_stage(worn, stages[-1]))
             write(worn, task.folder, stages)
     except StoreError as error:
         return error

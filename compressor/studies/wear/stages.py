@@ -158,7 +158,7 @@ def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> WearRu
     return WearRun(work, slid.std(axis=0), turn, metrics(p, whole), states[-1])
 
 
-def first(machine: Worn) -> Stage:
+def first_stage(machine: Worn) -> Stage:
     """Return the stage of unworn bores."""
     unworn = np.zeros((len(JOINTS), machine.wear.sectors))
     return new_stage(0.0, unworn, wear_bores(machine.case, unworn, None))
@@ -176,7 +176,7 @@ def new_stage(hours: float, worn: np.ndarray, motion: WearRun) -> Stage:
     }  # fmt: skip
 
 
-def following(machine: Worn, stage: Stage) -> Stage:
+def next_stage(machine: Worn, stage: Stage) -> Stage:
     """Return the stage after one that is not the last; by the midpoint rule."""
     rate = machine.depth_per_work[:, np.newaxis] * stage["rubbing_work"]  # m a revolution
     left = (machine.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
@@ -278,7 +278,7 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
     """Return how long a machine lasts, by straight lines between its stages."""
     opened = stages["clearance"].transpose("stage", "joint").values
     hours = stages["hours"].values
-    reached = [when(hours, opened[:, joint], machine.limit) for joint in range(opened.shape[1])]
+    reached = [hours_at_limit(hours, clearance, machine.limit) for clearance in opened.T]
     worst = int(np.nanargmin(reached)) if np.isfinite(reached).any() else int(opened[-1].argmax())
     found, factor, most = reached[worst], machine.wear.coefficient_factor, machine.wear.hours
     deepest = stages["worn_depth"].isel(stage=-1, joint=worst)
@@ -292,7 +292,7 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
     )
 
 
-def when(hours: np.ndarray, opened: np.ndarray, limit: float) -> float:
+def hours_at_limit(hours: np.ndarray, opened: np.ndarray, limit: float) -> float:
     """Return when a clearance that never shrinks reaches a limit; nan where it does not."""
     beyond = np.flatnonzero(opened >= limit)
     if not beyond.size:

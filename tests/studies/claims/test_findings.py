@@ -8,10 +8,10 @@ from compressor.studies.claims.findings import (
     consistency,
     coordinate_in_words,
     count_claims,
-    deciding,
     flips,
     is_mass_plane,
     most_consistent,
+    rank_assumptions,
     summary,
 )
 
@@ -118,7 +118,7 @@ def test_who_decides_is_said_with_rivals():
         },
         {"claim": [4, 1], "assumption": names},
     )
-    assert [*deciding(table)] == [
+    assert [*rank_assumptions(table)] == [
         "Claim 4: most by rod mass, 0.60 [0.45, 0.75]; not told from static friction.",
         "Claim 1: its margin is the same at all machines.",
     ]

@@ -49,7 +49,7 @@ def test_what_lies_far_off_is_seen_by_both_distances(known):
 def test_the_feature_that_is_off_is_named(known):
     points = drawn(20, 5)
     points[:, 7] += 4.0
-    found = [int(np.abs(known.off(point)).argmax()) for point in points]
+    found = [int(np.abs(known.deviations(point)).argmax()) for point in points]
     assert found.count(7) > 15
 
 

@@ -24,7 +24,7 @@ from compressor.studies.regimes.confirm import (
     doubts,
     other_starts,
     read_verdicts,
-    seen_in_row,
+    signature_of_row,
 )
 from compressor.studies.regimes.run import chains_of
 from compressor.studies.regimes.values import empty
@@ -97,11 +97,11 @@ def row(case, period, at):
 
 
 def test_a_row_says_what_it_has_seen():
-    seen = seen_in_row(row(CASES[1], 2, 0.7), CASES[1])
+    seen = signature_of_row(row(CASES[1], 2, 0.7), CASES[1])
     assert (seen.regime, seen.period) == ("periodic", 2.0)
     assert seen.places.shape == (2, 2, 2)
     np.testing.assert_allclose(seen.places[:, 0, 0], 0.7)
-    assert seen_in_row(empty(ASKED, CASES[1]), CASES[1]).regime == ""
+    assert signature_of_row(empty(ASKED, CASES[1]), CASES[1]).regime == ""
 
 
 @pytest.fixture
@@ -188,6 +188,6 @@ def test_the_paper_s_machine_has_one_motion():
         {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
     )
     pair = ChainPair(*(Chain.of("real", ASKED, way, [case] * 3) for way in ASKED.directions))
-    seen = [module.later(one, None, pair.up) for one in other_starts(case)[:2]]
+    seen = [module.follow_on(one, None, pair.up) for one in other_starts(case)[:2]]
     assert [one.regime for one in seen] == ["periodic"] * 2
     assert not differ(*seen, WITHIN)

@@ -8,7 +8,7 @@ from compressor.studies.regimes.values import (
     MAX_PERIOD,
     MORE,
     TOLERANCE,
-    apart,
+    hausdorff_distance,
     period_of,
     places,
     tolerance,
@@ -75,11 +75,11 @@ def test_either_joint_counts():
 
 def test_the_distance_of_sets_is_hausdorff_s():
     one = cycle(4, 4)
-    assert apart(one, np.roll(one, 1, axis=0)) == 0
+    assert hausdorff_distance(one, np.roll(one, 1, axis=0)) == 0
     more = np.concatenate((one, np.add(one[:1], [[0.3, 0.4], [0, 0]])))
-    assert 0 < apart(one, more) <= 0.5 + 1e-12
-    assert apart(one, more) == apart(more, one)
-    assert apart(np.zeros((1, 2, 2)), np.full((1, 2, 2), [[3, 4], [0, 0]])) == 5
+    assert 0 < hausdorff_distance(one, more) <= 0.5 + 1e-12
+    assert hausdorff_distance(one, more) == hausdorff_distance(more, one)
+    assert hausdorff_distance(np.zeros((1, 2, 2)), np.full((1, 2, 2), [[3, 4], [0, 0]])) == 5
 
 
 def test_places_are_in_clearances_and_an_ideal_joint_has_none():

@@ -11,7 +11,7 @@ from compressor.studies.regimes.captions import (
     periods,
     regime_of,
     sections,
-    way,
+    seen_values,
 )
 
 VALUES = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
@@ -40,10 +40,10 @@ def test_the_captions_of_regimes_are_those_of_compsim_plot():
 
 def test_a_chain_is_read_the_way_it_went():
     data = study([1, 1, 2, 4, "chaotic", "chaotic"], [1, 2, 2, 4, "chaotic", "undecided"])
-    assert [one.regime for one in way(data.sel(direction="up"))][:3] == ["period 1"] * 2 + [
+    assert [one.regime for one in seen_values(data.sel(direction="up"))][:3] == ["period 1"] * 2 + [
         "period 2"
     ]
-    down = way(data.sel(direction="down"))
+    down = seen_values(data.sel(direction="down"))
     assert [one.value for one in down] == VALUES[::-1]
     assert [one.regime for one in down][:2] == ["undecided", "chaotic"]
 

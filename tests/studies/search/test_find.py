@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.outcome import ROW
-from compressor.studies.search.find import Point, extremum, first
+from compressor.studies.search.find import Point, find_extremum, find_first
 from compressor.studies.search.question import (
     Goal,
     JobReading,
@@ -42,7 +42,7 @@ def jobs(function, bar=0.0, calls=None):
 def test_a_threshold_is_between_the_ends(threshold, at_once):
     calls = []
     evaluate = jobs(lambda x: 1.0 + x - threshold, calls=calls)
-    found = first(evaluate, ABOVE.holds, SCAN, 1e-3, at_once)
+    found = find_first(evaluate, ABOVE.holds, SCAN, 1e-3, at_once)
     assert found.kind == "found"
     assert found.low.share <= threshold < found.high.share
     assert found.high.share - found.low.share <= 1e-3 * (1 + 1e-9)
@@ -54,24 +54,26 @@ def test_a_threshold_is_between_the_ends(threshold, at_once):
 
 def test_no_share_is_asked_for_twice():
     calls = []
-    first(jobs(lambda x: 1.0 + x - 0.3, calls=calls), ABOVE.holds, SCAN, 1e-4, 3)
+    find_first(jobs(lambda x: 1.0 + x - 0.3, calls=calls), ABOVE.holds, SCAN, 1e-4, 3)
     shares = [share for call in calls for share in call]
     assert len(shares) == len({*shares})
 
 
 def test_a_jump_is_found():
-    found = first(jobs(lambda x: 2.0 if x >= 0.7 else 0.0), ABOVE.holds, SCAN, 1e-6, 2)
+    found = find_first(jobs(lambda x: 2.0 if x >= 0.7 else 0.0), ABOVE.holds, SCAN, 1e-6, 2)
     assert found.low.share < 0.7 <= found.high.share
     assert found.high.share - found.low.share <= 1.001e-6
 
 
 def test_the_first_of_several_changes_counts():
-    found = first(jobs(lambda x: 1.0 + math.sin(4 * math.pi * (x - 0.05))), ABOVE.holds, SCAN, 1e-3)
+    found = find_first(
+        jobs(lambda x: 1.0 + math.sin(4 * math.pi * (x - 0.05))), ABOVE.holds, SCAN, 1e-3
+    )
     assert found.low.share <= 0.05 < found.high.share
 
 
 def test_a_comparison_that_becomes_false_is_found_by_its_opposite():
-    found = first(
+    found = find_first(
         jobs(lambda x: 2.0 - 3.0 * x), comparison("peak_acceleration < 1").holds, SCAN, 1e-3
     )
     assert found.low.share <= 1 / 3 < found.high.share
@@ -83,7 +85,7 @@ def test_a_comparison_that_becomes_false_is_found_by_its_opposite():
 )
 def test_nothing_changes(value, bar, kind):
     calls = []
-    found = first(jobs(lambda x: value, bar, calls), ABOVE.holds, SCAN, 1e-3)
+    found = find_first(jobs(lambda x: value, bar, calls), ABOVE.holds, SCAN, 1e-3)
     assert found.kind == kind
     assert calls == [SCAN]
     assert len(found.blind) == (9 if kind == "unclear" else 0)
@@ -92,7 +94,7 @@ def test_nothing_changes(value, bar, kind):
 @pytest.mark.parametrize("bar", [0.003, 0.02, 0.2])
 def test_bars_leave_an_interval(bar):
     """Of 1 + x - 0.4 with a bar the comparison is told outside 0.4 - bar ... 0.4 + bar alone."""
-    found = first(jobs(lambda x: 0.6 + x, bar), ABOVE.holds, SCAN, 1e-3, 2)
+    found = find_first(jobs(lambda x: 0.6 + x, bar), ABOVE.holds, SCAN, 1e-3, 2)
     assert found.kind == "undecided"
     assert found.low.share == pytest.approx(0.4 - bar, abs=1.001e-3)
     assert found.low.share <= 0.4 - bar
@@ -103,7 +105,7 @@ def test_bars_leave_an_interval(bar):
 
 
 def test_what_cannot_be_decided_from_the_lower_end_on_has_no_lower_end():
-    found = first(jobs(lambda x: 0.95 + x, 0.1), ABOVE.holds, SCAN, 1e-3, 2)
+    found = find_first(jobs(lambda x: 0.95 + x, 0.1), ABOVE.holds, SCAN, 1e-3, 2)
     assert (found.kind, found.low) == ("undecided", None)
     assert found.high.share == pytest.approx(0.15, abs=1.001e-3)
 
@@ -112,13 +114,13 @@ def test_failed_jobs_are_gone_around():
     def function(x):
         return None if 0.3 < x < 0.5 else 1.0 + x - 0.4
 
-    found = first(jobs(function), ABOVE.holds, SCAN, 1e-3, 2)
+    found = find_first(jobs(function), ABOVE.holds, SCAN, 1e-3, 2)
     assert found.kind == "undecided"
     assert found.low.share == pytest.approx(0.3, abs=1.001e-3)
     assert found.high.share == pytest.approx(0.5, abs=1.001e-3)
     assert {point.failed for point in found.blind} == {True}
     assert {*found.failed} == {*found.blind}
-    elsewhere = first(jobs(lambda x: None if x > 0.8 else 0.6 + x), ABOVE.holds, SCAN, 1e-3)
+    elsewhere = find_first(jobs(lambda x: None if x > 0.8 else 0.6 + x), ABOVE.holds, SCAN, 1e-3)
     assert (elsewhere.kind, len(elsewhere.failed)) == ("found", 2)
 
 
@@ -126,7 +128,7 @@ def test_noise_ends_where_it_is_told():
     """Noise as large as its bar: the threshold stays inside, and the search comes to an end."""
     noise = np.random.default_rng(1)
     evaluate = jobs(lambda x: 0.6 + x + noise.uniform(-0.05, 0.05), 0.05)
-    found = first(evaluate, ABOVE.holds, SCAN, 1e-4, 2)
+    found = find_first(evaluate, ABOVE.holds, SCAN, 1e-4, 2)
     assert found.low.share <= 0.4 <= found.high.share
     assert found.high.share - found.low.share <= 0.2
     assert len(found.points) < 60
@@ -136,7 +138,7 @@ def test_noise_ends_where_it_is_told():
 @pytest.mark.parametrize("greatest", [True, False])
 def test_an_extremum_is_found(peak, greatest):
     sign = 1.0 if greatest else -1.0
-    found = extremum(jobs(lambda x: -sign * (x - peak) ** 2), greatest, SCAN, 1e-4)
+    found = find_extremum(jobs(lambda x: -sign * (x - peak) ** 2), greatest, SCAN, 1e-4)
     assert found.kind == "found"
     assert found.best.share == pytest.approx(peak, abs=2e-4)
     assert found.within == (found.best,)
@@ -149,28 +151,30 @@ def test_the_highest_of_two_peaks_counts():
     def function(x):
         return math.exp(-(((x - 0.2) / 0.1) ** 2)) + 1.1 * math.exp(-(((x - 0.77) / 0.1) ** 2))
 
-    assert extremum(jobs(function), True, SCAN, 1e-4).best.share == pytest.approx(0.77, abs=1e-3)
+    assert find_extremum(jobs(function), True, SCAN, 1e-4).best.share == pytest.approx(
+        0.77, abs=1e-3
+    )
 
 
 def test_points_whose_bars_reach_the_best_are_as_good():
     """-(x - 0.4)^2 with bars of 0.005: what is less than 0.1 away cannot be told apart."""
-    found = extremum(jobs(lambda x: -((x - 0.4) ** 2), 0.005), True, SCAN, 1e-4)
+    found = find_extremum(jobs(lambda x: -((x - 0.4) ** 2), 0.005), True, SCAN, 1e-4)
     assert found.best in found.within
     assert all(abs(point.share - 0.4) <= 0.1 + 1e-3 for point in found.within)
     assert (found.low.share, found.high.share) == (0.25, 0.625)
-    flat = extremum(jobs(lambda x: 7.0), True, SCAN, 1e-2)
+    flat = find_extremum(jobs(lambda x: 7.0), True, SCAN, 1e-2)
     assert (flat.low, flat.high, len(flat.within)) == (None, None, len(flat.points))
 
 
 def test_an_extremum_goes_around_failures_and_tells_of_them():
-    found = extremum(
+    found = find_extremum(
         jobs(lambda x: None if 0.35 < x < 0.45 else -((x - 0.4) ** 2)), True, SCAN, 1e-3
     )
     assert found.kind == "undecided"
     assert 0.45 <= found.best.share < 0.47
     assert found.low.share == 0.25
     assert 0.375 in [point.share for point in found.blind]
-    none = extremum(jobs(lambda x: None), True, SCAN, 1e-3)
+    none = find_extremum(jobs(lambda x: None), True, SCAN, 1e-3)
     assert (none.kind, none.best, len(none.failed)) == ("unclear", None, 9)
 
 

@@ -9,12 +9,12 @@ import pytest
 from compressor.cases.case import Case
 from compressor.studies.wear.stages import (
     Worn,
-    first,
-    following,
+    first_stage,
+    hours_at_limit,
     life,
+    next_stage,
     stages_dataset,
     wear_bores,
-    when,
 )
 
 VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
@@ -23,9 +23,9 @@ VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"
 def followed(wear, **values):
     """A machine, and its stages up to the last."""
     of = Worn(Case.from_values({**VALUES, **values, "wear": {"limit_mm": 0.26, **wear}}))
-    stages = [first(of)]
+    stages = [first_stage(of)]
     while not of.over(stages[-1]):
-        stages.append(following(of, stages[-1]))
+        stages.append(next_stage(of, stages[-1]))
     return of, stages
 
 
@@ -123,8 +123,8 @@ def test_a_life_beyond_the_hours_is_not_told(machine):
 
 
 def test_a_limit_is_met_by_a_straight_line():
-    assert when(np.array([0.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0]), 3.0) == 2.5
-    assert math.isnan(when(np.array([0.0, 2.0]), np.array([1.0, 2.0]), 3.0))
+    assert hours_at_limit(np.array([0.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0]), 3.0) == 2.5
+    assert math.isnan(hours_at_limit(np.array([0.0, 2.0]), np.array([1.0, 2.0]), 3.0))
 
 
 def test_a_motion_that_fails_ends_its_machine():

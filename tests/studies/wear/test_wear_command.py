@@ -89,7 +89,7 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
     """SIGKILL at random, until all stages are there."""
     cases, out = told
     worn, rng, stops = Worn(cases[0]), np.random.default_rng(3), []
-    stages.first(worn)  # loads the equations, which forked processes share
+    stages.first_stage(worn)  # loads the equations, which forked processes share
     path = worn.path(tmp_path)
     for _ in range(30):
         before = len(stages.read_kept_stages(worn, path))
