@@ -158,7 +158,7 @@ class Comparison:
 
 
 def comparisons(p=None):
-    """Return what the paper prints of spring and cam beside what follows (Eq. 8-12, Table 1).
+    """Return the paper's numbers of spring and cam beside those that follow (Eq. 8-12, Table 1).
 
     `p` is a record of the spring load with the paper's pressures, by default the paper's; returns a
     list of Comparison.

@@ -126,7 +126,7 @@ def response(runs: Runs, fault: str) -> str:
 
 
 def deviations(worn_runs: Sequence[xr.Dataset]) -> str:
-    """Return how far the motion leaves that of the machine without clearance."""
+    """Describe how far the motion leaves that of the machine without clearance."""
     greatest = np.zeros(3)
     for run in worn_runs:
         settled = settled_part(run)
@@ -142,7 +142,7 @@ def deviations(worn_runs: Sequence[xr.Dataset]) -> str:
 
 
 def motion(courses: Sequence[JournalMotion]) -> str:
-    """Return how the journal moves in its bearing."""
+    """Describe how the journal moves in its bearing."""
     joint = SPOKEN[courses[0].joint]
     gap_fractions = [one.gap_fraction for one in courses]
     spans = angle_spans([one.turns for one in courses])
@@ -167,7 +167,7 @@ def motion(courses: Sequence[JournalMotion]) -> str:
 
 
 def rings(courses: Sequence[JournalMotion]) -> list[str]:
-    """Return the frequencies after the first change of sign, where all runs have the same one."""
+    """Describe the frequencies after the first change of sign, where all runs have the same one."""
     found = [one.rings for one in courses]
     spans = angle_spans([one.turns[:1] for one in courses])
     if (
@@ -180,7 +180,7 @@ def rings(courses: Sequence[JournalMotion]) -> list[str]:
 
 
 def peaks(worn_runs: Sequence[xr.Dataset]) -> str:
-    """Return the greatest accelerations, and whether they grow with clearance."""
+    """Describe the greatest accelerations, and whether they grow with clearance."""
     greatest = [float(run["peak_acceleration"]) for run in worn_runs]
     grows = all(b > a for a, b in itertools.pairwise(greatest))
     trend = "grows with clearance" if grows else "does not always grow with clearance"
@@ -368,7 +368,7 @@ def angles(found: Shakings, runs: Runs) -> str:
 
 
 def why(forces: list[Shaking], near: list[float], rest: list[float]) -> str:
-    """Return what decides whether the whole rises or falls."""
+    """Describe which part decides whether the whole rises or falls."""
     whole = [one.spectrum.above for one in forces]
     bigger = "larger" if near[-1] > rest[-1] else "smaller"
     if near[-1] > near[0] and whole[-1] > whole[0]:
@@ -398,7 +398,7 @@ def friction(forces: list[Shaking], run) -> list[str]:
 
 
 def flights(runs: Runs) -> str:
-    """Return whether any joint is ever in flight."""
+    """Describe whether any joint is ever in flight."""
     following, most = True, 0.0
     for joint in SINGLE_FAULTS:
         for clearance in CLEARANCES:
@@ -412,7 +412,7 @@ def flights(runs: Runs) -> str:
 
 
 def course_of(values: list[float]) -> str:
-    """Return how forces (N) go from the first to the last clearance, and through what."""
+    """Describe how forces (N) go from the first to the last clearance, and through which values."""
     first, *_, last = values
     steps = np.diff(values)
     if (steps > 0).all():

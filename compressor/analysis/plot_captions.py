@@ -78,12 +78,12 @@ MIN_FORCE = 0.05  # N: below it a force is told as less than 0.1
 
 
 def caution(run: xr.Dataset) -> str:
-    """Return what is added to the captions of a chaotic run."""
+    """Return the sentence that captions of a chaotic run add, else nothing."""
     return CHAOTIC if run.attrs.get("regime") == "chaotic" else ""
 
 
 def film(run: xr.Dataset) -> str:
-    """Return what captions of contacts add for joints with oil: nothing of dry ones."""
+    """Return the sentence that captions of contacts add for joints with oil, else nothing."""
     return FILM if case_of(run).lubricant else ""
 
 
@@ -228,7 +228,7 @@ def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
 
 
 def left_out(rows: Sequence[SweptRow]) -> str:
-    """Return the rows that could not be drawn, and those of chaotic motion."""
+    """Describe the rows that could not be drawn, and those of chaotic motion."""
     gone, wild = sum(bool(row.problem) for row in rows), sum(row.chaotic for row in rows)
     said = f" {plural(gone, 'job')} of {len(rows)} without series to draw." if gone else ""
     return said + (f" {plural(wild, 'job')} chaotic: their lines change." if wild else "")

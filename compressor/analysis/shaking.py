@@ -135,7 +135,7 @@ class Shaking:
     ring: float
 
     def is_near_turn(self, angle: np.ndarray) -> np.ndarray:
-        """Return which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn."""
+        """Return whether crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn."""
         return near_a_turn(angle, self.turns)
 
 
@@ -222,7 +222,10 @@ def directions_change(settled: xr.Dataset) -> tuple[float, ...]:
 
 
 def near_a_turn(angle: np.ndarray, turns: tuple[float, ...]) -> np.ndarray:
-    """Return which crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` one of the turns."""
+    """Return whether crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn.
+
+    turns: the crank angles of all changes of direction, degrees.
+    """
     is_near = np.zeros(angle.size, bool)
     for turn in turns:
         is_near |= (angle - turn + BEFORE) % 360.0 < BEFORE + AFTER

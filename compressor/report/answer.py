@@ -42,7 +42,7 @@ class Assumptions:
 
 
 def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: bool) -> Section:
-    """Return what to keep in mind of the studies of a store, and of the claims if they are told."""
+    """Return the section of the assumptions behind a store's studies and the claims."""
     default = Case.from_values({}).machine
     cases = [(study, case) for study in studies if (case := last_case(stored, study))]
     ours = [
@@ -157,7 +157,7 @@ def mechanism_svg(case: Case, angle: float = ANGLE) -> Markup:
 
 
 def mechanism_words(case: Case) -> str:
-    """Return what the picture does not show: speed, masses and the pin."""
+    """Return the data that the picture does not show: speed, masses and the pin."""
     machine = case.machine
     pins = " and ".join(dict.fromkeys(f"{machine.pin_radius(joint):g}" for joint in JOINTS))
     return (
@@ -183,7 +183,7 @@ class Provenance:
 
 
 def provenance_section(studies: Sequence[StoredStudy], results: Folder, command: str) -> Section:
-    """Return what made this page now, and the studies it is about."""
+    """Return the section on program and command that made a page, and its studies."""
     versions = library_versions(*LIBRARIES)
     content = Provenance(
         program=f"{PROGRAM}, model {MODEL}",
@@ -244,7 +244,7 @@ def answer_section(answer: FirstScreen) -> Section:
 
 
 def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[MetricChange]:
-    """Return what changes most over jobs, each named and with its metrics."""
+    """Return the metrics that change most over jobs, each job named."""
     named = [(name, job) for name, job in jobs if str(job["status"].item()) == "ok"]
     known = list(dict.fromkeys(m for _, job in named for m in measures(job)))
     names = [name for name, _ in named]
@@ -253,7 +253,7 @@ def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[MetricChange]:
 
 
 def study_findings(data: xr.Dataset) -> list[MetricChange]:
-    """Return what changes most over the jobs of a study, as `open_study` gives it."""
+    """Return the metrics that change most over a study's jobs, as `open_study` gives it."""
     rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in measures(data)]
     return rank_findings(rows, Points(data))
 
@@ -323,7 +323,7 @@ def rank_findings(
 def finding(
     measure: Measure, values: np.ndarray, bars: np.ndarray, names: Sequence[str]
 ) -> MetricChange | None:
-    """Return what a measure does over jobs, where that is beyond its error bars.
+    """Return the change of a measure over jobs, where it is beyond its error bars.
 
     Jobs whose value is not known within its bar, such as a chaotic motion's peak, do not count.
     """

@@ -62,7 +62,7 @@ def script(name: str, drawing: Drawing) -> str:
 
 
 def content(drawing: Drawing) -> dict[str, Any]:
-    """Return what a figure shows, as plain data. Panels with the same `link` are zoomed together.
+    """Return a figure as plain data. Panels with the same `link` are zoomed together.
 
     `unified`: all curves go from left to right, so that the values at one x are told together.
     """
@@ -232,7 +232,7 @@ def numbers(values: np.ndarray) -> Any:
 
 
 def describe_figure(drawing: Drawing) -> str:
-    """Return what is seen in a figure, in words: its panels, their axes and curves."""
+    """Return a figure in words: its panels, their axes and curves."""
     texts = []
     for panel in drawing.panels:
         names = [t.name or (t.scale.title if t.scale else "") for t in panel.ordered]

@@ -106,7 +106,7 @@ def status_text(status: object, reason: object, regime: object = "") -> str:
 
 
 def column_title(measure: Measure) -> str:
-    """Return what stands above a measure's column."""
+    """Return the title of a measure's column."""
     return measure.title + (f" ({measure.unit})" if measure.unit else "")
 
 
@@ -139,7 +139,7 @@ class Plate:
 
     @property
     def alt(self) -> str:
-        """Return what is seen, in words."""
+        """Return the figure in words."""
         return describe_figure(self.drawing)
 
     @property

@@ -117,7 +117,7 @@ def paper_candidates(
 
 
 def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
-    """Return what makes a run better than another of the same physics."""
+    """Return the rank of a run: greater is better, among runs of the same physics."""
     return str(run["status"].item()) == "ok", "time" in run.dims, -run.attrs.get("rtol", math.inf)
 
 
@@ -439,7 +439,7 @@ class PaperCasesContent:
 def paper_sections(
     paper: PaperRuns, plates: Sequence[Plate], caveats: list[str]
 ) -> tuple[list[Section], list[Section]]:
-    """Return what there is of the paper: figures; claims, cases, and the load's printed numbers."""
+    """Return the paper's sections: figures; and claims, cases, and the load's printed numbers."""
     figures = [Section("figures", "The paper's figures", "figures.html", plates)] if plates else []
     if not paper.stored:
         return figures, []

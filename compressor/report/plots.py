@@ -246,7 +246,7 @@ def select_jobs(
 
 
 def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
-    """Return what one job tells, or why it tells nothing."""
+    """Return one job as a row of a figure over an axis, or with the reason why it has none."""
     name, status = (
         format_swept_value(value) if value != "" else key[:KEY_DIGITS],
         stored.status(key),

@@ -138,7 +138,7 @@ class ReportContent(NamedTuple):
 def build_report(
     results: Folder, command: str, add: Sequence[Add] = (), running: Running | None = None
 ) -> ReportContent:
-    """Return everything of a report, in memory."""
+    """Return the figures, series and page of a report, in memory."""
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     papers = [study for study in studies if is_of_paper(stored, study)]
@@ -187,7 +187,7 @@ def build_report(
 
 
 def notes_on(study: str, added: Sequence[Additions]) -> list[StudyNote]:
-    """Return what was added to the section of a study."""
+    """Return the notes that studies add to the section of one."""
     return [one.notes[study] for one in added if study in one.notes]
 
 

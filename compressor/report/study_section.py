@@ -126,7 +126,7 @@ def file_name(*words: str) -> str:
 
 
 def job_counts(data: xr.Dataset) -> Counts:
-    """Return how many jobs of a study are ok, failed or were not run."""
+    """Return the numbers of a study's jobs that are ok, failed or were not run."""
     status = data["status"].values
     failed, missing = int((status == "failed").sum()), int((status == "missing").sum())
     return Counts(status.size - failed - missing, failed, missing)
@@ -153,7 +153,7 @@ def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[st
 
 
 def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
-    """Return where in the sweep jobs failed, and what is known of each; the first of many."""
+    """Return the place and reason of each failed job in the sweep, the first of many."""
     failed = np.flatnonzero(data["status"].values == "failed")
     swept = swept_values(data)
     rows = []

@@ -96,7 +96,10 @@ def find_drawn(results: "Folder") -> dict[str, StudyKind]:
 
 
 def page_additions(folders: "Mapping[str, Folder]") -> "list[Add]":
-    """Return what the studies add to a report; folders: by the option that names them."""
+    """Return the functions by which studies add to a report.
+
+    folders: by the option that names them.
+    """
     return [
         partial(kind.module("page").add, place=folders.get(kind.page_folder, kind.page_folder))
         for kind in STUDIES

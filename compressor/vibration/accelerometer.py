@@ -45,7 +45,7 @@ def analogue_rate(body: Body, sensor: Sensor) -> float:
 
 
 def point_of(body: Body, sensor: Sensor, guide: float) -> tuple[float, float]:
-    """Return where a sensor sits, m from the body's mass centre.
+    """Return the place of a sensor from the body's mass centre, m.
 
     guide: mid-stroke from the crank, m.
     """

@@ -86,7 +86,7 @@ def one_step(root: complex, step: float) -> tuple[complex, np.ndarray]:
 
 
 def final(whole: complex, driven: np.ndarray) -> complex:
-    """Return where an oscillator is after all steps, from rest."""
+    """Return the state z of an oscillator after all steps, from rest."""
     return lfilter([1.0], [1.0, -whole], driven)[-1]
 
 

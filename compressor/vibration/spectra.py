@@ -86,7 +86,7 @@ def checked_positive(value: float, what: str) -> float:
 
 
 def whole_revolutions(count: int, a_turn: int) -> int:
-    """Return how many revolutions of a_turn samples count samples are; raises SignalError."""
+    """Return the number of revolutions that `count` samples are; raises SignalError."""
     a_turn = checked_count(a_turn, 2, "the number of samples a revolution")
     if count % a_turn:
         rest = f"{count} samples are no whole number of revolutions of {a_turn} samples"
@@ -251,7 +251,7 @@ def synchronous_average(
 
 
 def angle_window(angle: np.ndarray, values: np.ndarray, begin: float, end: float) -> AngleWindow:
-    """Return what falls into a window of crank angle in each revolution.
+    """Return rms and peak in a window of crank angle in each revolution.
 
     angle (rad) and values: (m,). begin, end: degrees, begin included and end not; a window whose
     end is not above its begin goes across 360. Only windows that the samples wholly reach over

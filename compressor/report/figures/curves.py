@@ -167,7 +167,7 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
 
 
 def first_peak(score: np.ndarray, nearly: float, reach: int) -> int:
-    """Return where the first maximum lies that is nearly the greatest.
+    """Return the place of the first maximum that is nearly the greatest.
 
     Revolutions that are nearly equal then give the same place.
     """

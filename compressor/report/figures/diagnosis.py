@@ -104,7 +104,7 @@ def draw_diagnosis_orbits(runs: Runs) -> Drawing:
 
 
 def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Drawing:
-    """Return when X has its high orders, and the joints' contact modes, over the crank angle."""
+    """Return X's high orders and the joints' contact modes over the crank angle."""
     figure, panels = make_grid(2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2)
     for joint, profile, strip in zip(SINGLE_FAULTS, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)

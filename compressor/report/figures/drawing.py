@@ -79,7 +79,7 @@ class Trace:
         return self.kind == "line" and self.style.linestyle == "none"
 
     def extent(self, way: Way) -> np.ndarray:
-        """Return what a panel shows of it along the axis `x` or `y`."""
+        """Return the values that a panel must show of it along the axis `x` or `y`."""
         at = self.x if way == "x" else self.y
         if self.kind in ("bars", "columns"):
             half = np.asarray(self.thick) / 2.0

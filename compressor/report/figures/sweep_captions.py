@@ -56,13 +56,13 @@ def split_measures(
 
 
 def describe_marks(sweep: PlottedSweep) -> str:
-    """Return what marks mean, where there are any."""
+    """Describe the marks that are drawn, if any."""
     status, chaotic = sweep.status, sweep.chaotic
     return MARKS if chaotic.any() or np.isin(status, ("failed", "missing")).any() else ""
 
 
 def describe_unchanged(sweep: PlottedSweep, same: Sequence[Measure]) -> str:
-    """Return the measures that are the same at every job, with their values."""
+    """Describe the measures that are the same at every job, with their values."""
     if not same:
         return ""
     parts = [
@@ -73,7 +73,7 @@ def describe_unchanged(sweep: PlottedSweep, same: Sequence[Measure]) -> str:
 
 
 def curves(sweep: PlottedSweep) -> str:
-    """Return a sweep along one axis."""
+    """Describe a sweep along one axis."""
     return join_sentences(
         f"Every metric against {sweep.axes[0].phrase}, a point a job, with error bars where one "
         "is long enough to be seen.",
@@ -82,7 +82,7 @@ def curves(sweep: PlottedSweep) -> str:
 
 
 def maps(sweep: PlottedSweep) -> str:
-    """Return a sweep along two axes."""
+    """Describe a sweep along two axes."""
     return join_sentences(
         "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
         *(describe_thinning(axis, MAX_CELLS) for axis in sweep.axes),
@@ -90,13 +90,13 @@ def maps(sweep: PlottedSweep) -> str:
 
 
 def describe_thinning(axis: PlottedAxis, most: int) -> str:
-    """Return how many of an axis' values are shown, if not all are."""
+    """Describe how many of an axis' values are shown, if not all are."""
     count = axis.values.size
     return "" if count <= most else f"Of {count} values of {axis.phrase} {most} are shown."
 
 
 def describe_points(sweep: PlottedSweep, role: Roles) -> str:
-    """Return what a point is: a job, with what its marks mean, or a mean over which axes."""
+    """Describe a point: a job, with the meaning of its marks, or a mean over some axes."""
     others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
     if not others:
         return join_sentences("A point a job.", describe_marks(sweep))
@@ -109,7 +109,7 @@ def describe_points(sweep: PlottedSweep, role: Roles) -> str:
 
 
 def overview(sweep: PlottedSweep, role: Roles) -> str:
-    """Return every metric over two of the axes."""
+    """Describe every metric over two of the axes."""
     color = sweep.axes[role.color]
     return join_sentences(
         f"Every metric over {sweep.axes[role.x].phrase}, a colour for each value of "
@@ -123,7 +123,7 @@ def overview(sweep: PlottedSweep, role: Roles) -> str:
 
 
 def multiples(sweep: PlottedSweep, role: Roles) -> str:
-    """Return the panels for the values of an axis, or of two."""
+    """Describe the panels for the values of an axis, or of two."""
     places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
     limits = zip(role, (MAX_PLACES, MAX_LINES, MAX_COLUMNS, MAX_ROWS), strict=True)
     return join_sentences(
@@ -135,13 +135,13 @@ def multiples(sweep: PlottedSweep, role: Roles) -> str:
 
 
 def points(sweep: PlottedSweep, is_ranked: bool) -> str:
-    """Return each metric of a list of jobs over a key."""
+    """Describe each metric of a list of jobs over a key."""
     which = "the key that matters most for it" if is_ranked else "a key"
     return join_sentences(f"Every metric over {which}, a point a job.", *describe_trends(sweep))
 
 
 def scatter(sweep: PlottedSweep, columns: Sequence[int], keys: int) -> str:
-    """Return some metrics of a list of jobs over several keys."""
+    """Describe some metrics of a list of jobs over several keys."""
     some = f"the {len(columns)} strongest of {keys} keys" if keys > len(columns) else "each key"
     return join_sentences(
         f"The metrics that change most over {some}, a point a job.", *describe_trends(sweep)
@@ -149,7 +149,7 @@ def scatter(sweep: PlottedSweep, columns: Sequence[int], keys: int) -> str:
 
 
 def describe_trends(sweep: PlottedSweep) -> Iterator[str]:
-    """Yield what is said of trends and of colours, and how many points are drawn."""
+    """Yield the sentences on trends, on colours, and on how many points are drawn."""
     yield TREND
     phrase, _, _ = grouping(sweep)
     if phrase:
@@ -162,7 +162,7 @@ def describe_trends(sweep: PlottedSweep) -> Iterator[str]:
 
 
 def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> str:
-    """Return which axis matters for which of the metrics that are shown."""
+    """Describe which axis matters for which of the metrics that are shown."""
     left = [measure.title for measure in shown if measure not in found]
     kind = next(iter(found.values())).kind
     unit = "the correlation" if kind == "rank" else "its total effect"

@@ -211,7 +211,7 @@ class PlottedSweep:
 
     @cached_property
     def status(self) -> np.ndarray:
-        """Return how each point's job ended."""
+        """Return the status of each point's job, or `OUTSIDE`."""
         return np.where(self.place < 0, OUTSIDE, self.of(self.data["status"]))
 
     @cached_property

@@ -209,7 +209,9 @@ class MeasuredPoints:
 
 
 def roles_of(sweep: PlottedSweep, order: Sequence[int], detailed: bool) -> Roles:
-    """Return which axis does what. order: the axes' numbers, the strongest first.
+    """Return the roles of the axes in a figure.
+
+    order: the axes' numbers, the strongest first.
 
     In x lies the one of the two strongest axes of numbers that has more values, in colours the
     strongest of the others; with `detailed` the next two make columns and rows.

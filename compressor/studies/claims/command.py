@@ -111,7 +111,7 @@ def report_machines(found: "list[xr.Dataset]", as_json: bool) -> None:
 
 
 def sentences(found: "xr.Dataset") -> Iterator[str]:
-    """Yield what a file of judged machines says."""
+    """Yield the findings of a file of judged machines."""
     from compressor.studies.claims.findings import (
         change,
         consistency,

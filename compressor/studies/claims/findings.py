@@ -68,7 +68,7 @@ def count_claims(found: xr.Dataset) -> tuple[int, dict[int, int], int]:
 
 
 def summary(found: xr.Dataset) -> Iterator[str]:
-    """Yield what machines say: how many hold which claims, where, and what claim 7 lacks."""
+    """Yield how many machines hold which claims, where, and how far claim 7 falls short."""
     judged, each, whole = count_claims(found)
     failed = int((found["status"] == "failed").sum())
     some = ", ".join(f"{claim} in {count}" for claim, count in each.items())
@@ -92,7 +92,7 @@ def summary(found: xr.Dataset) -> Iterator[str]:
 
 
 def region(found: xr.Dataset) -> Iterator[str]:
-    """Yield where all claims hold, or all but claim 7, as ranges of what is swept."""
+    """Yield the ranges of the swept keys in which all claims hold, or all but claim 7."""
     held = found["held"] == 1
     for name, claims in (("All eight", CLAIMS), ("All but claim 7", (1, 2, 3, 4, 5, 6, 8))):
         all_hold = held.sel(claim=[*claims]).all("claim")
@@ -155,7 +155,7 @@ def consistency(found: xr.Dataset) -> str:
 
 
 def rank_assumptions(table: xr.Dataset) -> Iterator[str]:
-    """Yield which assumption has most of each margin's variance, of `sensitivity`."""
+    """Yield the assumption that has most of each margin's variance, of `sensitivity`."""
     names = [coordinate_in_words(str(name)) for name in table["assumption"].values]
     for claim in table["claim"].values.tolist():
         one = table.sel(claim=claim)
@@ -213,7 +213,7 @@ def change(found: xr.Dataset) -> Iterator[str]:
 
 
 def changes(machine: xr.Dataset) -> str:
-    """Return what is not as by default at a machine."""
+    """Return the values of a machine that are not the defaults, in words."""
     defaults = Case.from_values({}).values()
     parts = []
     for name, coordinate in machine.coords.items():
@@ -286,7 +286,7 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
 
 
 def phrase(name: str) -> str:
-    """Return what an index or an end of its interval is, in words."""
+    """Return an index, or an end of its interval, in words."""
     order, _, end = name.partition("_order")
     meanings = {"first": "by this assumption alone", "total": "with this assumption's interactions"}
     text = f"share of the margin's variance {meanings[order]}"

@@ -89,7 +89,7 @@ def plane(found: xr.Dataset) -> tuple[str, str, Drawing]:
 
 
 def borders(found: xr.Dataset) -> str:
-    """Return how often neighbours on the map differ, in words."""
+    """Describe how often neighbours on the map differ."""
     parts = []
     for claim in OF_MASSES:
         one = flips(found, claim)

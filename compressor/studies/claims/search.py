@@ -157,7 +157,7 @@ class MachineSearch:
         return judge_machines(study, self.folder, self.workers, self.progress)
 
     def cost(self, point: Sequence[float]) -> float:
-        """Return what the search makes small, of a machine that is known."""
+        """Return the cost, as `cost`, of a machine that is known."""
         verdict = self.points[tuple(point)]
         return cost(verdict, self.distance(point) / len(self.spans), self.longer > 1)
 

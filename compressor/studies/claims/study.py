@@ -184,13 +184,13 @@ def judge_machines(
 
 
 def machine_key(case: Case) -> str:
-    """Return what a machine's verdict depends on: all of its case, and how claims are measured."""
+    """Return the hash of a machine's case and of the rules by which claims are measured."""
     rules = "\n".join(f"{rule.statement} {rule.threshold}" for rule in RULES)
     return hashlib.sha256(f"{case.key} {rules}".encode()).hexdigest()[:20]
 
 
 def judge_end(end: JobResult | JobLost) -> Judged:
-    """Return what a job says of its machine, also one that took its worker with it."""
+    """Return the verdict of a job that ended, also of one that took its worker with it."""
     return (
         end.result if isinstance(end, JobResult) else Judged(failed=f"{end.reason}: {end.detail}")
     )
@@ -272,7 +272,7 @@ def read_machines(path: Path) -> xr.Dataset:
 
 
 def rows_of(found: xr.Dataset) -> dict[str, Judged]:
-    """Return what is known of machines, by key."""
+    """Return the stored verdicts of machines, by key."""
     flat = found.stack(all_machines=found["key"].dims, create_index=False)
     flat = flat.transpose("all_machines", ...)
     columns = [flat[name].values.tolist() for name in Judged._fields]

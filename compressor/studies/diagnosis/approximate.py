@@ -196,13 +196,13 @@ class Strangeness:
         return left @ self.back[-left.size :] / self.spread
 
     def _residuals(self, white: np.ndarray) -> np.ndarray:
-        """Return what the strongest components do not predict of the others."""
+        """Return the weaker components less their prediction by the strongest ones."""
         strong = self.regression.points.shape[1]
         return white[strong:] - self.regression.predict(white[None, :strong])[0]
 
 
 def _whitening(residuals: np.ndarray) -> np.ndarray:
-    """Return what turns residuals (n, c) into uncorrelated ones of variance 1, (c, c)."""
+    """Return the matrix that makes residuals (n, c) uncorrelated with variance 1, (c, c)."""
     values, vectors = np.linalg.eigh(np.atleast_2d(np.cov(residuals.T)))
     return vectors / np.sqrt(np.maximum(values, WEAKEST * values.max()))
 
@@ -306,7 +306,7 @@ def weighted_quantiles(
 
 
 def misses(intervals: np.ndarray, logs: np.ndarray) -> np.ndarray:
-    """Return how many times as wide an interval's half would have to be to hold the truth, (n, k).
+    """Return the factor on an interval's half by which it just holds the truth, (n, k).
 
     intervals: (n, k, 3) of `quantiles`; logs: the true log clearances, (n, k).
     """

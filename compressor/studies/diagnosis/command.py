@@ -181,7 +181,7 @@ def ends(clearances: dict[str, Any]) -> str:
 
 
 def grounds(fitted: "Identifier", answer: "Identification", folder: str) -> Iterator[str]:
-    """Yield what an answer rests on, and its cautions."""
+    """Yield the jobs and distances on which an answer rests, and its cautions."""
     library = fitted.library
     yield (f"rests on {len(library.keys)} of {plural(library.jobs)} of study {library.study} in "
            f"{folder}; the nearest one is {answer.nearest}")  # fmt: skip

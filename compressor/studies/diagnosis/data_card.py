@@ -81,7 +81,7 @@ def describe_origin(dataset: "xr.Dataset") -> str:
 
 
 def describe_simulation(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
-    """Return how many jobs and machines, what was swept, how the motions are, what was left out."""
+    """Describe jobs and machines, swept keys, kinds of motion, and jobs that are left out."""
     machines = len({*dataset["machine"].values.tolist()})
     jobs = len({*dataset["key"].values.tolist()})
     first = (
@@ -127,7 +127,7 @@ def _meaning(reason: str) -> str:
 
 
 def describe_cuts(dataset: "xr.Dataset") -> str:
-    """Return how records were cut, disturbed and split."""
+    """Describe how records were cut, disturbed and split."""
     attrs = dataset.attrs
     levels = ", ".join(f"{rms:g}" for rms in dataset["noise"].values)
     hops = "one after the other" if attrs["hop"] >= attrs["revolutions"] else "overlapping"
@@ -173,7 +173,7 @@ def groups(fixed: dict[str, Any]) -> str:
 
 
 def labels(dataset: "xr.Dataset") -> str:
-    """Return what a window is labelled with, and over which range."""
+    """Describe the labels of a window, and their ranges."""
     rows = [(f"`{name}`", "", phrase, _words(dataset, name)) for name, phrase in WORDS.items()]
     for name, (unit, phrase, _) in LABELS.items():
         values = dataset[name].values
@@ -194,7 +194,7 @@ def feature_table(dataset: "xr.Dataset") -> str:
 
 
 def files(dataset: "xr.Dataset", parquet: bool) -> str:
-    """Return what the files hold and how they are opened."""
+    """Describe the files, and how they are opened."""
     signal = "their samples, " if "signal" in dataset else ""
     lines = [
         f"- `windows.nc` (netCDF-4, which is HDF5): the windows, {signal}labels and features; "
@@ -219,7 +219,7 @@ def model_rows(models: dict[str, dict[str, int]]) -> list[tuple[str, str]]:
 
 
 def unmodelled_parts(models: dict[str, dict[str, int]]) -> Iterator[str]:
-    """Yield what the chosen models leave out, each with the jobs that it is said of."""
+    """Yield the effects that the chosen models leave out, each with the jobs concerned."""
 
     def of_jobs(part: str, kind: str) -> str:
         count, every = models[part].get(kind, 0), sum(models[part].values())
@@ -246,7 +246,7 @@ def unmodelled_parts(models: dict[str, dict[str, int]]) -> Iterator[str]:
 
 
 def absent(fixed: dict[str, Any], models: dict[str, dict[str, int]]) -> list[str]:
-    """Return what the data set does not have."""
+    """Describe the parts that the data set does not have."""
     body, sensor = fixed.get("body") or {}, fixed.get("sensor") or {}
     found = [*ABSENT, *unmodelled_parts(models)]
     if body:

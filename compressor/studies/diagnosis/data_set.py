@@ -153,7 +153,7 @@ def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
 def split_by_machine(
     machines: Sequence[str], strata: Sequence[str], share: float, seed: int
 ) -> np.ndarray:
-    """Return which windows are for testing, (n,): all of a machine or none.
+    """Return whether windows are for testing, (n,): all of a machine or none.
 
     machines, strata: of each window. Of the machines of each stratum a share is drawn, to the
     nearest number, and at least one of two; a single one is for training. The order of windows
@@ -228,7 +228,7 @@ def make_data_set(
 
 
 def without_sensor(study: StoredStudy) -> DataSetError:
-    """Return what to write into the case file of a study without records."""
+    """Return the error that says which keys a study without records lacks."""
     text = f"study {study.name} has no sensor's record: write {RECORD_NEEDED} into"
     return DataSetError(f"{text} {study.case_file}, keep series, and run it again")
 

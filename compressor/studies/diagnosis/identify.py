@@ -139,7 +139,7 @@ class Identifier:
         )  # fmt: skip
 
     def identify(self, row: np.ndarray) -> Identification:
-        """Return what explains a record with these features, (FEATURES,)."""
+        """Return the joints that explain a record with these features, (FEATURES,)."""
         filled = np.where(np.isnan(row), self.middle, row)
         plain = (filled - self.middle) / self.scale
         point = np.clip(plain, -FARTHEST, FARTHEST)
@@ -188,7 +188,7 @@ def find_record(name: str, folder: Folder, steady: SteadySpeed | None) -> tuple[
 def explain_record(
     record: Record, folder: Folder, study: str, key: str, progress: Progress
 ) -> tuple[Identifier, Identification]:
-    """Return what a stored study tells of a record, and the identifier that does.
+    """Return the joints that explain a record by a stored study, and the identifier.
 
     key: a job left out.
 

@@ -53,7 +53,7 @@ class Library:
     swept: dict[str, np.ndarray]
 
     def without(self, key: str) -> "Library":
-        """Return the same but for a job, since a job must not explain itself."""
+        """Return the library without a job, since a job must not explain itself."""
         return self.only(self.keys != key)
 
     def only(self, mask: np.ndarray) -> "Library":
@@ -106,7 +106,7 @@ def vector(record: Record) -> np.ndarray:
 
 
 def _place(stored: Stored, key: str) -> int | None:
-    """Return where a job that is ok and has series stands in the rows of a store."""
+    """Return the row in a store of a job that is ok and has series, else None."""
     place = stored.position(key)
     if place is None or stored.rows.words["status"][place] != "ok":
         return None
@@ -114,7 +114,7 @@ def _place(stored: Stored, key: str) -> int | None:
 
 
 def _digest(stored: Stored, positions: dict[str, int]) -> str:
-    """Return what features are made of: files by their digests, and the code that makes them."""
+    """Return the hash of the files from which features are made, and of their code."""
     parts = (stored.rows.columns[name] for name in ("key", "digest"))
     keys, digests = (column[[*positions.values()]].tolist() for column in parts)
     names = [f"{k.decode()}-{d.decode()}.h5" for k, d in zip(keys, digests, strict=True)]

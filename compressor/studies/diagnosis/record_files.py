@@ -234,7 +234,7 @@ def _even(path: str | Path, times: np.ndarray) -> np.ndarray:
 def _pulses(
     path: str | Path, times: np.ndarray, tacho: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return when a tacho rises through the middle of its range, and how well that is known: s.
+    """Return the times at which a tacho rises through its middle, and their uncertainty, s.
 
     A rise comes from low and goes high, or goes high from the first sample on. A level that jumps
     between two samples jumps anywhere between them; one that rises slowly is known better.

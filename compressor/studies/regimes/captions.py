@@ -33,7 +33,7 @@ class SeenValue(NamedTuple):
 
 
 def seen_values(chain: xr.Dataset) -> list[SeenValue]:
-    """Return what one direction saw, in the order it went; values that failed are left out."""
+    """Return the values of one direction in its order, without those that failed."""
     over, found = chain.attrs["over"], []
     for i in np.argsort(chain[over].values, kind="stable"):
         one = chain.isel({over: i})
@@ -76,7 +76,7 @@ def bifurcation(pair: xr.Dataset) -> str:
 
 
 def course(values: Sequence[SeenValue], unit: str) -> str:
-    """Return where period 1 is lost and comes back, and how often each regime was found."""
+    """Describe where period 1 is lost and comes back, and how often each regime was found."""
     regimes = [one.regime for one in values]
     if not values:
         return "no value has a result."
@@ -117,7 +117,7 @@ def describe_exponent(values: Sequence[SeenValue], unit: str) -> str:
 
 
 def directions(pair: xr.Dataset) -> list[str]:
-    """Return whether up and down differ, where, and whether second attractors were confirmed."""
+    """Describe whether up and down differ, where, and whether second attractors were confirmed."""
     if pair.sizes["direction"] < 2 or "differs" not in pair:
         return []
     over, unit = pair.attrs["over"], unit_of(pair)
@@ -142,7 +142,7 @@ def directions(pair: xr.Dataset) -> list[str]:
 
 
 def failures(pair: xr.Dataset) -> list[str]:
-    """Return how many values failed, and why."""
+    """Describe how many values failed, and why."""
     failed = pair["status"].values == "failed"
     if not failed.any():
         return []
@@ -213,7 +213,7 @@ def rate(one: SeenValue) -> str:
 
 
 def phrase_of(data: xr.Dataset, name: str) -> str:
-    """Return what a coordinate is called in a sentence."""
+    """Return a coordinate's phrase for a sentence."""
     return str(data[name].attrs.get("long_name") or data[name].attrs.get("case_key", name))
 
 

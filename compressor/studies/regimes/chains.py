@@ -62,7 +62,7 @@ class Chain:
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
-        """Return where it is stored."""
+        """Return the path of its file."""
         return Path(folder) / FOLDER / self.study / f"{self.key}.nc"
 
 
@@ -110,7 +110,7 @@ def first_failed(rows: Sequence[Row]) -> int:
 
 
 def chain_end(chain: Chain, rows: Sequence[Row]) -> ChainEnd:
-    """Return how far a chain has come."""
+    """Return the numbers of a chain's values, and its failed ones."""
     paired = zip(chain.values, rows, strict=False)
     bad = [(v, row["reason"], row["detail"]) for v, row in paired if row["status"] != "ok"]
     return ChainEnd(len(rows), tuple(bad))

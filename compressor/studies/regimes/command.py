@@ -49,14 +49,14 @@ def check_options(alone: bool, scheduler: str | None, rerun: tuple[str, ...], wa
 
 
 def ahead(studies: "list[Study]", folder: str) -> "list[ChainProgress]":
-    """Return how many values of each study's chains are stored."""
+    """Return the number of stored values of each study's chains."""
     from compressor.studies.regimes.run import standing
 
     return standing(studies, folder)
 
 
 def ahead_lines(standings: "list[ChainProgress]") -> Iterator[str]:
-    """Yield how many values the chains of each study have, and how many of them are stored."""
+    """Yield the numbers of values of each study's chains, and of stored ones."""
     for one in standings:
         missing = one.chains * one.values - one.done
         chains = f"{plural(one.chains, 'chain')} x {plural(one.values, 'value')}"
@@ -64,7 +64,7 @@ def ahead_lines(standings: "list[ChainProgress]") -> Iterator[str]:
 
 
 def regimes_of(folder: str, study: str) -> str:
-    """Return how many values of a study are in which regime."""
+    """Describe how many values of a study are in which regime."""
     from compressor.studies.regimes.dataset import open_regimes
 
     found = open_regimes(folder, study)

@@ -86,7 +86,7 @@ def differ(one: MotionSignature, other: MotionSignature, within: float) -> bool:
 
 
 def signature_of_row(row: Row, case: Case) -> MotionSignature:
-    """Return what a stored value says of its motion."""
+    """Return the signature of the motion at a stored value."""
     count = 0 if row["status"] != "ok" else int(row["revolutions"])
     period = float(row["period"])
     points = row["section"][: count if math.isnan(period) else int(period)]
@@ -96,7 +96,7 @@ def signature_of_row(row: Row, case: Case) -> MotionSignature:
 
 
 def signature_of_motion(motion: SettledMotion, case: Case) -> MotionSignature:
-    """Return the same of a motion that was followed now."""
+    """Return the signature of a motion that was followed now."""
     found = places(motion.points, record(case)["clearance"])
     if motion.reason:
         return MotionSignature("", math.nan, found, math.nan, math.nan)
@@ -118,7 +118,7 @@ class ChainPair:
         return hashlib.sha256(identity.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
-        """Return where its verdicts are stored."""
+        """Return the path of the file with its verdicts."""
         return Path(folder) / FOLDER / self.up.study / f"pair-{self.key}.nc"
 
 

@@ -78,7 +78,7 @@ def of_joint(over: str, chains: Sequence[Sequence[xr.Dataset | None]]) -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return which chains a study has. Raises StoreError."""
+    """Return the manifest of a study: its keys, axes and chains. Raises StoreError."""
     path = folder / FILE
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
@@ -144,7 +144,7 @@ def stack_chains(
 def verdicts(
     pairs: Sequence[xr.Dataset | None], dims: tuple[str, ...], shape: tuple[int, ...]
 ) -> dict[str, tuple]:
-    """Return where up and down differ, over machine and value; 0 where it is not known yet."""
+    """Return the verdicts on values, over machine and value; 0 where it is not known yet."""
     found = {}
     for name, attrs in verdict_attrs().items():
         columns = [np.zeros(shape[-1], int) if p is None else p[name].values for p in pairs]

@@ -105,7 +105,7 @@ def plot_periods(panel: Panel, pair: xr.Dataset) -> None:
 
 
 def period_rows(chain: xr.Dataset) -> np.ndarray:
-    """Return where the period of each value stands; nan where it has no result."""
+    """Return the height of each value's period in the panel; nan where it has no result."""
     words, ok = chain["regime"].values, chain["status"].values == "ok"
     repeats = (words == "periodic") & np.isfinite(chain["period"].values)
     period = np.where(repeats, chain["period"].values, 1.0)

@@ -120,7 +120,7 @@ def at(dataset: xr.Dataset, fixed: dict) -> xr.Dataset:
 
 
 def describe_fixed_axes(fixed: dict, leave: str = "") -> str:
-    """Return what other axes a figure is of, in words."""
+    """Describe the values of the other axes that a figure is of."""
     words = [f"{axis} {shown_value(value)}" for axis, value in fixed.items() if axis != leave]
     return f" Here {', '.join(words)}." if words else ""
 

@@ -149,7 +149,7 @@ def write_manifest(folder: Path, study: Study) -> None:
 
 
 def done(chain: Chain, folder: Path) -> int:
-    """Return how many values of a chain are stored. Raises StoreError."""
+    """Return the number of stored values of a chain. Raises StoreError."""
     path = chain.path(folder)
     return read_chain(path).sizes.get("value", 0) if path.exists() else 0
 
@@ -188,7 +188,7 @@ class ChainWatch:
 def run_chains(
     tasks: Sequence[ChainTask], workers: int, watch: ChainWatch
 ) -> dict[str, ChainEnd | JobLost]:
-    """Return how each chain ended, by its key."""
+    """Return the end of each chain, by its key; run what is missing."""
     missing = [task for task in tasks if task.rerun or not complete(task)]
     cases = [case for task in missing for case in task.chain.cases[:1]]
     jobs = [(task.chain.key, task, seconds(task.chain)) for task in missing]
@@ -218,7 +218,7 @@ def seconds(chain: Chain) -> float:
 
 
 def result(end: JobResult | JobLost) -> Any:
-    """Return what a job gave, or how it was lost; raises the StoreError that one gave."""
+    """Return the result of a job, or how it was lost; raise the StoreError that it gave."""
     if isinstance(end, JobResult) and isinstance(end.result, StoreError):
         raise end.result
     return end.result if isinstance(end, JobResult) else end
@@ -271,7 +271,7 @@ def describe_progress(
     ends: dict[str, ChainEnd | JobLost],
     books: dict[str, VerdictBook],
 ) -> tuple[tuple[ChainCount, ...], tuple[ValueFailure, ...]]:
-    """Return what each study has now, and every failed value."""
+    """Return the counts of each study, and every failed value."""
     counts, failures = [], []
     for study in studies:
         own = [machine for machine in machines if machine.study == study.name]
@@ -318,7 +318,7 @@ class ChainProgress(NamedTuple):
 
 
 def standing(studies: Sequence[Study], folder: Folder) -> list[ChainProgress]:
-    """Return how far the chains of studies are in a folder; runs nothing. Raises StoreError."""
+    """Return the progress of the chains of studies; run nothing. Raises StoreError."""
     place: Callable[[Chain], int] = partial(done, folder=Path(folder))
     found = []
     for study in studies:

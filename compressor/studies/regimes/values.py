@@ -48,7 +48,7 @@ MORE = 4  # revolutions, beyond two periods, in which points are to repeat
 
 
 def tolerance(case: Case) -> float:
-    """Return how near (of the clearance) two Poincaré points of a case are one.
+    """Return the distance (of the clearance) below which two Poincaré points are one.
 
     At accuracy standard or better a thousandth: five times what the steps' own errors were seen to
     scatter them by, at both joints.

@@ -118,7 +118,7 @@ def lines(question: "Question", answer: "SearchResult", folder: str) -> Iterator
 
 
 def comparison_lines(question: "Question", answer: "SearchResult") -> Iterator[str]:
-    """Yield where a comparison first becomes true."""
+    """Yield the place at which a comparison first becomes true."""
     goal = question.goal
     text = f"{goal.name} {goal.sign} {goal.limit:g} {goal.unit}".rstrip()
     low, high = answer.low, answer.high
@@ -140,12 +140,12 @@ def comparison_lines(question: "Question", answer: "SearchResult") -> Iterator[s
 
 
 def doubt(answer: "SearchResult") -> str:
-    """Return what points do whose error bars reach the limit."""
+    """Describe points whose error bars reach the limit."""
     return "does not decide" if len(answer.blind) == 1 else "do not decide"
 
 
 def extremum_lines(question: "Question", answer: "SearchResult") -> Iterator[str]:
-    """Yield where a metric is greatest or least."""
+    """Yield the place at which a metric is greatest or least."""
     best = answer.best
     assert best is not None
     yield (f"{question.goal.name} is {question.goal.sign} at {at(question, best)}: "
@@ -183,7 +183,7 @@ def why_undecided(question: "Question", point: Any) -> str:
 
 
 def spacing(question: "Question") -> str:
-    """Return how far the points of a scan are apart."""
+    """Describe the distance of the points of a scan."""
     steps = question.scan - 1
     if question.logarithmic:
         factor = (question.high / question.low) ** (1 / steps)

@@ -86,7 +86,7 @@ def find_first(
 
 
 def interval(points: Sequence[Point], holds: Holds) -> SearchResult:
-    """Return what some points, in their order, say of where a comparison first becomes true."""
+    """Return the interval in which a comparison first becomes true, by points in their order."""
     low: Point | None = None
     blind: list[Point] = []
     for point in points:
@@ -127,10 +127,11 @@ def sections(answer: SearchResult, tolerance: float, at_once: int) -> list[float
 def find_extremum(
     evaluate: Evaluate, greatest: bool, shares: Sequence[float], tolerance: float
 ) -> SearchResult:
-    """Return where a metric is greatest or least: near the best of the points at `shares`.
+    """Return the place at which a metric is greatest or least, near the best of some points.
 
-    Between the two neighbours of that, minimize_scalar(method="bounded") goes on until its argument
-    is known to `tolerance`, a share. Points that say nothing count as the worst one that is known.
+    The points are at `shares`. Between the two neighbours of that,
+    minimize_scalar(method="bounded") goes on until its argument is known to `tolerance`, a share.
+    Points that say nothing count as the worst one that is known.
     """
     points = sorted(evaluate(shares), key=lambda point: point.share)
     usable = [point for point in points if not point.told.reason]
@@ -177,7 +178,7 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
 
 
 def place(point: Point) -> float:
-    """Return where on the range a point lies."""
+    """Return the share of the range at which a point lies."""
     return point.share
 
 

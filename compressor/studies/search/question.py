@@ -81,7 +81,9 @@ class Goal:
         return ends.pop() if not reading.reason and len(ends) == 1 else None
 
     def read(self, numbers: np.void, regime: str) -> JobReading:
-        """Return what the numbers (dtype ROW) of a job that is ok say, moving in a regime.
+        """Return the reading of the goal from the numbers (dtype ROW) of a job that is ok.
+
+        regime: that the job moves in.
 
         A single peak of a chaotic motion has no meaning: the mean over revolutions of each one's
         counts, with the 95 % interval that its standard error and Student's t give. The bars of

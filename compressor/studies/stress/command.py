@@ -129,6 +129,6 @@ def summary(study: "xr.Dataset") -> Iterator[str]:
 
 
 def command(row: "xr.Dataset", attrs: dict[str, Any]) -> str:
-    """Return what repeats a scene of a campaign."""
+    """Return the command that repeats a scene of a campaign."""
     drawn = f" --{attrs['drawn']}" if attrs.get("drawn") else ""
     return f"compsim stress --scene {row['scene'].item()} --seed {attrs['seed']}{drawn}"

@@ -176,7 +176,7 @@ def choose_law(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
 
 
 def place(case: Case) -> dict[str, float]:
-    """Return where a scene lies on the axes of `SPANS`; the clearance of an ideal joint is nan."""
+    """Return a scene's place on the axes of `SPANS`; the clearance of an ideal joint is nan."""
     exponent = case.contact.exponent
     stiffness = (case.contact.stiffness_N_per_mm15 or math.nan) * 1000.0**exponent
     friction = case.friction

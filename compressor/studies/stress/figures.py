@@ -82,7 +82,7 @@ def coordinate(study: xr.Dataset, name: str) -> np.ndarray:
 
 
 def describe_draw(study: xr.Dataset, name: str) -> Mapping[str, Any]:
-    """Return how a parameter was drawn: the attributes of its variable in a campaign."""
+    """Return the draw of a parameter: the attributes of its variable in a campaign."""
     return study["clearance_big_end" if name == "clearance" else name].attrs
 
 
@@ -101,6 +101,6 @@ def frame(panel: Panel, first: Mapping[str, Any], second: Mapping[str, Any]) -> 
 
 
 def legend_entry(name: str, count: int) -> Trace:
-    """Return what a mark means, and how many there are."""
+    """Return the legend's entry of a mark, with its count."""
     look = replace(LOOKS[name], markersize=max(LOOKS[name].markersize, 4.0), edge_width=1.0)
     return entry(f"{name.replace('_', ' ')} ({count})", look)

@@ -229,7 +229,10 @@ def excess(name: str, found: Solution, other: Solution, least: float) -> Excess:
 
 
 def size(name: str, metrics: dict[str, Any]) -> float:
-    """Return what errors of a metric are relative to: its greatest value over joints and axes."""
+    """Return the size to which errors of a metric are relative.
+
+    It is the greatest value over joints and axes, or 1 where errors are absolute.
+    """
     return 1.0 if name in ABSOLUTE else float(np.abs(metrics[name]).max()) or 1.0
 
 

@@ -216,7 +216,7 @@ def drawn_ranges() -> dict[str, dict[str, Any]]:
 
 
 def settings(budget: Budget) -> str:
-    """Return what scenes and verdicts depend on beside the seed."""
+    """Return the settings on which scenes and verdicts depend beside the seed."""
     return (
         f"model {MODEL}; {budget.revolutions:g} revolutions, "
         f"{budget.max_steps} steps or {budget.seconds:g} s{DRAWN[budget.drawn]}"

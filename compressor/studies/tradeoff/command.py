@@ -181,7 +181,7 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
 
 
 def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
-    """Yield what each change of the model does to each scene.
+    """Yield the effect of each change of the model on each scene.
 
     Those that do not apply are left out.
     """
@@ -333,7 +333,7 @@ def scale_lines(joint: "JointScales") -> Iterator[str]:
 
 
 def cost_lines(facts: "Explanation") -> Iterator[str]:
-    """Yield what a job and the sweep cost."""
+    """Yield the cost of a job and of the sweep."""
     work = f" ({facts.steps} steps, {facts.evaluations} evaluations)" if facts.steps else ""
     yield heading("cost", f"{1e3 * facts.seconds:.3g} ms a job{work}")
     solved = f"{1e3 * facts.solution_seconds:.3g} ms of it for the solution (`seconds` in show)"

@@ -167,7 +167,7 @@ def time_case(case: Case, repeats: int) -> tuple[xr.Dataset, float, float]:
 
 
 def other_work(case: Case) -> tuple[str, ...]:
-    """Return what a job does beside its solution, in words."""
+    """Return the work of a job beside its solution, in words."""
     found = ["the runs that its error bars come from"] if case.wants_bars else []
     found += ["its time series"] if case.output.keep == "series" else []
     found += ["the motion of its body"] if case.body else []
@@ -194,7 +194,7 @@ def promise(case: Case) -> float:
 
 
 def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return what a case computes, in words by term, and what it leaves out at no cost."""
+    """Return the terms that a case computes, in words, and those that it leaves out at no cost."""
     ideal = not faulty(case)
     own_keys = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
     shown = [feature for feature in FEATURES if not feature.key.startswith(own_keys)]
@@ -265,7 +265,7 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
 
 
 def advise(case: Case, repeats: int, progress: Progress) -> Iterator[Advice]:
-    """Yield what each feature that a case pays for changes, and whether it could be left out."""
+    """Yield the effect of each feature that a case pays for, and whether it could be left out."""
     paid = [feature for feature in FEATURES if feature.paid(case)]
     if not paid:
         return

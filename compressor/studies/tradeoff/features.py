@@ -348,7 +348,7 @@ def comparable(case: Case) -> Case:
 
 
 def compare(base: Case, other: Case, repeats: int, known: xr.Dataset | None = None) -> Effect:
-    """Return what another model changes in the joints that the base has clearance in.
+    """Return the effect of another model on the joints in which the base has clearance.
 
     Answers are compared at `EXACT`; the ratio of times is the median over `repeats` pairs of runs
     in turn, each case by its own method and tolerance. known: the base's run to compare with, where

@@ -103,7 +103,7 @@ def mark_tiers(panel: Panel, row: xr.Dataset) -> None:
 
 
 def uncertainty(one: xr.Dataset) -> float:
-    """Return how far a scene's references lie apart in acceleration."""
+    """Return the relative distance of a scene's references in acceleration."""
     return float(one["reference_uncertainty"].sel(quantity="acceleration"))
 
 

@@ -270,7 +270,9 @@ def trade(
     repeats: int = 3,
     progress: Progress = no_progress,
 ) -> xr.Dataset:
-    """Return what every change of the model makes of cases; dims (scene, choice), as `tabulate`.
+    """Return the metrics of cases under every change of the model; dims (scene, choice).
+
+    Variables as `tabulate` has them.
 
     A change that a scene has no use for is missing there. `place_error` is that of the series
     kinematics as a share of the clearance, `acceleration_error` that of its acceleration (L2). Each

@@ -122,7 +122,7 @@ def has_number(measure: Measure, value: float, bar: float) -> bool:
 def change(
     measure: Measure, values: np.ndarray, bars: np.ndarray, choice: xr.Dataset
 ) -> tuple[str, float]:
-    """Return what a choice changes in a measure, in words and as a number, nan where unknown.
+    """Return the change of a measure by a choice, in words and as a number, nan where unknown.
 
     values, bars: of the case itself, and of the choice.
     """
@@ -159,7 +159,7 @@ def percent(size: float) -> str:
 
 
 def span_text(measure: Measure, low: float, high: float) -> str:
-    """Return how far choices move a measure, as `-66 to +93 %`."""
+    """Return the span of a measure over the choices, as `-66 to +93 %`."""
     if low == high == 0.0:
         return NONE_SEEN
     unit = "%" if measure.is_relative else "points"
@@ -173,7 +173,7 @@ def span_text(measure: Measure, low: float, high: float) -> str:
 
 
 def note_of(choice: xr.Dataset) -> str:
-    """Return what a choice assumes, and why its run failed, if it did."""
+    """Return the assumption of a choice, and why its run failed, if it did."""
     reason, note = str(choice["reason"].item()), str(choice["note"].item())
     failed = f"failed: {reason}" if reason else ""
     return "; ".join(text for text in (failed, note) if text)
@@ -209,7 +209,7 @@ def headline(table: ModelTable) -> str:
 
 
 def place_text(study: Study | StoredStudy, key: str) -> str:
-    """Return which job of its study the choices are of, in words."""
+    """Return the place in its study of the job that the choices are of, in words."""
     at = next(islice(points(study), study.keys.index(key), None))
     point = ", ".join(f"{name} = {value}" for name, value in at.items())
     which = "the only job" if study.jobs == 1 else f"one of {study.jobs} jobs"
@@ -230,7 +230,7 @@ class ModelsContent:
 
 
 def models_file(folder: Folder, study: str) -> Path:
-    """Return where the choices of the model of a study's job are stored, or would be."""
+    """Return the path at which the choices of the model of a study's job are stored."""
     return Path(folder) / "models" / f"{study}.nc"
 
 
@@ -257,7 +257,7 @@ def read_models(folder: Folder, study: StoredStudy) -> xr.Dataset | None:
 
 
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
-    """Return what is stored of choices of the model: a line on each study, and a section."""
+    """Return a line on each study with stored choices of the model, and a section on them."""
     notes, chapters = {}, []
     for study in studies:
         data = read_models(results, study)

@@ -223,7 +223,7 @@ def empty(scenes: list[str], methods: Sequence[str], tolerances: Sequence[float]
 
 
 def compare_references(study: xr.Dataset, name: str, truth: Mapping[str, Mapping]) -> None:
-    """Return how far the references of a case lie apart, by quantity."""
+    """Write into a study how far the references of a case lie apart, by quantity."""
     distances = errors(truth[REFERENCES[1]], truth[REFERENCES[0]])
     study["reference_uncertainty"].loc[name] = [distances[quantity] for quantity in ERRORS]
 

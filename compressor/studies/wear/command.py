@@ -118,7 +118,7 @@ def table(machines: "tuple[WornMachine, ...]") -> Iterator[str]:
 
 
 def wear_ending(one: "WornMachine") -> str:
-    """Return how a machine ended, in a line."""
+    """Return the end of a machine's wear in a line."""
     found, wear_keys = one.life, one.case.wear
     if not found or not wear_keys:
         return f"failed: {one.reason}"

@@ -144,7 +144,7 @@ def follow_wear(task: WearTask) -> WearEnd | StoreError:
 
 
 def wear_end(worn: Worn, stages: list[Stage]) -> WearEnd:
-    """Return how a machine's wear has ended."""
+    """Return the end of a machine's wear."""
     last = stages[-1]
     return WearEnd(
         len(stages), life(worn, stages_dataset(worn, stages)), last["reason"], last["detail"]

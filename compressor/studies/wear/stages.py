@@ -102,7 +102,7 @@ class Worn:
         return to_si(self.wear.coefficient_mm3_per_N_m, "mm3/(N m)") / self.sector_area
 
     def path(self, folder: Folder) -> Path:
-        """Return where it is stored."""
+        """Return the path of its file."""
         return Path(folder) / FOLDER / f"{self.key}.nc"
 
     def over(self, stage: Stage) -> bool:
@@ -165,7 +165,7 @@ def first_stage(machine: Worn) -> Stage:
 
 
 def new_stage(hours: float, worn: np.ndarray, motion: WearRun) -> Stage:
-    """Return what is kept of a motion on bores that were worn in some hours."""
+    """Return the stage of a motion on bores that were worn in some hours."""
     found = {name: motion.metrics.get(name, math.nan) for name in SHOWN}
     shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
     return {
@@ -243,12 +243,12 @@ def write(machine: Worn, folder: Folder, stages: list[Stage]) -> None:
 
 
 def wear_file(folder: Folder, case: Case) -> Path:
-    """Return where the stages of a case with wear are stored."""
+    """Return the path at which the stages of a case with wear are stored."""
     return Worn(case).path(folder)
 
 
 def open_wear(folder: Folder, case: Case) -> xr.Dataset:
-    """Return how the bores of a case have worn, from a folder of results, as far as that was run.
+    """Return the wear of a case's bores from a folder of results, as far as it was run.
 
     Dims: `stage`, `joint`, `angle` of a place on the bore; `hours` and `worn_depth` (m) by stage,
     with the metrics of the motion on such bores. Raises StoreError where there is nothing of it.
@@ -275,7 +275,7 @@ class Life(NamedTuple):
 
 
 def life(machine: Worn, stages: xr.Dataset) -> Life:
-    """Return how long a machine lasts, by straight lines between its stages."""
+    """Return the life of a machine, by straight lines between its stages."""
     opened = stages["clearance"].transpose("stage", "joint").values
     hours = stages["hours"].values
     reached = [hours_at_limit(hours, clearance, machine.limit) for clearance in opened.T]
@@ -293,7 +293,10 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
 
 
 def hours_at_limit(hours: np.ndarray, opened: np.ndarray, limit: float) -> float:
-    """Return when a clearance that never shrinks reaches a limit; nan where it does not."""
+    """Return the hours at which a clearance reaches a limit; nan where it does not.
+
+    opened: a clearance that never shrinks.
+    """
     beyond = np.flatnonzero(opened >= limit)
     if not beyond.size:
         return math.nan
