@@ -223,9 +223,9 @@ def relation(runs: Runs, joint: str) -> str:
 def angle_spans(turns: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     """Return the least and greatest value of each angle (degrees) over runs.
 
-    In the order of the first run. Angles of one turn belong together that lie nearest round the
-    circle, so that 359 and 1 degrees are one change: given as (359, 361). Empty where the runs have
-    not the same number of them.
+    They are in the order of the first run. Angles that lie nearest to each other round the circle
+    belong together, so that 359 and 1 degrees are one change: (359, 361). The list is empty where
+    runs have different numbers of angles.
     """
     first = np.array(turns[0])
     if not first.size or {len(one) for one in turns} != {first.size}:

@@ -219,13 +219,11 @@ def continuity_of(found: Evidence, joint: str) -> Continuity:
 def measured_shares(run: xr.Dataset, joint: str) -> Shares:
     """Return the settled shares of a joint with clearance.
 
-    Errors as far as the run's error bars tell.
-
-    Of `apart`, the error bar of the share of time without contact, and two samples for each impact;
-    of `hit`, a window for each impact that is within the velocity's error of `SLOWEST`, or within a
-    sample of a window's edge; of `energy_angle`, what it changes where the energy changes as much
-    as the force's error allows. Of a chaotic run the scatter of its revolutions. Raises as
-    `continuity`.
+    The errors follow from the run's error bars. That of `apart` is the bar of the share of time
+    without contact, and two samples for each impact. That of `hit` is a window for each impact that
+    is within the velocity's error of `SLOWEST`, or within a sample of a window's edge. That of
+    `energy_angle` is its change where the energy changes as much as the force's error allows. In a
+    chaotic run all come from the scatter of its revolutions. Raises as `continuity`.
     """
     by = evidence(run, joint)
     found = continuity_of(by, joint)

@@ -230,8 +230,8 @@ def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
 def left_out(rows: Sequence[SweptRow]) -> str:
     """Describe the rows that could not be drawn, and those of chaotic motion."""
     gone, wild = sum(bool(row.problem) for row in rows), sum(row.chaotic for row in rows)
-    said = f" {plural(gone, 'job')} of {len(rows)} without series to draw." if gone else ""
-    return said + (f" {plural(wild, 'job')} chaotic: their lines change." if wild else "")
+    text = f" {plural(gone, 'job')} of {len(rows)} without series to draw." if gone else ""
+    return text + (f" {plural(wild, 'job')} chaotic: their lines change." if wild else "")
 
 
 def span(values: np.ndarray, form: str = ".2f") -> str:

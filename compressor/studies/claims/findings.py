@@ -142,14 +142,14 @@ def most_consistent(found: xr.Dataset) -> Consistent:
 def consistency(found: xr.Dataset) -> str:
     """Return the most consistent machine of a mass plane, in words."""
     best = most_consistent(found)
-    said = ", ".join(map(str, best.claims))
+    names = ", ".join(map(str, best.claims))
     where = (
         f"rod mass {best.rod_mass:.3g} kg and reciprocating mass {best.reciprocating_mass:.3g} kg"
     )
     if best.least < 0.0:
-        return f"Nowhere claims {said} hold at a machine and all around it; nearest is {where}."
+        return f"Nowhere claims {names} hold at a machine and all around it; nearest is {where}."
     return (
-        f"The most consistent machine has {where}: there and at all neighbours claims {said} hold "
+        f"The most consistent machine has {where}: there and at all neighbours claims {names} hold "
         f"by {100 * best.least:.2g} % or more."
     )
 

@@ -201,19 +201,19 @@ def least_change(
 ) -> xr.Dataset:
     """Return the machine nearest to the defaults at which all claims hold.
 
-    Or else the one that lacks least. As `judge_machines` gives it, alone, and stored in
-    FOLDER/NAME-best.nc. The attribute `distance` is how far it is from the defaults, the sum of
-    changes, each as a share of its range; `looked` how many machines were judged in all; `least` is
-    1 where its changes were taken back as far as the claims go on holding.
+    If there is none, it is the one that lacks least. It has the form of `judge_machines`, and is
+    stored in FOLDER/NAME-best.nc. Its attribute `distance` is the sum of changes from the defaults,
+    each as a share of its range; `looked` is the number of machines that were judged; `least` is 1
+    where changes were taken back as far as the claims go on holding.
 
-    study: whose axes are all drawn by a design, in whose ranges is looked; all machines are stored,
-    in FOLDER/NAME-search.nc and -longer, -longest, and the same call goes on from them. It begins
-    at the best of the study's own machines, as far as they are judged. Evolution finds a region,
-    and a compass search goes on from its best machine. Chaotic runs of few revolutions leave wide
-    errors, in which a search finds lucky machines: so another compass search looks from there, in
-    runs 5 times as long, until all claims hold beyond their errors. Then each change is taken back
-    as far as they go on holding. Where some hold within their errors alone, a run 20 times as long
-    decides. Raises ClaimsError where the study draws nothing.
+    study: its axes are all drawn by a design, whose ranges are searched. All machines are stored,
+    in FOLDER/NAME-search.nc and -longer, -longest, and the same call goes on from them. The search
+    begins at the best of the study's own machines that are judged. Evolution finds a region, and a
+    compass search goes on from its best machine. Chaotic runs of few revolutions leave wide errors,
+    in which a search finds lucky machines: so another compass search goes on in runs 5 times as
+    long, until all claims hold beyond their errors. Then each change is taken back as far as they
+    go on holding. Where some hold only within their errors, a run 20 times as long decides. Raises
+    ClaimsError where the study draws nothing.
     """
     from scipy.optimize import differential_evolution
 

@@ -73,8 +73,8 @@ def dataset(
 
     options = DataSetOptions(revolutions, hop, noise, test_share, seed, not no_signals)
     with ProgressReporter(quiet) as progress:
-        made, written = build_data_set(folder, study, output, options, progress)
-    for line in describe_dataset(made):
+        data_set, written = build_data_set(folder, study, output, options, progress)
+    for line in describe_dataset(data_set):
         print_text(line)
     for name, count in written.files.items():
         print_text(f"{os.path.join(output, name)}  {size(count)}")

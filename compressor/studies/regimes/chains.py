@@ -37,26 +37,26 @@ class Chain:
     """One machine followed one way: its cases in the order of their running."""
 
     study: str
-    asked: Regimes
+    request: Regimes
     direction: str
     cases: tuple[Case, ...]
 
     @classmethod
-    def of(cls, study: str, asked: Regimes, direction: str, cases: Sequence[Case]) -> "Chain":
+    def of(cls, study: str, request: Regimes, direction: str, cases: Sequence[Case]) -> "Chain":
         """Return the chain of cases that are given going up."""
         ordered = cases if direction == "up" else cases[::-1]
-        return cls(study, asked, direction, tuple(ordered))
+        return cls(study, request, direction, tuple(ordered))
 
     @property
     def values(self) -> list[float]:
         """Return the values of the followed key, in the order of running."""
-        up = self.asked.values
+        up = self.request.values
         return up if self.direction == "up" else up[::-1]
 
     @cached_property
     def key(self) -> str:
         """Return the hash of what decides the numbers: cases, start, request, model."""
-        identity = [case.key for case in self.cases], self.asked.plain(), self.direction
+        identity = [case.key for case in self.cases], self.request.plain(), self.direction
         model = model_of(self.cases[0].values())
         text = json.dumps([identity, model, SCHEMA], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
@@ -93,7 +93,7 @@ def run_chain(task: ChainTask) -> ChainEnd | StoreError:
             rows = rows[: first_failed(rows)]
         written, stored = time.monotonic(), len(rows)
         for case in chain.cases[len(rows) :]:
-            rows.append(run_value(case, last_state(rows), chain.asked))
+            rows.append(run_value(case, last_state(rows), chain.request))
             if time.monotonic() - written > SECONDS_BETWEEN_WRITES:
                 write_dataset(path, chain_dataset(chain, rows))
                 written, stored = time.monotonic(), len(rows)
@@ -129,16 +129,16 @@ def chain_dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
         texts = np.array([row[name] for row in rows], object)
         found[name] = ("value",), texts, {"long_name": phrase}
     for name, (dims, unit, phrase) in NUMBERS.items():
-        shape = np.shape(empty(chain.asked, chain.cases[0])[name])
+        shape = np.shape(empty(chain.request, chain.cases[0])[name])
         numbers = np.array([row[name] for row in rows], float).reshape(len(rows), *shape)
         found[name] = ("value", *dims), numbers, {"units": unit, "long_name": phrase}
-    units = {"units": chain.asked.unit, "long_name": chain.asked.over}
+    units = {"units": chain.request.unit, "long_name": chain.request.over}
     value = np.array(chain.values[: len(rows)], float)
     attrs: dict[str, Any] = {
         "key": chain.key,
         "study": chain.study,
         "direction": chain.direction,
-        "regimes": json.dumps(chain.asked.plain()),
+        "regimes": json.dumps(chain.request.plain()),
         "case": chain.cases[0].attributes()["case"],
         "program": PROGRAM,
         "model_version": MODEL,

@@ -70,11 +70,11 @@ class MotionSignature(NamedTuple):
 def differ(one: MotionSignature, other: MotionSignature, within: float) -> bool:
     """Return whether two motions of a machine are different ones.
 
-    Two that repeat themselves: by sets of Poincaré places that are farther apart than three times
-    the tolerance `within`, of the clearance; sets of other periods are, unless a period is doubled
-    by less than can be told. One that does and a chaotic one. Two chaotic ones: by
-    means of rms_acceleration that are more than 3 standard errors of their difference apart. Of a
-    motion of which less is known nothing is said.
+    Two periodic motions differ if their sets of Poincaré places are farther apart than three times
+    the tolerance `within`, of the clearance. Sets of different periods are, unless a period is
+    doubled by less than that. A periodic and a chaotic motion differ. Two chaotic ones differ if
+    their means of rms_acceleration are more than 3 standard errors of their difference apart. Other
+    motions are not known well enough to differ.
     """
     regimes = {one.regime, other.regime}
     if regimes == {Regime.PERIODIC}:
@@ -188,10 +188,10 @@ def follow_on(case: Case, state: np.ndarray | None, chain: Chain) -> MotionSigna
     state: where it goes on, or None to begin at the case's own start.
     """
     clock = Clock(case.solve.timeout_s)
-    run = follow_revolutions(case, state, span_of(chain.asked, FURTHER, clock))
+    run = follow_revolutions(case, state, span_of(chain.request, FURTHER, clock))
     if run.reason:
         return MotionSignature("", math.nan, run.points[:0, :, :2], math.nan, math.nan)
-    return signature_of_motion(measure_motion(case, run.state, chain.asked, clock), case)
+    return signature_of_motion(measure_motion(case, run.state, chain.request, clock), case)
 
 
 def other_starts(case: Case) -> list[Case]:
@@ -238,7 +238,10 @@ def write_verdicts(pair: ChainPair, folder: Folder, known: Mapping[int, Verdict]
     }
     looked = np.array([int(n in known) for n in range(len(rows))])
     variables["looked"] = dims, looked, {"units": "1", "long_name": "1: the verdict is known"}
-    value = np.array(pair.up.values), {"units": pair.up.asked.unit, "long_name": pair.up.asked.over}
+    value = (
+        np.array(pair.up.values),
+        {"units": pair.up.request.unit, "long_name": pair.up.request.over},
+    )
     attrs = {"key": pair.key, "study": pair.up.study, "program": PROGRAM}
     write_dataset(pair.path(folder), xr.Dataset(variables, {"value": (dims, *value)}, attrs))
 

@@ -105,7 +105,7 @@ def settle_motion(
 ) -> tuple[RevolutionRun, float]:
     """Follow a case until the metrics of revolutions agree, as with `settle_rev: auto`.
 
-    With the revolution from which on they do; nan where they do not within the span.
+    Return the run, and the revolution from which on they agree, nan if they do not in the span.
     """
     p, within = record(case), least_promise(case)
     each: list[Metrics] = []
@@ -124,8 +124,8 @@ def run_with_series(
 ) -> tuple[DatasetParts, str, str]:
     """Return revolutions from a state on with time series, measured from the second one on.
 
-    What the Dataset is made of, on the case's output grid, and the reason and detail of a run that
-    did not come to its end.
+    The first value has the parts of the Dataset, on the case's output grid; the others are the
+    reason and detail of a run that did not come to its end.
     """
     of = bare_case(case, span.revolutions)
     of = replace(of, solve=replace(of.solve, settle_rev=1.0))

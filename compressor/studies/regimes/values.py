@@ -184,7 +184,7 @@ def empty(request: Regimes, case: Case) -> Row:
 def run_value(case: Case, state: np.ndarray | None, request: Regimes) -> Row:
     """Follow a case from a state on, or from its own start, until it settles, and measure it.
 
-    What is found, by the names of `TEXTS` and `NUMBERS`. A run that stops is a row too, with its
+    The row has the names of `TEXTS` and `NUMBERS`. A run that stops is a row too, with its
     reason and the state that it began from, so that the chain can go on from there. The wall time
     is the case's own. Nothing in a row depends on how long it took.
     """
@@ -262,8 +262,8 @@ def contacts(
 ) -> tuple[str, str]:
     """Write contact modes and impacts of the revolutions that follow into a row.
 
-    Of one period, or of up to `SAMPLED` revolutions; one more goes before, so that contacts have
-    begun. The reason and detail of a run that stopped, empty otherwise.
+    They are of one period, or of up to `SAMPLED` revolutions; one more goes before, so that
+    contacts have begun. Return the reason and detail of a run that stopped, empty otherwise.
     """
     count = min(motion.count, SAMPLED) if math.isnan(motion.period) else int(motion.period)
     span = span_of(request, count + 1, clock)

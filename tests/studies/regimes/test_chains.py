@@ -63,7 +63,7 @@ def same(one, other):
 def test_a_chain_has_its_values_in_the_order_of_running(whole):
     chain, path = whole
     found = read_chain(path)
-    assert found["value"].values.tolist() == chain.values == chain.asked.values[::-1]
+    assert found["value"].values.tolist() == chain.values == chain.request.values[::-1]
     assert (found["status"] == "ok").all()
     assert found["section"].dims == ("value", "revolution", "joint", "coordinate")
     for name in found.data_vars:
@@ -158,9 +158,9 @@ def test_what_is_stored_is_not_run_again(whole, monkeypatch):
 def test_a_chain_is_named_by_all_that_decides_its_numbers(study, whole):
     up, down = chains_of(study, 0)
     assert down.key == whole[0].key != up.key
-    other = Chain.of("other", up.asked, "up", up.cases)
+    other = Chain.of("other", up.request, "up", up.cases)
     assert other.key == up.key
-    shorter = Chain.of("lively", up.asked, "up", up.cases[:-1])
+    shorter = Chain.of("lively", up.request, "up", up.cases[:-1])
     assert shorter.key != up.key
 
 
