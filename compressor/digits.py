@@ -11,9 +11,9 @@ SMALL, LARGE = 1e-3, 1e7  # sizes between which a number is written without a po
 
 
 def is_known(value: float, bar: float, relative: bool = True) -> bool:
-    """Return whether a number is larger than its error bar; nan, of no bar, is no error bar at all.
+    """Return whether a number is larger than its error bar; False without a bar (nan).
 
-    Of a share or a count (not relative) any bar below inf tells something, also beside 0.
+    A share or a count (not relative) is known by any bar below inf, also beside 0.
     """
     if math.isnan(value) or math.isnan(bar) or math.isinf(bar):
         return False
@@ -21,10 +21,10 @@ def is_known(value: float, bar: float, relative: bool = True) -> bool:
 
 
 def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) -> str:
-    """Return a number and its error bar, such as 647.1 ± 0.3, or at most six of its digits alone
-    (bare).
+    """Return a number with its error bar, such as 647.1 ± 0.3, to the digits that the bar allows.
 
-    bar: nan where none was made; the number then has six digits.
+    bar: nan where none was made; the number then has six digits. bare: at most six of these digits,
+    without the bar.
     """
     if math.isnan(value):
         return "–"
@@ -48,10 +48,7 @@ def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) 
 
 
 def _rounded_up(bar: float) -> tuple[float, int]:
-    """Return a bar to one digit, two where the first is 1, never shorter.
-
-    And its last digit's power.
-    """
+    """Return a bar rounded up to one digit (two after a leading 1), and its last digit's power."""
     place = math.floor(math.log10(bar))
     if bar / 10.0**place < 2.0:
         place -= 1

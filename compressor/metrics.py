@@ -66,7 +66,7 @@ class Metric(NamedTuple):
 
     @property
     def counted(self) -> bool:
-        """Whether it counts events: contact that grazes begins any number of times."""
+        """Return whether it counts events: contact that grazes begins any number of times."""
         return self.kind in ("count", "rate")
 
 
@@ -192,7 +192,10 @@ def of_source(source: str) -> list[Metric]:
 
 
 def derive(row: Metric, end: str, phrase: str, dims: tuple[str, ...] = ()) -> Metric:
-    """Return a statistic of a metric of a chaotic motion, by batch means over its revolutions."""
+    """Return the row of a number that follows from a metric, `NAME_end`; its unit stays.
+
+    By default it is a statistic of a chaotic motion, by batch means over its revolutions.
+    """
     return row._replace(
         name=f"{row.name}_{end}", dims=row.dims + dims, phrase=f"{phrase} {row.name}",
         source="statistics", when="chaotic",
@@ -200,14 +203,15 @@ def derive(row: Metric, end: str, phrase: str, dims: tuple[str, ...] = ()) -> Me
 
 
 def error_bar(row: Metric) -> Metric:
-    """Return how far a metric may be from the exact one: inf where that is not known, as beyond
-    the horizon, nan where no bar was made.
+    """Return the row of a metric's error bar: how far the metric may be from the exact one.
+
+    Its values are inf where that is not known, as beyond the horizon, nan where no bar was made.
     """
     return derive(row, "error", "error bar of")._replace(source="error", when=row.when)
 
 
 def series_error(name: str) -> Metric:
-    """Return how far a time series may be from the exact one; a vector by its length."""
+    """Return the row of the relative L2 error of a time series; a vector counts by its length."""
     dims = tuple(dim for dim in SERIES[name][0] if dim != "axis")
     phrase = f"relative L2 error of {name} after settling"
     contact = name in ("eccentricity", "penetration")
@@ -215,7 +219,7 @@ def series_error(name: str) -> Metric:
 
 
 def statistics_of(row: Metric) -> Iterator[Metric]:
-    """Yield what is known of a metric of a chaotic motion, with standard errors."""
+    """Yield the rows of a metric's statistics in a chaotic motion, with standard errors."""
     if row.kind == "greatest":
         for word, dims in (("mean", ()), ("quantile", ("quantile",))):
             one = derive(row, word, f"{word} over revolutions of each one's", dims)
@@ -225,7 +229,7 @@ def statistics_of(row: Metric) -> Iterator[Metric]:
 
 
 def every_number() -> Iterator[Metric]:
-    """Yield what is stored of a job, in the order of files."""
+    """Yield the rows of all numbers that are stored of a job, in the order of files."""
     metrics = of_source("tally")
     yield from (*metrics, *map(error_bar, metrics), *map(series_error, SERIES))
     yield from of_source("run")

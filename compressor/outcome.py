@@ -79,22 +79,22 @@ class Outcome:
     series: SeriesFile | None = None
 
     def __reduce__(self) -> Any:
-        """As workers send it: to send the names of all numbers would take most of the time."""
+        """Return the pickled form without the names of all numbers, whose sending costs most."""
         parts = self.status, self.reason, self.numbers.tobytes(), self.attributes, self.series
         return _rebuild_outcome, parts
 
     @property
     def key(self) -> str:
-        """The job's identity."""
+        """Return the job's identity."""
         return str(self.attributes["key"])
 
     @property
     def detail(self) -> str:
-        """What is known of a failure beyond its reason."""
+        """Return what is known of a failure beyond its reason."""
         return str(self.attributes.get("detail", ""))
 
     def table(self, more: dict[str, tuple]) -> "DatasetParts":
-        """With more variables, what the job's Dataset is made of."""
+        """Return what the job's Dataset is made of: its own variables, and more of them."""
         variables = self.variables() | more
         variables |= coordinates(dim for dims, _, _ in variables.values() for dim in dims)
         named = {
@@ -124,13 +124,12 @@ def _rebuild_outcome(status: str, reason: str, numbers: bytes, *rest: Any) -> Ou
 
 
 def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more: Any) -> Outcome:
-    """Return the outcome of a job of which no run can tell.
+    """Return the outcome of a job that has no run: it failed, and all its numbers are nan.
 
-    `attributes`: what is to be said of its case (`Case.attributes`); `more`: other attributes.
+    `attributes`: those of its case (`Case.attributes`); `more`: other attributes.
     """
-    program = PROGRAM
-    said = {**attributes, "complete": 0, "program": program, "detail": detail} | more
-    return Outcome("failed", str(reason), row(), said)
+    whole = {**attributes, "complete": 0, "program": PROGRAM, "detail": detail} | more
+    return Outcome("failed", str(reason), row(), whole)
 
 
 class Variable(NamedTuple):
@@ -150,10 +149,7 @@ class DatasetParts:
 
 
 def coordinates(used: Iterable[Any] = SIZES) -> dict[str, tuple]:
-    """Return the coordinates of those dimensions that are used as xarray variables.
-
-    Always the space's.
-    """
+    """Return the coordinates of joint, axis and the dimensions used, as xarray variables."""
     wanted = {"joint", "axis", *used}
     every = {
         "joint": (("joint",), list(JOINTS), {"long_name": "joint of the rod"}),

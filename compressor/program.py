@@ -103,29 +103,28 @@ def printable(text: str) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | None = None) -> str:
-    """Return what was probably meant by a word that is not known, as `did you mean A or B?`, or "".
+    """Return what an unknown word probably meant, as `did you mean A or B?`; "" without a guess.
 
-    told: what to tell for each, itself by default. A path or a file's name stands for its stem,
-    too; upper and lower case are the same.
+    told: what to print for each known word, itself by default. A path or a file's name stands for
+    its stem, too; upper and lower case are the same.
     """
     names = {name.casefold(): name for name in known}
-    sought = [word[:LONGEST_WORD].casefold()]
-    sought.append(Path(sought[0]).stem)
-    near = next(
-        (found for one in sought if (found := get_close_matches(one, names, MAX_MEANT))), []
-    )
-    exact = next(([one] for one in sought if one in names), [])
-    found = [str((told or {}).get(names[one], names[one])) for one in exact or near]
-    return f"did you mean {' or '.join(found)}?" if found else ""
+    spellings = [word[:LONGEST_WORD].casefold()]
+    spellings.append(Path(spellings[0]).stem)
+    matches = (get_close_matches(spelling, names, MAX_MEANT) for spelling in spellings)
+    similar = next(filter(None, matches), [])
+    exact = next(([spelling] for spelling in spellings if spelling in names), [])
+    guesses = [str((told or {}).get(names[name], names[name])) for name in exact or similar]
+    return f"did you mean {' or '.join(guesses)}?" if guesses else ""
 
 
 def library_versions(*names: str) -> dict[str, str]:
-    """Return the installed version of each distribution by name; raises PackageNotFoundError."""
+    """Return the installed version of each distribution by name. Raises PackageNotFoundError."""
     return {name: metadata.version(name) for name in names}
 
 
 def sources_hash(folder: Path) -> str:
-    """Hash of all Python sources in a folder and below: 16 hexadecimal digits."""
+    """Return the hash of all Python sources in a folder and below: 16 hexadecimal digits."""
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())

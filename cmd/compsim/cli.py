@@ -47,7 +47,7 @@ SECONDS_TO_RESEND = 0.02  # s until a dropped signal is sent again
 
 
 class Interrupted(BaseException):
-    """SIGINT, SIGTERM or SIGHUP has arrived."""
+    """The arrival of SIGINT, SIGTERM or SIGHUP."""
 
     def __init__(self, number: int):
         self.number = number
@@ -131,7 +131,7 @@ def interruptible() -> Iterator[None]:
 
 @contextlib.contextmanager
 def warnings_told() -> Iterator[None]:
-    """Say the store's warnings, each once, as a user reads them; others stay as they are."""
+    """Report the store's warnings, each once, as a user reads them; others stay as they are."""
     show, told = warnings.showwarning, set()
 
     def say_it(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
@@ -173,7 +173,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def report_error(error: Exception) -> int:
-    """Say what went wrong and return the exit code; only what nobody foresaw has a traceback."""
+    """Report what went wrong and return the exit code; a traceback only of internal errors."""
     if isinstance(error, CompsimError):
         say(f"{error.prefix}{error}")
         return error.exit_code

@@ -50,7 +50,7 @@ def init(template: str | None, output: str | None) -> int:
 
 
 def unknown(template: str, known: Iterable[str]) -> str:
-    """Return what is said of a template that there is not."""
+    """Return the error of a template that there is not."""
     if template.endswith(CASE_FILES):
         return f"a template comes first: compsim init wear -o {template}"
     near = did_you_mean(template, known) or f"there are {', '.join(known)}"

@@ -48,10 +48,7 @@ def align_lines(lines: list[Line]) -> list[str]:
 
 
 def stop(found: "JobReport") -> list[Line]:
-    """Return where a job's run stopped, and how its last steps went, a line each.
-
-    No lines for a run that ended.
-    """
+    """Return where a job's run stopped, and its last steps, a line each; [] for one that ended."""
     told = found.attributes
     if "stop_history_words" not in told:
         return []
@@ -76,9 +73,7 @@ def stop(found: "JobReport") -> list[Line]:
 
 
 def numbers(found: "JobReport", *sources: str) -> list[Line]:
-    """Return a job's numbers of some sources, a line for each joint and axis, to the digits that
-    errors allow.
-    """
+    """Return a line for each number of some sources, joint and axis, to its known digits."""
     lines = []
     for name, row in metrics.NUMBERS.items():
         if row.source not in sources or name.endswith(SPREAD) or name not in found.numbers:
@@ -134,8 +129,7 @@ def unit_of(row: metrics.Metric) -> tuple[str, float]:
 
 
 def places(row: metrics.Metric) -> Iterator[tuple[tuple[int, ...], str]]:
-    """Yield where each of a number's values stands, and what it is called: `peak contact force, big
-    end`.
+    """Yield the place and label of each of a number's values: `peak contact force, big end`.
 
     The error of a series is called after the series.
     """
@@ -177,10 +171,7 @@ def format_measured(value: float, error: float, relative: bool) -> str:
 
 
 def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[Line]:
-    """Return whether the rod load changes its side for long and far enough.
-
-    None without signals.
-    """
+    """Return whether the rod load changes sides for long and far enough; [] without signals."""
     worst, told = math.inf, []
     for name, unit, least in (("angle", math.degrees(1.0), degrees), ("share", 100.0, percent)):
         value = unit * found.numbers.get(f"rod_load_reversal_{name}", math.nan)

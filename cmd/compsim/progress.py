@@ -20,7 +20,7 @@ BAR_WIDTH = 24  # columns
 
 
 class ProgressReporter:
-    """Reports how many things are done, until the end of its `with`.
+    """A reporter of how many things are done, until the end of its `with`.
 
     things: what is counted; alike: each takes about as long; folder: where those done are stored,
     which is said if this ends early. A terminal that cannot draw (TERM=dumb), or shall
@@ -57,7 +57,7 @@ class ProgressReporter:
             say(f"{stored} {verb} stored in {self.folder}; the same command goes on from there")
 
     def end(self) -> None:
-        """Take the line of progress away; in a log, end with how far it came."""
+        """Remove the line of progress; in a log, end with how far it came."""
         if self.line:
             self.line.stop()
             self.line = None
@@ -65,7 +65,7 @@ class ProgressReporter:
             say(self.words())
 
     def __call__(self, done: int, total: int, remark: str) -> None:
-        """Take note of progress (`compressor.program.Progress`)."""
+        """Report progress (`compressor.program.Progress`)."""
         if not self.ends or done < self.ends[0][0]:
             self.ends = [(done, 0.0)]
         elif done > self.ends[-1][0]:
@@ -81,7 +81,7 @@ class ProgressReporter:
             self.log()
 
     def show_sweep(self, now: "SweepProgress") -> None:
-        """Take note of how a sweep stands, which knows best how long it will take."""
+        """Report how a sweep stands, which knows best how long it will take."""
         self.alike, self.failed = False, now.failed
         self.known = None if now.left is None else (now.left, now.at_least, time.monotonic())
         if self.total and not self.quiet and not self.live:

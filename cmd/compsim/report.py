@@ -14,7 +14,7 @@ from compsim.screen import (
 
 
 def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command an option for each study that adds to the page from a folder of its own."""
+    """Return a command with an option for each study whose own folder adds to the page."""
     for kind in STUDIES:
         if kind.page_folder:
             text = f"Folder of what `compsim {kind.name}` wrote, if there is one."

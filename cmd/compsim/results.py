@@ -76,12 +76,12 @@ def some_words(words: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def files(_: click.Context, __: click.Parameter, word: str) -> Items:
-    """Let the shell complete a file."""
+    """Return what lets the shell complete a file."""
     return [CompletionItem(word, type="file")]
 
 
 def folders(_: click.Context, __: click.Parameter, word: str) -> Items:
-    """Let the shell complete a folder."""
+    """Return what lets the shell complete a folder."""
     return [CompletionItem(word, type="dir")]
 
 
@@ -135,9 +135,7 @@ def read_study_file(path: Path) -> dict[str, Any]:
 
 
 def keys(folder: str, known: dict[str, Path]) -> list[str]:
-    """Return the keys of jobs: of those with time series, and of all where the files of studies
-    are small.
-    """
+    """Return the keys of jobs with time series, and of all where the studies' files are small."""
     found = {path.name[:20] for path in Path(folder).glob("jobs/*.h5")}
     if sum(path.stat().st_size for path in known.values()) <= MAX_BYTES:
         found.update(
@@ -154,7 +152,7 @@ def values(path: Path) -> Iterator[str]:
 
 
 def of_results(metavar: str = "", complete: Complete = folders) -> Callable[..., Any]:
-    """Return the folder of results, as the first of `given` or by -i, and other words after it."""
+    """Return the decorator that gives a command `given`, words with a folder first, and -i."""
 
     def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
         option = click.option(

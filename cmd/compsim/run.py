@@ -46,7 +46,7 @@ class ShardType(click.ParamType):
     name = "I/N"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
-        """(I, N), or a usage error."""
+        """Return (I, N). Raises a usage error for other text."""
         number, _, of = str(value).partition("/")
         if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
             self.fail(f"{value!r} is no I/N with 1 <= I <= N, such as 2/8", param, ctx)
@@ -133,7 +133,7 @@ def run(
 def run_jobs(
     context: click.Context, studies: "list[Study]", output: str, jobs: int, options: Any
 ) -> int:
-    """Run studies of jobs."""
+    """Run studies of jobs, and return the exit code."""
     rerun, part, wait, scheduler, page, quiet = options
     tell_changes(studies, output)
     from compressor.sweep import Options, sweep
@@ -168,7 +168,7 @@ def watching(
 
 
 def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
-    """Usage errors of options that do not go together."""
+    """Raise UsageError for options that do not go together."""
     if backend == "dask" and not scheduler:
         raise click.UsageError(
             "--backend dask needs --scheduler ADDRESS, such as tcp://host:8786: "
@@ -190,7 +190,7 @@ def cluster(scheduler: str | None) -> contextlib.AbstractContextManager[Any]:
 
 
 def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
-    """Say what a run did, what failed and what to do next: with a page, to look at it."""
+    """Report what a run did, what failed and what to do next: with a page, to look at it."""
     width = max(len(count.study) for count in summary.counts)
     for count in summary.counts:
         where = os.path.join(folder, "studies", f"{count.study}.json")
@@ -215,7 +215,7 @@ def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
 
 
 def tell_caveats(names: list[str], folder: str) -> None:
-    """Say what only the runs of some studies tell of their numbers, `caution` the rest."""
+    """Report the caveats that only runs show of their numbers; `caution` reports the rest."""
     from compressor.store import read_store, read_studies, run_caveats
 
     rows = read_store(folder).rows
@@ -225,7 +225,7 @@ def tell_caveats(names: list[str], folder: str) -> None:
 
 
 def tell_stale(summary: "Summary") -> None:
-    """Say what stored jobs of another version lack, and how they are brought up to date."""
+    """Report what stored jobs of another version lack, and how they are brought up to date."""
     if not summary.gaining:
         return
     lacks = summary.stale.items()
@@ -235,7 +235,7 @@ def tell_stale(summary: "Summary") -> None:
 
 
 def report_failures(summary: "Summary") -> None:
-    """List failed jobs, and what to do about each kind of failure."""
+    """Report failed jobs, and what to do about each kind of failure."""
     failures = summary.failed
     if not failures:
         return

@@ -67,7 +67,7 @@ setting = click.option(
 
 
 def jobs_option(words: str) -> Callable[..., Any]:
-    """-j, by default as many as this process may use."""
+    """Return the option -j, by default as many processes as this one may use cores."""
     return click.option("-j", "--jobs", type=click.IntRange(min=1),
                         show_default="cores available", help=words)  # fmt: skip
 
@@ -102,7 +102,7 @@ def print_text(text: str) -> None:
 
 @contextlib.contextmanager
 def unread() -> Iterator[None]:
-    """Go on where nobody reads stdout any more: what it would tell is done all the same."""
+    """Ignore that nobody reads stdout any more: what it would report is done all the same."""
     try:
         yield
     except BrokenPipeError:
@@ -140,9 +140,7 @@ def say(text: str, end: str = "\n") -> None:
 
 
 def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
-    """Return the commands that run the missing jobs of studies, one for those with the same
-    overrides.
-    """
+    """Return the commands that run the missing jobs of studies, one for each set of overrides."""
     found: dict[tuple[str, ...], list[Again]] = {}
     for study in dict.fromkeys(studies):
         found.setdefault(study.overrides, []).append(study)
@@ -157,7 +155,7 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
 
 
 def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None:
-    """Say once what is odd about case files, `most` lines a file however many jobs it has."""
+    """Report once what is odd about case files, in at most `most` lines a file."""
     from compressor.solve import cautions
 
     for study in studies:
@@ -172,7 +170,7 @@ def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None
 
 
 def tell_changes(studies: "Sequence[Study]", folder: str) -> None:
-    """Say which stored studies have jobs that their case files no longer ask for."""
+    """Report which stored studies have jobs that their case files no longer ask for."""
     from compressor.store import changes
 
     for one in changes(folder, studies):

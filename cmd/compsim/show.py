@@ -83,7 +83,7 @@ def show(
 
 
 def print_report(found: "JobReport", folder: str, reversal: tuple[float, float]) -> None:
-    """Say what is known of a job."""
+    """Print what is known of a job."""
     from compressor.cases import Case, to_yaml
     from compressor.reasons import remedy
     from compsim.job_text import sections
@@ -111,9 +111,7 @@ def print_report(found: "JobReport", folder: str, reversal: tuple[float, float])
 
 
 def whole_case(found: "JobReport", folder: str) -> str:
-    """Return a job's case as a case file, under a name of its own: its study's may be another
-    file's.
-    """
+    """Return a job's case as a case file, under a name of its own: its study's may be taken."""
     from compressor.cases import Case, to_yaml
 
     if "case" not in found.attributes:
@@ -132,7 +130,7 @@ def stop_text(found: "JobReport") -> str:
 
 
 def sayable(value: Any) -> Any:
-    """Return a value as JSON can say it: null for nan, "inf" for an unknown error."""
+    """Return a value as JSON can hold it: null for nan, "inf" for an unknown error."""
     if isinstance(value, dict):
         return {key: sayable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -15,14 +15,12 @@ FOLDERS = {"-o": "output", "--output": "output", "-i": "folder", "--input": "fol
 
 
 class Commands(click.Group):
-    """The commands; of one that there is not, it is told what was probably meant."""
+    """The group of commands; the error of an unknown one says what was probably meant."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command and its arguments. Raises UsageError where there is none of this
-        name.
-        """
+        """Return the command and its arguments. Raises UsageError for an unknown name."""
         word = args[0]
         unknown = self.get_command(ctx, word) is None and not word.startswith("-")
         if unknown and not ctx.resilient_parsing:
@@ -47,10 +45,7 @@ class Commands(click.Group):
 
 
 def one_line(error: click.ClickException, arguments: Sequence[str]) -> str:
-    """Return a mistake in the use of a command, and where to read on.
-
-    arguments: after `compsim`.
-    """
+    """Return a mistake in the use of a command in a line; arguments: those after `compsim`."""
     context = getattr(error, "ctx", None)
     path = context.command_path if context else " ".join(["compsim", *arguments[:1]])
     text = " ".join(error.format_message().split())

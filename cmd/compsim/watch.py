@@ -31,10 +31,10 @@ MAX_DEATHS = 3  # of the process, before it is given up
 
 
 class PageWatch:
-    """Keeps the page of a run fresh; a context manager around the sweep.
+    """A watch that keeps the page of a run fresh; a context manager around the sweep.
 
-    How the run stands is said anew every few seconds, and figures are drawn as often as costs jobs
-    little: drawing has a twentieth of one core.
+    How the run stands is written anew every few seconds, and figures are drawn as often as costs
+    jobs little: drawing has a twentieth of one core.
 
     Raises WrongName or StoreError at once where the report's folder cannot be made or written.
     """
@@ -96,7 +96,7 @@ class PageWatch:
         return self.process.stdin
 
     def listen(self, process: "subprocess.Popen[str]") -> None:
-        """Take answers of a process until it ends: in a thread."""
+        """Read answers of a process until it ends: in a thread."""
         assert process.stdout
         for line in process.stdout:
             self.answers.put(json.loads(line))
@@ -114,7 +114,7 @@ class PageWatch:
         return answer
 
     def take(self, answer: dict[str, Any]) -> None:
-        """A page was written, or not, or the process has ended."""
+        """Act on an answer: a page was written, or not, or the process has ended."""
         self.idle = True
         if "ended" in answer:
             self.process = None
@@ -128,7 +128,7 @@ class PageWatch:
             self.tell(answer["problem"])
 
     def tell(self, problem: str) -> None:
-        """Say once what is wrong with the page."""
+        """Report once what is wrong with the page."""
         if problem not in self.problems:
             self.problems.add(problem)
             say(f"{self.page} is not fresh: {problem}; the run does not depend on it")
@@ -166,11 +166,11 @@ def exit_text(code: int) -> str:
 
 
 class PageOutdated(BaseException):
-    """The page that is being written is out of date; no handler of errors shall take this."""
+    """The end of a page that is out of date; no handler of errors shall catch it."""
 
 
 class PageWriter:
-    """Writes pages; SIGINT leaves the one that is being written."""
+    """A writer of pages; SIGINT makes it leave the one that is being written."""
 
     def __init__(self, told: dict[str, str]):
         self.told = told
@@ -179,13 +179,13 @@ class PageWriter:
         signal.signal(signal.SIGINT, self.leave)
 
     def leave(self, *_: object) -> None:
-        """Called by the signal."""
+        """Raise PageOutdated if a page is being written; called by the signal."""
         if self.writing:
             self.writing = False
             raise PageOutdated
 
     def write(self, running: dict[str, Any] | None, draw: bool = True) -> dict[str, Any]:
-        """Write a page, the ordinary one if nothing is running; what to answer.
+        """Write a page, the ordinary one if nothing is running, and return the answer.
 
         draw: figures and tables, too, and not only how the run stands.
         """

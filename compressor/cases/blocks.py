@@ -51,7 +51,7 @@ class Draft:
 
     @property
     def is_sampled(self) -> bool:
-        """Whether any key is drawn by a design."""
+        """Return whether any key is drawn by a design."""
         return any(sweep.kind in SAMPLED for sweep in self.sweeps.values())
 
     def sizes(self) -> dict[str, int]:
@@ -65,9 +65,9 @@ class Draft:
         )
 
     def block(self, name: str) -> Block:
-        """Return the block of a study of some name, its values made.
+        """Return the block with all its values; name: of the study.
 
-        Wrong ones join `problems`, and leave it without jobs.
+        Wrong values join `problems`, and leave the block without jobs.
         """
         factors = tuple((keys, self.rows(keys)) for keys in self.factors)
         count = math.prod(len(rows) for _, rows in factors)
@@ -83,9 +83,9 @@ class Draft:
         return replace(found, kept=[*itertools.compress(range(count), kept)])
 
     def rows(self, keys: tuple[str, ...]) -> list[Row]:
-        """Return the values of keys that advance together.
+        """Return the values of keys that advance together; [] where any is wrong.
 
-        Each wrong one, and repetition, is told.
+        Wrong values and repetitions join `problems`.
         """
         points: list[list[float]] = []
         if self.sweeps[keys[0]].kind in SAMPLED:
@@ -109,7 +109,10 @@ class Draft:
         return rows
 
     def checked(self, sweep: SweptKey, nodes: Sequence[Node]) -> list[Node]:
-        """Return the valid ones of a key's values; of wrong ones that were made, one is told."""
+        """Return the valid ones of a key's values; the others join `problems`.
+
+        Of wrong values that a form such as `linspace` has made, the first alone.
+        """
         good = []
         for node in nodes:
             value = check(sweep.key, node, self.problems)
@@ -121,7 +124,7 @@ class Draft:
 
 
 def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
-    """Return a block as far as it goes without making any value."""
+    """Return a block as far as it is known before any value is made."""
     found = Draft(leaves, problems)
     for key, node in leaves.values.items():
         if key.partition(".")[0] in SWEEP:
@@ -142,17 +145,14 @@ def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
 
 
 def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
-    """Return a node with its value as the case holds it.
-
-    None if that is wrong, which joins `problems`.
-    """
-    if node.value is None or key in WORDS:  # told when it was read; or its word, which is valid
+    """Return a node with its value as the case holds it; None for a wrong one, a problem."""
+    if node.value is None or key in WORDS:  # reported before; or its word, which is valid
         return node if key in WORDS and node.value is WORDS[key] else None
     if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
         return None
     found: list[Problem] = []
     row = row_of(key)
-    assert row  # an unknown key was told when it was read
+    assert row  # an unknown key was reported when it was read
     value = check_value(row.key, node.plain(), found)
     parts = node.value if isinstance(node.value, dict) else {}
     for problem in found:
@@ -200,7 +200,7 @@ def _zip_groups(found: Draft) -> Iterable[tuple[str, ...]]:
         if any(found.sweeps[key].kind in SAMPLED for key in swept):
             found.refuse(group, "zip", "sampled keys go together by their design already")
         elif bad and bad[0] in found.leaves.values and bad[0] not in found.fixed:
-            pass  # how it is swept is wrong, and told
+            pass  # how it is swept is wrong, and reported
         elif bad:
             hint = "" if bad[0] in table() else suggestion(bad[0], "")
             found.refuse(group, "zip", f"{quote_value(bad[0])} is not swept here{hint}")
@@ -228,7 +228,7 @@ def _words(found: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
 
 
 def _exclusions(found: Draft) -> Iterable[Test]:
-    """Yield what `exclude` says; a combination is left out where any of its comparisons holds."""
+    """Yield the comparisons of `exclude`; where one holds, a combination is left out."""
     node = found.leaves.values.get("exclude")
     if not node:
         return

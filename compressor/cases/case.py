@@ -1,8 +1,7 @@
 """The case: one fully resolved simulation, its identity, and the numbers that follow from it.
 
-Numbers that have changed within one version of the model, for the cases that they changed for. A
-job's key holds the version of the model, which stays while most results do. Where the equations of
-a feature are mended, its line in `CHANGES` tells stored results of before from those of now.
+A job's key holds the version of the model, which stays while most results do. Where the equations
+of a feature are mended, a line in `CHANGES` says whose numbers have changed within that version.
 """
 
 import contextlib
@@ -111,7 +110,7 @@ def model_of(values: Mapping[str, Any]) -> str:
 
 # MODEL_VERSION is that of equations and of the meaning of what is stored; part of a job's identity.
 # Results of one key agree within the sum of their error bars, whichever version of the program made
-# them, unless a revision has changed them (`revisions`); to the bit they are equal only for one
+# them, unless a revision has changed them (`CHANGES`); to the bit they are equal only for one
 # version of program and libraries on one kind of processor
 LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
@@ -147,7 +146,7 @@ class Case(Settings):
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> "Case":
-        """Build a case from nested values as in a case file, without sweeps.
+        """Return a case of nested values as in a case file, without sweeps.
 
         values: words, numbers (also those of numpy) and, by group, mappings, in the units that
         stand in the keys. What is left out has its default; `help(compressor.Machine)` and the like
@@ -169,10 +168,10 @@ class Case(Settings):
 
     @classmethod
     def resolve(cls, values: Mapping[str, Any]) -> "Case":
-        """Build a case as `from_values`, from values among which may be some that it does not read.
+        """Return a case as `from_values` does, of values that it need not all read.
 
-        Such are a job of a sweep over loads or laws, and what an older program has stored. Raises
-        CaseError with everything else that is wrong.
+        Such are those of a job of a sweep over loads or laws, and what an older program has stored.
+        Raises CaseError with everything else that is wrong.
         """
         return cls._of_values(values, lenient=True)
 
@@ -188,7 +187,7 @@ class Case(Settings):
 
     @cached_property
     def problems(self) -> tuple[Problem, ...]:
-        """What is wrong with a case that was made without `from_values`; () if nothing is.
+        """Return what is wrong with a case that was made without `from_values`; () for nothing.
 
         Each problem has the dotted `key` and the `message` that `from_values` would raise. A run
         of such a case fails as invalid_input, and simulates nothing.
@@ -281,7 +280,7 @@ class Case(Settings):
 
     @property
     def rtol(self) -> float:
-        """The relative tolerance asked for, by number or word; with `targets`, the first one."""
+        """Return the relative tolerance of the first run, by `rtol` or by the accuracy."""
         if self.solve.rtol is not None:
             return self.solve.rtol
         accuracy = self.solve.accuracy
@@ -289,48 +288,49 @@ class Case(Settings):
 
     @property
     def promise(self) -> float:
-        """The relative L2 error of acceleration that `accuracy` promises; inf: none is promised."""
+        """Return the relative L2 error of acceleration that `accuracy` promises; inf for none."""
         word = self.solve.accuracy
         named = isinstance(word, str) and self.solve.rtol is None
         return ACCURACY[str(word)].promise if named else math.inf
 
     @property
     def targets(self) -> Targets:
-        """The greatest relative error of each metric that accuracy is asked for by."""
+        """Return the greatest relative error of each metric, where accuracy is given by number."""
         return () if isinstance(self.solve.accuracy, str) else self.solve.accuracy
 
     @property
     def wants_bars(self) -> bool:
-        """Whether metrics are to have error bars; accuracy by number cannot do without."""
+        """Return whether metrics are to have error bars; accuracy by number needs them."""
         return self.solve.error_bars or bool(self.targets)
 
     @property
     def chooses_laws(self) -> bool:
-        """Whether contact or friction has another law than the default one."""
+        """Return whether contact or friction has another law than the default one."""
         return self.contact.law != CONTACT_LAWS[0] or bool(self.friction and self.friction.law)
 
     @property
     def has_features(self) -> bool:
-        """Whether it has more than the paper's machine: oil, guide, drive, rod, rubbing joints."""
+        """Return whether oil, a guide, a drive, a rod or rubbing ideal joints are modelled."""
         rubbing = self.friction and self.friction.ideal_joints
         return bool(self.lubricant or self.guide or self.drive or self.rod or rubbing)
 
     @property
     def is_plain(self) -> bool:
-        """Whether it has neither laws of its own nor features: many such runs march in lanes."""
+        """Return whether it has default laws and no features: many such runs march in lanes."""
         return not (self.chooses_laws or self.has_features)
 
     @cached_property
     def physics_key(self) -> str:
-        """Hash of what is simulated, 20 hexadecimal digits: physics and span, not the solver."""
+        """Return the hash of physics and span, without the solver: 20 hexadecimal digits."""
         return digest(identity(self, with_solver=False))
 
     @cached_property
     def key(self) -> str:
-        """The job's identity, 20 hexadecimal digits: a hash of physics, solver and model version.
+        """Return the job's identity: 20 hexadecimal digits.
 
-        Equal keys have equal results, within error bars, and a store holds each once. Name, output,
-        time limit and error bars are no part of it.
+        It is a hash of physics, solver and model version. Equal keys have equal results, within
+        error bars, and a store holds each once. Name, output, time limit and error bars are no part
+        of it.
         """
         return digest(identity(self, with_solver=True))
 
@@ -422,7 +422,7 @@ def identity(case: Case, with_solver: bool, part_text: Callable[[Any], str] = pa
 
 
 def digest(text: str) -> str:
-    """Hash of a text, 20 hexadecimal digits."""
+    """Return the hash of a text: 20 hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
@@ -490,9 +490,7 @@ def _groups_in_identity() -> tuple[str, ...]:
 
 
 def with_ideal_joints(case: Case) -> Case:
-    """Return the case without clearance, and without oil and wear, which only a clearance can
-    have.
-    """
+    """Return the case without clearance, and so without oil and wear."""
     return replace(case, joint="none", lubricant=None, wear=None)
 
 

@@ -8,8 +8,8 @@ Words of the trade: keys that are twice one of ours, and other units that are an
 written out as its key when values are read, so that nothing else knows it; so is a value that a key
 has for each joint, such as `pin_radius_mm: {big_end: 60, small_end: 35}`.
 
-Keys that are not there, and groups that are none: what they are told, in files and values alike. An
-unknown key is told what was probably meant, or else what there is.
+Keys that are not there, and groups that are none: their errors, in files and values alike. That of
+an unknown key names what was probably meant, or else what there is.
 """
 
 import dataclasses
@@ -87,10 +87,7 @@ def value_of(case: Settings, key: str) -> Any:
 
 
 def value_in(values: Mapping[str, Any], key: str) -> Any:
-    """Return the value of a dotted key in nested values.
-
-    None where they have none, or no single one.
-    """
+    """Return the value of a dotted key in nested values; None where it is not one value."""
     value: Any = values
     for part in key.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None
@@ -202,10 +199,7 @@ def of_percent(name: str, group: str, value: Any, stroke: float) -> str:
 
 
 def stroke_in(values: Any) -> float:
-    """Return the stroke of a case's nested values (mm), nan where it is no number.
-
-    It is the default's where they give none.
-    """
+    """Return the stroke of a case's nested values (mm), else the default's; nan for no number."""
     machine = values.get("machine") if isinstance(values, Mapping) else None
     given = machine if isinstance(machine, Mapping) else {}
     radius = given.get("crank_radius_mm", table()["machine.crank_radius_mm"].default)
@@ -227,10 +221,7 @@ MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
 def known_keys(group: str, file: bool = True) -> list[str]:
-    """Return the keys that a group (or, for "", the top) may hold.
-
-    Of a `file`, those of sweeps, too.
-    """
+    """Return the keys that a group (or, for "", the top) may hold; a `file` has those of sweeps."""
     if group in MAPPINGS:
         return [*MAPPINGS[group]]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
@@ -245,7 +236,7 @@ def accepted_keys(group: str, file: bool = True) -> list[str]:
 def describe_unknown(
     name: str, group: str, file: bool = True, value: Any = None, values: Any = None
 ) -> str:
-    """Return what is said of a key that a group does not have.
+    """Return the error of a key that a group does not have.
 
     value: the key's. values: the whole case's, nested, as far as they are known.
     """
@@ -260,7 +251,7 @@ def describe_unknown(
 
 
 def no_mapping(key: str, value: Any) -> str:
-    """Return what is told of a value that stands where a group's keys are due."""
+    """Return the error of a value that stands where a group's keys are due."""
     word = f"{quote_value(WORDS[key])} or " if key in WORDS else ""
     return f"needs {word}a mapping of keys{_example(key)}, not {quote_value(value)}"
 
@@ -350,10 +341,7 @@ PLAIN_TYPES = (int, float, str)
 
 
 def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
-    """Return a value as its dataclass holds it.
-
-    Its default if it is wrong, which joins `problems`.
-    """
+    """Return a value as its dataclass holds it; the default for a wrong one, a problem."""
     row, before = table()[key], len(problems)
     if value is None and row.optional:
         return row.default
@@ -404,9 +392,7 @@ def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
 
 @lru_cache(maxsize=256)
 def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[Any, list[Problem]]:
-    """Return a group from its values, and what is wrong.
-
-    Jobs of a sweep share those they have alike.
+    """Return a group from its values, and what is wrong; jobs of a sweep share equal groups.
 
     Types are part of the values, since 1, 1.0 and true are equal.
     """

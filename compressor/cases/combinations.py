@@ -53,7 +53,7 @@ class Block:
 
     @cached_property
     def swept(self) -> list[str]:
-        """The keys of all factors."""
+        """Return the keys of all factors."""
         return [key for keys, _ in self.factors for key in keys]
 
     def case(self, number: int) -> Case:
@@ -73,12 +73,12 @@ class Block:
 
     @cached_property
     def given(self) -> frozenset[str]:
-        """The dotted keys that a case is given."""
+        """Return the dotted keys that a case is given."""
         return frozenset(values_given(self._first))
 
     @cached_property
     def _first(self) -> dict[str, Any]:
-        """The nested values of a case with the first value of each factor."""
+        """Return the nested values of a case with the first value of each factor."""
         first = dict(self.fixed)
         for keys, rows in self.factors:
             first |= zip(keys, rows[0], strict=True)
@@ -86,9 +86,7 @@ class Block:
 
     @cached_property
     def _sources(self) -> dict[str, list[tuple[int, int, str]]]:
-        """Where swept values of each field of a case are: the factor, the place in its rows, and
-        the key.
-        """
+        """Return what sweeps each field of a case: (factor, place in its rows, key) a key."""
         found: dict[str, list[tuple[int, int, str]]] = {}
         for factor, (keys, _) in enumerate(self.factors):
             for place, key in enumerate(keys):
@@ -98,13 +96,13 @@ class Block:
 
     @cached_property
     def _shared(self) -> dict[str, Any]:
-        """The fields that are the same in all cases."""
+        """Return the fields that are the same in all cases."""
         same = self._first.keys() - self._sources.keys()
         return {name: _field(name, self._first[name]) for name in same}
 
     @cached_property
     def _part(self) -> Callable[..., Any]:
-        """The function that gives a field of a case by the rows of its sources."""
+        """Return the function that gives a field of a case by the rows of its sources."""
 
         def part(name: str, *rows: int) -> Any:
             chosen = {
@@ -130,7 +128,7 @@ class Block:
 
 
 def _field(name: str, value: Any) -> Any:
-    """Return the field of a case of a checked value: of a group, its mapping or its word."""
+    """Return the field of a case from a checked value: of a group, its mapping or its word."""
     if isinstance(value, dict):
         return GROUPS[name](**value)
     return GROUPS[name]() if name in GROUPS and value else value or None

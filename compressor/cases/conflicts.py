@@ -24,7 +24,7 @@ from compressor.metrics import AXES, JOINTS
 
 
 def back_action(case: Settings, axis: str, frequency: Any) -> Any:
-    """Return the relative change of the shaking force by the motion of the body it drives, complex.
+    """Return the relative change, complex, of the shaking force by the motion of its body.
 
     A body that accelerates by a takes the moving parts m along, so that the force X on it becomes
     X - m a. With a = -X G / M, G = f^2 / (f_n^2 - f^2 + 2 i zeta f f_n), the change is m G / M of
@@ -73,10 +73,11 @@ def problem_of(key: str, reader: Reader) -> Problem:
 
 
 def unread_values(case: Settings, values: Mapping[str, Any]) -> Iterator[Problem]:
-    """Find the keys of one case that it does not read; values: those given, by dotted key.
+    """Yield a problem for each key of one case that it does not read.
 
-    A value that the case would have without it passes, so that `Case.values` reads back; a group
-    that a case has only if it is named does not, whatever its values.
+    values: those given, by dotted key. A value that the case would have without it passes, so that
+    `Case.values` reads back; a group that a case has only if it is named does not, whatever its
+    values.
     """
     for key, value in values.items():
         for unread, reader in conditions(key):
@@ -166,7 +167,7 @@ def _judged_values(values: Mapping[str, Any]) -> Iterator[tuple[str, float, tupl
 
 
 def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Find what a law of contact cannot do without."""
+    """Yield what a law of contact lacks: a restitution, or what a pin in a bore needs."""
     law, restitution = case.contact.law, case.contact.restitution
     if law in CYLINDRICAL:
         yield from cylinder_conflicts(case)
@@ -218,7 +219,7 @@ SLIM = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at lea
 
 
 def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Find a bearing for which the film's numbers do not hold."""
+    """Yield a bearing for which the film's numbers do not hold."""
     if not case.lubricant:
         return
     for joint in JOINTS:
@@ -233,7 +234,7 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
 
 
 def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Find what a bore that wears cannot have: oil, and a limit that is reached already."""
+    """Yield what a bore that wears cannot have: oil, and a limit that is reached already."""
     if not case.wear:
         return
     if case.lubricant:
@@ -310,7 +311,7 @@ def conflicts(
     values: Mapping[str, Any],
     wrong: frozenset[str] = frozenset(),
 ) -> Iterator[Problem]:
-    """Find everything in a case that does not fit together.
+    """Yield everything in a case that does not fit together.
 
     given: the dotted keys set by hand. values: those of them that the case has to read. wrong:
     keys, or whole groups, in whose place the case holds defaults; what does not fit is found among
@@ -332,16 +333,14 @@ def conflicts(
 
 
 def _undecided_keys(wrong: frozenset[str]) -> frozenset[str]:
-    """Return the keys of which nothing is known where some are wrong: these, and what they
-    decide.
-    """
+    """Return the keys whose values are unknown: the wrong ones, and those that they decide."""
     filled_in = {key for key, by in FILLED_IN.items() if wrong & {*by, "machine"}}
     rivals = {pair[not place] for pair in IN_PLACE_OF for place in (0, 1) if pair[place] in wrong}
     return wrong | filled_in | rivals
 
 
 class _Unknown(Exception):
-    """Ends a rule that reads what is wrong."""
+    """The end of a rule that reads a wrong value."""
 
 
 class _Known:
@@ -395,7 +394,7 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
 
 
 def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
-    """Yield the first two orders of the speed carry most of the shaking force."""
+    """Yield a resonance near the speed's first two orders, which carry most of the force."""
     for order in (1, 2):
         frequency = order * case.machine.speed_rpm / 60.0
         back = abs(back_action(case, axis, frequency))
@@ -410,7 +409,7 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
 
 
 def _inertia_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    """Yield a default inertia may leave the range that a given one must keep."""
+    """Yield a default inertia that leaves the range which a given one must keep."""
     key, inertia = "machine.rod_inertia_kg_m2", case.machine.rod_inertia_kg_m2
     if inertia is None or not table()[key].holds(inertia):
         yield Problem(key, f"m L^2 / 12 of the rod: {table()[key].check(inertia)}")
@@ -434,7 +433,7 @@ def _geometry_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
 
 
 def _clearance_conflicts(case: Settings, given: frozenset[str], joint: str) -> Iterator[Problem]:
-    """Find a clearance that is missing, or does not fit the pin or where its journal starts."""
+    """Yield a clearance that is missing, or does not fit the pin or its journal's start."""
     key, clearance = f"clearance_mm.{joint}", getattr(case.clearance_mm, joint)
     if not clearance:
         if case.joint in (joint, "both") and key not in given:

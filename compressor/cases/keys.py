@@ -41,10 +41,7 @@ class Leaves:
 
 
 def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
-    """Return the leaves of a tree.
-
-    Keys that are unknown, or no group where one is due, are problems.
-    """
+    """Return the leaves of a tree; unknown keys, and values in place of groups, are problems."""
     found = Leaves({}, {})
     for name, node in _known("", root, problems, root):
         found.places[name] = node.key_place
@@ -64,10 +61,7 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
 
 
 def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) -> None:
-    """Add a leaf of a group; a word of the trade as the key that it is the double of.
-
-    A value for each joint is a leaf for each.
-    """
+    """Add a leaf of a group to those found: a synonym as its key, a value by joint as several."""
     if keys := by_joint(key, node.value):
         if message := lacking_joint(key, node.value):
             problems.append(FileProblem(node.place, key, message))
@@ -110,9 +104,7 @@ def _is_sweep(name: str, node: Node) -> bool:
 def _known(
     group: str, node: Node, problems: list[FileProblem], root: Node
 ) -> Iterable[tuple[str, Node]]:
-    """Yield the entries of a group (or, for "", of a file) that it may hold and that have a
-    value.
-    """
+    """Yield the entries of a group (for "", of a file) that are known and have a value."""
     for name, item in node.value.items():
         if name not in accepted_keys(group):
             message = "unknown key"
@@ -169,9 +161,7 @@ def merge_leaves(file: Leaves, block: Leaves) -> Leaves:
 
 
 def _open_group(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
-    """Return a value that stands for a whole group, split up if an override sets a part of the
-    group.
-    """
+    """Return a leaf by key; one of a whole group is split where an override sets a part of it."""
     if not any(other.startswith(f"{key}.") for other in new):
         return {key: node}
     return dict.fromkeys(stands_for(key), node)

@@ -167,13 +167,12 @@ def load_studies(
 ) -> list[Study]:
     """Return the studies of YAML case files.
 
-    Each override, `key=value`, replaces a value in all of them.
-
-    A file that asks for more than `max_jobs` jobs is refused before any is made; `only`, a
-    comparison, selects the jobs to be run. A file with `regimes` is refused where the caller cannot
-    `follow` one. `progress` is told how many of many cases are read. `variants` gives the cases
-    that the caller runs for one; a key that none of them reads is refused. Raises CaseFileError
-    with everything that is wrong in all files, overrides and the comparison.
+    Each override, `key=value`, replaces a value in all of them. A file that asks for more than
+    `max_jobs` jobs is refused before any is made; `only`, a comparison, selects the jobs to be run.
+    A file with `regimes` is refused where the caller cannot `follow` one. `progress` is told how
+    many of many cases are read. `variants` gives the cases that the caller runs for one; a key that
+    none of them reads is refused. Raises CaseFileError with everything that is wrong in all files,
+    overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
@@ -231,8 +230,9 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
 
 
 def _name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
-    """Return the study's name: the file's value, checked later with all others, or the file's
-    stem.
+    """Return the study's name: the file's value, else the file's stem; "" for a wrong one.
+
+    What is wrong with the value is reported later, with all others.
     """
     if "name" in found.values:
         name = found.values["name"].value
@@ -246,7 +246,7 @@ def _name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
 
 
 def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
-    """A name is where a study is stored, and file systems may not tell `A` from `a`."""
+    """Refuse studies that would be stored under one name; on some disks `A` and `a` are one."""
     first: dict[str, _Draft] = {}
     for draft in drafts:
         other = first.setdefault(draft.name.casefold(), draft)
@@ -258,7 +258,7 @@ def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
 
 
 def _refuse_regimes(drafts: Sequence[_Draft]) -> None:
-    """A chain of regimes is no case."""
+    """Refuse files with regimes: a chain of them is no case."""
     for draft in drafts:
         if draft.regimes:
             place = draft.leaves.places.get(GROUP, Place(draft.path, 1, 1))
@@ -267,7 +267,7 @@ def _refuse_regimes(drafts: Sequence[_Draft]) -> None:
 
 
 def _unread(drafts: Sequence[_Draft], keys: KeysRead) -> Iterator[FileProblem]:
-    """Find the keys of all files that no job reads.
+    """Yield the keys of all files that no job reads.
 
     A key that a file's own jobs read stands there rightly, whatever the command line changes.
     """
@@ -334,10 +334,7 @@ def _study(
 
 
 def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
-    """Yield the leaves of each block, over those of the file.
-
-    The file's alone where it has no blocks.
-    """
+    """Yield the leaves of each block over those of the file; the file's alone without blocks."""
     node = draft.leaves.values.get("blocks")
     own = {key: item for key, item in draft.leaves.values.items() if key != "blocks"}
     file = Leaves(own, draft.leaves.places)
@@ -357,7 +354,7 @@ def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
 
 
 def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
-    """A `sample` of which no key is sampled is a mistake."""
+    """Refuse a `sample` where no key is sampled: a mistake."""
     place = draft.leaves.places.get("sample")
     if place and not any(one.samples and one.is_sampled for one in drafts):
         message = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
@@ -365,7 +362,7 @@ def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
 
 
 def _block_leaves(item: Node, draft: _Draft) -> Leaves:
-    """Return what a block says; what only a file can say is a problem."""
+    """Return the leaves of a block; keys that only a file can have are problems."""
     found = leaves(item, draft.problems)
     whole = ("name", "blocks", GROUP)
     for key in [key for key in found.values if key.partition(".")[0] in whole]:
@@ -431,10 +428,7 @@ def _check_cases(
 
 
 def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
-    """Return the cases of each chain.
-
-    What cannot be followed, and too many values, are problems.
-    """
+    """Return the cases of each chain; too many, or such that cannot be followed, are problems."""
     asked, places = draft.regimes, draft.leaves.places
     assert asked
     place = places.get(GROUP, Place(draft.path, 1, 1))

@@ -17,7 +17,7 @@ MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326
 
 
 def contact_stiffness(first, second, journal_radius, bearing_radius, internal=False):
-    """Return the Eq. 15's stiffness K (N/m^1.5) of two materials by name and two radii (m).
+    """Return Eq. 15's stiffness K (N/m^1.5) of two materials by name and two radii (m).
 
     The paper adds the radii's curvatures, as of two discs side by side; internal: it takes them
     from each other, as of a pin in a bore (Flores and Lankarani, Contact force models for multibody
@@ -35,9 +35,9 @@ def contact_stiffness(first, second, journal_radius, bearing_radius, internal=Fa
 
 
 def composite_modulus(first, second):
-    """E* (Pa) of two materials by name: 1 / E* is the sum of (1 - nu^2) / E.
+    """Return the composite modulus E* (Pa) of two materials by name.
 
-    Raises KeyError for a material that is not in Table 2.
+    1 / E* is the sum of (1 - nu^2) / E (Hertz). Raises KeyError for one that is not in Table 2.
     """
     compliance = 0.0
     for name in (first, second):
@@ -47,7 +47,7 @@ def composite_modulus(first, second):
 
 
 def joint_stiffness(contact: "Contact", pin_radius_mm: float, clearance_mm: float) -> float:
-    """Return what a joint's contact law is scaled by: K (N/m^p), or pi E* L (N/m) with johnson.
+    """Return the stiffness that scales a joint's law: K (N/m^p), or pi E* L (N/m) with johnson.
 
     With liu K (N/m^1.5) at small penetrations, which depends on the clearance; 0 without any.
     """

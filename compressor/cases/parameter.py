@@ -261,7 +261,7 @@ def quote_value(value: Any) -> str:
 
 @lru_cache(4096)  # the jobs of a study share most of their values
 def to_si(value: float, unit: str) -> float:
-    """Return a case-file value in SI.
+    """Return a case-file value in SI. Raises KeyError for a unit that is none of `UNITS`.
 
     Powers of ten are divided, so that 0.1 mm is exactly 1e-4 m.
     """
@@ -291,7 +291,7 @@ class Parameter:
 
     @property
     def range(self) -> str:
-        """The allowed values, for a table or an error."""
+        """Return the allowed values, for a table or an error."""
         if self.kind == "choice":
             return " | ".join(self.choices)
         if self.kind == "boolean":
@@ -307,7 +307,7 @@ class Parameter:
 
     @property
     def needed(self) -> str:
-        """The allowed values in words, with their unit."""
+        """Return the allowed values in words, with their unit."""
         words = join_with_or(self.choices)
         if self.kind == "choice":
             return words
@@ -325,7 +325,7 @@ class Parameter:
 
     @property
     def judged_on(self) -> str:
-        """The range that the program was judged on, "" without one."""
+        """Return the range that the program was judged on, "" without one."""
         return "{:g} to {:g}".format(*self.judged) if self.judged else ""
 
     @property
@@ -409,7 +409,7 @@ def join_with_or(words: Sequence[str]) -> str:
 
 
 def _is_finite(value: float) -> bool:
-    """Return whether a number fits a float; an integer may be too large to be asked by math."""
+    """Return whether a number fits a float, also for integers that are too large for `math`."""
     try:
         return math.isfinite(value)
     except OverflowError:
@@ -419,10 +419,7 @@ def _is_finite(value: float) -> bool:
 def parameter(
     default: Any, unit: str, span: tuple[float, float], source: str, phrase: str, **more: Any
 ) -> Any:
-    """Return a dataclass field that is also a row of the table.
-
-    `more`: other fields of `Parameter`.
-    """
+    """Return a dataclass field that is also a row of the table; more: of `Parameter`."""
     row = {"unit": unit, "low": span[0], "high": span[1], "above": False, "source": source}
     row |= {"phrase": phrase, "kind": "number"}
     return _field(default, row | more)
@@ -444,9 +441,7 @@ def _field(default: Any, row: dict[str, Any]) -> Any:
 
 
 def document_fields(group: type[Group]) -> type[Group]:
-    """Return a group's dataclass, its fields told in its docstring: range, unit, default,
-    source.
-    """
+    """Return a group's dataclass with its fields in the docstring: range, unit, default, source."""
     lines = []
     for item in fields(group):  # type: ignore[arg-type]
         row = Parameter(item.name, default=item.default, **item.metadata)

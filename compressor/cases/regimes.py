@@ -75,19 +75,19 @@ class Regimes:
 
     @property
     def values(self) -> list[float]:
-        """The values of the key, going up."""
+        """Return the values of the key, going up."""
         word, ends = "logspace" if self.log else "linspace", (self.first, self.last)
         first, last = (Fraction(str(end)) for end in ends)
         return between(word, first, last, self.n)()
 
     @property
     def directions(self) -> tuple[str, ...]:
-        """The ways that it is followed, each a chain."""
+        """Return the ways that it is followed, each a chain."""
         return DIRECTIONS[self.direction]
 
     @property
     def unit(self) -> str:
-        """The unit of `over` in a case file."""
+        """Return the unit of `over` in a case file."""
         row = row_of(self.over)
         return row.unit if row else ""
 
@@ -97,12 +97,7 @@ class Regimes:
 
 
 def read_regimes(leaves: Leaves, problems: list[FileProblem]) -> Regimes | None:
-    """Return what `regimes` asks for in a file's leaves.
-
-    None without it, or with something wrong in it.
-
-    What is wrong joins `problems`.
-    """
+    """Return the `regimes` of a file's leaves; None without, or where any of it is a problem."""
     place = leaves.places.get(GROUP)
     nodes = {
         key.removeprefix(f"{GROUP}."): node
@@ -157,7 +152,7 @@ def _not_followed(key: Any) -> str | None:
 def _check_range(
     given: Mapping[str, Any], nodes: Mapping[str, Node], problems: list[FileProblem]
 ) -> None:
-    """What is wrong with the ends joins `problems`."""
+    """Add what is wrong with the ends to `problems`."""
     row, first, last = row_of(given["over"]), given["from"], given["to"]
     for name in ("from", "to"):
         message = row.check(given[name]) if row else None
@@ -200,9 +195,7 @@ def at_first(leaves: Leaves, asked: Regimes, problems: list[FileProblem]) -> Lea
 
 
 def follow_key(asked: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
-    """Yield a combination of a file's values at each value of the key that is followed, going
-    up.
-    """
+    """Yield a combination of a file's values at each value of the followed key, going up."""
     if at := chosen.get(asked.over):  # an ideal machine has no clearance
         for value in asked.values:
             yield {**chosen, asked.over: Node(value, at.place, at.key_place)}

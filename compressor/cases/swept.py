@@ -62,9 +62,7 @@ class SweptKey:
 
 
 def is_swept(key: str, node: Node) -> bool:
-    """Return whether a value stands for many: not the pair of a contact's materials, nor an
-    accuracy.
-    """
+    """Return whether a value stands for many, unlike a pair of materials or an accuracy."""
     if isinstance(node.value, dict):
         return key != "solve.accuracy"
     if not isinstance(node.value, list):
@@ -157,9 +155,7 @@ def _sweep_range(
 
 
 def between(word: str, first: Fraction, last: Fraction, count: int) -> Make:
-    """Return the function that makes `count` values from first to last, evenly or with even
-    ratios.
-    """
+    """Return the function that makes `count` values from first to last, in even steps or ratios."""
     low, high = float(first), float(last)
 
     def even() -> list[float]:
@@ -188,7 +184,7 @@ def round_made_value(value: float) -> float:
 
 
 def format_count(count: int) -> str:
-    """Return a number of jobs as it is told, however large."""
+    """Return a number of jobs as messages write it, however large."""
     return str(count) if count < 10**100 else f"over 10^{int(count.bit_length() * 0.30103) - 1}"
 
 
@@ -264,7 +260,7 @@ def comparison(text: str) -> Test:
 
 
 class _Reader:
-    """Turns the tree of a text into a test.
+    """A reader that turns the tree of a text into a test.
 
     `code` is what Python's parser gets: the text from its first word, with spaces for other white
     space and for leading zeros, so that places in it are `indent` before those in the text.
@@ -377,8 +373,9 @@ class _Reader:
 
 
 def _misfit(code: str, error: SyntaxError) -> tuple[int, str]:
-    """Return where a code cannot be read and why: words that cannot be neighbours, or Python's
-    error.
+    """Return where a code cannot be read and why, by its first words that cannot be neighbours.
+
+    Without such words it is where Python's parser stopped.
     """
     earlier, before = "", ""
     ends, opened = False, 0  # ends: whether a comparison may end with `before`

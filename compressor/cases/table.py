@@ -107,17 +107,17 @@ class Settings:
 
     @property
     def omega(self) -> float:
-        """Crank speed, rad/s."""
+        """Return the crank speed, rad/s."""
         return self.machine.speed_rpm * math.pi / 30
 
     @property
     def turn(self) -> float:
-        """Time of one revolution, s."""
+        """Return the time of one revolution, s."""
         return 60.0 / self.machine.speed_rpm
 
     @property
     def duration(self) -> float:
-        """Duration, s; with `duration_rev: auto` the longest that it may come to."""
+        """Return the duration, s; with `duration_rev: auto` the longest that it may come to."""
         if self.solve.duration_s is not None:
             return self.solve.duration_s
         given = self.solve.duration_rev
@@ -125,18 +125,18 @@ class Settings:
 
     @property
     def settle(self) -> float:
-        """Time from which metrics count, s; with `settle_rev: auto` 0, until that is known."""
+        """Return the time from which metrics count, s; 0 with `auto`, until that is known."""
         given = self.solve.settle_rev
         return 0.0 if isinstance(given, str) else given * self.turn
 
     @property
     def settles_itself(self) -> bool:
-        """Whether a run finds out by itself where it settles, or how long it is."""
+        """Return whether a run finds out by itself where it settles, or how long it is."""
         return "auto" in (self.solve.duration_rev, self.solve.settle_rev)
 
     @property
     def steps(self) -> float:
-        """Output steps in the duration, a whole number in a valid case."""
+        """Return the output steps in the duration, a whole number in a valid case."""
         if self.solve.output_step_s is not None:
             return self.duration / self.solve.output_step_s
         return self.duration * self.machine.speed_rpm * 6.0 / (self.solve.output_step_deg or 1.0)
@@ -169,7 +169,5 @@ def table() -> dict[str, Parameter]:
 
 @cache
 def outside_identity() -> frozenset[str]:
-    """Return the keys that change nothing of what a job computes, so that no study can sweep
-    them.
-    """
+    """Return the keys that no result depends on, so that no study can sweep them."""
     return frozenset(row.key for row in parameters() if not row.identity)

@@ -40,7 +40,7 @@ def unreadable(path: str, error: OSError | ValueError) -> str:
 
 
 def no_text(data: bytes) -> str:
-    """Return what is said of a file that is no text in UTF-8."""
+    """Return the error of a file that is no text in UTF-8."""
     if data.startswith(RESULTS):
         return "is a file of results (netCDF or HDF5); a case file is YAML text"
     return "is not UTF-8 text"
@@ -126,7 +126,7 @@ class Node:
 
 
 class _Unreadable(Exception):
-    """Ends the reading of a file; carries the last problem."""
+    """The end of the reading of a file; carries the last problem."""
 
 
 def shorten(text: str, most: int = 60) -> str:
@@ -155,10 +155,7 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
 
 
 def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | None:
-    """Return the value of a YAML text, or None.
-
-    A `start` without a line places everything there.
-    """
+    """Return the value of a YAML text, or None; a `start` without a line is everything's place."""
     builder = _Builder(text, start, problems)
     if odd := ODD_BREAKS.search(text):
         problems.append(_forbidden(text, odd.start(), start))
@@ -217,7 +214,7 @@ def _integer(text: str) -> float:
 
 
 class _Builder:
-    """Builds nodes out of the parser's events, and notes what a strict reader refuses."""
+    """A builder of nodes from the parser's events; notes what a strict reader refuses."""
 
     def __init__(self, text: str, start: Place, problems: list[FileProblem]):
         self.start, self.last, self.problems, self.parts = start, start, problems, 0

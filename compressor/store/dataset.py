@@ -50,7 +50,7 @@ def _word(value: Any) -> str:
 
 
 def grid(study: StoredStudy) -> Layout:
-    """Return one study: a dimension for every axis."""
+    """Return the layout of one study that is a grid: a dimension for every axis."""
     names = coordinate_names([axis.key for axis in study.axes])
     coordinates = {
         names[axis.key]: _coordinate((names[axis.key],), axis.key, axis.values, axis.units)
@@ -61,7 +61,7 @@ def grid(study: StoredStudy) -> Layout:
 
 
 def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
-    """Return several studies, or one that is no grid: one dimension, `job`."""
+    """Return the layout of several studies, or of one that is no grid: one dimension, `job`."""
     units = {"joint": "", "load": ""} | {a.key: a.units for s in studies for a in s.axes}
     rows = [(study, point) for study in studies for point in points(study)]
     coordinates = {"study": xr.Variable("job", [study.name for study, _ in rows])}
@@ -110,10 +110,9 @@ def label_dataset(
 
 
 def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a Dataset of jobs in which metrics are nan where their error bars do not vouch for
-    them.
+    """Return a Dataset of jobs with nan for each metric that its error bar does not vouch for.
 
-    So are those of jobs that are not ok, and of runs without error bars.
+    So are metrics of jobs that are not ok, and of runs without error bars.
     """
     known = np.vectorize(is_known, otypes=[bool])
     good = dataset["status"] == "ok"
@@ -159,10 +158,7 @@ def _taken(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
 
 def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """Return all numbers of the rows.
-
-    Nan where a job has none. Statistics where a job is chaotic.
-    """
+    """Return all numbers of the rows, nan where a job has none, but for those that no job has."""
     found = {}
     for name, metric in NUMBERS.items():
         values = np.array(rows.numbers[name][positions])
@@ -197,7 +193,7 @@ def _series(
 
 
 def _first_readable(keys: np.ndarray, job: Callable[[str], xr.Dataset]) -> xr.Dataset:
-    """Return the first of some jobs that is not damaged; who reads the others is told."""
+    """Return the first of some jobs that is not damaged; without any an empty Dataset, and warn."""
     for key in keys:
         try:
             return job(key.decode())
@@ -208,7 +204,7 @@ def _first_readable(keys: np.ndarray, job: Callable[[str], xr.Dataset]) -> xr.Da
 
 
 class StudySeries(BackendArray):
-    """One series of all jobs of a study; indexing reads the files of the jobs asked for."""
+    """One series of all jobs of a study; indexing reads the files of those jobs alone."""
 
     def __init__(self, values: Values, name: str, keys: np.ndarray, longest: tuple[int, ...]):
         self.values, self.name, self.keys, self.longest = values, name, keys, longest

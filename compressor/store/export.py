@@ -116,10 +116,7 @@ def export(
 def _named_jobs(
     folder: Folder, names: Sequence[str], stored: Stored, known: Sequence[StoredStudy]
 ) -> tuple[list[StoredStudy], list[str]]:
-    """Return the studies and the keys of the jobs that are named, each once.
-
-    All studies by default.
-    """
+    """Return the studies and the keys of jobs that are named, each once; by default all studies."""
     by_name = {study.name for study in known}
     if not names:
         return [study for study in known if not study.former_of], []
@@ -187,10 +184,7 @@ def _refuse_existing(tasks: Iterable[_Task]) -> None:
 
 
 def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
-    """Return the numbers of all jobs of studies as one table.
-
-    In netCDF a lone grid keeps its axes.
-    """
+    """Write the numbers of studies' jobs as one table; in netCDF a lone grid keeps its axes."""
     from compressor.store.dataset import (  # loads xarray: half a second
         grid,
         outcomes,
@@ -214,7 +208,7 @@ def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
 
 
 def _series(task: _Task, stored: Stored, form: str) -> Exported:
-    """Return the time series of one job. In netCDF it is the stored file, to the byte."""
+    """Write the time series of one job; in netCDF it is the stored file, to the byte."""
     position = stored.position(task.key)
     if position is None:
         raise WrongName(stored.folder, f"job {task.key} is not stored", "run its case file first")

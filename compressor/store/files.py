@@ -104,14 +104,14 @@ def refusals(path: Folder) -> Iterator[None]:
 
 
 def publish(path: Path, data: bytes, pending: bool = False) -> None:
-    """Put a whole file under its name, durably, or leave what was there; see `publishing`."""
+    """Write a whole file under its name, durably, or leave what was there; see `publishing`."""
     with publishing(path, pending) as file:
         file.write(data)
 
 
 @contextlib.contextmanager
 def publishing(path: Path, pending: bool = False) -> Iterator[BinaryIO]:
-    """A file to write: it has its name, durably, once the block has ended well, or never.
+    """Yield a file to write: it has its name, durably, once the block has ended well, or never.
 
     What stood under the name is left until then. A `pending` file is left under `pending_path` for
     `name_pending`, and is durable once its folder has been synced. Raises StoreError where the disk
@@ -178,7 +178,7 @@ def is_locked(place: Path) -> bool:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, durably; raises StoreError."""
+    """Make a folder and those above it, durably. Raises StoreError."""
     try:
         if not folder.is_dir():
             make_folder(folder.parent)
@@ -192,9 +192,9 @@ def make_folder(folder: Path) -> None:
 
 
 def writable_folder(folder: Folder, make: bool = True) -> None:
-    """Be sure that files can be written to a folder before there are any, and make it if wanted.
+    """Raise WrongName unless files may be written to a folder, and make it if wanted.
 
-    Raises WrongName where that is not allowed, StoreError where the disk refuses.
+    Called before there are any files. Raises StoreError where the disk refuses.
     """
     path = Path(folder)
     above = next(place for place in (path, *path.parents, Path()) if place.exists())
@@ -269,9 +269,7 @@ def no_results(folder: Folder) -> WrongName:
 
 
 def remedy_for(place: Path) -> str:
-    """Return what to do instead of naming this folder: name one near by that holds results, or
-    run.
-    """
+    """Return what to name in place of this folder: a near one that holds results, or a new run."""
     above = place.absolute().parent
     inside = [*found_in(place)]
     if inside:

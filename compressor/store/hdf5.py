@@ -118,7 +118,7 @@ def storable(text: str) -> str:
 
 
 def _image(data: bytes) -> h5py.File:
-    """Open bytes as an HDF5 file."""
+    """Return an HDF5 file in memory, opened from its bytes."""
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(backing_store=False)
     access.set_file_image(data)
@@ -127,7 +127,7 @@ def _image(data: bytes) -> h5py.File:
 
 @contextlib.contextmanager
 def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.File]:
-    """The HDF5 file that `data` is, every part of it checked; `path` is named in errors.
+    """Yield the HDF5 file that `data` is, every part of it checked; `path` is named in errors.
 
     Raises DamagedJob for what is no HDF5 file or holds what ours never do: groups, links, data in
     other files, foreign filters, types other than numbers and text, more data than can be in it.
@@ -231,9 +231,7 @@ def _heap_items(data: bytes, heap: int) -> dict[int, bytes]:
 
 
 def _dimensions(file: h5py.File) -> dict[str, tuple[str, ...]]:
-    """Return the names of the dimensions of each variable, from the coordinates that tell of
-    them.
-    """
+    """Return the names of each variable's dimensions, by the coordinates that refer to it."""
     found = {name: [""] * stored.ndim for name, stored in file.items()}
     for name, stored in file.items():
         if "CLASS" in stored.attrs and _attribute(stored, "CLASS") == "DIMENSION_SCALE":

@@ -106,7 +106,7 @@ class JobStatus:
 
     @property
     def numbers(self) -> np.void:
-        """The job's numbers, dtype ROW."""
+        """Return the job's numbers, dtype ROW."""
         return self.rows.numbers[self.position]
 
     def serves(self, case: Case) -> bool:
@@ -155,7 +155,7 @@ class Stored:
         self.rows = Rows.of(segments, _usable)
 
     def warned(self) -> "Stored":
-        """Return the same, after warnings of the damage: its readers go on without some jobs."""
+        """Return this store, after a StoreWarning of each damage, whose jobs count as missing."""
         for damage in self.damaged:
             text = f"{damage}: its jobs count as missing"
             warnings.warn(text, StoreWarning, stacklevel=3)
@@ -227,7 +227,7 @@ class Stored:
 
     @cached_property
     def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The position of the first job of each kind, and the kind of each job, (jobs,)."""
+        """Return the position of the first job of each kind, and the kind of each job, (jobs,)."""
         rows, columns = self.rows, self.rows.columns
         _, code = np.unique(columns["reason"], return_inverse=True)
         code = 3 * code + np.unique(columns["precision"], return_inverse=True)[1]
@@ -323,8 +323,9 @@ def segment_paths(place: Path) -> list[Path]:
 
 
 def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
-    """Return what a folder holds. Damage that is `bearable` is kept in `damaged`, other is
-    raised.
+    """Return what a folder holds; `bearable` damage is listed in `damaged`, other is raised.
+
+    Raises StoreError, also where writers change the folder faster than it can be read.
     """
     folder = Path(os.path.abspath(folder))
     for _ in range(ATTEMPTS):

@@ -85,12 +85,12 @@ class Segment:
 
     @property
     def place(self) -> Path:
-        """The folder that holds `rows` and `jobs`."""
+        """Return the folder that holds `rows` and `jobs`."""
         return self.path.parent.parent
 
     @cached_property
     def details(self) -> list[bytes]:
-        """What is known of each failure, as JSON."""
+        """Return what is known of each failure, as JSON."""
         return unpack_lines(self.notes, self)
 
 
@@ -216,9 +216,7 @@ def decode(data: bytes, path: Path) -> Segment:
 
 
 def read_segment(path: Path) -> Segment:
-    """Return a segment from its file. Raises Cut where its bytes are not those that were
-    written.
-    """
+    """Return a segment from its file. Raises Cut where its bytes are not as they were written."""
     data = path.read_bytes()
     named = NAME.fullmatch(path.name)
     if named is None or digest(data) != named[2]:
@@ -259,14 +257,13 @@ def _lines(segment: Segment) -> list[bytes]:
 
 
 def completeness(columns: dict[str, np.ndarray]) -> np.ndarray:
-    """Return how much rows of one job tell: failed 0, ok 1, with time series 3, in double precision
-    5.
+    """Return how complete rows are, integers (rows,): failed 0, ok 1, with time series 3.
 
-    One more with signals.
+    Double precision adds 2 to that, signals add 1.
     """
     series, double = columns["samples"] > 0, columns["precision"] == b"double"
-    told = 1 + series * (2 + 2 * double + (columns["signals"] == b"yes"))
-    return (columns["status"] == b"ok") * told
+    score = 1 + series * (2 + 2 * double + (columns["signals"] == b"yes"))
+    return (columns["status"] == b"ok") * score
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +277,7 @@ class Rows:
 
     @classmethod
     def of(cls, segments: Sequence[Segment], usable: Any = None) -> "Rows":
-        """Merge segments; `usable` tells which rows of a segment there are (default: all)."""
+        """Return the rows of segments that count; `usable` masks those of one (default: all)."""
         masks = [np.ones(len(s), bool) if usable is None else usable(s) for s in segments]
         source = np.repeat(np.arange(len(segments)), [mask.sum() for mask in masks])
         row = np.concatenate([np.flatnonzero(mask) for mask in masks] or [np.zeros(0, int)])
@@ -302,22 +299,22 @@ class Rows:
 
     @cached_property
     def numbers(self) -> np.ndarray:
-        """All numbers of every job, dtype ROW, (jobs,): a kilobyte a job, read when first used."""
+        """Return all numbers of every job, dtype ROW, (jobs,): a kilobyte a job, read once."""
         return self._numbers()
 
     @cached_property
     def barred(self) -> np.ndarray:
-        """Whether metrics have error bars, (jobs,)."""
+        """Return whether metrics have error bars, (jobs,)."""
         return ~np.isnan(self._estimates["peak_acceleration_error"])
 
     @cached_property
     def foretold(self) -> np.ndarray:
-        """Whether it is known how long a job's motion can be foretold, (jobs,)."""
+        """Return whether it is known how long each motion can be foretold, (jobs,)."""
         return ~np.isnan(self._estimates[HORIZON])
 
     @cached_property
     def course(self) -> np.ndarray:
-        """When each motion settled (rev) and how much of its record is clipped, (jobs,)."""
+        """Return when each motion settled (rev) and how much of its record is clipped, (jobs,)."""
         return self._numbers("settled_rev", "clipped_fraction")
 
     @cached_property
@@ -344,7 +341,7 @@ class Rows:
 
     @cached_property
     def words(self) -> dict[str, np.ndarray]:
-        """Status, reason, precision, promise, regime and signals of every job as text."""
+        """Return status, reason, precision, promise, regime and signals of every job as text."""
         names = ("status", "reason", "precision", "promise", "regime", "signals")
         return {name: np.char.decode(self.columns[name], "utf-8", "replace") for name in names}
 
@@ -354,10 +351,7 @@ class Rows:
         return read_line(segment.details[self.row[position]], str, segment)
 
     def text(self, position: int) -> bytes:
-        """Return a job's attributes as JSON.
-
-        Quick for jobs of the same segment one after the other.
-        """
+        """Return a job's attributes as JSON; quick for jobs of one segment after the other."""
         return _lines(self.segments[self.source[position]])[self.row[position]]
 
     def attributes(self, position: int) -> dict[str, Any]:
@@ -370,10 +364,7 @@ class Rows:
             raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY) from error
 
     def path(self, position: int) -> Path | None:
-        """Return the file with a job's time series, which may wait for its name.
-
-        None without any.
-        """
+        """Return the file with a job's time series, which may wait for its name; None for none."""
         if not self.columns["samples"][position]:
             return None
         key, checksum = (self.columns[name][position].decode() for name in ("key", "digest"))
@@ -382,8 +373,6 @@ class Rows:
         return waiting if not path.exists() and waiting.exists() else path
 
     def intact(self, position: int) -> bool:
-        """Return whether the file with a job's time series, if there is one, is what was
-        written.
-        """
+        """Return whether a job's file of time series, if it has one, is as it was written."""
         path = self.path(position)
         return path is None or intact(path)

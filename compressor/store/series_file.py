@@ -71,15 +71,16 @@ def series_image(dataset: "DatasetParts | xr.Dataset", output: Output) -> bytes:
 
 
 def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
-    """Store a Dataset that is no job as netCDF-4, with the digest of its bytes, durably."""
+    """Write a Dataset that is no job as netCDF-4 with the digest of its bytes; return its path.
+
+    Raises StoreError where the disk refuses.
+    """
     publish(path, seal(image_of(dataset)))
     return path
 
 
 def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
-    """Return what `write_dataset` stored. Raises StoreError where a file is no such thing, or
-    damaged.
-    """
+    """Return what `write_dataset` wrote. Raises DamagedJob for a foreign or damaged file."""
     import xarray as xr
 
     data = unseal(path.read_bytes(), path, remedy)

@@ -130,7 +130,7 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
 
 
 def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
-    """Yield what is said of motions that did not repeat, and of those that did too late."""
+    """Yield a sentence about motions that did not repeat, and one about those that did too late."""
     word = "job" if jobs == 1 else "jobs"
     if unrepeated:
         was = "was" if unrepeated == 1 else "were"
@@ -143,7 +143,7 @@ def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
 
 
 def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
-    """Yield what is said of sensor records of which a thousandth or more is clipped."""
+    """Yield a sentence about sensor records of which a thousandth or more is clipped."""
     known = fractions[~np.isnan(fractions)]
     clipped = known[known >= Sensor.REPORTED]
     if clipped.size:
@@ -154,7 +154,7 @@ def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
 
 
 def _of_stiffness(rows: Rows, study: StoredStudy) -> list[str]:
-    """Return what is said of the paper's contact stiffness at other pins, by a stored job's case.
+    """Return a sentence about the paper's contact stiffness at other pins, by a stored job's case.
 
     Of the stored jobs a few are looked at, evenly over the study: a case takes a millisecond to
     read.
@@ -171,18 +171,16 @@ def _of_stiffness(rows: Rows, study: StoredStudy) -> list[str]:
 
 
 def _settle_revs(study: StoredStudy) -> list[float]:
-    """Return the revolution at which metrics of each job begin to count.
-
-    Nan where that is `auto`.
-    """
+    """Return the revolution from which metrics of each job count; nan where that is `auto`."""
     fixed = value_in(study.fixed, "solve.settle_rev")
     given = (point.get("solve.settle_rev", fixed) for point in points(study))
     return [float(v) if isinstance(v, int | float) else math.nan for v in given]
 
 
 def _outside_of_study(study: StoredStudy) -> dict[str, str]:
-    """Return the judged keys that a study leaves, each with a sentence: of fixed values and
-    axes' ends.
+    """Return the keys of a study that leave the judged range, each with a sentence.
+
+    Of an axis both ends are looked at.
     """
     base = copy.deepcopy(study.fixed)
     ends: list[tuple[str, Any]] = []
@@ -428,15 +426,11 @@ def report_job(folder: Folder, *words: str) -> JobReport:
 
 
 def _hides_clipping(numbers: dict[str, Any], attributes: dict[str, Any]) -> bool:
-    """Return whether an older version kept how much of a sensor's record is clipped in its file
-    alone.
-    """
+    """Return whether an older version stored a record's clipping in the job's file alone."""
     return math.isnan(numbers["clipped_fraction"]) and '"sensor"' in attributes.get("case", "")
 
 
 def changes(folder: Folder, studies: "Sequence[Study]") -> list[StudyChange]:
-    """Return what a run of studies would take out of the stored ones of their names. Raises
-    StoreError.
-    """
+    """Return what a run of studies would take out of the stored ones. Raises StoreError."""
     found = (change_of(folder, study, lambda: read_store(folder).keys()) for study in studies)
     return [change for change in found if change]

@@ -4,8 +4,8 @@ A study whose case file asks for other jobs than before is replaced. Where finis
 longer in it, the former one stays as `former/NAME~1.json`, and opens under that name; the next is
 NAME~2.
 
-What studies and jobs are called: the nearest ones are told where a name is not there. A job is
-named by the beginning of its key, or by its study and values of the study's axes, such as `wear
+What studies and jobs are called: the error of a wrong name has the nearest ones. A job is named by
+the beginning of its key, or by its study and values of the study's axes, such as `wear
 clearance_mm=0.2`.
 """
 
@@ -81,13 +81,13 @@ class StoredStudy:
 
     @property
     def former_of(self) -> str:
-        """The name of the study that has replaced this one; "" for one that is no former study."""
+        """Return the name of the study that has replaced this one; "" where none has."""
         named = FORMER.fullmatch(self.name)
         return named[1] if named else ""
 
     @property
     def again(self) -> "Again":
-        """What a run of the same jobs needs."""
+        """Return what a run of the same jobs needs."""
         options = argparse.ArgumentParser(allow_abbrev=False, add_help=False)
         options.add_argument("--set", action="append", default=[])
         options.add_argument("--max-jobs", default="0")
@@ -119,7 +119,7 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
 
 
 def in_words(value: Any) -> str:
-    """Return a swept value as it is told: 0.2, big_end, true; several with commas, "" for none."""
+    """Return a swept value in words: 0.2, big_end, true; several with commas, "" for none."""
     if isinstance(value, tuple | list):
         return ", ".join(map(in_words, value))
     return "" if value is None else str(value).lower()
@@ -139,9 +139,7 @@ def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
 def owners(
     studies: "Iterable[StoredStudy]", keys: Iterable[str]
 ) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return the studies that each of some jobs belongs to, by name, with its swept values
-    there.
-    """
+    """Return each job's studies by key and name, with the job's swept values there."""
     found: dict[str, dict[str, dict[str, Any]]] = {key: {} for key in keys}
     for study in studies:
         if not found.keys().isdisjoint(study.keys):
@@ -171,7 +169,7 @@ class StudyChange(NamedTuple):
 def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) -> StudyChange | None:
     """Return what writing a study would take out of the stored one; None where nothing.
 
-    stored: gives the keys of all stored jobs, where it is asked.
+    stored: returns the keys of all stored jobs; called only where they matter.
     """
     old = _present(folder, study.name)
     gone = {*old.keys}.difference(study.keys) if old else set()
@@ -194,9 +192,7 @@ def _present(folder: Folder, name: str) -> StoredStudy | None:
 
 
 def _former_name(folder: Folder, old: StoredStudy) -> str:
-    """Return where a study that is replaced stays: under a new name, or one that has the same
-    jobs.
-    """
+    """Return the name that a replaced study gets: a new one, or that of an equal former study."""
     mine = [study for study in former_studies(folder) if study.former_of == old.name]
     for study in mine:
         if (study.axes, study.keys) == (old.axes, old.keys):
@@ -211,7 +207,7 @@ def write_study(
     command: str = "",
     stored: Callable[[], set[str]] = set,
 ) -> None:
-    """Store which jobs a study has; a study that is stored already is left as it is.
+    """Write which jobs a study has; a study that is stored already is left as it is.
 
     One that is replaced stays as a former study where finished jobs, of those that `stored` gives,
     are no longer in the new one.
@@ -259,10 +255,7 @@ def study_paths(folder: Folder, where: str = "studies") -> list[Path]:
 
 
 def former_studies(folder: Folder) -> list[StoredStudy]:
-    """Return the studies that others of their names have replaced, by name.
-
-    Damaged ones are told of.
-    """
+    """Return the studies that others have replaced, by name, and warn of damaged ones."""
     found = []
     for path in study_paths(folder, "former"):
         try:
@@ -326,9 +319,7 @@ def _in_present_words(study: StoredStudy) -> StoredStudy:
 
 
 def _is_sound(study: StoredStudy, path: Path) -> bool:
-    """Return whether a study's entries are of the kinds that we write, and its name that of its
-    file.
-    """
+    """Return whether a study's entries have the types that we write, and its name is its file's."""
     swept = {key for name in table() for key in (name, name.rpartition(".")[0])}
     texts = (study.case_file, study.command, study.written, *study.versions.values())
     return (
@@ -371,9 +362,7 @@ SAME_VALUE = 1e-9  # relative; the decimal fractions of a case file are not mean
 def find_study(
     folder: Folder, name: str | None = None, known: Sequence[StoredStudy] | None = None
 ) -> StoredStudy:
-    """Return the study of a name, or the only one.
-
-    `known`: the folder's studies, where they were read.
+    """Return the study of a name, or the only one; known: the folder's studies, if they were read.
 
     Raises WrongName with the nearest names where there is none, or without a name several.
     """
@@ -397,7 +386,7 @@ def find_job(
     """Return the key of the job that words name; stored: the keys of the jobs that are stored.
 
     words: the beginning of a key; or a study, and `axis=value` until one job is left. Raises
-    WrongName with what is near.
+    WrongName with the nearest names.
     """
     first, *values = words
     if any(study.name == first for study in studies) or values:
@@ -408,10 +397,7 @@ def find_job(
 def whole_key(
     folder: Folder, beginning: str, studies: Sequence[StoredStudy], stored: set[str]
 ) -> str:
-    """Return the one key, of a stored or a planned job, that begins so.
-
-    WrongName where that is none.
-    """
+    """Return the one key, of a stored or a missing job, that begins so. Raises WrongName."""
     known = sorted(stored.union(*(study.keys for study in studies)))
     like = [key for key in known if key.startswith(beginning)]
     if len(like) == 1:
@@ -428,9 +414,9 @@ def whole_key(
 
 
 def _near_keys(beginning: str, known: Sequence[str]) -> str:
-    """Return the sorted keys that have most of a beginning in common.
+    """Return a hint at the keys nearest to a beginning; "" where they share less than half of it.
 
-    "" where that is not its half.
+    known: sorted.
     """
     at = bisect.bisect(known, beginning)
     shared = {key: _in_common(key, beginning) for key in known[max(at - 1, 0) : at + 1]}
@@ -517,7 +503,7 @@ def _number(text: str) -> float | None:
 
 
 def _axes(study: StoredStudy) -> str:
-    """Return what a study's jobs are told apart by."""
+    """Return a hint at the axes of a study, by which one of its jobs is named."""
     axes = [f"{axis.key}={in_words(axis.values[0])}" for axis in study.axes]
     return (
         f"its axes are {list_few([axis.key for axis in study.axes])}, as in {axes[0]}"

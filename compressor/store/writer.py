@@ -114,17 +114,17 @@ class Writer:
             _release(self.lock)
 
     def add(self, outcome: Outcome) -> list[str]:
-        """Take an outcome in; `write_series` has written its time series, if it has any."""
+        """Add an outcome, whose time series are written already; return the keys now on disk."""
         self.pending[outcome.key] = outcome
         return self.flush_if_due()
 
     def flush_if_due(self) -> list[str]:
-        """Write what waits, but not more than once a second; call it often. Keys now on disk."""
+        """Write what waits, but at most once a second, and return the keys now on disk."""
         due = time.monotonic() - self.flushed >= MAX_AGE or len(self.pending) >= MAX_ROWS
         return self.flush() if due else []
 
     def flush(self) -> list[str]:
-        """Write all that waits. Keys now on disk."""
+        """Write all that waits, and return the keys now on disk."""
         if not self.pending:
             return []
         keys = list(self.pending)
@@ -244,7 +244,7 @@ def _holder(descriptor: int) -> str:
 
 
 def _lock(path: Path, wait: bool, command: str) -> int:
-    """Take a lock for this process, for as long as the descriptor stays open."""
+    """Return the descriptor of a lock, which this process has for as long as it stays open."""
     import fcntl  # not on Windows, where nothing is run
 
     make_folder(path.parent)

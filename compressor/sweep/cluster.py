@@ -59,7 +59,7 @@ def sees(token: Path, text: str) -> bool:
 
 @contextlib.contextmanager
 def visible(place: Path) -> Iterator[tuple[Path, str]]:
-    """Put a file into a place: by its text a worker knows the place for ours; a context manager."""
+    """Yield a new file in a place, and its text, by which a worker knows the place for ours."""
     text = uuid.uuid4().hex
     token = place / "jobs" / f".{text}.tmp"
     publish(token, text.encode())
@@ -97,7 +97,7 @@ class Batch(NamedTuple):
 
 
 def on_worker(data: bytes) -> bytes:
-    """Do a pickled Batch on a worker of the cluster; return its pickled ends. Raises Unfit."""
+    """Run a pickled Batch on a worker of the cluster; return its pickled ends. Raises Unfit."""
     from distributed import get_worker
 
     worker, batch = get_worker(), Batch(*pickle.loads(data))
@@ -118,7 +118,7 @@ def on_worker(data: bytes) -> bytes:
 
 
 def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) -> bytes:
-    """Do jobs in processes that stay for the next batch; their ends, in order, pickled."""
+    """Return the pickled ends, in order, of jobs in processes that stay for the next batch."""
     key = pickle.dumps((work, rules))
     if key not in KEPT:
         while KEPT:
@@ -180,7 +180,7 @@ class Remote(Batches):
         return ended
 
     def watch(self, now: float, news: bool) -> None:
-        """Count the threads of all workers now and then, and tell where there is none."""
+        """Count the threads of all workers now and then; remark where there are none."""
         if now - self.census < CENSUS:
             return
         try:
@@ -303,7 +303,7 @@ class Cluster:
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[JobResult | JobLost, None, None]:
-        """Run cases; `compressor.sweep.sweep.Backend` tells the rest."""
+        """Yield how each case ended; `compressor.sweep.sweep.Backend` says the rest."""
         with visible(place) as (token, text):
             rules = Workers(prepare=partial(load, Needs.of(cases)), grace=GRACE)
             work = partial(run_near, place, token, text)

@@ -256,7 +256,7 @@ def run_batches(
     workers: Workers,
     pulse: Callable[[], object] = lambda: None,
 ) -> Generator[End, None, None]:
-    """Call work(payload) for each job in worker processes; yield how each one ended.
+    """Yield how each job ended, for whose payload a worker process has called `work`.
 
     `jobs` is read as workers need it, in a thread; where it has a length, batches shrink towards
     the end. What `work` raises makes its job a JobLost. `pulse` is called several times a second,
@@ -477,8 +477,9 @@ def cores() -> int:
 
 
 def memory_share(count: int) -> int:
-    """Return the bytes for each of `count` workers: three quarters of the machine's, or the
-    container's.
+    """Return the bytes for each of `count` workers, of three quarters of the memory there is.
+
+    That is the machine's, or the container's where it has a limit.
     """
     most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     for path in MEMORY_LIMITS:

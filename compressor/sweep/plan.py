@@ -188,8 +188,9 @@ def drawn_from(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
 
 
 def timed_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[str, list[Cost]]:
-    """Return the time jobs of each study in turn, at least one of each, until so many seconds
-    are over.
+    """Return the costs of jobs of each study, run in turn until so many seconds are over.
+
+    At least one of each study is run.
     """
     end = time.perf_counter() + seconds
     costs: dict[str, list[Cost]] = {study: [] for study in drawn}
@@ -219,8 +220,9 @@ def mean_with_range(values: Sequence[float], of: int) -> tuple[float, float, flo
 
 
 def measure_cost(case: Case) -> Cost:
-    """Return what a job costs. It runs again where its search for chaos had to load machine code
-    first.
+    """Return what a job costs; it runs again where machine code was loaded in that time.
+
+    The first search for chaos of a process loads its own.
     """
     took, size, searched = ran(case)
     if searched and not SEARCHED:
@@ -230,7 +232,7 @@ def measure_cost(case: Case) -> Cost:
 
 
 def ran(case: Case) -> tuple[float, int, bool]:
-    """Run a job: the seconds it took, its file's bytes, and whether chaos was looked for."""
+    """Return the seconds that a job took, its file's bytes, and whether chaos was looked for."""
     from compressor.solve import measure, observe  # needs numba: only to simulate
 
     began = time.process_time()

@@ -21,9 +21,8 @@ class Carried(NamedTuple):
 def run_job(place: Path | None, case: Case, ahead: Any = None) -> Outcome | Carried | StoreError:
     """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
 
-    Without a place, what is to be stored comes back. ahead: what `run_ahead` has made of it. A
-    StoreError is returned: it ends the sweep,
-    while an exception is a failure of the job.
+    Without a place, what is to be stored comes back. ahead: what `run_ahead` has made of the case.
+    A StoreError is returned, since it ends the sweep: an exception is a failure of the job alone.
     """
     from compressor.solve import measure, observe  # needs numba: only to simulate
 
@@ -43,9 +42,7 @@ def run_job(place: Path | None, case: Case, ahead: Any = None) -> Outcome | Carr
 
 
 def run_ahead(scenes: tuple[int, ...], cases: list[Case]) -> list[Any]:
-    """Return what can be made of several cases at once: the first attempts of those of some
-    scenes.
-    """
+    """Return what is computed of several cases at once: first attempts, of cases of some scenes."""
     from compressor.solve import side_by_side
 
     return side_by_side(cases, scenes)

@@ -33,11 +33,10 @@ class RequestedJobs(Mapping[str, Case]):
     """Each selected job once, by key; its case is built when it is asked for.
 
     Where studies share a job, its case serves them all. A case can be changed in what is no part of
-    its key.
+    its key. among: the keys of those that are wanted, if not all.
     """
 
     def __init__(self, studies: Sequence[Study], among: Container[str] | None = None):
-        """among: the keys of those that are wanted, if not all."""
         self.places: dict[str, tuple[Study, int]] = {}
         self.own: dict[str, Case] = {}  # of jobs that several studies share, or that were changed
         for study in studies:
@@ -66,9 +65,7 @@ class RequestedJobs(Mapping[str, Case]):
         return len(self.places)
 
     def alike(self) -> Iterator[tuple[Case, list[str]]]:
-        """Yield the keys of jobs whose cases ask for the same beside their results, with one of
-        them.
-        """
+        """Yield a case, and the keys of jobs whose `solve` and `output` are equal to its own."""
         found: dict[Hashable, list[str]] = {}
         for key, (study, number) in self.places.items():
             kind = key if key in self.own else (study.name, study.solver_of(number))
@@ -181,7 +178,7 @@ class SweepWork:
             self.ahead[kind(case)] = self.ahead.get(kind(case), 0.0) + revolutions(case)
 
     def add(self, end: JobResult | JobLost) -> None:
-        """A job has ended; one that was lost tells nothing of the others."""
+        """Count a job that has ended; the time of one that was lost is not known."""
         of, turns = kind(end.id), revolutions(end.id)
         self.ahead[of] = max(0.0, self.ahead[of] - turns)
         if isinstance(end, JobLost):

@@ -42,8 +42,10 @@ LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
 
 class Needs(NamedTuple):
-    """What some cases need of the equations: methods, twins for a horizon, scenes in lanes, laws
-    other than the default ones, a mechanism with features.
+    """The parts of the equations that some cases need.
+
+    methods: of integration; horizon: perturbed trajectories; lanes: scenes whose runs march side by
+    side; laws: others than the default ones; features: a mechanism with any.
     """
 
     methods: tuple[str, ...] = ()
@@ -64,7 +66,7 @@ class Needs(NamedTuple):
 
     @property
     def parts(self) -> "dict[str, Needs]":
-        """The parts of the equations that are needed, by name, each as needs of its own."""
+        """Return the parts of the equations that are needed, by name, each as needs of its own."""
         found = {method: Needs((method,)) for method in self.methods}
         if self.horizon:
             found["horizon"] = Needs(horizon=True)
@@ -78,11 +80,11 @@ class Needs(NamedTuple):
 
     @property
     def uncompiled(self) -> "dict[str, Needs]":
-        """Those of the parts that this machine has not compiled before."""
+        """Return those of the parts that this machine has not compiled before."""
         return {part: alone for part, alone in self.parts.items() if not marker(part).exists()}
 
     def with_lanes(self, cases: Sequence[Case]) -> "Needs":
-        """With the scenes of which there are jobs enough to march side by side.
+        """Return the needs with the scenes of which enough jobs can march side by side.
 
         Results are the same to the bit without: where no lanes have been compiled yet, many more
         jobs are asked for than where they need but be loaded.
@@ -123,7 +125,7 @@ def load(needs: Needs) -> None:
 
 
 def load_telling(needs: Needs, told: str, remark: Callable[[str], None]) -> None:
-    """`load`; what takes long is told, in these words."""
+    """Load as `load` does; remark on what takes long, in these words."""
     timer = threading.Timer(SECONDS_TO_REMARK, remark, [told])
     timer.daemon = True
     timer.start()

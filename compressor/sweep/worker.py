@@ -88,7 +88,7 @@ def init_worker(work: Callable[[Any], Any], rules: Workers, parent: int) -> None
 
 
 def prepare() -> str:
-    """Make ready for the first batch; return what keeps this process from it, or ""."""
+    """Prepare this process for its first batch; return what prevents that, or ""."""
     rules = HERE["rules"]
     try:
         rules.prepare()
@@ -101,7 +101,7 @@ def prepare() -> str:
 
 
 def limit(memory: int) -> None:
-    """Have allocations fail once a job has added `memory` bytes, and no crash write a core file."""
+    """Limit what a job may allocate to `memory` bytes, and let no crash write a core file."""
     import resource  # not on Windows, where nothing is run
 
     _, most = resource.getrlimit(resource.RLIMIT_CORE)
@@ -122,7 +122,7 @@ def limit(memory: int) -> None:
 
 
 def do_batch(path: str, payloads: Sequence[bytes]) -> str:
-    """Do the jobs of a batch; return what keeps this process from any job, or "".
+    """Run the jobs of a batch; return what keeps this process from any job, or "".
 
     The file gets a note of who is at which job, and in the end how jobs ended, all but a rest that
     is given back.
@@ -148,7 +148,7 @@ def do_batch(path: str, payloads: Sequence[bytes]) -> str:
 
 
 def look_ahead(payloads: Sequence[bytes]) -> Sequence[Callable[[], tuple[Any, ...]]]:
-    """For each job of a batch a call that gives the arguments of its work."""
+    """Return for each job of a batch a function that returns the arguments of its work."""
     if HERE["rules"].ahead is None:
         return [partial(only, payload) for payload in payloads]
     try:
@@ -165,7 +165,7 @@ def only(payload: bytes) -> tuple[Any]:
 
 
 def perform(job: Callable[[], tuple[Any, ...]], start: float) -> JobResult | JobLost:
-    """Do one job; its result is pickled."""
+    """Return the result of one job, pickled, or why it has none."""
     try:
         result = pickle.dumps(HERE["work"](*job()), pickle.HIGHEST_PROTOCOL)
         return JobResult(None, result, time.monotonic() - start)
