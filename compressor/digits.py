@@ -42,8 +42,8 @@ def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) 
     error = max(error, 10.0**place)
     pair: tuple[float, ...] = (value,) if bare else (value, error)
     if SMALL <= abs(value) < LARGE or value == 0.0:
-        return " ± ".join(f"{round(one, -place):.{max(0, -place)}f}" for one in pair)
-    text = " ± ".join(f"{one / 10.0**top:.{max(0, top - place)}f}" for one in pair)
+        return " ± ".join(f"{round(number, -place):.{max(0, -place)}f}" for number in pair)
+    text = " ± ".join(f"{number / 10.0**top:.{max(0, top - place)}f}" for number in pair)
     return f"{text if bare else f'({text})'}e{top:+03d}"
 
 

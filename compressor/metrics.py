@@ -222,8 +222,8 @@ def statistics_of(row: Metric) -> Iterator[Metric]:
     """Yield the rows of a metric's statistics in a chaotic motion, with standard errors."""
     if row.kind == "greatest":
         for word, dims in (("mean", ()), ("quantile", ("quantile",))):
-            one = derive(row, word, f"{word} over revolutions of each one's", dims)
-            yield from (one, derive(one, "standard_error", "standard error of"))
+            statistic = derive(row, word, f"{word} over revolutions of each one's", dims)
+            yield from (statistic, derive(statistic, "standard_error", "standard error of"))
     else:
         yield derive(row, "standard_error", "standard error of")
 

@@ -156,4 +156,4 @@ def coordinates(used: Iterable[Any] = SIZES) -> dict[str, tuple]:
         "axis": (("axis",), list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
         "quantile": (("quantile",), list(QUANTILES), {"long_name": "share of values below"}),
     }
-    return {name: one for name, one in every.items() if name in wanted}
+    return {name: variable for name, variable in every.items() if name in wanted}

@@ -168,7 +168,7 @@ def _user_cache() -> Path:
 
 def _may_write(folder: Path) -> bool:
     """Return whether files can be written to a folder, which need not be there yet."""
-    above = next((one for one in (folder, *folder.parents) if os.path.exists(one)), folder)
+    above = next((place for place in (folder, *folder.parents) if os.path.exists(place)), folder)
     return os.path.isdir(above) and os.access(above, os.W_OK | os.X_OK)
 
 

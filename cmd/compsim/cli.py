@@ -54,12 +54,12 @@ class Interrupted(BaseException):
         super().__init__(signal.Signals(number).name)
 
 
-def version(context: click.Context, _: click.Parameter, asked: bool) -> None:
+def version(context: click.Context, _: click.Parameter, is_set: bool) -> None:
     """Print the version of the program and of what it computes with, and end."""
-    if asked and not context.resilient_parsing:
+    if is_set and not context.resilient_parsing:
         others = {"Python": platform.python_version()} | library_versions(*LIBRARIES)
-        told = ", ".join(f"{name} {number}" for name, number in others.items())
-        click.echo(f"{PROGRAM} ({told})")
+        listed = ", ".join(f"{name} {number}" for name, number in others.items())
+        click.echo(f"{PROGRAM} ({listed})")
         context.exit()
 
 
@@ -130,19 +130,19 @@ def interruptible() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def warnings_told() -> Iterator[None]:
+def report_warnings() -> Iterator[None]:
     """Report the store's warnings, each once, as a user reads them; others stay as they are."""
-    show, told = warnings.showwarning, set()
+    show, reported = warnings.showwarning, set()
 
-    def say_it(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
+    def report_once(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
         if not issubclass(category, CompsimWarning):
             show(message, category, *where, **more)
-        elif str(message) not in told:
-            told.add(str(message))
+        elif str(message) not in reported:
+            reported.add(str(message))
             say(f"compsim: {message}")
 
     with warnings.catch_warnings():
-        warnings.showwarning = say_it
+        warnings.showwarning = report_once
         yield
 
 
@@ -152,7 +152,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     command = shlex.join(["compsim", *arguments])
     try:
-        with interruptible(), warnings_told():
+        with interruptible(), report_warnings():
             return cli.main(arguments, "compsim", standalone_mode=False, obj=command) or DONE
     except Interrupted as signal_sent:
         say(f"interrupted by {signal_sent}")

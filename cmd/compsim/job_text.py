@@ -32,8 +32,8 @@ def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[
     """
     yield "", align_lines(stop(found))
     known = numbers(found, "tally", "statistics", "samples")
-    told = align_lines([*known, *reversal_verdict(found, *limits)])
-    yield "metrics, with their error bars", [*told, *cautions(found), *found.caveats]
+    lines = align_lines([*known, *reversal_verdict(found, *limits)])
+    yield "metrics, with their error bars", [*lines, *cautions(found), *found.caveats]
     yield (
         "relative errors of the time series",
         align_lines(series_errors(found)),
@@ -49,21 +49,21 @@ def align_lines(lines: list[Line]) -> list[str]:
 
 def stop(found: "JobReport") -> list[Line]:
     """Return where a job's run stopped, and its last steps, a line each; [] for one that ended."""
-    told = found.attributes
-    if "stop_history_words" not in told:
+    attributes = found.attributes
+    if "stop_history_words" not in attributes:
         return []
-    angle = math.degrees(told["stop_crank_angle"]) % 360
-    when = f"at {told['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"
+    angle = math.degrees(attributes["stop_crank_angle"]) % 360
+    when = f"at {attributes['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"
     lines = [("stopped", when)]
-    if told["stop_dominant"]:
-        lines.append(("driven by", told["stop_dominant"]))
-    names = told["stop_state_names"].split("; ")
-    for name, value in zip(names, told["stop_state"], strict=False):
+    if attributes["stop_dominant"]:
+        lines.append(("driven by", attributes["stop_dominant"]))
+    names = attributes["stop_state_names"].split("; ")
+    for name, value in zip(names, attributes["stop_state"], strict=False):
         if name != "unused":
             lines.append((name, f"{value:.6g}"))
     steps = zip(
-        *(told[f"stop_history_{name}"] for name in ("time", "step", "error")),
-        told["stop_history_words"].split("; "),
+        *(attributes[f"stop_history_{name}"] for name in ("time", "step", "error")),
+        attributes["stop_history_words"].split("; "),
         strict=False,
     )
     for time, step, error, words in steps:
@@ -80,7 +80,7 @@ def numbers(found: "JobReport", *sources: str) -> list[Line]:
             continue
         if row.kind == "count":  # it grows with the run: the number per revolution is shown
             continue
-        values, (errors, relative, said) = found.numbers[name], bar_of(found, name)
+        values, (errors, relative, kind) = found.numbers[name], bar_of(found, name)
         unit, factor = unit_of(row)
         for place, label in places(row):
             value = pick_value(values, place)
@@ -91,8 +91,8 @@ def numbers(found: "JobReport", *sources: str) -> list[Line]:
             if error == 0.0 and name.endswith("_per_rev"):
                 text = f"{value:.3g}"  # a mean of few whole numbers: exact of this run alone
             if text != UNKNOWN:
-                text = " ".join(filter(None, (text, unit, "" if math.isnan(error) else said)))
-            elif said:
+                text = " ".join(filter(None, (text, unit, "" if math.isnan(error) else kind)))
+            elif kind:
                 continue  # of the statistics of a chaotic motion only those that are known
             lines.append((label, text))
     return lines
@@ -141,8 +141,8 @@ def places(row: metrics.Metric) -> Iterator[tuple[tuple[int, ...], str]]:
     first = row.name.removesuffix("_error")
     first = LABELS.get(first, first.removesuffix("_rev").removesuffix("_per").replace("_", " "))
     for choice in itertools.product(*(enumerate(words[dim]) for dim in row.dims)):
-        told = [first, *(str(word).replace("_", " ") for _, word in choice)]
-        yield tuple(number for number, _ in choice), ", ".join(told)
+        parts = [first, *(str(word).replace("_", " ") for _, word in choice)]
+        yield tuple(number for number, _ in choice), ", ".join(parts)
 
 
 def pick_value(values: Any, place: tuple[int, ...]) -> float:
@@ -172,7 +172,7 @@ def format_measured(value: float, error: float, relative: bool) -> str:
 
 def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[Line]:
     """Return whether the rod load changes sides for long and far enough; [] without signals."""
-    worst, told = math.inf, []
+    worst, texts = math.inf, []
     for name, unit, least in (("angle", math.degrees(1.0), degrees), ("share", 100.0, percent)):
         value = unit * found.numbers.get(f"rod_load_reversal_{name}", math.nan)
         bar = unit * found.numbers.get(f"rod_load_reversal_{name}_error", math.nan)
@@ -181,12 +181,12 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
         if math.isinf(bar):
             return [("rod load", "its reversal is not known well enough to be judged")]
         bar = 0.0 if math.isnan(bar) else bar
-        told.append(format_measured(value, bar, True) if bar else f"{value:.4g}")
+        texts.append(format_measured(value, bar, True) if bar else f"{value:.4g}")
         clear = value - least
         worst = min(worst, clear / abs(clear) if abs(clear) >= bar and clear else 0.0)
     word = {1.0: "passes", 0.0: "cannot be told apart from", -1.0: "fails"}[worst]
     kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
-    verdict = f"reversal of {told[0]} degrees and {told[1]} %: {word} {kind} "
+    verdict = f"reversal of {texts[0]} degrees and {texts[1]} %: {word} {kind} "
     return [("rod load", f"{verdict}{degrees:g} degrees and {percent:g} %")]
 
 
@@ -209,7 +209,7 @@ def facts(found: "JobReport") -> list[Line]:
     """Return how a job was run, a line each."""
     from compressor.outcome import regime_words
 
-    told = {name: str(found.attributes[name]) for name in FACTS if name in found.attributes}
+    texts = {name: str(found.attributes[name]) for name in FACTS if name in found.attributes}
     lines = [(name, regime_words(text) if name == "regime" else text)
-             for name, text in told.items()]  # fmt: skip
+             for name, text in texts.items()]  # fmt: skip
     return [*lines, ("file", os.path.relpath(found.file))] if found.file else lines

@@ -20,10 +20,10 @@ from compsim.screen import (
     output_option,
     plural,
     print_text,
+    report_changes,
     say,
     setting,
     size,
-    tell_changes,
     without_nan,
 )  # fmt: skip
 
@@ -75,7 +75,7 @@ def plan(
             print_text("\n".join(kind.module("command").ahead_lines(standings)))
     if not studies:
         return DONE
-    tell_changes(studies, output)
+    report_changes(studies, output)
     from compressor.sweep import forecast
 
     found = forecast(studies, output, first)

@@ -37,8 +37,8 @@ def results_folder(
         return option or "results", tuple(words)
     place, rest = words[0], tuple(words[1:])
     if rest and not named:
-        told = ", ".join(map(repr, words))
-        raise click.UsageError(f"takes one folder of results, not {len(words)}: {told}")
+        listed = ", ".join(map(repr, words))
+        raise click.UsageError(f"takes one folder of results, not {len(words)}: {listed}")
     if option is None and named and is_study(place, "results") and not place.endswith(os.sep):
         raise click.UsageError(
             f"{place!r} is a folder, and a study in results: write {place}{os.sep} for the folder, "
@@ -154,7 +154,7 @@ def values(path: Path) -> Iterator[str]:
 def of_results(metavar: str = "", complete: Complete = folders) -> Callable[..., Any]:
     """Return the decorator that gives a command `given`, words with a folder first, and -i."""
 
-    def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         option = click.option(
             "-i", "--input", "folder", metavar="FOLDER", show_default="results",
             shell_complete=folders, help="Folder of results; or give it as first argument.",
@@ -163,4 +163,4 @@ def of_results(metavar: str = "", complete: Complete = folders) -> Callable[...,
         argument = click.argument("given", nargs=-1, metavar=whole, shell_complete=complete)
         return argument(option(command))
 
-    return decorated
+    return decorate

@@ -25,10 +25,10 @@ from compsim.screen import (
     output_option,
     plural,
     print_text,
+    report_changes,
     say,
     setting,
     stored_before,
-    tell_changes,
     unread,
 )
 
@@ -135,7 +135,7 @@ def run_jobs(
 ) -> int:
     """Run studies of jobs, and return the exit code."""
     rerun, part, wait, scheduler, page, quiet = options
-    tell_changes(studies, output)
+    report_changes(studies, output)
     from compressor.sweep import Options, sweep
 
     with watching(output, page, context.obj, quiet) as watch:
@@ -208,13 +208,13 @@ def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
             say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
     report_failures(summary)
     if not quiet:
-        tell_caveats([count.study for count in summary.counts], folder)
-        tell_stale(summary)
+        report_caveats([count.study for count in summary.counts], folder)
+        report_stale(summary)
         say(f"page: {os.path.join(page, 'index.html')}" if page
             else f"next: compsim report -i {shlex.quote(folder)}")  # fmt: skip
 
 
-def tell_caveats(names: list[str], folder: str) -> None:
+def report_caveats(names: list[str], folder: str) -> None:
     """Report the caveats that only runs show of their numbers; `caution` reports the rest."""
     from compressor.store import read_store, read_studies, run_caveats
 
@@ -224,7 +224,7 @@ def tell_caveats(names: list[str], folder: str) -> None:
             say(f"{study.name}: {text}")
 
 
-def tell_stale(summary: "Summary") -> None:
+def report_stale(summary: "Summary") -> None:
     """Report what stored jobs of another version lack, and how they are brought up to date."""
     if not summary.gaining:
         return

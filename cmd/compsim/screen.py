@@ -34,12 +34,12 @@ class CaseFile(click.ParamType):
 
     def get_missing_message(self, param: Any, ctx: Any) -> str:
         """Return what could have been named, and how to make one."""
-        made = "compsim init writes one to start from"
+        remedy = "compsim init writes one to start from"
         near = nearby_case_files()
         if not near:
-            return f"Name a case file; {made}"
+            return f"Name a case file; {remedy}"
         more = f" and {len(near) - MAX_NEAR} more" if len(near) > MAX_NEAR else ""
-        return f"Name a case file, such as {', '.join(near[:MAX_NEAR])}{more}; {made}"
+        return f"Name a case file, such as {', '.join(near[:MAX_NEAR])}{more}; {remedy}"
 
 
 def nearby_case_files() -> list[str]:
@@ -169,7 +169,7 @@ def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None
             say(f"{study.path}: and {more}, which compsim plan {shlex.quote(study.path)} lists")
 
 
-def tell_changes(studies: "Sequence[Study]", folder: str) -> None:
+def report_changes(studies: "Sequence[Study]", folder: str) -> None:
     """Report which stored studies have jobs that their case files no longer ask for."""
     from compressor.store import changes
 

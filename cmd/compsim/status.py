@@ -44,10 +44,10 @@ def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
         if one.former_of:
             print_text(f"{'':<{width}}  {one.former_of} as it was run on {one.written[:10]}, with "
                        "finished jobs that it has no longer; opens by this name")  # fmt: skip
-        promised = [f"{n} {PROMISES[word]}" for word, n in one.promises.items() if word in PROMISES]
-        said = [", ".join(promised)] if promised else []
-        said += [f"{number} {regime_words(word)}" for word, number in one.regimes.items() if word]
-        for text in said:
+        promises = [f"{n} {PROMISES[word]}" for word, n in one.promises.items() if word in PROMISES]
+        remarks = [", ".join(promises)] if promises else []
+        remarks += [f"{n} {regime_words(word)}" for word, n in one.regimes.items() if word]
+        for text in remarks:
             print_text(f"{'':<{width}}  of those ok: {text}")
         for text in one.caveats:
             print_text(f"{'':<{width}}  {text}")

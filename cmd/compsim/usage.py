@@ -9,7 +9,7 @@ import click
 from compressor.program import did_you_mean
 
 CASE_FILES = (".yaml", ".yml")
-ASKED = {"help": "compsim --help, or compsim COMMAND --help", "version": "compsim --version"}
+HELP_OPTIONS = {"help": "compsim --help, or compsim COMMAND --help", "version": "compsim --version"}
 # what stands for the folder of results in some commands, and is asked of others in vain
 FOLDERS = {"-o": "output", "--output": "output", "-i": "folder", "--input": "folder"}
 
@@ -24,15 +24,15 @@ class Commands(click.Group):
         word = args[0]
         unknown = self.get_command(ctx, word) is None and not word.startswith("-")
         if unknown and not ctx.resilient_parsing:
-            raise click.UsageError(self.meant(word, args[1:]), ctx)
+            raise click.UsageError(self.describe_unknown(word, args[1:]), ctx)
         return super().resolve_command(ctx, args)
 
-    def meant(self, word: str, more: Sequence[str]) -> str:
+    def describe_unknown(self, word: str, more: Sequence[str]) -> str:
         """Return what is said of a word in the place of a command."""
         if word == "help" and more and more[0] in self.commands:
             return f"No such command 'help': compsim {more[0]} --help"
-        if word in ASKED:
-            return f"No such command {word!r}: {ASKED[word]}"
+        if word in HELP_OPTIONS:
+            return f"No such command {word!r}: {HELP_OPTIONS[word]}"
         if word.endswith(CASE_FILES):
             line = shlex.join(["compsim", "run", word, *more])
             return f"{word!r} is a case file, and a command comes first: {line}"

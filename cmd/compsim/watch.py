@@ -40,7 +40,7 @@ class PageWatch:
     """
 
     def __init__(self, results: str, report: str, command: str, quiet: bool = False):
-        self.told = {"results": os.path.abspath(results), "report": report, "command": command}
+        self.settings = {"results": os.path.abspath(results), "report": report, "command": command}
         self.page = os.path.join(report, "index.html")
         self.quiet = quiet
         self.process: subprocess.Popen[str] | None = None
@@ -53,7 +53,7 @@ class PageWatch:
     def __enter__(self) -> "PageWatch":
         from compressor.store import writable_folder
 
-        writable_folder(self.told["report"])
+        writable_folder(self.settings["report"])
         if not self.quiet:
             say(f"{self.page} is kept fresh until the run has ended")
         return self
@@ -90,7 +90,7 @@ class PageWatch:
     def pipe(self) -> IO[str]:
         """Return the input of the process, which is started where there is none."""
         if self.process is None:
-            self.process = start_process(self.told)
+            self.process = start_process(self.settings)
             threading.Thread(target=self.listen, args=[self.process], daemon=True).start()
         assert self.process.stdin
         return self.process.stdin
@@ -147,10 +147,10 @@ class PageWatch:
         return not answer["ended"]
 
 
-def start_process(told: dict[str, str]) -> "subprocess.Popen[str]":
+def start_process(settings: dict[str, str]) -> "subprocess.Popen[str]":
     """Return the process, in a session of its own: Ctrl-C is for the run."""
     return subprocess.Popen(
-        [sys.executable, "-m", "compsim.watch", json.dumps(told)],
+        [sys.executable, "-m", "compsim.watch", json.dumps(settings)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
         start_new_session=True,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
@@ -172,8 +172,8 @@ class PageOutdated(BaseException):
 class PageWriter:
     """A writer of pages; SIGINT makes it leave the one that is being written."""
 
-    def __init__(self, told: dict[str, str]):
-        self.told = told
+    def __init__(self, settings: dict[str, str]):
+        self.settings = settings
         self.writing = False
         self.shown: Any = None  # how the run stood on the page that lies there
         signal.signal(signal.SIGINT, self.leave)
@@ -201,10 +201,10 @@ class PageWriter:
             )
             now = Running(**running, drawn=drawn) if running else None
             if now and not answer["drawn"]:
-                restate(self.told["report"], self.shown, now)
+                restate(self.settings["report"], self.shown, now)
             else:
                 write_report(
-                    self.told["results"], self.told["report"], self.told["command"],
+                    self.settings["results"], self.settings["report"], self.settings["command"],
                     page_additions({}), now,
                 )  # fmt: skip
             self.shown = now
@@ -221,10 +221,10 @@ def spent() -> float:
     return sum(os.times()[:4])
 
 
-def main(told: str) -> None:
+def main(settings: str) -> None:
     """Write a page for each line of input, and the last one when no more can come."""
     os.nice(NICENESS)
-    writer = PageWriter(json.loads(told))
+    writer = PageWriter(json.loads(settings))
     for line in sys.stdin:
         answer(writer.write(**json.loads(line)))
     answer(writer.write(None))

@@ -74,13 +74,13 @@ class Draft:
         if self.problems:
             count = 0
         is_grid = not self.exclusions and not self.is_sampled and len(factors) == len(self.sweeps)
-        found = Block(name, self.leaves, self.fixed, factors, range(count), is_grid)
+        block = Block(name, self.leaves, self.fixed, factors, range(count), is_grid)
         if not self.exclusions:
-            return found
-        kept = found.where(lambda value: not any(test(value) for test in self.exclusions))
-        if count and not any(kept):
+            return block
+        selected = block.where(lambda value: not any(test(value) for test in self.exclusions))
+        if count and not any(selected):
             self.refuse(self.leaves.values["exclude"], "exclude", "leaves no job")
-        return replace(found, kept=[*itertools.compress(range(count), kept)])
+        return replace(block, numbers=[*itertools.compress(range(count), selected)])
 
     def rows(self, keys: tuple[str, ...]) -> list[Row]:
         """Return the values of keys that advance together; [] where any is wrong.
@@ -103,8 +103,8 @@ class Draft:
             values = tuple(node.value for node in row)
             if values in seen:
                 where = "in the list" if self.sweeps[keys[0]].kind == "list" else "among its values"
-                told = ", ".join(map(quote_value, values))
-                self.refuse(row[0], " with ".join(keys), f"{told} is {where} twice")
+                listed = ", ".join(map(quote_value, values))
+                self.refuse(row[0], " with ".join(keys), f"{listed} is {where} twice")
             seen.add(values)
         return rows
 
@@ -113,35 +113,35 @@ class Draft:
 
         Of wrong values that a form such as `linspace` has made, the first alone.
         """
-        good = []
+        valid = []
         for node in nodes:
             value = check(sweep.key, node, self.problems)
             if value:
-                good.append(value)
+                valid.append(value)
             elif sweep.kind != "list":
                 break
-        return good
+        return valid
 
 
 def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
     """Return a block as far as it is known before any value is made."""
-    found = Draft(leaves, problems)
+    block = Draft(leaves, problems)
     for key, node in leaves.values.items():
         if key.partition(".")[0] in SWEEP:
             continue
         if not is_swept(key, node):
             if good := check(key, node, problems):
-                found.fixed[key] = good
+                block.fixed[key] = good
         elif key in outside_identity():
-            found.refuse(node, key, "cannot be swept: it does not change what a job computes")
+            block.refuse(node, key, "cannot be swept: it does not change what a job computes")
         elif sweep := sweep_of(key, node, problems):
-            found.sweeps[key] = sweep
-    sampled = _sampled_keys(found)
-    groups = [*([sampled] if sampled else []), *_zip_groups(found)]
+            block.sweeps[key] = sweep
+    sampled = _sampled_keys(block)
+    groups = [*([sampled] if sampled else []), *_zip_groups(block)]
     first = {key: group for group in groups for key in group}
-    found.factors = list(dict.fromkeys(first.get(key, (key,)) for key in found.sweeps))
-    found.exclusions = list(_exclusions(found))
-    return found
+    block.factors = list(dict.fromkeys(first.get(key, (key,)) for key in block.sweeps))
+    block.exclusions = list(_exclusions(block))
+    return block
 
 
 def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
@@ -150,72 +150,72 @@ def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
         return node if key in WORDS and node.value is WORDS[key] else None
     if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
         return None
-    found: list[Problem] = []
+    wrong: list[Problem] = []
     row = row_of(key)
     assert row  # an unknown key was reported when it was read
-    value = check_value(row.key, node.plain(), found)
+    value = check_value(row.key, node.plain(), wrong)
     parts = node.value if isinstance(node.value, dict) else {}
-    for problem in found:
+    for problem in wrong:
         part = parts.get(problem.key.removeprefix(f"{row.key}."))
         place, about = (part.place, problem.key) if part else (node.place, key)
         problems.append(FileProblem(place, about, problem.message))
-    return None if found else replace(node, value=value)
+    return None if wrong else replace(node, value=value)
 
 
-def _sampled_keys(found: Draft) -> tuple[str, ...]:
+def _sampled_keys(block: Draft) -> tuple[str, ...]:
     """Return the keys that one sampling design draws together, in the order of the file."""
-    keys = tuple(key for key, sweep in found.sweeps.items() if sweep.kind in SAMPLED)
+    keys = tuple(key for key, sweep in block.sweeps.items() if sweep.kind in SAMPLED)
     for name, least, most in (("n", 1, math.inf), ("seed", 0, MAX_SEED)):
-        node = found.leaves.values.get(f"sample.{name}")
+        node = block.leaves.values.get(f"sample.{name}")
         if node and not (type(node.value) is int and least <= node.value <= most):
-            found.refuse(node, f"sample.{name}", f"needs a whole number from {least}")
+            block.refuse(node, f"sample.{name}", f"needs a whole number from {least}")
         elif node and name == "n":
-            found.samples = node.value
+            block.samples = node.value
         elif node:
-            found.seed = node.value
-    kinds = list(dict.fromkeys(found.sweeps[key].kind for key in keys))
+            block.seed = node.value
+    kinds = list(dict.fromkeys(block.sweeps[key].kind for key in keys))
     for key in keys:
-        sweep = found.sweeps[key]
+        sweep = block.sweeps[key]
         if sweep.kind != kinds[0]:
             message = f"one design draws all sampled keys: {kinds[0]} or {sweep.kind}, not both"
-            found.refuse(sweep.node, key, message)
+            block.refuse(sweep.node, key, message)
     if kinds == ["saltelli"] and len(keys) == 1:
         message = "saltelli exchanges keys one by one: draw two or more, or draw this one by sobol"
-        found.refuse(found.sweeps[keys[0]].node, keys[0], message)
-        found.samples = 0  # their repetition is no second mistake
-    if keys and "sample.n" not in found.leaves.values:
+        block.refuse(block.sweeps[keys[0]].node, keys[0], message)
+        block.samples = 0  # their repetition is no second mistake
+    if keys and "sample.n" not in block.leaves.values:
         message = "needs a number of samples: add `sample: {n: 64, seed: 1}` to the file"
-        found.refuse(found.sweeps[keys[0]].node, keys[0], message)
+        block.refuse(block.sweeps[keys[0]].node, keys[0], message)
     return keys
 
 
-def _zip_groups(found: Draft) -> Iterable[tuple[str, ...]]:
+def _zip_groups(block: Draft) -> Iterable[tuple[str, ...]]:
     """Yield the good groups of `zip`: swept keys, each in one group, with equally many values."""
-    node = found.leaves.values.get("zip")
+    node = block.leaves.values.get("zip")
     taken: set[str] = set()
-    for keys, group in _words(found, node) if node else ():
-        swept = [key for key in keys if key in found.sweeps]
-        sizes = {key: found.sweeps[key].count for key in swept}
-        bad = [key for key in keys if key not in swept]
-        if any(found.sweeps[key].kind in SAMPLED for key in swept):
-            found.refuse(group, "zip", "sampled keys go together by their design already")
-        elif bad and bad[0] in found.leaves.values and bad[0] not in found.fixed:
+    for keys, group in _words(block, node) if node else ():
+        swept = [key for key in keys if key in block.sweeps]
+        sizes = {key: block.sweeps[key].count for key in swept}
+        unswept = [key for key in keys if key not in swept]
+        if any(block.sweeps[key].kind in SAMPLED for key in swept):
+            block.refuse(group, "zip", "sampled keys go together by their design already")
+        elif unswept and unswept[0] in block.leaves.values and unswept[0] not in block.fixed:
             pass  # how it is swept is wrong, and reported
-        elif bad:
-            hint = "" if bad[0] in table() else suggestion(bad[0], "")
-            found.refuse(group, "zip", f"{quote_value(bad[0])} is not swept here{hint}")
+        elif unswept:
+            hint = "" if unswept[0] in table() else suggestion(unswept[0], "")
+            block.refuse(group, "zip", f"{quote_value(unswept[0])} is not swept here{hint}")
         elif taken & {*keys} or len({*keys}) < len(keys):
             twice = next(key for key in keys if key in taken or keys.count(key) > 1)
-            found.refuse(group, "zip", f"{twice} is named twice")
+            block.refuse(group, "zip", f"{twice} is named twice")
         elif len({*sizes.values()}) > 1:
-            told = ", ".join(f"{key} has {size}" for key, size in sizes.items())
-            found.refuse(group, "zip", f"needs equally many values of each key: {told}")
+            listed = ", ".join(f"{key} has {size}" for key, size in sizes.items())
+            block.refuse(group, "zip", f"needs equally many values of each key: {listed}")
         else:
             taken |= {*keys}
-            yield tuple(sorted(keys, key=[*found.sweeps].index))
+            yield tuple(sorted(keys, key=[*block.sweeps].index))
 
 
-def _words(found: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
+def _words(block: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
     """Yield the groups of keys that `zip` lists."""
     groups = node.value if isinstance(node.value, list) else [node]
     for group in groups:
@@ -224,22 +224,22 @@ def _words(found: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
             yield [item.value for item in items], group
         else:
             message = "needs a list of groups of keys, such as [[machine.speed_rpm, clearance_mm]]"
-            found.refuse(group, "zip", message)
+            block.refuse(group, "zip", message)
 
 
-def _exclusions(found: Draft) -> Iterable[Test]:
+def _exclusions(block: Draft) -> Iterable[Test]:
     """Yield the comparisons of `exclude`; where one holds, a combination is left out."""
-    node = found.leaves.values.get("exclude")
+    node = block.leaves.values.get("exclude")
     if not node:
         return
     texts = node.value if isinstance(node.value, list) else [node]
     if len(texts) > MAX_EXCLUSIONS:
-        found.refuse(node, "exclude", f"has more than {MAX_EXCLUSIONS} comparisons: join by `or`")
+        block.refuse(node, "exclude", f"has more than {MAX_EXCLUSIONS} comparisons: join by `or`")
     for text in texts[:MAX_EXCLUSIONS]:
         if not isinstance(text.value, str):
-            found.refuse(text, "exclude", "needs comparisons, such as clearance_mm > 0.2")
+            block.refuse(text, "exclude", "needs comparisons, such as clearance_mm > 0.2")
             continue
         try:
             yield comparison(text.value)
         except NoComparison as error:
-            found.refuse(text, "exclude", str(error))
+            block.refuse(text, "exclude", str(error))

@@ -18,23 +18,23 @@ from compressor.cases.checks import (
     PER_JOINT,
     SHORTHANDS,
     SWEEP,
-    checked_part,
+    check_part,
     expand_shorthands,
+    expand_synonyms,
     probable_keys,
     stands_for,
     values_given,
-    written_out,
 )
 from compressor.cases.conflicts import conflicts, values_read
 from compressor.cases.groups import Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
-from compressor.cases.optional_groups import filled_guide, filled_wear
+from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
     ACCURACY,
     CaseError,
     Problem,
     Targets,
-    first_rung,
+    first_tolerance,
     quote_value,
 )
 from compressor.cases.swept import FORMS
@@ -209,14 +209,14 @@ class Case(Settings):
         values = vars(self)  # which alone can be written to: a case is frozen
         values["load"] = table()["load"].choice_of(self.load)
         if self.guide:
-            values["guide"] = filled_guide(self.guide, self.machine.reciprocating_mass_kg)
+            values["guide"] = fill_guide(self.guide, self.machine.reciprocating_mass_kg)
         if self.joint != "both":
             unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
             values["clearance_mm"] = replace(self.clearance_mm, **unused)
         if self.joint == "none":  # which has no bore that oil fills, or that wears
             values["lubricant"] = values["wear"] = None
         if self.wear:
-            values["wear"] = filled_wear(self.wear, self.clearance_mm)
+            values["wear"] = fill_wear(self.wear, self.clearance_mm)
 
     @classmethod
     def from_attribute(cls, text: str) -> "Case":
@@ -284,7 +284,7 @@ class Case(Settings):
         if self.solve.rtol is not None:
             return self.solve.rtol
         accuracy = self.solve.accuracy
-        return ACCURACY[accuracy].rtol if isinstance(accuracy, str) else first_rung(accuracy)
+        return ACCURACY[accuracy].rtol if isinstance(accuracy, str) else first_tolerance(accuracy)
 
     @property
     def promise(self) -> float:
@@ -368,7 +368,7 @@ def parts_of(
         message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
         raise CaseError([Problem("", message)])
     whole = plain_values(values, problems)
-    parts = {key: checked_part(key, value, problems) for key, value in whole.items()}
+    parts = {key: check_part(key, value, problems) for key, value in whole.items()}
     if problems:
         wrong = _everything_wrong(whole, parts, problems, {} if lenient else values_given(values))
         raise CaseError(_as_written(values, wrong))
@@ -377,7 +377,7 @@ def parts_of(
 
 def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
     """Return nested values without shorthands and synonyms, and with the geometry of materials."""
-    whole = expand_shorthands(written_out(values, problems))
+    whole = expand_shorthands(expand_synonyms(values, problems))
     given = values_given(whole)
     pins = given.keys() & {*PER_JOINT["machine.pin_radius_mm"].values()}
     if pins and "contact.materials" in given and "contact.geometry" not in given:
@@ -517,16 +517,16 @@ def to_yaml(case: Case, brief: bool = False) -> str:
 
 def _independent_values(values: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a case without those that follow from the others."""
-    case, kept = Case.resolve(values), dict(values)
+    case, needed = Case.resolve(values), dict(values)
     for key, value in values.items():
         for name in value if isinstance(value, Mapping) else ():
-            rest = {inner: item for inner, item in kept[key].items() if inner != name}
-            if _is_same(kept | {key: rest or WORDS.get(key, {})}, case):
-                kept[key] = rest or WORDS.get(key, {})
-        rest = {outer: item for outer, item in kept.items() if outer != key}
+            rest = {inner: item for inner, item in needed[key].items() if inner != name}
+            if _is_same(needed | {key: rest or WORDS.get(key, {})}, case):
+                needed[key] = rest or WORDS.get(key, {})
+        rest = {outer: item for outer, item in needed.items() if outer != key}
         if key == "name" or _is_same(rest, case):
-            kept = rest
-    return kept or {"load": case.load}  # a file needs a key
+            needed = rest
+    return needed or {"load": case.load}  # a file needs a key
 
 
 def _is_same(values: Mapping[str, Any], case: Case) -> bool:

@@ -20,7 +20,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from compressor.cases.parameter import NO_VALUE, Parameter, Problem, checked_targets, quote_value
+from compressor.cases.parameter import NO_VALUE, Parameter, Problem, check_targets, quote_value
 from compressor.cases.table import GROUPS, WORDS, Settings, table
 from compressor.metrics import JOINTS
 
@@ -137,21 +137,21 @@ def lacking_joint(key: str, value: Mapping[str, Any]) -> str:
     return f"needs both, {' and '.join(joints)}, not {given}; or one number for both joints"
 
 
-def written_out(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
+def expand_synonyms(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
     """Return nested values with each synonym as its key; both at once are a problem."""
-    found = dict(values)
+    whole = dict(values)
     for synonym, key in DOUBLES.items():
         group, _, name = synonym.partition(".")
-        within, own = found.get(group), key.rpartition(".")[2]
+        within, own = whole.get(group), key.rpartition(".")[2]
         if not isinstance(within, Mapping) or name not in within:
             continue
         if own in within:
             problems.append(Problem(synonym, TWICE.format(key)))
         rest = {inner: value for inner, value in within.items() if inner != name}
-        found[group] = {own: halve(within[name])} | rest
+        whole[group] = {own: halve(within[name])} | rest
     for key in PER_JOINT:
         group, _, name = key.partition(".")
-        within = found.get(group)
+        within = whole.get(group)
         value: Any = within.get(name) if isinstance(within, Mapping) else None
         keys = by_joint(key, value)
         if not keys or not isinstance(within, Mapping):
@@ -160,8 +160,8 @@ def written_out(values: Mapping[str, Any], problems: list[Problem]) -> dict[str,
             problems.append(Problem(key, message))
         rest = {inner: one for inner, one in within.items() if inner != name}
         each = {keys[joint].rpartition(".")[2]: value[joint] for joint in keys if joint in value}
-        found[group] = each | rest
-    return found
+        whole[group] = each | rest
+    return whole
 
 
 def synonyms_of(group: str) -> list[str]:
@@ -179,8 +179,8 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     values = value if isinstance(value, list | tuple) else [value]
     if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
         return f"; write {key}: 1 {unit} is {factor:g} {ours}"
-    told = ", ".join(f"{one * factor:.12g}" for one in values)
-    return f"; write {key}: " + (f"[{told}]" if isinstance(value, list | tuple) else told)
+    amounts = ", ".join(f"{one * factor:.12g}" for one in values)
+    return f"; write {key}: " + (f"[{amounts}]" if isinstance(value, list | tuple) else amounts)
 
 
 def of_percent(name: str, group: str, value: Any, stroke: float) -> str:
@@ -190,12 +190,12 @@ def of_percent(name: str, group: str, value: Any, stroke: float) -> str:
     """
     if not PERCENT.fullmatch(name) or group not in ("", "gas", "machine"):
         return ""
-    told = f", {name.rpartition('_')[2]} of the stroke, in mm"
+    amount = f", {name.rpartition('_')[2]} of the stroke, in mm"
     if isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(stroke):
-        told = f": {value / 100 * stroke:.4g}, of a stroke of {stroke:g} mm"
+        amount = f": {value / 100 * stroke:.4g}, of a stroke of {stroke:g} mm"
     if group == "gas":
-        return f"; write head_clearance_mm{told}"
-    return f"; of the cylinder, write gas.head_clearance_mm{told}; of joints, clearance_mm in mm"
+        return f"; write head_clearance_mm{amount}"
+    return f"; of the cylinder, write gas.head_clearance_mm{amount}; of joints, clearance_mm in mm"
 
 
 def stroke_in(values: Any) -> float:
@@ -203,9 +203,9 @@ def stroke_in(values: Any) -> float:
     machine = values.get("machine") if isinstance(values, Mapping) else None
     given = machine if isinstance(machine, Mapping) else {}
     radius = given.get("crank_radius_mm", table()["machine.crank_radius_mm"].default)
-    found = given.get("stroke_mm", 2 * radius if isinstance(radius, int | float) else None)
-    is_number = isinstance(found, int | float) and not isinstance(found, bool)
-    return float(found) if is_number and found is not None else math.nan
+    stroke = given.get("stroke_mm", 2 * radius if isinstance(radius, int | float) else None)
+    is_number = isinstance(stroke, int | float) and not isinstance(stroke, bool)
+    return float(stroke) if is_number and stroke is not None else math.nan
 
 
 # keys of a case file that are no part of a case: how values are swept together
@@ -346,7 +346,7 @@ def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
     if value is None and row.optional:
         return row.default
     if row.kind == "accuracy" and isinstance(value, Mapping):
-        targets = checked_targets(key, value, problems)
+        targets = check_targets(key, value, problems)
         return targets if len(problems) == before else row.default
     if not isinstance(value, PLAIN_TYPES):
         value = _scalar(value)
@@ -366,7 +366,7 @@ def _scalar(value: Any) -> Any:
     return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
 
 
-def checked_part(key: str, value: Any, problems: list[Problem]) -> Any:
+def check_part(key: str, value: Any, problems: list[Problem]) -> Any:
     """Return the dataclass, scalar or None that stands for a key at the top of a case file.
 
     What is wrong with its value joins `problems`.

@@ -20,16 +20,13 @@ Row = tuple[Node, ...]
 
 @dataclass(frozen=True)
 class Block:
-    """The combinations of a block; `kept` holds the numbers, in C order, of those not excluded.
-
-    name: of the study.
-    """
+    """The combinations of a block; name: of the study."""
 
     name: str
     leaves: Leaves
     fixed: dict[str, Node]
     factors: tuple[tuple[tuple[str, ...], list[Row]], ...]  # keys, and their values together
-    kept: Sequence[int]
+    numbers: Sequence[int]  # of the combinations that are not excluded, in C order
     is_grid: bool  # whether every key is an axis of its own, and no combination is left out
 
     def places(self, number: int) -> list[int]:
@@ -124,7 +121,7 @@ class Block:
 
     def where(self, test: Test) -> list[bool]:
         """Return whether a comparison holds, of each job."""
-        return [test(reader(self.chosen(number))) for number in self.kept]
+        return [test(reader(self.chosen(number))) for number in self.numbers]
 
 
 def _field(name: str, value: Any) -> Any:

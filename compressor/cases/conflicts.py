@@ -353,11 +353,11 @@ class _Known:
         key = self._prefix + name
         if key in self._wrong:
             raise _Unknown(key)
-        made = getattr(type(self._values), name, None)
-        if isinstance(made, property) and made.fget:
-            return made.fget(self)
-        if isinstance(made, FunctionType):
-            return partial(made, self)
+        member = getattr(type(self._values), name, None)
+        if isinstance(member, property) and member.fget:
+            return member.fget(self)
+        if isinstance(member, FunctionType):
+            return partial(member, self)
         value = getattr(self._values, name)
         return _Known(value, self._wrong, f"{key}.") if key in GROUPS and value else value
 

@@ -32,7 +32,7 @@ def case_schema() -> Schema:
     blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
     blocks["description"] = "sets of jobs, one after the other; each over the keys of the file"
     top = _mapping(found | {"blocks": blocks})
-    return {"$schema": DIALECT, "title": "compsim case file", **top, "$defs": {"made": _made()}}
+    return {"$schema": DIALECT, "title": "compsim case file", **top, "$defs": {"made": _forms()}}
 
 
 def _top_keys() -> list[str]:
@@ -75,19 +75,19 @@ def _synonym_row(word: str, key: str) -> Parameter:
 
 def _value(row: Parameter) -> Schema:
     """Return the schema of a parameter: one value, or a sweep of it."""
-    one = _one(row)
+    single = _single_value(row)
     about = f"{row.phrase}, {row.unit}" if row.unit else row.phrase
     found: Schema = {"description": f"{about} ({row.source})"}
     if row.default is not None and row.kind != "text":
         found["default"] = row.default
     if not row.identity:
-        return found | one
-    listed = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
-    made = [{"$ref": "#/$defs/made"}] if is_number(row) else []
-    return found | {"anyOf": [one, listed, *made]}
+        return found | single
+    listed = {"type": "array", "items": single, "minItems": 1, "uniqueItems": True}
+    forms = [{"$ref": "#/$defs/made"}] if is_number(row) else []
+    return found | {"anyOf": [single, listed, *forms]}
 
 
-def _one(row: Parameter) -> Schema:
+def _single_value(row: Parameter) -> Schema:
     """Return the schema of one value of a parameter, as `Parameter.check` has it."""
     words = {"enum": [*row.choices, *(alias for alias, _ in row.aliases)]}
     if row.kind in ("number", "integer"):
@@ -97,7 +97,7 @@ def _one(row: Parameter) -> Schema:
     if row.kind == "materials":
         return {"type": "array", "items": words, "minItems": 2, "maxItems": 2}
     if row.kind == "accuracy":
-        targets = _mapping(dict.fromkeys(METRICS, _one(TARGET)))
+        targets = _mapping(dict.fromkeys(METRICS, _single_value(TARGET)))
         return {"anyOf": [words, targets | {"minProperties": 1}]}
     kinds: dict[str, Schema] = {
         "boolean": {"enum": [*row.choices, True, False]},
@@ -107,7 +107,7 @@ def _one(row: Parameter) -> Schema:
     return kinds[row.kind]
 
 
-def _made() -> Schema:
+def _forms() -> Schema:
     """Return the schema of values that are made, such as {linspace: [0.1, 0.3, 5]}."""
     counted = {**NUMBER, "multipleOf": 1, "minimum": 2}
     forms = []
@@ -148,7 +148,7 @@ def _regimes() -> Schema:
             "description": row.phrase,
             **({} if row.default is None else {"default": row.default}),
         }
-        | _one(row)
+        | _single_value(row)
         for name, row in ROWS.items()
     }
     about = "one machine followed along a key; each value starts from the end of the last one"

@@ -43,13 +43,13 @@ class Leaves:
 def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
     """Return the leaves of a tree; unknown keys, and values in place of groups, are problems."""
     found = Leaves({}, {})
-    for name, node in _known("", root, problems, root):
+    for name, node in _known_entries("", root, problems, root):
         found.places[name] = node.key_place
         mapping = isinstance(node.value, dict)
         if mapping and not node.value and WORDS.get(name):
             found.values[name] = replace(node, value=True)  # all of its defaults
         elif (name in GROUPS or name in MAPPINGS) and mapping and not _is_sweep(name, node):
-            for inner, item in _known(name, node, problems, root):
+            for inner, item in _known_entries(name, node, problems, root):
                 _add_leaf(found, f"{name}.{inner}", item, problems)
         elif name in SHORTHANDS or (name in WORDS and node.value is WORDS[name]):
             found.values[name] = node
@@ -101,7 +101,7 @@ def _is_sweep(name: str, node: Node) -> bool:
     return few and any(get_close_matches(word, FORMS, n=1) for word in node.value)
 
 
-def _known(
+def _known_entries(
     group: str, node: Node, problems: list[FileProblem], root: Node
 ) -> Iterable[tuple[str, Node]]:
     """Yield the entries of a group (for "", of a file) that are known and have a value."""
@@ -135,29 +135,29 @@ def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[st
     return found
 
 
-def overridden(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
+def override_leaves(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
     """Return a file's leaves with every override in place of the leaves at or under its key."""
     new = {key: node for change in overrides.values() for key, node in change.values.items()}
     places = {key: place for change in overrides.values() for key, place in change.places.items()}
-    gone = [*overrides]
+    replaced = [*overrides]
     for one, other in IN_PLACE_OF:
-        gone += [other] * (one in new) + [one] * (other in new)
+        replaced += [other] * (one in new) + [one] * (other in new)
     if "joint" in new and new["joint"].value == "none":
-        gone += OF_JOINTS
-    kept = {
+        replaced += OF_JOINTS
+    remaining = {
         key: node
         for outer, value in file.values.items()
         for key, node in _open_group(outer, value, new).items()
-        if key in new or not any(covers(other, key) for other in gone)
+        if key in new or not any(covers(other, key) for other in replaced)
     }
-    return Leaves(kept | new, places | file.places)
+    return Leaves(remaining | new, places | file.places)
 
 
 def merge_leaves(file: Leaves, block: Leaves) -> Leaves:
     """Return a file's leaves with every leaf of one of its blocks in place of the file's."""
     changes = {key: Leaves({key: node}, {}) for key, node in block.values.items()}
-    found = overridden(file, changes)
-    return Leaves(found.values, file.places | block.places)
+    merged = override_leaves(file, changes)
+    return Leaves(merged.values, file.places | block.places)
 
 
 def _open_group(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:

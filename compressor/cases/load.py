@@ -26,7 +26,7 @@ from compressor.cases.keys import (
     leaves,
     merge_leaves,
     nest_values,
-    overridden,
+    override_leaves,
     read_overrides,
 )
 from compressor.cases.parameter import CaseError, Problem, quote_value
@@ -78,7 +78,7 @@ class KeysRead:
             known = row_of(key) or key in WORDS
             if where not in self.read and known and not is_off(key, node.value):
                 unread.append(UnreadKey(where, key, node))
-        for number in block.kept:
+        for number in block.numbers:
             if not unread:
                 break
             for case in self.variants(block.case(number)):
@@ -213,23 +213,23 @@ def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
 def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProblem]) -> _Draft:
     problems = list(earlier)
     root = read_file(path, problems)
-    found = Leaves({}, {})
+    file = Leaves({}, {})
     if root and isinstance(root.value, dict):
-        found = leaves(root, problems)
+        file = leaves(root, problems)
     elif root and root.value is not None:
         message = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
         problems.append(FileProblem(root.place, "", message))
-    whole = overridden(found, changes)
-    name = _name(path, whole, problems) if root else ""
-    asked = regimes.read_regimes(whole, problems)
+    whole = override_leaves(file, changes)
+    name = _study_name(path, whole, problems) if root else ""
+    continuation = regimes.read_regimes(whole, problems)
     if "blocks" in changes:
-        found = overridden(found, {"blocks": changes["blocks"]})
-    gone = ("blocks", GROUP)
-    rest = {key: change for key, change in changes.items() if key.partition(".")[0] not in gone}
-    return _Draft(path, name, regimes.without(found), rest, problems, asked)
+        file = override_leaves(file, {"blocks": changes["blocks"]})
+    excluded = ("blocks", GROUP)
+    rest = {key: change for key, change in changes.items() if key.partition(".")[0] not in excluded}
+    return _Draft(path, name, regimes.without(file), rest, problems, continuation)
 
 
-def _name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
+def _study_name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
     """Return the study's name: the file's value, else the file's stem; "" for a wrong one.
 
     What is wrong with the value is reported later, with all others.
@@ -251,7 +251,7 @@ def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
     for draft in drafts:
         other = first.setdefault(draft.name.casefold(), draft)
         if draft.name and other is not draft:
-            given = overridden(draft.leaves, draft.changes).values.get("name")
+            given = override_leaves(draft.leaves, draft.changes).values.get("name")
             place = given.place if given else Place(draft.path, 1, 1)
             message = f"{other.path} and {draft.path} would be stored under one name, {draft.name}"
             draft.problems.append(FileProblem(place, "name", message))
@@ -296,7 +296,7 @@ def _cases(draft: _Draft, max_jobs: int) -> tuple[list[blocks.Draft], Cases | No
     if draft.regimes:
         every = (regimes.at_first(leaves, draft.regimes, draft.problems) for leaves in every)
     drafts = [blocks.draft(leaves, draft.problems) for leaves in every]
-    if not _bearable(drafts, draft, max_jobs):
+    if not _fits_limit(drafts, draft, max_jobs):
         return drafts, None
     return drafts, Cases([one.block(draft.name) for one in drafts])
 
@@ -339,7 +339,7 @@ def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
     own = {key: item for key, item in draft.leaves.values.items() if key != "blocks"}
     file = Leaves(own, draft.leaves.places)
     if node is None:
-        yield overridden(file, draft.changes)
+        yield override_leaves(file, draft.changes)
         return
     items = node.value if isinstance(node.value, list) else []
     if not items or not all(isinstance(item.value, dict) for item in items):
@@ -350,7 +350,7 @@ def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
         draft.problems.append(FileProblem(node.place, "blocks", message))
     else:
         for item in items:
-            yield overridden(merge_leaves(file, _block_leaves(item, draft)), draft.changes)
+            yield override_leaves(merge_leaves(file, _block_leaves(item, draft)), draft.changes)
 
 
 def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
@@ -373,7 +373,7 @@ def _block_leaves(item: Node, draft: _Draft) -> Leaves:
     return found
 
 
-def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> bool:
+def _fits_limit(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> bool:
     """Return whether there are few enough jobs to make their values; too many are a problem."""
     sizes = [one.sizes() for one in drafts]
     total = sum(math.prod(one.values()) for one in sizes)
@@ -381,9 +381,9 @@ def _bearable(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> b
         return True
     largest = max(drafts, key=lambda one: math.prod(one.sizes().values()))
     keys = max(largest.factors, key=lambda keys: largest.size(keys[0]))
-    told = [" x ".join(f"{name} ({format_count(n)})" for name, n in one.items()) for one in sizes]
+    counts = [" x ".join(f"{name} ({format_count(n)})" for name, n in one.items()) for one in sizes]
     message = (
-        f"{format_count(total)} jobs are more than {max_jobs}: {shorten(' + '.join(told), 300)}; "
+        f"{format_count(total)} jobs are more than {max_jobs}: {shorten(' + '.join(counts), 300)}; "
         "ask for fewer, or raise --max-jobs"
     )
     place = largest.sweeps[keys[0]].node.place
@@ -429,31 +429,31 @@ def _check_cases(
 
 def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
     """Return the cases of each chain; too many, or such that cannot be followed, are problems."""
-    asked, places = draft.regimes, draft.leaves.places
-    assert asked
+    continuation, places = draft.regimes, draft.leaves.places
+    assert continuation
     place = places.get(GROUP, Place(draft.path, 1, 1))
-    total = len(cases) * asked.n * len(asked.directions)
+    total = len(cases) * continuation.n * len(continuation.directions)
     if total > max_jobs:
         message = (
             f"{format_count(total)} values are more than {max_jobs}; lower n, or raise --max-jobs"
         )
         draft.problems.append(FileProblem(places.get(f"{GROUP}.n", place), f"{GROUP}.n", message))
         return ()
-    found = []
+    chains = []
     for block, number in cases.combinations():
         chosen = block.chosen(number)
         try:
-            chain = tuple(map(block.resolve_case, regimes.follow_key(asked, chosen)))
+            chain = tuple(map(block.resolve_case, regimes.follow_key(continuation, chosen)))
         except CaseError as error:
-            wrong = (
+            misfits = (
                 _locate_problem(problem, chosen, block, draft.path) for problem in error.problems
             )
-            draft.problems.extend(wrong)
+            draft.problems.extend(misfits)
             return ()
-        if message := regimes.objection(chain, asked):
+        if message := regimes.objection(chain, continuation):
             draft.problems.append(FileProblem(place, GROUP, message))
-        found.append(chain)
-    return tuple(found)
+        chains.append(chain)
+    return tuple(chains)
 
 
 def _locate_problem(

@@ -9,7 +9,7 @@ from compressor.cases.parameter import (
     ALONG_X,
     ALONG_Y,
     CASING,
-    CASING_HEARD,
+    CASING_SENSED,
     CORNER_DAMPED,
     CORNER_RESTITUTION,
     GUIDE_FRICTION,
@@ -214,7 +214,7 @@ class Rod:
     )
 
 
-def filled_guide(guide: Guide, mass: float) -> Guide:
+def fill_guide(guide: Guide, mass: float) -> Guide:
     """Return a guide with its crosshead's inertia, by the mass (kg) that reciprocates."""
     if guide.crosshead_inertia_kg_m2 is not None:
         return guide
@@ -264,7 +264,7 @@ class Body:
     damping_ratio: float = parameter(0.03, "", (0, 0.99), OURS, "of the foundation", above=True)
     casing: bool = choice(
         True, (), OURS, "a casing mode at the guide and one at the main bearing, heard by sensors",
-        kind="boolean", read=CASING_HEARD,
+        kind="boolean", read=CASING_SENSED,
     )  # fmt: skip
     casing_mass_kg: float | None = parameter(
         None, "kg", (0, 1e6), "ours: a 25th of the body's mass", "modal mass of a casing mode",
@@ -397,7 +397,7 @@ class Wear:
     )  # fmt: skip
 
 
-def filled_wear(wear: Wear, clearance_mm: PerJoint) -> Wear:
+def fill_wear(wear: Wear, clearance_mm: PerJoint) -> Wear:
     """Return the wear with its limit, by the clearances of both joints."""
     most = max(clearance_mm.big_end, clearance_mm.small_end)
     return wear if wear.limit_mm or not most else replace(wear, limit_mm=2.0 * most)

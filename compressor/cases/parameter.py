@@ -51,7 +51,7 @@ def has_ideal_friction(case: Any) -> bool:
     return bool(case.friction and case.friction.ideal_joints)
 
 
-def hears_casing(case: Any) -> bool:
+def senses_casing(case: Any) -> bool:
     """Return whether a sensor hears a casing mode: the guide bears no force along x."""
     sensor = case.sensor
     if not case.body or not sensor or sensor.place == "body":
@@ -134,9 +134,9 @@ ALONG_Y = Reader(
 ROCKING = Reader(
     "body.freedoms: xy_rocking", lambda case: case.body and case.body.freedoms == "xy_rocking"
 )
-CASING_HEARD = Reader("sensor.place: bearing, or guide with direction: y", hears_casing)
+CASING_SENSED = Reader("sensor.place: bearing, or guide with direction: y", senses_casing)
 CASING = (
-    CASING_HEARD,
+    CASING_SENSED,
     Reader("body.casing: true", lambda case: case.body and case.body.casing),
 )
 RANDOM = Reader(
@@ -175,7 +175,7 @@ IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was ne
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 NO_VALUE = "has no value; leave the key out to get its default"
 # a number that is written as text, with a comma or a unit
-WRITTEN = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
+AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
 # case-file unit -> (SI unit, numerator, denominator): SI value = value * numerator / denominator
 UNITS = {
@@ -387,7 +387,7 @@ class Parameter:
         near = get_close_matches(word[:MAX_WORD].lower(), lower, n=1)
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"
-        if self.kind in ("number", "integer") and (number := WRITTEN.fullmatch(word[:MAX_WORD])):
+        if self.kind in ("number", "integer") and (number := AS_NUMBER.fullmatch(word[:MAX_WORD])):
             plain, comma, unit = number[1].replace(",", "."), number[2] == ",", number[3]
             if unit and unit != self.unit:
                 return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
@@ -498,12 +498,12 @@ TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")
 Targets = tuple[tuple[str, float], ...]  # (metric, greatest relative error), by name
 
 
-def first_rung(targets: Targets) -> float:
+def first_tolerance(targets: Targets) -> float:
     """Return the tolerance of the first run where accuracy is asked for by number."""
     return min(LOOSEST, *(FIRST_TOLERANCE_FACTOR * target for _, target in targets))
 
 
-def checked_targets(key: str, value: Mapping[Any, Any], problems: list[Problem]) -> Targets:
+def check_targets(key: str, value: Mapping[Any, Any], problems: list[Problem]) -> Targets:
     """Return the accuracy by number as a case holds it; what is wrong with it joins `problems`."""
     if not value:
         problems.append(Problem(key, "needs a metric, such as {peak_acceleration: 0.01}"))

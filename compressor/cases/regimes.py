@@ -157,8 +157,8 @@ def _check_range(
     for name in ("from", "to"):
         message = row.check(given[name]) if row else None
         if message:
-            told = f"of {given['over']}: {message}"
-            problems.append(FileProblem(nodes[name].place, f"{GROUP}.{name}", told))
+            text = f"of {given['over']}: {message}"
+            problems.append(FileProblem(nodes[name].place, f"{GROUP}.{name}", text))
     if first == last:
         message = f"from and to are both {first:g}: give two different ends"
         problems.append(FileProblem(nodes["to"].place, f"{GROUP}.to", message))
@@ -172,46 +172,47 @@ def _check_range(
 
 def without(leaves: Leaves) -> Leaves:
     """Return the leaves that are of cases."""
-    kept = {key: node for key, node in leaves.values.items() if not covers(GROUP, key)}
-    return Leaves(kept, leaves.places)
+    remaining = {key: node for key, node in leaves.values.items() if not covers(GROUP, key)}
+    return Leaves(remaining, leaves.places)
 
 
-def at_first(leaves: Leaves, asked: Regimes, problems: list[FileProblem]) -> Leaves:
+def at_first(leaves: Leaves, regimes: Regimes, problems: list[FileProblem]) -> Leaves:
     """Return a block's leaves with the key that is followed at its first value.
 
     A key that is given in vain, or sets what is followed, is a problem.
     """
-    over, places = asked.over, leaves.places
+    over, places = regimes.over, leaves.places
     for key, node in leaves.values.items():
         if covers(over, key) or covers(key, over):
-            message = f"is what regimes follows: leave it out, {over} goes from {asked.first:g} on"
+            start = f"{over} goes from {regimes.first:g} on"
+            message = f"is what regimes follows: leave it out, {start}"
             problems.append(FileProblem(node.key_place, key, message))
         for other, why in IN_VAIN.items():
             if covers(other, key):
                 message = f"has no meaning beside regimes: leave it out; {why}"
                 problems.append(FileProblem(node.key_place, key, message))
     place = places.get(f"{GROUP}.over", Place(""))
-    return Leaves(leaves.values | {over: Node(asked.first, place, place)}, places)
+    return Leaves(leaves.values | {over: Node(regimes.first, place, place)}, places)
 
 
-def follow_key(asked: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
+def follow_key(regimes: Regimes, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
     """Yield a combination of a file's values at each value of the followed key, going up."""
-    if at := chosen.get(asked.over):  # an ideal machine has no clearance
-        for value in asked.values:
-            yield {**chosen, asked.over: Node(value, at.place, at.key_place)}
+    if at := chosen.get(regimes.over):  # an ideal machine has no clearance
+        for value in regimes.values:
+            yield {**chosen, regimes.over: Node(value, at.place, at.key_place)}
 
 
-def objection(cases: tuple[Case, ...], asked: Regimes) -> str:
+def objection(cases: tuple[Case, ...], regimes: Regimes) -> str:
     """Return why the cases of a chain cannot be followed, or ""."""
     worn = {tuple(getattr(case.clearance_mm, joint) > 0.0 for joint in JOINTS) for case in cases}
     if len(worn) > 1:
-        at = f"{asked.over} = {asked.first:g}"
+        at = f"{regimes.over} = {regimes.first:g}"
         return f"starts from {at}, where a joint is ideal: begin above 0"
     if not cases or not any(*worn):
-        none = f"set joint and {OF_JOINTS[0]}"
-        return f"has nothing to follow: no joint of the machine has clearance; {none}"
+        remedy = f"set joint and {OF_JOINTS[0]}"
+        return f"has nothing to follow: no joint of the machine has clearance; {remedy}"
     if cases[0].key == cases[-1].key:
-        return f"{asked.over} changes nothing in this case: follow another key"
+        return f"{regimes.over} changes nothing in this case: follow another key"
     return ""
 
 

@@ -72,7 +72,7 @@ class Cases(Sequence[Case]):
 
     def __init__(self, parts: Sequence[Block]):
         self.parts = parts
-        self.ends = list(itertools.accumulate(len(part.kept) for part in parts))
+        self.ends = list(itertools.accumulate(len(part.numbers) for part in parts))
         self.keys: Sequence[str] = ()
 
     def __len__(self) -> int:
@@ -95,14 +95,14 @@ class Cases(Sequence[Case]):
     def combinations(self) -> Iterator[tuple[Block, int]]:
         """Yield the block of each case, and the number of its combination there."""
         for part in self.parts:
-            for number in part.kept:
+            for number in part.numbers:
                 yield part, number
 
     def _locate(self, number: int) -> tuple[int, int]:
         """Return the number of a case's block, and of its combination there."""
         block = bisect.bisect_right(self.ends, number)
-        kept = self.parts[block].kept
-        return block, kept[number - self.ends[block] + len(kept)]
+        numbers = self.parts[block].numbers
+        return block, numbers[number - self.ends[block] + len(numbers)]
 
     def solver_of(self, number: int) -> Hashable:
         """Return what cases share only if their groups `solve` and `output` are equal."""

@@ -237,10 +237,10 @@ SIGNS: dict[type[ast.cmpop], tuple[str, Callable[[Any, Any], bool]]] = {
     ast.Gt: (">", operator.gt),
     ast.GtE: (">=", operator.ge),
 }
-WRITTEN = tuple(sign for sign, _ in SIGNS.values())
+SIGN_TEXTS = tuple(sign for sign, _ in SIGNS.values())
 NEEDS_KEY = "needs a key, such as clearance_mm"
 UNREADABLE = "cannot be read"
-NEEDS_SIGN = f"needs one of {' '.join(WRITTEN)} after "
+NEEDS_SIGN = f"needs one of {' '.join(SIGN_TEXTS)} after "
 NEEDS_JOIN = "needs `and` or `or` before this"
 
 Value = Callable[[str], Any]  # a key -> a job's value, or None
@@ -384,7 +384,7 @@ def _misfit(code: str, error: SyntaxError) -> tuple[int, str]:
         needs_more = word in ("(", "not", "+", "-")
         named = word not in ("and", "or", "not") and (word[0].isalnum() or word[0] in "_.")
         if ends and (named or word in ("(", "not")):
-            return at, NEEDS_JOIN if earlier in WRITTEN or before == ")" else NEEDS_SIGN + before
+            return at, NEEDS_JOIN if earlier in SIGN_TEXTS or before == ")" else NEEDS_SIGN + before
         if not (ends or named or needs_more):
             return at, _missing(before)
         opened += (word == "(") - (word == ")")
@@ -401,4 +401,4 @@ def _misfit(code: str, error: SyntaxError) -> tuple[int, str]:
 
 def _missing(before: str) -> str:
     """Return what is missing after a word of a code, "" at its beginning."""
-    return f"needs a value after {before}" if before in (*WRITTEN, "+", "-") else NEEDS_KEY
+    return f"needs a value after {before}" if before in (*SIGN_TEXTS, "+", "-") else NEEDS_KEY

@@ -115,15 +115,15 @@ def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
     So are metrics of jobs that are not ok, and of runs without error bars.
     """
     known = np.vectorize(is_known, otypes=[bool])
-    good = dataset["status"] == "ok"
-    kept = {}
+    is_ok = dataset["status"] == "ok"
+    masked = {}
     for name in METRICS:
         if name in dataset:
             bar = dataset[f"{name}_error"]
             vouched = xr.apply_ufunc(known, dataset[name], bar, METRICS[name].bar.relative)
-            kept[name] = dataset[name].where(vouched & good)
-            kept[f"{name}_error"] = bar.where(vouched & good)
-    return dataset.assign(kept)
+            masked[name] = dataset[name].where(vouched & is_ok)
+            masked[f"{name}_error"] = bar.where(vouched & is_ok)
+    return dataset.assign(masked)
 
 
 def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
@@ -134,10 +134,10 @@ def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
 
 def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
     """Return the key, status, reason, promise and regime of every job."""
-    there = positions >= 0
+    is_stored = positions >= 0
 
     def words(name: str, otherwise: str) -> np.ndarray:
-        return np.where(there, _taken(rows.words[name], positions), otherwise)
+        return np.where(is_stored, _values_at(rows.words[name], positions), otherwise)
 
     texts = {
         "key": (layout.keys, "a job's identity"),
@@ -152,7 +152,7 @@ def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr
     }
 
 
-def _taken(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def _values_at(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """Return the values at positions; anything where a position is -1."""
     return values[positions] if values.size else np.full(positions.shape, "")
 

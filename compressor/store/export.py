@@ -138,15 +138,15 @@ def _form(output: Folder, form: str | None) -> tuple[str, bool]:
     target = Path(output)
     if not target.suffix or target.is_dir() or os.fspath(output).endswith(os.sep):
         return form or "netcdf", False
-    told = {suffix: form for form, suffix in SUFFIXES.items()}.get(target.suffix)
-    if told is None:
+    known = {suffix: form for form, suffix in SUFFIXES.items()}.get(target.suffix)
+    if known is None:
         raise ExportError(
             f"{target}: no files of the type {target.suffix} are written: end the name in "
             f"{' or '.join(SUFFIXES.values())}, or, for a folder, in {os.sep}"
         )
-    if form not in (None, told):
-        raise ExportError(f"{target} is no name for {form}: end it in {SUFFIXES[form or told]}")
-    return told, True
+    if form not in (None, known):
+        raise ExportError(f"{target} is no name for {form}: end it in {SUFFIXES[form or known]}")
+    return known, True
 
 
 def _one_file(
@@ -170,8 +170,8 @@ def _files(
         yield _Task(target / f"{study.name}{suffix}", (study,))
         if series:
             positions = stored.rows.find(study.keys)
-            kept = (positions >= 0) & (stored.rows.columns["samples"][positions] > 0)
-            for key in dict.fromkeys(itertools.compress(study.keys, kept.tolist())):
+            has_series = (positions >= 0) & (stored.rows.columns["samples"][positions] > 0)
+            for key in dict.fromkeys(itertools.compress(study.keys, has_series.tolist())):
                 yield _Task(target / study.name / f"{key}{suffix}", key=key, named=False)
     for key in keys:
         yield _Task(target / f"{key}{suffix}", key=key)
@@ -300,8 +300,8 @@ def _link_coordinates(table: "xr.Dataset") -> "xr.Dataset":
 
 def _attributes(studies: Sequence[StoredStudy]) -> dict[str, str]:
     """Return where the numbers of a file come from."""
-    told = ("name", "case_file", "fixed", "command", "versions", "written")
-    origin = [{name: getattr(study, name) for name in told} for study in studies]
+    fields = ("name", "case_file", "fixed", "command", "versions", "written")
+    origin = [{name: getattr(study, name) for name in fields} for study in studies]
     return {
         "title": f"compsim: {' '.join(study.name for study in studies)}",
         "program": PROGRAM,

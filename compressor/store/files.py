@@ -263,8 +263,8 @@ def no_results(folder: Folder) -> WrongName:
         return WrongName(folder, "there is no such folder of results", remedy_for(place))
     for files in STUDY_FILES:
         if files.result and (found := sorted(place.glob(files.result))):
-            told = files.told.format(list_few([path.parent.name for path in found]))
-            return WrongName(folder, f"holds no study of jobs, only {told}", files.remedy)
+            content = files.told.format(list_few([path.parent.name for path in found]))
+            return WrongName(folder, f"holds no study of jobs, only {content}", files.remedy)
     return WrongName(folder, "holds no study", remedy_for(place))
 
 

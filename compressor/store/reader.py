@@ -66,15 +66,15 @@ def _changed_by_revision(rows: Rows, position: int) -> list[str]:
 
 def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
     """Return which rows lack what any run of this version gives that ends well, by name."""
-    good = rows.words["status"][positions] == "ok"
+    is_ok = rows.words["status"][positions] == "ok"
     signals = rows.words["signals"][positions] == "yes"
-    found = {}
-    present = {"": good, "signals": good & signals}  # whether another job has one is not known
+    lacking = {}
+    present = {"": is_ok, "signals": is_ok & signals}  # whether another job has one is not known
     for name, metric in BARRED.items():
         absent = np.isnan(rows.numbers[name][positions])
         missed = absent.all(axis=tuple(range(1, absent.ndim)))
-        found[name] = missed & present.get(metric.when, False)
-    return found | {name: good & (rows.words[name][positions] == "") for name in WORDS}
+        lacking[name] = missed & present.get(metric.when, False)
+    return lacking | {name: is_ok & (rows.words[name][positions] == "") for name in WORDS}
 
 
 # reasons that leave no time series
@@ -109,7 +109,7 @@ class JobStatus:
         """Return the job's numbers, dtype ROW."""
         return self.rows.numbers[self.position]
 
-    def serves(self, case: Case) -> bool:
+    def satisfies(self, case: Case) -> bool:
         """Return whether a case needs no new run.
 
         The one place that knows of what a case may ask for without it being in its key.
@@ -130,7 +130,7 @@ class JobStatus:
             return False
         return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
 
-    def kept_by(self, case: Case) -> Case:
+    def with_stored_outputs(self, case: Case) -> Case:
         """Return a case that, run again, has the time series of this job, as exact as they are.
 
         Where the job is ok, it has its error bars and its horizon as well.
@@ -210,8 +210,8 @@ class Stored:
             int(rows.columns["samples"][position]),
             words["precision"],
             words["signals"] == "yes",
-            bool(rows.barred[position]),
-            bool(rows.foretold[position]),
+            bool(rows.has_bars[position]),
+            bool(rows.has_horizon[position]),
             rows,
             position,
         )
@@ -219,11 +219,11 @@ class Stored:
     def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
         """Return whether each of the jobs at some positions needs no new run for a case, boolean.
 
-        Jobs of one kind, in all that `JobStatus.serves` reads, are asked once.
+        Jobs of one kind, in all that `JobStatus.satisfies` reads, are asked once.
         """
         first, kinds = self._kinds
-        serves = np.array([self.status_at(one).serves(case) for one in first.tolist()], bool)
-        return serves[kinds[positions]] if len(positions) else np.zeros(0, bool)
+        satisfied = np.array([self.status_at(at).satisfies(case) for at in first.tolist()], bool)
+        return satisfied[kinds[positions]] if len(positions) else np.zeros(0, bool)
 
     @cached_property
     def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -233,7 +233,7 @@ class Stored:
         code = 3 * code + np.unique(columns["precision"], return_inverse=True)[1]
         for flag in (
             columns["status"] == b"ok", columns["signals"] == b"yes", columns["samples"] > 0,
-            rows.barred, rows.foretold,
+            rows.has_bars, rows.has_horizon,
         ):  # fmt: skip
             code = 2 * code + flag
         _, first, kinds = np.unique(code, return_index=True, return_inverse=True)
@@ -271,17 +271,17 @@ class Stored:
 def _usable(segment: Segment) -> np.ndarray:
     """Return which rows of a segment count: not those whose time series are gone."""
     columns = segment.columns
-    kept = columns["samples"] > 0
-    if not kept.any():
-        return ~kept
+    has_series = columns["samples"] > 0
+    if not has_series.any():
+        return ~has_series
     listed = _names(segment.place / "jobs")
     names = np.array([name.removeprefix(".").removesuffix(".tmp") for name in listed], "S")
     wanted = np.char.add(np.char.add(np.char.add(columns["key"], b"-"), columns["digest"]), b".h5")
-    found = ~kept | np.isin(wanted, names)
-    for position in np.flatnonzero(~found):  # a listing may miss what gets its name meanwhile
+    usable = ~has_series | np.isin(wanted, names)
+    for position in np.flatnonzero(~usable):  # a listing may miss what gets its name meanwhile
         path = segment.place / "jobs" / wanted[position].decode()
-        found[position] = path.exists() or pending_path(path).exists() or path.exists()
-    return found
+        usable[position] = path.exists() or pending_path(path).exists() or path.exists()
+    return usable
 
 
 def _names(folder: Path) -> list[str]:

@@ -61,7 +61,7 @@ class Segment:
 
     path: Path  # of its file; empty before it has one
     columns: dict[str, np.ndarray]  # each of shape (rows,)
-    held: np.ndarray | bytes  # its numbers, dtype ROW, (rows,), or the file that has them
+    numbers_or_file: np.ndarray | bytes  # its numbers, dtype ROW, (rows,), or its file's bytes
     texts: bytes  # zlib of each row's attributes as JSON, a line a row
     notes: bytes  # the same of each row's `detail`
 
@@ -74,13 +74,13 @@ class Segment:
         They are read each time: few ask for them, and they are a kilobyte a row.
         """
         kind = ROW if not names else np.dtype([(name, ROW[name]) for name in names])
-        if isinstance(self.held, np.ndarray):
-            return self.held[[*names]] if names else self.held
+        if isinstance(self.numbers_or_file, np.ndarray):
+            return self.numbers_or_file[[*names]] if names else self.numbers_or_file
         found = np.full(len(self), np.nan, kind)
-        with open_file(self.held, self.path, REMEDY) as file:
+        with open_file(self.numbers_or_file, self.path, REMEDY) as file:
             for name in kind.names or ():
                 if name in file:
-                    found[name] = read_variable(file[name], self.held)
+                    found[name] = read_variable(file[name], self.numbers_or_file)
         return found
 
     @property
@@ -303,12 +303,12 @@ class Rows:
         return self._numbers()
 
     @cached_property
-    def barred(self) -> np.ndarray:
+    def has_bars(self) -> np.ndarray:
         """Return whether metrics have error bars, (jobs,)."""
         return ~np.isnan(self._estimates["peak_acceleration_error"])
 
     @cached_property
-    def foretold(self) -> np.ndarray:
+    def has_horizon(self) -> np.ndarray:
         """Return whether it is known how long each motion can be foretold, (jobs,)."""
         return ~np.isnan(self._estimates[HORIZON])
 

@@ -374,18 +374,18 @@ def standings(folder: Folder) -> list[StudyProgress]:
             more = {*study.keys}.difference(present.get(study.former_of, ()))
             if (rows.find(sorted(more)) < 0).all():
                 continue
-        good = rows.words["status"][stored] == "ok"
+        is_ok = rows.words["status"][stored] == "ok"
 
         def counts(word: str, which: np.ndarray) -> dict[str, int]:
             return dict(Counter(rows.words[word][which].tolist()).most_common())
 
-        done = stored[good]
-        ok, failed = int(good.sum()), int((~good).sum())
+        done = stored[is_ok]
+        ok, failed = int(is_ok.sum()), int((~is_ok).sum())
         missing = study.jobs - ok - failed
         found.append(
             StudyProgress(
                 study.name, study.case_file, study.jobs, ok, failed, missing,
-                counts("reason", stored[~good]), counts("promise", done), counts("regime", done),
+                counts("reason", stored[~is_ok]), counts("promise", done), counts("regime", done),
                 study_caveats(rows, study), study.again, study.former_of, study.written,
             )
         )  # fmt: skip

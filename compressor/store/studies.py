@@ -172,14 +172,14 @@ def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) ->
     stored: returns the keys of all stored jobs; called only where they matter.
     """
     old = _present(folder, study.name)
-    gone = {*old.keys}.difference(study.keys) if old else set()
-    if old is None or not gone:
+    removed = {*old.keys}.difference(study.keys) if old else set()
+    if old is None or not removed:
         return None
-    finished = len(gone & stored())
+    finished = len(removed & stored())
     former = _former_name(folder, old) if finished else ""
     model = str(old.versions.get("model", ""))
     return StudyChange(
-        study.name, old.jobs, study.jobs, len({*old.keys}) - len(gone), finished, former,
+        study.name, old.jobs, study.jobs, len({*old.keys}) - len(removed), finished, former,
         "" if model == MODEL_VERSION else model,
     )  # fmt: skip
 
@@ -399,17 +399,17 @@ def whole_key(
 ) -> str:
     """Return the one key, of a stored or a missing job, that begins so. Raises WrongName."""
     known = sorted(stored.union(*(study.keys for study in studies)))
-    like = [key for key in known if key.startswith(beginning)]
-    if len(like) == 1:
-        return like[0]
-    if like:
-        problem = f"{len(like)} jobs' keys begin with {beginning!r}: {list_few(like)}"
+    matches = [key for key in known if key.startswith(beginning)]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        problem = f"{len(matches)} jobs' keys begin with {beginning!r}: {list_few(matches)}"
         raise WrongName(folder, problem, "give more of the key")
-    near = did_you_mean(beginning, [study.name for study in studies]) or _near_keys(
+    hint = did_you_mean(beginning, [study.name for study in studies]) or _near_keys(
         beginning, known
     )
     problem = f"no job's key begins with {beginning!r}, and no study is called so"
-    remedy = near or "compsim status tells the studies, and a job is named by STUDY AXIS=VALUE, too"
+    remedy = hint or "compsim status tells the studies, and a job is named by STUDY AXIS=VALUE, too"
     raise WrongName(folder, problem, remedy)
 
 
@@ -439,16 +439,16 @@ def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
         for key, point in zip(study.keys, points(study), strict=True)
         if all(key in point and point[key] == value for key, value in wanted.items())
     ]
-    found = {key for key, _ in jobs}
-    if len(found) == 1:
-        return found.pop()
-    told = " and ".join(f"{key}={in_words(value)}" for key, value in wanted.items())
-    if not found:
-        raise WrongName(folder, f"no job of {study.name} has {told}", _axes(study))
+    matches = {key for key, _ in jobs}
+    if len(matches) == 1:
+        return matches.pop()
+    conditions = " and ".join(f"{key}={in_words(value)}" for key, value in wanted.items())
+    if not matches:
+        raise WrongName(folder, f"no job of {study.name} has {conditions}", _axes(study))
     problem = (
-        f"{len(found)} jobs of {study.name} have {told}"
-        if told
-        else (f"{study.name} is a study of {len(found)} jobs")
+        f"{len(matches)} jobs of {study.name} have {conditions}"
+        if conditions
+        else (f"{study.name} is a study of {len(matches)} jobs")
     )
     left = _varied_axes([point for _, point in jobs])
     more = "; ".join(f"{key}=… of {_some(values)}" for key, values in left.items())

@@ -218,8 +218,8 @@ def _series_paths(place: Path, columns: Mapping[str, np.ndarray]) -> list[Path]:
 
 def _series_names(columns: Mapping[str, np.ndarray]) -> set[tuple[str, str]]:
     """Return key and digest of the rows that have time series."""
-    kept = columns["samples"] > 0
-    names = (columns[name][kept].tolist() for name in ("key", "digest"))
+    has_series = columns["samples"] > 0
+    names = (columns[name][has_series].tolist() for name in ("key", "digest"))
     return {(key.decode(), checksum.decode()) for key, checksum in zip(*names, strict=True)}
 
 

@@ -84,7 +84,7 @@ def receive_result(place: Path, result: Any) -> Any:
 
 
 POOL_LOCK = threading.Lock()  # one pool a process: threads take turns, each with all of it
-KEPT: dict[bytes, Local] = {}  # the pool that is kept for the next batch, by what it does
+IDLE_POOLS: dict[bytes, Local] = {}  # the pool that is kept for the next batch, by what it does
 
 
 class Batch(NamedTuple):
@@ -107,9 +107,9 @@ def on_worker(data: bytes) -> bytes:
         # dask's workers are daemons, which may have no children lest they outlive them; ours die
         # with their parent
         multiprocessing.current_process().daemon = False
-        most = worker.memory_manager.memory_limit  # of all threads together; None: no limit
+        limit = worker.memory_manager.memory_limit  # of all threads together; None: no limit
         count = worker.state.nthreads
-        share = int(MEMORY_SHARE * most / count) if most else memory_share(max(cores(), count))
+        share = int(MEMORY_SHARE * limit / count) if limit else memory_share(max(cores(), count))
         rules = replace(batch.rules, count=count, memory=share)
         with POOL_LOCK:
             return in_processes(batch.work, rules, batch.jobs)
@@ -120,17 +120,17 @@ def on_worker(data: bytes) -> bytes:
 def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) -> bytes:
     """Return the pickled ends, in order, of jobs in processes that stay for the next batch."""
     key = pickle.dumps((work, rules))
-    if key not in KEPT:
-        while KEPT:
-            KEPT.popitem()[1].stop()
-        KEPT[key] = Local(work, [], rules)
-        KEPT[key].decode = bytes  # results travel on as they are
-    local = KEPT[key]
+    if key not in IDLE_POOLS:
+        while IDLE_POOLS:
+            IDLE_POOLS.popitem()[1].stop()
+        IDLE_POOLS[key] = Local(work, [], rules)
+        IDLE_POOLS[key].decode = bytes  # results travel on as they are
+    local = IDLE_POOLS[key]
     local.waiting.extend(jobs)
     try:
         ends = sorted(local.run_pending(lambda: None), key=lambda end: end.id)
     except BaseException:
-        KEPT.pop(key).stop()
+        IDLE_POOLS.pop(key).stop()
         raise
     return pickle.dumps(ends, pickle.HIGHEST_PROTOCOL)
 
@@ -159,7 +159,7 @@ class Remote(Batches):
         super().__init__(jobs, rules.target_seconds, 1)
         self.client, self.work, self.rules = client, work, rules
         self.distant: dict[int, Any] = {}  # dask's future of each batch that is out
-        self.asked = versions()
+        self.versions = versions()
         self.remark: Callable[[str], None] = lambda text: None
         self.threads, self.census = -1, 0.0  # of all workers, when they were counted
         self.size = 0.0  # bytes of a result
@@ -172,8 +172,8 @@ class Remote(Batches):
 
     def submit(self, number: int, batch: list[Job]) -> "Future[bytes]":
         jobs = [Job(n, *job[1:3]) for n, job in enumerate(batch)]
-        asked = Batch(self.asked, self.work, self.rules, jobs)
-        data = pickle.dumps(asked, pickle.HIGHEST_PROTOCOL)
+        request = Batch(self.versions, self.work, self.rules, jobs)
+        data = pickle.dumps(request, pickle.HIGHEST_PROTOCOL)
         self.distant[number] = self.client.submit(on_worker, data, pure=False)
         ended: Future[bytes] = Future()
         self.distant[number].add_done_callback(partial(pass_on, ended))
@@ -315,18 +315,18 @@ class Cluster:
 
 def within(seconds: float, call: Callable[[], Any]) -> Any:
     """Return what a call gives that may wait for ever. Raises what it raises, and TimeoutError."""
-    told: list[Any] = []
+    answer: list[Any] = []
 
-    def noted() -> None:
+    def store_answer() -> None:
         try:
-            told.extend((call(), None))
+            answer.extend((call(), None))
         except Exception as error:
-            told.extend((None, error))
+            answer.extend((None, error))
 
-    thread = threading.Thread(target=noted, daemon=True)
+    thread = threading.Thread(target=store_answer, daemon=True)
     thread.start()
     thread.join(seconds)
-    result, error = told or (None, TimeoutError())
+    result, error = answer or (None, TimeoutError())
     if error:
         raise error
     return result

@@ -300,7 +300,7 @@ class Local(Batches):
         self.executor: ProcessPoolExecutor | None = None
         self.processes: dict[int, Any] = {}
         self.late: set[int] = set()  # processes that were killed for taking too long
-        self.fruitless, self.heard = 0, 0.0  # heard: when a batch was last sent, or ended
+        self.fruitless, self.last_news = 0, 0.0  # last_news: when a batch was last sent, or ended
         self.begun = False  # whether a job of this pool has
 
     def start(self) -> ProcessPoolExecutor:
@@ -325,7 +325,7 @@ class Local(Batches):
     def submit(self, number: int, batch: list[Job]) -> "Future[Any]":
         self.executor = self.executor or self.start()
         self.files[number] = file = SharedFile()
-        self.heard = time.monotonic()
+        self.last_news = time.monotonic()
         return self.executor.submit(do_batch, file.path, [job.payload for job in batch])
 
     def ends_of(self, number: int, problem: str) -> list[End]:
@@ -338,8 +338,8 @@ class Local(Batches):
         """Kill workers whose jobs take too long, and all of them where nothing moves any more."""
         self.processes = self.processes | {child.pid: child for child in children()}
         if news:
-            self.heard, self.fruitless, self.most = now, 0, MAX_BATCH
-        latest, at_work = self.heard, False
+            self.last_news, self.fruitless, self.most = now, 0, MAX_BATCH
+        latest, at_work = self.last_news, False
         for number, file in [*self.files.items()]:
             pid, position, since = file.note()
             latest, at_work = max(latest, abs(since)), at_work or since > 0
@@ -347,7 +347,7 @@ class Local(Batches):
             if since > 0 and now - since > self.out[number][position].timeout + self.rules.grace:
                 self.late.add(pid)
                 kill([pid])
-        self.begun = self.begun or latest > self.heard
+        self.begun = self.begun or latest > self.last_news
         patience = STALL if self.begun else MAX_START_SECONDS
         if self.out and not at_work and now - latest > patience:
             kill(self.processes)

@@ -92,11 +92,11 @@ class Ahead:
         looked_at = list(self.cases.values())
         needs = Needs.of(looked_at)
         compile_once(needs, remark)
-        drawn = {part.study: drawn_from(self.missing[part.study], self.cases)
+        drawn = {part.study: draw_cases(self.missing[part.study], self.cases)
                  for part in self.counts.studies if part.missing}  # fmt: skip
-        costs = timed_in_turn(drawn, TIMING)
+        costs = time_in_turn(drawn, TIMING)
         parts = [
-            self.expected(part, costs[part.study]) if part.missing else part
+            self.estimate(part, costs[part.study]) if part.missing else part
             for part in self.counts.studies
         ]
         working = min(workers, self.counts.missing)
@@ -112,7 +112,7 @@ class Ahead:
             bytes=sum(part.bytes for part in parts),
         )
 
-    def expected(self, part: StudyShare, costs: "Sequence[Cost]") -> StudyShare:
+    def estimate(self, part: StudyShare, costs: "Sequence[Cost]") -> StudyShare:
         """Return a study's part with what its missing jobs will take, by some of them."""
         keys = self.missing[part.study]
         looked_at = [self.cases[key] for key in keys if key in self.cases]
@@ -140,17 +140,17 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
     looked_at: set[str] = set()
     ahead: list[Next] = []
     parts: list[StudyShare] = []
-    told: set[str] = set()
+    counted: set[str] = set()
     for study in studies:
-        mine = [key for key in keys[study.name] if key not in told]
-        told.update(mine)
+        mine = [key for key in keys[study.name] if key not in counted]
+        counted.update(mine)
         new = [key for key in mine if key not in done]
         missing[study.name] = new
         few = len(new) <= MAX_CASES
         looked_at.update(new if few else random.Random(0).sample(new, MAX_CASES))
         parts.append(StudyShare(study.name, len(mine), len(mine) - len(new), len(new)))
         ahead += next_of(study, {*new}, first - len(ahead))
-    counts = Forecast(len(told), len(done), len(told) - len(done), tuple(parts), tuple(ahead))
+    counts = Forecast(len(counted), len(done), len(counted) - len(done), tuple(parts), tuple(ahead))
     return Ahead(counts, missing, dict(RequestedJobs(studies, looked_at)))
 
 
@@ -173,7 +173,7 @@ class Cost(NamedTuple):
     sample: float
 
 
-def drawn_from(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
+def draw_cases(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
     """Return up to a dozen of the missing jobs of a study, one at random from each stretch of them.
 
     Jobs stand in the order of the design, so that stretches spread over its axes. They come in
@@ -187,7 +187,7 @@ def drawn_from(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
     return [cases[key] for key in found]
 
 
-def timed_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[str, list[Cost]]:
+def time_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[str, list[Cost]]:
     """Return the costs of jobs of each study, run in turn until so many seconds are over.
 
     At least one of each study is run.
@@ -224,14 +224,14 @@ def measure_cost(case: Case) -> Cost:
 
     The first search for chaos of a process loads its own.
     """
-    took, size, searched = ran(case)
+    took, size, searched = run_timed(case)
     if searched and not SEARCHED:
         SEARCHED.append(case.key)
-        took, size, _ = ran(case)
+        took, size, _ = run_timed(case)
     return Cost(took / revolutions(case), size / (case.steps + 1))
 
 
-def ran(case: Case) -> tuple[float, int, bool]:
+def run_timed(case: Case) -> tuple[float, int, bool]:
     """Return the seconds that a job took, its file's bytes, and whether chaos was looked for."""
     from compressor.solve import measure, observe  # needs numba: only to simulate
 

@@ -147,7 +147,7 @@ def sweep(
             for key in gaining:
                 del ends[key]
                 position = int(writer.found.rows.find([key])[0])
-                cases[key] = writer.found.status_at(position).kept_by(cases[key])
+                cases[key] = writer.found.status_at(position).with_stored_outputs(cases[key])
             stale, gaining = {}, set()
         missing = PendingCases(cases, [key for key in cases if key not in ends])
         for study in studies:
@@ -179,36 +179,36 @@ def run_missing(
     done, total, work = len(ends), len(ends) + len(missing), SweepWork(missing)
     failed = sum(end.status != "ok" for end in ends.values())
 
-    def tell(acknowledged: Sequence[str]) -> None:
+    def acknowledge(keys: Sequence[str]) -> None:
         nonlocal done, failed
-        if acknowledged:
-            done += len(acknowledged)
-            failed += sum(ends[key].status != "ok" for key in acknowledged)
+        if keys:
+            done += len(keys)
+            failed += sum(ends[key].status != "ok" for key in keys)
             progress(done, total, "")
 
     def beat() -> None:
-        tell(writer.flush_if_due())
+        acknowledge(writer.flush_if_due())
         left = work.left()
         pulse(SweepProgress(done, failed, total, *(left or ())))
 
-    def keep(end: JobResult | JobLost) -> None:
+    def store(end: JobResult | JobLost) -> None:
         outcome = outcome_of(end)
         ends[outcome.key] = JobEnd(outcome.status, outcome.reason, outcome.detail)
         work.add(end)
-        tell(writer.add(outcome))
+        acknowledge(writer.add(outcome))
 
     progress(done, total, "")
     pulse(SweepProgress(done, failed, total))
-    running = backend(writer.place, missing, lambda remark: progress(done, total, remark), beat)
+    running = backend(writer.place, missing, lambda text: progress(done, total, text), beat)
     try:
         for end in running:
-            keep(end)
+            store(end)
     except BaseException as error:
         for end in drain(running, error):  # which raises it again
-            keep(end)
+            store(end)
     finally:
         running.close()
-        tell(writer.flush())
+        acknowledge(writer.flush())
 
 
 def local(workers: int) -> Backend:

@@ -26,7 +26,7 @@ class JobEnd(NamedTuple):
     detail: str
 
 
-WELL = JobEnd("ok", "", "")
+OK_END = JobEnd("ok", "", "")
 
 
 class RequestedJobs(Mapping[str, Case]):
@@ -122,19 +122,19 @@ def stored_ends(store: Stored, wanted: RequestedJobs) -> dict[str, JobEnd]:
     rows = store.rows
     for case, keys in [*wanted.alike()]:
         places = rows.find(keys)
-        here = np.flatnonzero(places >= 0)
-        serving = store.serving(places[here], case)
+        indices = np.flatnonzero(places >= 0)
+        satisfied = store.serving(places[indices], case)
         for at, position, serves in zip(
-            here.tolist(), places[here].tolist(), serving.tolist(), strict=True
+            indices.tolist(), places[indices].tolist(), satisfied.tolist(), strict=True
         ):
             key = keys[at]
             if serves and rows.intact(position):
-                found[key] = WELL
+                found[key] = OK_END
                 if rows.columns["status"][position] != b"ok":
                     end = store.status_at(position)
                     found[key] = JobEnd(end.status, end.reason, end.detail)
             else:
-                wanted[key] = store.status_at(position).kept_by(wanted[key])
+                wanted[key] = store.status_at(position).with_stored_outputs(wanted[key])
     return found
 
 

@@ -90,11 +90,11 @@ class Needs(NamedTuple):
         jobs are asked for than where they need but be loaded.
         """
         step = max(1, len(cases) // MAX_JOBS_SEEN)
-        looked = (cases[i] for i in range(0, len(cases), step))
-        seen = Counter(case.joint for case in looked if case.is_plain)
+        sample = (cases[i] for i in range(0, len(cases), step))
+        counts = Counter(case.joint for case in sample if case.is_plain)
         least = {of: FEWEST if marker(f"lanes-{of}").exists() else MANY for of in LANES}
-        many = (of for of, joint in LANES.items() if seen[joint] * step >= least[of])
-        return self._replace(lanes=tuple(many))
+        worthwhile = (of for of, joint in LANES.items() if counts[joint] * step >= least[of])
+        return self._replace(lanes=tuple(worthwhile))
 
 
 def load(needs: Needs) -> None:
@@ -124,9 +124,9 @@ def load(needs: Needs) -> None:
             measure(Case.from_values({**values, **kind, "solve": solve | how}))
 
 
-def load_telling(needs: Needs, told: str, remark: Callable[[str], None]) -> None:
+def load_with_remark(needs: Needs, text: str, remark: Callable[[str], None]) -> None:
     """Load as `load` does; remark on what takes long, in these words."""
-    timer = threading.Timer(SECONDS_TO_REMARK, remark, [told])
+    timer = threading.Timer(SECONDS_TO_REMARK, remark, [text])
     timer.daemon = True
     timer.start()
     began = time.monotonic()
@@ -167,8 +167,8 @@ def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
     ahead = needs.uncompiled
     for number, (part, alone) in enumerate(ahead.items(), 1):
         what, seconds = name_part(part)
-        told = COMPILING.format(number=number, count=len(ahead), what=what, seconds=seconds)
-        load_telling(alone, told, remark)
+        text = COMPILING.format(number=number, count=len(ahead), what=what, seconds=seconds)
+        load_with_remark(alone, text, remark)
         path = marker(part)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()

@@ -7,7 +7,7 @@ from random_cases import random_cases
 
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.cases.parameter import ACCURACY, first_rung
+from compressor.cases.parameter import ACCURACY, first_tolerance
 from compressor.metrics import METRICS, NUMBERS, SERIES, Bar, Metric
 from compressor.solve import attempts
 from compressor.solve.error_bars import (
@@ -299,14 +299,14 @@ def test_a_stored_job_without_bars_does_not_serve_a_case_that_wants_them(tmp_pat
     )
     keep(tmp_path, simulate(plain))
     stored = read_store(tmp_path).status(plain.key)
-    assert stored.serves(plain)
-    assert not stored.serves(barred)
+    assert stored.satisfies(plain)
+    assert not stored.satisfies(barred)
     keep(tmp_path, simulate(barred))
     stored = read_store(tmp_path).status(plain.key)
-    assert stored.serves(plain)
-    assert stored.serves(barred)
+    assert stored.satisfies(plain)
+    assert stored.satisfies(barred)
     keep(tmp_path, simulate(by_number))
-    assert read_store(tmp_path).status(by_number.key).serves(by_number)
+    assert read_store(tmp_path).status(by_number.key).satisfies(by_number)
 
 
 # Accuracy as it is asked for
@@ -373,4 +373,4 @@ def test_tiers_promise_more_for_tighter_tolerances():
     tiers = list(ACCURACY.values())
     assert [tier.rtol for tier in tiers] == sorted((t.rtol for t in tiers), reverse=True)
     assert [tier.promise for tier in tiers] == sorted((t.promise for t in tiers), reverse=True)
-    assert first_rung((("peak_acceleration", 0.5),)) > ACCURACY["draft"].rtol
+    assert first_tolerance((("peak_acceleration", 0.5),)) > ACCURACY["draft"].rtol

@@ -181,11 +181,11 @@ def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
     assert plain.key == asked.key
     assert serving_both(plain, asked).solve.horizon is True
     keep(tmp_path, simulate(plain))
-    assert not read_store(tmp_path).status(plain.key).serves(asked)
+    assert not read_store(tmp_path).status(plain.key).satisfies(asked)
     keep(tmp_path, simulate(asked))
     stored = read_store(tmp_path).status(plain.key)
-    assert stored.serves(asked)
-    assert stored.serves(plain)
+    assert stored.satisfies(asked)
+    assert stored.satisfies(plain)
     assert 0 < stored.numbers["predictability_horizon"] < asked.duration
 
 

@@ -8,7 +8,7 @@ from page_tables import kept
 from random_cases import random_cases
 
 from compressor.cases.case import Case
-from compressor.cases.parameter import ACCURACY, TIGHTEST, first_rung
+from compressor.cases.parameter import ACCURACY, TIGHTEST, first_tolerance
 from compressor.metrics import METRICS, SERIES
 from compressor.physics import Column
 from compressor.solve import attempts, solution
@@ -305,7 +305,7 @@ def test_the_rtol_told_is_the_one_that_gives_the_same_metrics():
     accuracy = {"max_penetration": 1e-3}
     found = measure(of(ILL, accuracy=accuracy))
     assert found.status == "ok"
-    assert found.attributes["rtol"] < first_rung((*accuracy.items(),))
+    assert found.attributes["rtol"] < first_tolerance((*accuracy.items(),))
     again = measure(of(ILL, rtol=found.attributes["rtol"]))
     for name in METRICS:
         assert found.numbers[name].tolist() == again.numbers[name].tolist()
@@ -317,7 +317,7 @@ def test_accuracy_that_is_not_reached_is_told_and_numbers_are_kept(budget):
     target, detail = 2e-9, "no run is tighter"
     solve = {**SHORT, "accuracy": {"peak_contact_force": target}}
     if budget:
-        first = measure(of(BOTH, **SHORT, rtol=first_rung((("", target),)), error_bars=False))
+        first = measure(of(BOTH, **SHORT, rtol=first_tolerance((("", target),)), error_bars=False))
         solve["max_steps"] = int(budget * first.numbers["steps"])
         detail = f"the next run: more than {solve['max_steps']} steps"
     found = measure(of(BOTH, **solve))
@@ -331,7 +331,7 @@ def test_accuracy_that_is_not_reached_is_told_and_numbers_are_kept(budget):
 
 
 def test_time_that_runs_out_on_the_ladder_can_be_raised():
-    """The clock's reason, which a longer timeout makes try again (JobStatus.serves)."""
+    """The clock's reason, which a longer timeout makes try again (JobStatus.satisfies)."""
     case = Case.from_values(
         {**BOTH, "solve": SHORT | {"accuracy": {"peak_acceleration": 1e-4}, "timeout_s": 1e-9}}
     )

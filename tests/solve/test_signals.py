@@ -190,6 +190,6 @@ def test_cases_that_share_a_job_keep_what_both_ask_for(tmp_path):
     assert one.key == other.key
     assert serving_both(one, other).output.signals
     keep(tmp_path, simulate(one))
-    assert not read_store(tmp_path).status(one.key).serves(other)
+    assert not read_store(tmp_path).status(one.key).satisfies(other)
     assert measure(other).attributes["signals"] == 1
     assert not SERIES.keys() & SIGNALS.keys()

@@ -232,7 +232,7 @@ def test_what_a_stored_job_serves(row, ideal, tmp_path):
     *_, asks, exact, serves = row
     stored_as(row, ideal, tmp_path, ideal.attrs["key"])
     case = Case.resolve({"output": {"keep": asks, "precision": exact}})
-    assert store.read_store(tmp_path).status(ideal.attrs["key"]).serves(case) == serves
+    assert store.read_store(tmp_path).status(ideal.attrs["key"]).satisfies(case) == serves
 
 
 def test_many_jobs_serve_as_each_does(ideal, tmp_path):
@@ -248,7 +248,7 @@ def test_many_jobs_serve_as_each_does(ideal, tmp_path):
     ):
         output = {"keep": keeps, "precision": precision}
         case = Case.resolve({"output": output, "solve": {"error_bars": bars}})
-        each = [stored.status_at(position).serves(case) for position in positions]
+        each = [stored.status_at(position).satisfies(case) for position in positions]
         assert stored.serving(positions, case).tolist() == each
         told |= {*each}
     assert told == {True, False}

@@ -107,7 +107,7 @@ def timed_as(monkeypatch, seconds):
         made.append(case)
         return seconds(case), 0, False
 
-    monkeypatch.setattr(plan, "ran", ran)
+    monkeypatch.setattr(plan, "run_timed", ran)
     monkeypatch.setattr(plan, "compile_once", lambda *_: None)
     return made
 
@@ -152,7 +152,7 @@ def test_the_range_is_student_s_and_knows_what_was_timed():
 
 def test_loading_the_search_for_chaos_is_no_part_of_a_job_s_time(studies, monkeypatch):
     took = iter([60.0, 2.0, 3.0])
-    monkeypatch.setattr(plan, "ran", lambda case: (next(took), 0, True))
+    monkeypatch.setattr(plan, "run_timed", lambda case: (next(took), 0, True))
     monkeypatch.setattr(plan, "SEARCHED", [])
     (case,) = studies(one={})[0].cases
     turns = case.duration / case.turn

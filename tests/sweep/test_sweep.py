@@ -287,7 +287,7 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
 
     monkeypatch.setattr(warm_up, "load", load)
     monkeypatch.setattr(
-        warm_up, "load_telling", lambda a, words, say: (load(a), told.append(words))
+        warm_up, "load_with_remark", lambda a, words, say: (load(a), told.append(words))
     )
     with pytest.raises(KeyboardInterrupt):
         warm_up.compile_once(needs, pytest.fail)
