@@ -180,6 +180,7 @@ def report_error(error: Exception) -> int:
     if isinstance(error, MemoryError) or any(words in str(error) for words in NO_ROOM):
         say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
         return INTERNAL
+    # raised by click's echo: stdout does not take it, such as a full disk
     if isinstance(error, OSError) and traceback.extract_tb(error.__traceback__)[-1].name == "echo":
         say(f"compsim: stdout: {error.strerror}; the same command prints it again")
         discard_output()

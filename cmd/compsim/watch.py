@@ -137,7 +137,7 @@ class PageWatch:
         """Return whether the process has written the ordinary page and has ended."""
         process = self.process
         with contextlib.suppress(BrokenPipeError):
-            self.pipe().close()
+            self.pipe().close()  # which starts a process where none has begun, or it has died
         process = process or self.process
         assert process
         if not self.idle:

@@ -112,6 +112,7 @@ def model_of(values: Mapping[str, Any]) -> str:
 # Results of one key agree within the sum of their error bars, whichever version of the program made
 # them, unless a revision has changed them (`CHANGES`); to the bit they are equal only for one
 # version of program and libraries on one kind of processor
+# keys of stored jobs were made with the loads' older names, and stay
 LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))

@@ -48,12 +48,12 @@ def stands_for(key: str) -> tuple[str, ...]:
 
 
 def row_of(key: str) -> Parameter | None:
-    """Return the row of the table that a key's values must keep; None where there is none."""
+    """Return the table's row of a key, of a shorthand that of its first key; None for no key."""
     return table().get(next(iter(stands_for(key)), key))
 
 
 def phrase_of(key: str) -> str:
-    """Return what a key's values are called: of a shorthand, what each of its keys' is."""
+    """Return the phrase of a key's values, such as "crank radius"; an unknown key as it is."""
     row = row_of(key)
     return SHORTHANDS[key].each if key in SHORTHANDS else row.phrase if row else key
 

@@ -31,7 +31,8 @@ def back_action(case: Settings, axis: str, frequency: Any) -> Any:
     the force, and the response of a body coupled both ways is that of one driven one way over
     1 - m G / M. Exact for ideal joints.
 
-    frequency: Hz, a number or an array; axis: x or y.
+    case: one with a body. frequency: Hz, a number or an array, whose shape the result has; axis: x
+    or y.
     """
     body = case.body
     assert body is not None
@@ -353,6 +354,7 @@ class _Known:
         key = self._prefix + name
         if key in self._wrong:
             raise _Unknown(key)
+        # properties and methods run on this view: what they read is looked up here, too
         member = getattr(type(self._values), name, None)
         if isinstance(member, property) and member.fget:
             return member.fget(self)

@@ -25,7 +25,7 @@ Schema = dict[str, Any]
 
 
 def case_schema() -> Schema:
-    """Return the schema of a whole case file, in the dialect 2020-12."""
+    """Return the JSON Schema of a whole case file, in the dialect 2020-12."""
     found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in _top_keys()}
     found |= _sweeps() | {"regimes": _regimes()}
     in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}

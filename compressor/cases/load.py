@@ -79,7 +79,7 @@ class KeysRead:
             if where not in self.read and known and not is_off(key, node.value):
                 unread.append(UnreadKey(where, key, node))
         for number in block.numbers:
-            if not unread:
+            if not unread:  # cases are built only until each key has a reader
                 break
             for case in self.variants(block.case(number)):
                 self.read |= {one.where for one in unread if one.is_read(case)}
@@ -138,7 +138,7 @@ class _Draft:
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
     """Return the cases of YAML case files, in the order of the files and of their axes.
 
-    A list of values in a file is an axis, and axes multiply; `configs/README.md` tells every key.
+    A list of values in a file is an axis, and axes multiply; `configs/README.md` lists every key.
     Raises CaseFileError with everything that is wrong in all files, each with its place.
 
     >>> import compressor

@@ -49,7 +49,8 @@ def composite_modulus(first, second):
 def joint_stiffness(contact: "Contact", pin_radius_mm: float, clearance_mm: float) -> float:
     """Return the stiffness that scales a joint's law: K (N/m^p), or pi E* L (N/m) with johnson.
 
-    With liu K (N/m^1.5) at small penetrations, which depends on the clearance; 0 without any.
+    K is the case's, or Eq. 15's of the materials (`contact_stiffness`). With liu it is K (N/m^1.5)
+    at small penetrations, which depends on the clearance; 0 without any.
     """
     pin, clearance = to_si(pin_radius_mm, "mm"), to_si(clearance_mm, "mm")
     if contact.law in CYLINDRICAL:

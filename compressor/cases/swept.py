@@ -196,11 +196,12 @@ def design_size(kind: str, count: int, keys: int) -> int:
 def design(kind: str, count: int, keys: int, seed: int) -> list[list[float]]:
     """Return the points of a sampling design: `count` of `keys` coordinates in [0, 1).
 
-    The same seed gives the same points. `random` is uniform, `lhs` a Latin hypercube, `sobol`
-    Sobol's sequence, scrambled, whose balance is best where `count` is a power of two. `saltelli`
-    has `count` points A and as many B, both of one Sobol's sequence, and then for each coordinate A
-    with that of B in its place: `design_size` points, from which a variance-based sensitivity is
-    estimated (Saltelli et al., Computer Physics Communications 181, 2010, 259-270).
+    kind: a word of `SAMPLED`. The same seed gives the same points. `random` is uniform, `lhs` a
+    Latin hypercube, `sobol` Sobol's sequence, scrambled, whose balance is best where `count` is a
+    power of two. `saltelli` has `count` points A and as many B, both of one Sobol's sequence, and
+    then for each coordinate A with that of B in its place: `design_size` points, from which a
+    variance-based sensitivity is estimated (Saltelli et al., Computer Physics Communications 181,
+    2010, 259-270).
     """
     if kind == "saltelli":
         points = design("sobol", count, 2 * keys, seed)

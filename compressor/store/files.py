@@ -104,7 +104,10 @@ def refusals(path: Folder) -> Iterator[None]:
 
 
 def publish(path: Path, data: bytes, pending: bool = False) -> None:
-    """Write a whole file under its name, durably, or leave what was there; see `publishing`."""
+    """Write a whole file under its name, durably, or leave what was there, as `publishing` does.
+
+    Raises StoreError where the disk refuses.
+    """
     with publishing(path, pending) as file:
         file.write(data)
 

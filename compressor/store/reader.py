@@ -280,6 +280,7 @@ def _usable(segment: Segment) -> np.ndarray:
     usable = ~has_series | np.isin(wanted, names)
     for position in np.flatnonzero(~usable):  # a listing may miss what gets its name meanwhile
         path = segment.place / "jobs" / wanted[position].decode()
+        # looked for twice: it may get its name while it is looked for under the pending one
         usable[position] = path.exists() or pending_path(path).exists() or path.exists()
     return usable
 
@@ -381,7 +382,7 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     number or inf, as of single peaks of a chaotic motion, or was not made; and where a job failed.
 
     Raises StoreError for a folder without results and for a study that it does not hold: a
-    WrongName, which tells what was probably meant. Damaged files are told by a StoreWarning, and
+    WrongName, which says what was probably meant. Of damaged files a StoreWarning is given, and
     their jobs count as missing.
 
     After `compsim run wear.yaml` with the file of `load_cases`:

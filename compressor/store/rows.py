@@ -288,6 +288,7 @@ class Rows:
             )
             for name, (kind, *_) in COLUMNS.items()
         }
+        # by key, completeness and serial: of a key's rows the last one counts
         order = np.lexsort((columns["serial"], completeness(columns), columns["key"]))
         keys = columns["key"][order]
         chosen = order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]

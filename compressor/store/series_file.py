@@ -46,7 +46,10 @@ def series_path(place: Path, key: str, checksum: str) -> Path:
 
 
 def write_series(place: Path, dataset: "DatasetParts | xr.Dataset", output: Output) -> SeriesFile:
-    """Write the file of a job's Dataset, or of what it is made of; a `Writer` gives it its name."""
+    """Write the file of a job's Dataset, or of its parts; a `Writer` gives it its name.
+
+    place: the folder that holds `jobs`. Raises StoreError where the disk refuses.
+    """
     file, data = series_file(dataset, output)
     store_series(place, dataset.attrs["key"], file, data)
     return file
@@ -59,7 +62,10 @@ def series_file(dataset: "DatasetParts | xr.Dataset", output: Output) -> tuple[S
 
 
 def store_series(place: Path, key: str, file: SeriesFile, data: bytes) -> None:
-    """Write the bytes of a job's file; a `Writer` gives it its name."""
+    """Write the bytes of a job's file; a `Writer` gives it its name.
+
+    Raises StoreError for what is no key, and where the disk refuses.
+    """
     publish(series_path(place, key, file.digest), data, pending=True)
 
 
@@ -80,7 +86,10 @@ def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
 
 
 def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
-    """Return what `write_dataset` wrote. Raises DamagedJob for a foreign or damaged file."""
+    """Return what `write_dataset` wrote. Raises DamagedJob for a foreign or damaged file.
+
+    Raises OSError where the file cannot be read. remedy: the end of the error's text.
+    """
     import xarray as xr
 
     data = unseal(path.read_bytes(), path, remedy)

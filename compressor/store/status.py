@@ -69,7 +69,7 @@ def study_caveats(rows: Rows, study: StoredStudy) -> list[str]:
 
 
 def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:
-    """Return what only a run can tell of a study: motions not seen to repeat, clipped records."""
+    """Return a sentence for each caveat that runs show: unrepeated motions, clipped records."""
     positions = rows.find(study.keys)
     there = positions >= 0
     there[there] = rows.words["status"][positions[there]] == "ok"

@@ -104,7 +104,7 @@ class Again(NamedTuple):
 
 
 def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[str, str]]:
-    """Return the values of a swept key as a coordinate, and its attributes.
+    """Return the values of a swept key as a coordinate, (jobs,), and its attributes.
 
     Numbers, nan where a job has none, have a unit; others are words, "" where there is none.
     """
@@ -210,7 +210,7 @@ def write_study(
     """Write which jobs a study has; a study that is stored already is left as it is.
 
     One that is replaced stays as a former study where finished jobs, of those that `stored` gives,
-    are no longer in the new one.
+    are no longer in the new one. Raises StoreError where the disk refuses.
     """
     axes = [StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes]
     new = StoredStudy(
@@ -290,6 +290,7 @@ def read_study(path: Path) -> StoredStudy:
             raise ValueError
         if not study.is_grid and {*sizes} - {study.jobs}:
             raise ValueError
+        # a sound file is what would be written of it again, its digest included
         if encode(study) != data or not _is_sound(study, path):
             raise ValueError
         study = _in_present_words(study)

@@ -94,7 +94,7 @@ class Batches:
         """Yield how each job ended; workers end with the iterator."""
         try:
             yield from self.run_pending(pulse)
-        except GeneratorExit:
+        except GeneratorExit:  # a generator that is closed may yield nothing more
             raise
         except BaseException:
             self.stop()

@@ -234,9 +234,11 @@ def run_here(
     remark: Callable[[str], None],
     pulse: Callable[[], object] = lambda: None,
 ) -> Generator[JobResult | JobLost, None, None]:
-    """Return `run_batches` in processes that load the equations, compiled before if there is a job.
+    """Return the generator of how jobs end in processes here, which load the equations first.
 
-    Where the needs name scenes for lanes, jobs are cases, and `work` takes what `run_ahead` gives.
+    They are compiled before, if there is a job. Where the needs name scenes for lanes, jobs are
+    cases, and `work` takes what `run_ahead` gives. Raises what `run_batches` raises, and
+    UnsupportedSystem on Windows.
     """
     require_posix()
     if jobs:

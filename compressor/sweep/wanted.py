@@ -204,7 +204,7 @@ class SweepWork:
             for of, turns in self.ahead.items()
             if of in self.behind
         )
-        at_once = self.seconds / elapsed
+        at_once = self.seconds / elapsed  # jobs at work at a time, in the mean
         since = self.clock() - self.last
         return RemainingWork(max(0.0, seconds / at_once - since), unknown > 0)
 
