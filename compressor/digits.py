@@ -6,8 +6,8 @@ Without libraries: results are read without any.
 import math
 
 UNKNOWN = "unknown"  # a number whose error bar is as long as itself
-PLAIN, MOST = 6, 12  # digits without an error bar, and with one
-SMALL, LARGE = 1e-3, 1e7  # sizes between which a number is written without a power of ten
+DIGITS_WITHOUT_BAR, MAX_DIGITS = 6, 12  # digits without an error bar, and with one
+MIN_DECIMAL, MAX_DECIMAL = 1e-3, 1e7  # sizes of numbers written without a power of ten
 
 
 def is_known(value: float, bar: float, relative: bool = True) -> bool:
@@ -29,19 +29,19 @@ def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) 
     if math.isnan(value):
         return "–"
     if math.isnan(bar):
-        return f"{value:.{PLAIN}g}"
+        return f"{value:.{DIGITS_WITHOUT_BAR}g}"
     if not is_known(value, bar, relative):
         return UNKNOWN
     if bar == 0.0:
-        return f"{value:.{PLAIN}g}"
+        return f"{value:.{DIGITS_WITHOUT_BAR}g}"
     if not relative and bar >= abs(value):
         return f"≤ {_rounded_up(abs(value) + bar)[0]:g}"
     error, place = _rounded_up(bar)
     top = math.floor(math.log10(abs(value))) if value else place
-    place = max(place, top - (PLAIN if bare else MOST) + 1)
+    place = max(place, top - (DIGITS_WITHOUT_BAR if bare else MAX_DIGITS) + 1)
     error = max(error, 10.0**place)
     pair: tuple[float, ...] = (value,) if bare else (value, error)
-    if SMALL <= abs(value) < LARGE or value == 0.0:
+    if MIN_DECIMAL <= abs(value) < MAX_DECIMAL or value == 0.0:
         return " ± ".join(f"{round(number, -place):.{max(0, -place)}f}" for number in pair)
     text = " ± ".join(f"{number / 10.0**top:.{max(0, top - place)}f}" for number in pair)
     return f"{text if bare else f'({text})'}e{top:+03d}"

@@ -23,7 +23,7 @@ THREAD_VARIABLES = (
     "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
 )  # fmt: skip
 MAX_MEANT = 3  # words that may have been meant
-LONGEST_WORD = 100  # characters of a word that others are compared with
+MAX_WORD_LENGTH = 100  # characters of a word that others are compared with
 
 
 Progress = Callable[[int, int, str], None]  # things done, things in all, a remark or ""
@@ -109,7 +109,7 @@ def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | N
     its stem, too; upper and lower case are the same.
     """
     names = {name.casefold(): name for name in known}
-    spellings = [word[:LONGEST_WORD].casefold()]
+    spellings = [word[:MAX_WORD_LENGTH].casefold()]
     spellings.append(Path(spellings[0]).stem)
     matches = (get_close_matches(spelling, names, MAX_MEANT) for spelling in spellings)
     similar = next(filter(None, matches), [])

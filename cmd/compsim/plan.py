@@ -81,7 +81,7 @@ def plan(
     found = forecast(studies, output, first)
     workers = jobs or cores()
     if as_json:
-        whole = without_nan(dataclasses.asdict(found.timed(workers, say)) | more)
+        whole = without_nan(dataclasses.asdict(found.with_times(workers, say)) | more)
         print_text(json.dumps(whole, indent=1))
         return DONE
     width = max(len(part.study) for part in found.counts.studies)
@@ -89,7 +89,7 @@ def plan(
         print_text(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
                    f"{part.missing:>4} missing")  # fmt: skip
     if found.counts.missing:
-        print_text(cost(found.timed(workers, say)))
+        print_text(cost(found.with_times(workers, say)))
     for job in found.counts.first:
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
         print_text(f"next: {job.study}{point}")

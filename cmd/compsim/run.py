@@ -147,7 +147,7 @@ def run_jobs(
             def show(now: "SweepProgress") -> None:
                 progress.show_sweep(now)
                 if watch:
-                    watch.stands(now)
+                    watch.update(now)
 
             how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
                           backend=elsewhere, pulse=show)  # fmt: skip

@@ -68,13 +68,13 @@ class PageWatch:
         if error is not None:
             again = "" if isinstance(error, Exception) else "; Ctrl-C again ends at once"
             say(f"writing {self.page} once more{again}")
-        self.hear()
+        self.read_answers()
         while self.deaths < MAX_DEATHS and not self.finished():
             pass
 
-    def stands(self, now: "SweepProgress") -> None:
+    def update(self, now: "SweepProgress") -> None:
         """Have a page written if it is time; called several times a second."""
-        self.hear()
+        self.read_answers()
         if not self.idle or time.monotonic() < self.due or self.deaths >= MAX_DEATHS:
             return
         running = {
@@ -91,43 +91,43 @@ class PageWatch:
         """Return the input of the process, which is started where there is none."""
         if self.process is None:
             self.process = start_process(self.settings)
-            threading.Thread(target=self.listen, args=[self.process], daemon=True).start()
+            threading.Thread(target=self.collect_answers, args=[self.process], daemon=True).start()
         assert self.process.stdin
         return self.process.stdin
 
-    def listen(self, process: "subprocess.Popen[str]") -> None:
+    def collect_answers(self, process: "subprocess.Popen[str]") -> None:
         """Read answers of a process until it ends: in a thread."""
         assert process.stdout
         for line in process.stdout:
             self.answers.put(json.loads(line))
         self.answers.put({"ended": process.wait()})
 
-    def hear(self, wait: bool = False) -> dict[str, Any]:
+    def read_answers(self, wait: bool = False) -> dict[str, Any]:
         """Act on the answers that have come; with `wait`, on the next one, which is returned."""
         answer: dict[str, Any] = {}
         with contextlib.suppress(queue.Empty):
             while True:
                 answer = self.answers.get(block=wait)
-                self.take(answer)
+                self.act_on(answer)
                 if wait:
                     break
         return answer
 
-    def take(self, answer: dict[str, Any]) -> None:
+    def act_on(self, answer: dict[str, Any]) -> None:
         """Act on an answer: a page was written, or not, or the process has ended."""
         self.idle = True
         if "ended" in answer:
             self.process = None
             if answer["ended"]:
                 self.deaths += 1
-                self.tell(f"what writes it ended with {exit_text(answer['ended'])}")
+                self.report_problem(f"what writes it ended with {exit_text(answer['ended'])}")
         self.due = time.monotonic() + SECONDS
         if answer.get("drawn", True):
             self.draw_due = time.monotonic() + REDRAW_FACTOR * answer.get("seconds", 0.0)
         if answer.get("problem"):
-            self.tell(answer["problem"])
+            self.report_problem(answer["problem"])
 
-    def tell(self, problem: str) -> None:
+    def report_problem(self, problem: str) -> None:
         """Report once what is wrong with the page."""
         if problem not in self.problems:
             self.problems.add(problem)
@@ -142,7 +142,7 @@ class PageWatch:
         assert process
         if not self.idle:
             process.send_signal(signal.SIGINT)  # leave the page that is being written
-        while "ended" not in (answer := self.hear(wait=True)):
+        while "ended" not in (answer := self.read_answers(wait=True)):
             pass
         return not answer["ended"]
 

@@ -17,7 +17,7 @@ from typing import Any, cast
 
 from compressor.cases.checks import SHORTHANDS, row_of, value_in
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
-from compressor.cases.optional_groups import GREATEST_RATIO, MIN_RATIO
+from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, Problem, Reader
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
@@ -216,7 +216,7 @@ def cylinder_conflicts(case: Settings) -> Iterator[Problem]:
         yield Problem("contact.materials", f"{needed} [steel, copper], or give modulus_GPa")
 
 
-SLIM = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
+MIN_BAR_INERTIA = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
 
 
 def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
@@ -226,11 +226,11 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
     for joint in JOINTS:
         width = 2.0 * case.machine.pin_radius(joint)
         ratio = case.lubricant.bearing_length_mm / width
-        if case.joint in (joint, "both") and not MIN_RATIO <= ratio <= GREATEST_RATIO:
+        if case.joint in (joint, "both") and not MIN_RATIO <= ratio <= MAX_RATIO:
             yield Problem(
                 "lubricant.bearing_length_mm",
                 f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
-                f"hold from {MIN_RATIO:g} to {GREATEST_RATIO:g} times",
+                f"hold from {MIN_RATIO:g} to {MAX_RATIO:g} times",
             )
 
 
@@ -265,7 +265,7 @@ def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
                 "machine.rod_centre_mm", "an elastic rod is a uniform bar: leave the key out"
             )
         least = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2 / 12
-        if (machine.rod_inertia_kg_m2 or 0.0) < SLIM * least:
+        if (machine.rod_inertia_kg_m2 or 0.0) < MIN_BAR_INERTIA * least:
             yield Problem(
                 "machine.rod_inertia_kg_m2",
                 f"an elastic rod is a uniform bar, which has {least:.4g} kg m2 at least: leave "
@@ -286,8 +286,8 @@ IN_PLACE_OF = (
     ("contact.materials", "contact.stiffness_N_per_mm15"),
     ("contact.materials", "contact.modulus_GPa"),
 )
-HEAVIEST = 0.1  # the moving parts' share of a body's mass
-MAX_BACK = 0.3  # of a force that a body's motion may change at the speed's first two orders
+MAX_MOVING_SHARE = 0.1  # the moving parts' share of a body's mass
+MAX_BACK_ACTION = 0.3  # of a force that a body's motion may change at the speed's first two orders
 MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
@@ -372,11 +372,11 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     if case.output.keep != "series":
         yield Problem("body", "moves in time series: it needs output.keep: series")
     share = moving_mass(case) / body.mass_kg
-    if share > HEAVIEST:
+    if share > MAX_MOVING_SHARE:
         yield Problem(
             "body.mass_kg",
             f"the moving parts have {100 * share:.2g} % of the body's mass; it is driven one way, "
-            f"which holds up to {100 * HEAVIEST:g} %: give a heavier body",
+            f"which holds up to {100 * MAX_MOVING_SHARE:g} %: give a heavier body",
         )
     for axis in sorted({*body.freedoms[:2]} & {*AXES}):
         yield from _resonance_conflicts(case, axis)
@@ -400,7 +400,7 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
     for order in (1, 2):
         frequency = order * case.machine.speed_rpm / 60.0
         back = abs(back_action(case, axis, frequency))
-        if back > MAX_BACK:
+        if back > MAX_BACK_ACTION:
             key = f"frequency_{axis}_Hz"
             yield Problem(
                 f"body.{key}",

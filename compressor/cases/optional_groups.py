@@ -22,7 +22,7 @@ from compressor.cases.parameter import (
     parameter,
 )
 
-MIN_RATIO, GREATEST_RATIO = 0.125, 1.0  # of a bearing's length and diameter
+MIN_RATIO, MAX_RATIO = 0.125, 1.0  # of a bearing's length and diameter
 
 
 @document_fields

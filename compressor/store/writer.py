@@ -46,7 +46,7 @@ from compressor.store.series_file import series_path
 MAX_ROWS = 4096  # in a segment that is written at once; one with fewer is small
 MAX_AGE = 1.0  # s between two writings, if they are small
 MAX_SMALL = 32  # small segments before they are merged
-FEW_SMALL = 8  # that may stay when the writer ends
+MAX_SMALL_AT_END = 8  # that may stay when the writer ends
 LOCK_SECONDS = 1.0  # s for which a lock's holder may leave its file empty
 SHARD = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}")
 
@@ -108,7 +108,7 @@ class Writer:
         try:
             with contextlib.suppress(StoreError) if kind else contextlib.nullcontext():
                 self.flush()
-                if not kind and len(self.small) > FEW_SMALL:
+                if not kind and len(self.small) > MAX_SMALL_AT_END:
                     self._merge_small()
         finally:
             _release(self.lock)

@@ -135,11 +135,11 @@ def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) ->
     return pickle.dumps(ends, pickle.HIGHEST_PROTOCOL)
 
 
-CENSUS = 2.0  # s between two counts of the workers
+SECONDS_BETWEEN_COUNTS = 2.0  # s between two counts of the workers
 MAX_BYTES = 100_000_000  # of results that may be on their way
 SECONDS_TO_REMARK = 5.0  # s without a result before a remark on it
 STARTING_REMARK = "the cluster's workers load, or compile, the equations (under a minute)"
-WAITING = "the cluster has no workers: waiting for the first"
+WAITING_REMARK = "the cluster has no workers: waiting for the first"
 
 
 class Remote(Batches):
@@ -181,14 +181,14 @@ class Remote(Batches):
 
     def watch(self, now: float, news: bool) -> None:
         """Count the threads of all workers now and then; remark where there are none."""
-        if now - self.census < CENSUS:
+        if now - self.census < SECONDS_BETWEEN_COUNTS:
             return
         try:
             threads = [*self.client.nthreads().values()]
         except (OSError, TimeoutError, ValueError) as error:
             raise describe_lost_scheduler(self.client) from error
         if not threads and self.threads:
-            self.remark(WAITING)
+            self.remark(WAITING_REMARK)
         self.threads, self.census, self.width = sum(threads), now, max(len(threads), 1)
         self.target_seconds = self.rules.target_seconds * max(sum(threads) / self.width, 1)
         if threads and not self.weight and now > self.patience:
@@ -246,9 +246,10 @@ def describe_lost_scheduler(client: Any) -> ClusterError:
 
 
 EXTRA = "--backend dask needs dask.distributed: pip install 'compsim[dask]'"
-CONNECTING = 8.0  # s until a scheduler that does not answer counts as not there
-CLOSING = 2.0  # s in which a scheduler may take leave
-CHECKING = 60.0  # s in which workers may tell their versions before the jobs; later ones with them
+CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
+CLOSE_SECONDS = 2.0  # s in which a scheduler may take leave
+# s in which workers may tell their versions before the jobs; later ones with them
+CHECK_SECONDS = 60.0
 
 
 class Cluster:
@@ -267,9 +268,9 @@ class Cluster:
             raise ClusterError(EXTRA) from error
         for name in ("distributed", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # we speak for it
-        dial = partial(Client, self.address, timeout=CONNECTING, set_as_default=False)
+        dial = partial(Client, self.address, timeout=CONNECT_SECONDS, set_as_default=False)
         try:
-            self.client = within(CONNECTING + 1, dial)
+            self.client = within(CONNECT_SECONDS + 1, dial)
         except Exception as error:
             remedy = "is one running there? `dask scheduler` starts one, and tells its address"
             raise ClusterError(f"{self.address}: no scheduler answers; {remedy}") from error
@@ -282,14 +283,14 @@ class Cluster:
 
     def __exit__(self, *_: object) -> None:
         with contextlib.suppress(OSError, TimeoutError):  # the scheduler may be gone
-            self.client.close(timeout=CLOSING)
+            self.client.close(timeout=CLOSE_SECONDS)
 
     def check(self) -> None:
         """Compare the versions of all present workers with ours. Raises ClusterError."""
         ours, unfit = versions(), []
         with contextlib.suppress(TimeoutError):
             ask = partial(self.client.run, versions, on_error="return")
-            for address, theirs in within(CHECKING, ask).items():
+            for address, theirs in within(CHECK_SECONDS, ask).items():
                 known = isinstance(theirs, dict)
                 why = differences(ours, theirs) if known else unfitness(theirs)
                 unfit += [f"worker {address}: {why}"] if why else []

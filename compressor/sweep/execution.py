@@ -49,7 +49,7 @@ End = JobResult | JobLost
 TICK = 0.1  # s between two looks at the clocks of the jobs
 MAX_BATCH = 200  # jobs
 BATCHES_AHEAD = 3  # that a worker has at most: one at work, others on their way
-MEMORY = 50  # jobs that a mean of their seconds rests on
+MAX_JOBS_IN_MEAN = 50  # jobs that a mean of their seconds rests on
 FAILED_ALONE = "also when it ran again alone"
 
 
@@ -193,7 +193,7 @@ class Batches:
                 again = end.reason == Reason.OUT_OF_MEMORY and FAILED_ALONE not in end.detail
                 yield from self.lose(job, end, again)
                 continue
-            known = min(self.weight, MEMORY)
+            known = min(self.weight, MAX_JOBS_IN_MEAN)
             self.mean, self.weight = (known * self.mean + end.seconds) / (known + 1), known + 1
             try:
                 end = replace(end, id=job.id, result=self.decode(end.result))
@@ -216,11 +216,11 @@ def error_of(ended: "Future[Any]") -> BaseException | None:
     return CancelledError() if ended.cancelled() else ended.exception()
 
 
-STALL = 60.0  # s without any result, while no job runs, after which all workers are killed
+STALL_SECONDS = 60.0  # s without any result, while no job runs, after which all workers are killed
 # s that workers may take to begin: what they prepare may have to be compiled
 MAX_START_SECONDS = 600.0
 IDLE_SECONDS = 300.0  # after which a worker without a batch ends
-FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
+MAX_FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
 ELSEWHERE = "run these jobs in a process of their own"
 POOL = threading.Lock()
 # BrokenPipeError: loky's own helper was killed
@@ -348,7 +348,7 @@ class Local(Batches):
                 self.late.add(pid)
                 kill([pid])
         self.begun = self.begun or latest > self.last_news
-        patience = STALL if self.begun else MAX_START_SECONDS
+        patience = STALL_SECONDS if self.begun else MAX_START_SECONDS
         if self.out and not at_work and now - latest > patience:
             kill(self.processes)
 
@@ -380,7 +380,7 @@ class Local(Batches):
                 self.waiting.extendleft(reversed(batch))
         if not running:  # nobody is named: smaller batches will tell
             self.fruitless, self.most = self.fruitless + 1, max(1, largest // 2)
-            if self.fruitless > FRUITLESS:
+            if self.fruitless > MAX_FRUITLESS:
                 how = batch_ending(next((codes[pid] for pid in died), None))
                 raise WorkersFailed(f"jobs could not even begin: {how}")
         self.discard()

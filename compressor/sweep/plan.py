@@ -23,7 +23,7 @@ from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
 ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
 MAX_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
 TIMED_JOBS = 12  # jobs of a study that are timed
-TIMING = 4.0  # s of timing, of all studies, after which no further job is begun
+TIMING_SECONDS = 4.0  # s of timing, of all studies, after which no further job is begun
 SEARCHED: list[str] = []  # the first job of this process in which chaos was looked for
 
 
@@ -78,14 +78,14 @@ class Forecast:
 
 
 class Ahead:
-    """What is ahead of some studies: `counts`, a Forecast without times and bytes, and `timed`."""
+    """What is ahead of some studies: `counts` is a Forecast without times and bytes."""
 
     def __init__(self, counts: Forecast, missing: dict[str, list[str]], cases: dict[str, Case]):
         self.counts = counts
         self.missing = missing  # keys, by study
         self.cases = cases  # of some of them, by key
 
-    def timed(self, workers: int, remark: Callable[[str], None]) -> Forecast:
+    def with_times(self, workers: int, remark: Callable[[str], None]) -> Forecast:
         """Return the whole forecast, for so many processes; `remark` is told of compiling."""
         if not self.counts.missing:
             return self.counts
@@ -94,7 +94,7 @@ class Ahead:
         compile_once(needs, remark)
         drawn = {part.study: draw_cases(self.missing[part.study], self.cases)
                  for part in self.counts.studies if part.missing}  # fmt: skip
-        costs = time_in_turn(drawn, TIMING)
+        costs = time_in_turn(drawn, TIMING_SECONDS)
         parts = [
             self.estimate(part, costs[part.study]) if part.missing else part
             for part in self.counts.studies

@@ -139,7 +139,7 @@ def stored_ends(store: Stored, wanted: RequestedJobs) -> dict[str, JobEnd]:
 
 
 MIN_JOBS_FOR_ETA = 5  # jobs that a guess rests on
-SOONEST = 1.0  # s of work before there is one
+MIN_SECONDS_FOR_ETA = 1.0  # s of work before there is one
 MIN_MEASURED_SHARE = 0.5  # of the revolutions ahead must be of kinds that are measured
 
 
@@ -194,7 +194,7 @@ class SweepWork:
     def left(self) -> RemainingWork | None:
         """Return what is left to do; None as long as too little is known to say."""
         elapsed = self.last - self.began
-        if self.ends < MIN_JOBS_FOR_ETA or elapsed < SOONEST or not self.seconds:
+        if self.ends < MIN_JOBS_FOR_ETA or elapsed < MIN_SECONDS_FOR_ETA or not self.seconds:
             return None
         unknown = sum(turns for of, turns in self.ahead.items() if of not in self.behind)
         if unknown > (1.0 - MIN_MEASURED_SHARE) * sum(self.ahead.values()):

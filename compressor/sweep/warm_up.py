@@ -36,7 +36,7 @@ WHAT = {
     "features-horizon": ("the horizon of mechanisms with features", 20),
 }  # by part: what it is, and the seconds that it takes an idle core
 LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes of which runs march side by side
-FEWEST, MANY = 16, 4000  # jobs of a scene that lanes are loaded for, and compiled for
+MIN_JOBS_TO_LOAD, MIN_JOBS_TO_COMPILE = 16, 4000  # of a scene, for its lanes
 MAX_JOBS_SEEN = 1000  # jobs that are looked at for it
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
@@ -92,7 +92,10 @@ class Needs(NamedTuple):
         step = max(1, len(cases) // MAX_JOBS_SEEN)
         sample = (cases[i] for i in range(0, len(cases), step))
         counts = Counter(case.joint for case in sample if case.is_plain)
-        least = {of: FEWEST if marker(f"lanes-{of}").exists() else MANY for of in LANES}
+        least = {
+            of: MIN_JOBS_TO_LOAD if marker(f"lanes-{of}").exists() else MIN_JOBS_TO_COMPILE
+            for of in LANES
+        }
         worthwhile = (of for of, joint in LANES.items() if counts[joint] * step >= least[of])
         return self._replace(lanes=tuple(worthwhile))
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from compressor.reasons import Reason
 
-OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
+MAX_OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
 MAX_TEXT = 20_000  # characters of a traceback
 ENDING = [signal.SIGINT, signal.SIGTERM]
 if hasattr(signal, "SIGHUP"):  # not on Windows
@@ -140,7 +140,7 @@ def do_batch(path: str, payloads: Sequence[bytes]) -> str:
             found.append(perform(job, start - each))
             start = time.monotonic()
             NOTE.pack_into(note, 0, os.getpid(), position, -start)
-            if start - began > OVERRUN * HERE["rules"].target_seconds:
+            if start - began > MAX_OVERRUN * HERE["rules"].target_seconds:
                 break
         file.seek(NOTE.size)
         pickle.dump(found, file, pickle.HIGHEST_PROTOCOL)

@@ -67,7 +67,8 @@ def stub_sweep(jobs):
     with ProcessPoolExecutor(1) as other:  # as in a real run, this process has no equations
         found = other.submit(measured, study.cases[0]).result()
     sys.modules["compressor.sweep.sweep"].run_job = functools.partial(answered, found)
-    warm_up.FEWEST = warm_up.MANY = math.inf  # no lanes: they would simulate
+    # no lanes: they would simulate
+    warm_up.MIN_JOBS_TO_LOAD = warm_up.MIN_JOBS_TO_COMPILE = math.inf
     sweep([study], "results", 2)
 
 

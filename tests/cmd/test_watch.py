@@ -75,8 +75,8 @@ def until(condition):
 def answered(one):
     """Have a page written, and wait until the process has answered."""
     one.due = 0.0
-    one.stands(NOW)
-    until(lambda: one.hear() or one.idle)
+    one.update(NOW)
+    until(lambda: one.read_answers() or one.idle)
 
 
 def test_the_process_is_told_how_the_sweep_stands_and_ends_with_the_ordinary_page(watched, capsys):
@@ -86,7 +86,7 @@ def test_the_process_is_told_how_the_sweep_stands_and_ends_with_the_ordinary_pag
         answered(one)
         assert one.draw_due - time.monotonic() == pytest.approx(30.0, abs=5)
         one.due = time.monotonic() + 60
-        one.stands(NOW)  # too early
+        one.update(NOW)  # too early
         answered(one)
         one.draw_due = 0.0
         answered(one)
@@ -108,7 +108,7 @@ def test_the_sweep_never_waits_for_a_page(watched):
         began = time.monotonic()
         for _ in range(1000):
             one.due = 0.0
-            one.stands(NOW)
+            one.update(NOW)
         assert time.monotonic() - began < 5
         until(lambda: len(noted()) == 1)
     assert noted()[1:] == ["final"]  # and what is being written is left at the end
@@ -131,9 +131,9 @@ def test_a_process_that_dies_is_started_again_a_few_times(watched, capsys):
     with made("die") as one:
         for deaths in range(1, watch.MAX_DEATHS + 1):
             answered(one)
-            until(lambda deaths=deaths: one.hear() or one.deaths == deaths)
+            until(lambda deaths=deaths: one.read_answers() or one.deaths == deaths)
         one.due = 0.0
-        one.stands(NOW)  # given up
+        one.update(NOW)  # given up
     assert len(noted()) == watch.MAX_DEATHS
     err = capsys.readouterr().err
     assert err.count("is not fresh: what writes it ended with exit code 7") == 1
@@ -237,15 +237,15 @@ def case_file(tmp_path, monkeypatch, in_process):
 def test_a_run_is_watched_from_its_first_page_to_its_last(case_file, capsys, monkeypatch):
     pages = []
 
-    def stands(self, now):
+    def update(self, now):
         if not pages:
             real(self, now)
-            until(lambda: self.hear() or self.idle)
+            until(lambda: self.read_answers() or self.idle)
             pages.append((now, Path("report/index.html").read_text()))
 
-    real = PageWatch.stands
+    real = PageWatch.update
     monkeypatch.setattr(watch, "SECONDS", 0.0)
-    monkeypatch.setattr(PageWatch, "stands", stands)
+    monkeypatch.setattr(PageWatch, "update", update)
     assert cli.main(["run", case_file, "-j", "1", "--watch"]) == 0
     assert capsys.readouterr().err.endswith("page: report/index.html\n")
     ((now, page),) = pages

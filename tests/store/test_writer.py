@@ -149,7 +149,7 @@ def test_small_segments_are_merged_and_nothing_else_changes(tmp_path, monkeypatc
         for number in range(100):
             kept = outcome(number % 75, number, detail=f"the {number}th")
             assert open_writer.add(kept) == [kept.key]
-    assert len(list(tmp_path.glob("rows/*.h5"))) <= writer.FEW_SMALL
+    assert len(list(tmp_path.glob("rows/*.h5"))) <= writer.MAX_SMALL_AT_END
     assert peaks(tmp_path) == {n: n + 75 if n < 25 else n for n in range(75)}
     found = store.read_store(tmp_path)
     details = {k: found.outcome(found.position(k)).detail for k in found.keys()}  # noqa: SIM118
@@ -160,7 +160,7 @@ def test_small_segments_are_merged_and_nothing_else_changes(tmp_path, monkeypatc
 def test_merging_does_not_make_an_old_row_new(tmp_path, monkeypatch):
     put(tmp_path, outcome(1, 10), shard="a")
     put(tmp_path, outcome(1, 11))
-    monkeypatch.setattr(writer, "FEW_SMALL", 1)
+    monkeypatch.setattr(writer, "MAX_SMALL_AT_END", 1)
     put(tmp_path, outcome(2), shard="a")
     assert len(list(tmp_path.glob("shards/a/rows/*.h5"))) == 1
     assert peaks(tmp_path) == {1: 11, 2: 2}
@@ -174,7 +174,7 @@ def test_a_reader_that_loses_the_race_with_a_merge_reads_again(tmp_path, monkeyp
     def merged_meanwhile(path):
         if not gone:
             gone.append(path)
-            monkeypatch.setattr(writer, "FEW_SMALL", 1)
+            monkeypatch.setattr(writer, "MAX_SMALL_AT_END", 1)
             put(tmp_path, outcome(3))
         return real(path)
 
@@ -568,7 +568,7 @@ def test_a_row_of_a_pickled_object_cannot_be_stored(tmp_path):
 
 @pytest.mark.parametrize("name", ["glob", "rename", "unlink", "read_bytes"])
 def test_what_a_disk_refuses_a_writer_has_a_name(name, tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "FEW_SMALL", 0)
+    monkeypatch.setattr(writer, "MAX_SMALL_AT_END", 0)
     put(tmp_path, outcome(0))
     (tmp_path / "jobs").mkdir()
     (tmp_path / "jobs" / f"{key(1)}-{key(2)}.h5").write_bytes(b"of no row")

@@ -339,7 +339,7 @@ def test_versions_tell_programs_apart():
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr(cluster, "CONNECTING", 1.0)
+    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
 
 
 def test_a_scheduler_that_is_not_there_is_an_error(impatient):
@@ -362,12 +362,12 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
 
         def remark(done, total, text):
             told.append(text)
-            if text == cluster.WAITING:
+            if text == cluster.WAITING_REMARK:
                 empty.close()
 
         with pytest.raises(ClusterError, match="the scheduler was lost; the same command goes on"):
             sweep(studies, tmp_path / "out", progress=remark, options=Options(backend=backend))
-    assert told.count(cluster.WAITING) == 1
+    assert told.count(cluster.WAITING_REMARK) == 1
 
 
 def test_without_distributed_the_extra_is_named(monkeypatch):

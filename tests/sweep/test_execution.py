@@ -299,7 +299,7 @@ def test_workers_that_die_between_jobs_are_replaced(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_worker_that_ends_amid_its_results_costs_nothing(number, tmp_path, monkeypatch):
     """No job runs whose clock tells; what is left half-written is read by nobody."""
-    monkeypatch.setattr(execution, "STALL", 2.0)
+    monkeypatch.setattr(execution, "STALL_SECONDS", 2.0)
 
     def end_amid_results():
         writing, main = False, threading.main_thread().ident
@@ -322,7 +322,7 @@ def test_a_worker_that_ends_amid_its_results_costs_nothing(number, tmp_path, mon
 
 
 def test_workers_that_cannot_begin_end_the_call(monkeypatch):
-    monkeypatch.setattr(execution, "FRUITLESS", 4)
+    monkeypatch.setattr(execution, "MAX_FRUITLESS", 4)
     with pytest.raises(WorkersFailed, match="jobs could not even begin: exit code 7"):
         list(run_batches(work, named(range(100)), Workers(2, lambda: os._exit(7))))
 
@@ -331,7 +331,7 @@ def test_what_keeps_workers_from_beginning_is_told(monkeypatch):
     def prepare():
         raise MemoryError("no room for machine code")
 
-    monkeypatch.setattr(execution, "FRUITLESS", 2)
+    monkeypatch.setattr(execution, "MAX_FRUITLESS", 2)
     with pytest.raises(WorkersFailed, match="even begin: MemoryError: no room for machine code"):
         list(run_batches(work, named(range(10)), Workers(1, prepare)))
 

@@ -83,13 +83,13 @@ def test_a_job_that_is_stored_and_does_not_serve_is_missing(studies):
 
 def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
     (study,) = studies(one=NINE)
-    monkeypatch.setattr(plan, "TIMING", 60.0)
-    whole = forecast([study], "results", 0).timed(2, str)
+    monkeypatch.setattr(plan, "TIMING_SECONDS", 60.0)
+    whole = forecast([study], "results", 0).with_times(2, str)
     monkeypatch.setattr(plan, "MAX_CASES", 3)
     study = noted(study)
     found = forecast([study], "results", 0)
     assert len({*study.cases.made}) == 3
-    some = found.timed(2, str)
+    some = found.with_times(2, str)
     assert some.bytes == whole.bytes == 9 * ROW_BYTES
     assert (some.workers, some.missing, some.studies[0].missing) == (2, 9, 9)
     assert some.studies[0].seconds == pytest.approx(2 * some.seconds)
@@ -116,7 +116,7 @@ def test_a_dozen_jobs_drawn_over_the_design_tell_the_time(studies, monkeypatch):
     """A fifth of them twenty times as long as the first one, which alone was timed before."""
     made = timed_as(monkeypatch, lambda case: 1.0 if case.machine.rod_mass_kg < 4.6 else 20.0)
     axes = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 100]}}}
-    found = forecast(studies(one=axes), "results", 0).timed(1, str)
+    found = forecast(studies(one=axes), "results", 0).with_times(1, str)
     true = 80 * 1.0 + 20 * 20.0
     assert found.timed == len(made) == plan.TIMED_JOBS
     assert 0.5 * true < found.seconds < 2.0 * true
@@ -125,15 +125,15 @@ def test_a_dozen_jobs_drawn_over_the_design_tell_the_time(studies, monkeypatch):
     stretches = np.histogram(masses, np.linspace(3, 5.0001, plan.TIMED_JOBS + 1))[0]
     assert (stretches >= 1).sum() >= plan.TIMED_JOBS - 2
     again = timed_as(monkeypatch, lambda case: 1.0)
-    forecast(studies(one=axes), "results", 0).timed(1, str)
+    forecast(studies(one=axes), "results", 0).with_times(1, str)
     assert [case.key for case in again] == [case.key for case in made]
 
 
 def test_timing_ends_when_its_seconds_are_over_with_one_job_of_each_study(studies, monkeypatch):
-    monkeypatch.setattr(plan, "TIMING", 0.0)
+    monkeypatch.setattr(plan, "TIMING_SECONDS", 0.0)
     made = timed_as(monkeypatch, lambda case: 1.0)
     both = studies(one=NINE, two={**NINE, "load": "none"})
-    found = forecast(both, "results", 0).timed(1, str)
+    found = forecast(both, "results", 0).with_times(1, str)
     assert [case.load for case in made] == ["spring", "none"]
     assert [part.timed for part in found.studies] == [1, 1]
     assert found.seconds == pytest.approx(18.0)
@@ -163,7 +163,7 @@ def test_compiling_that_is_ahead_is_told(studies, monkeypatch, tmp_path, capsys)
     """Lanes are compiled by `run` alone; the rest is, too, before anything is timed."""
     timed_as(monkeypatch, lambda case: 0.01)
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
-    monkeypatch.setattr(warm_up, "MANY", 5)
+    monkeypatch.setattr(warm_up, "MIN_JOBS_TO_COMPILE", 5)
     warm_up.marker("auto").touch()
     studies(one={**NINE, "joint": "both", "clearance_mm": 0.1})
     assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
@@ -180,7 +180,7 @@ def test_the_range_is_told_and_json_has_no_nan(studies, monkeypatch, capsys):
     assert cli.main(["plan", "one.yaml", "-j", "2"]) == 0
     words = r"about \d+ min with 2 workers \(\d+ min to \d+ min by 12 timed jobs\)"
     assert re.search(words, capsys.readouterr().out)
-    monkeypatch.setattr(plan, "TIMING", 0.0)
+    monkeypatch.setattr(plan, "TIMING_SECONDS", 0.0)
     assert cli.main(["plan", "one.yaml", "-j", "2"]) == 0
     assert "with 2 workers (by 1 timed job)" in capsys.readouterr().out
     assert cli.main(["plan", "one.yaml", "--json"]) == 0
@@ -191,7 +191,7 @@ def test_the_range_is_told_and_json_has_no_nan(studies, monkeypatch, capsys):
 def test_nothing_ahead_costs_nothing(studies):
     made = studies(one=NINE)
     sweep(made, "results", 1)
-    found = forecast(made, "results", 5).timed(2, pytest.fail)
+    found = forecast(made, "results", 5).with_times(2, pytest.fail)
     assert (found.missing, found.seconds, found.bytes, found.first) == (0, 0, 0, ())
 
 

@@ -357,8 +357,8 @@ def test_jobs_in_lanes_are_stored_with_the_same_bits(studies, tmp_path, monkeypa
     made = studies(many={"joint": "both", "clearance_mm": lengths, "output": {"keep": "metrics"}})
     rows = []
     for name, fewest in (("lanes", 1), ("alone", 10**9)):
-        monkeypatch.setattr(warm_up, "FEWEST", fewest)
-        monkeypatch.setattr(warm_up, "MANY", fewest)
+        monkeypatch.setattr(warm_up, "MIN_JOBS_TO_LOAD", fewest)
+        monkeypatch.setattr(warm_up, "MIN_JOBS_TO_COMPILE", fewest)
         needs = warm_up.Needs.of(made[0].cases).with_lanes(made[0].cases)
         assert needs.lanes == ((3,) if name == "lanes" else ())
         sweep(made, tmp_path / name, 2)
@@ -373,7 +373,7 @@ def test_lanes_are_compiled_for_many_jobs_alone(studies, tmp_path, monkeypatch):
     few = studies(few={**BOTH, "clearance_mm": [0.1 + 0.001 * k for k in range(20)]})[0].cases
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
     assert warm_up.Needs().with_lanes(few).lanes == ()
-    assert warm_up.Needs().with_lanes([few[0]] * warm_up.MANY).lanes == (3,)
+    assert warm_up.Needs().with_lanes([few[0]] * warm_up.MIN_JOBS_TO_COMPILE).lanes == (3,)
     warm_up.marker("lanes-3").touch()
     assert warm_up.Needs().with_lanes(few).lanes == (3,)
     assert warm_up.Needs().with_lanes([few[0]]).lanes == ()

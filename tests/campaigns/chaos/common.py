@@ -76,7 +76,7 @@ def complete_store(folder: Path) -> Path:
     sweep(load_studies(*case_files(folder / "cases")), store, 1)
     contents(store)
     studies = load_studies(*case_files(folder / "cases"))
-    forecast.forecast(studies, folder / "new", 1).timed(1, str)
+    forecast.forecast(studies, folder / "new", 1).with_times(1, str)
     return store
 
 

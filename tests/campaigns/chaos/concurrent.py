@@ -38,7 +38,7 @@ REAL = 10  # one trial in so many is of real commands
 
 def hurried():
     """Have a fork write and merge all the time."""
-    writer.MAX_AGE, writer.MAX_SMALL, writer.FEW_SMALL = 0.03, 4, 2
+    writer.MAX_AGE, writer.MAX_SMALL, writer.MAX_SMALL_AT_END = 0.03, 4, 2
 
 
 def one_study(folder, draw):

@@ -240,7 +240,7 @@ class Campaign:
         """What a command says in a process of its own."""
 
         def work() -> Said:
-            writer.FEW_SMALL = 1  # so that each run merges
+            writer.MAX_SMALL_AT_END = 1  # so that each run merges
             undrawn()
             with faults.injected() if faults else contextlib.nullcontext():
                 return command(*words)

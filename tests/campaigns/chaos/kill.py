@@ -48,7 +48,7 @@ KINDS = {
 
 def hurried():
     """Have a fork write and merge all the time, on a slow disk: that is what kills should hit."""
-    writer.MAX_AGE, writer.MAX_SMALL, writer.FEW_SMALL = 0.03, 4, 2
+    writer.MAX_AGE, writer.MAX_SMALL, writer.MAX_SMALL_AT_END = 0.03, 4, 2
     fsync = os.fsync
 
     def slow(descriptor):

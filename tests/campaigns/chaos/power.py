@@ -100,7 +100,7 @@ def call(*words: object, good: tuple[int, ...] = (0,)) -> None:
 def write(wanted: list[Study], store: Path, channel: int, control: str, rng: random.Random) -> None:
     """In a forked process: run a sweep that tells each acknowledged key over a pipe."""
     if rng.random() < 0.5:  # write and merge more often than the program does
-        writer.MAX_AGE, writer.MAX_SMALL, writer.FEW_SMALL = 0.05, 5, 2
+        writer.MAX_AGE, writer.MAX_SMALL, writer.MAX_SMALL_AT_END = 0.05, 5, 2
     if control:
         os.fsync = without(control)
     flush = writer.Writer.flush
