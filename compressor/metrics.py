@@ -45,7 +45,7 @@ class Metric(NamedTuple):
     series: str = ""  # the time series that it is taken from
     bar: Bar = Bar()
     shown: Shown | None = None  # None: not drawn
-    contact: bool = False  # of a contact: of an ideal joint it tells nothing
+    contact: bool = False  # of a contact: without meaning at an ideal joint
     # how it comes from the run; a count grows with it, a rate is a count by revolutions
     kind: Literal["greatest", "root", "share", "count", "rate"] = "share"
     # what it is made from: sums over the dense solution or samples of it, both with an error bar;

@@ -68,7 +68,7 @@ def export(
 
 
 def list_exported(found: "list[Exported]", output: str) -> list[str]:
-    """Return what was written, a line a file; files in a folder of the output are told together."""
+    """Return what was written, a line a file; files in a folder of the output share one."""
     lines = []
     for (place, _), group in itertools.groupby(found, key=lambda one: _line_of(one, output)):
         files = [*group]
@@ -81,7 +81,7 @@ def list_exported(found: "list[Exported]", output: str) -> list[str]:
 
 
 def _line_of(one: "Exported", output: str) -> tuple[str, str]:
-    """Return the path of the line that tells of a file, and its kind."""
+    """Return the path in the line of a file, and the file's kind."""
     above = os.path.dirname(one.path)
     return (one.path if above in ("", os.path.normpath(output)) or one.path == output else above,
             one.kind)  # fmt: skip

@@ -81,7 +81,7 @@ class ProgressReporter:
             self.log()
 
     def show_sweep(self, now: "SweepProgress") -> None:
-        """Report how a sweep stands, which knows best how long it will take."""
+        """Report the progress of a sweep, which knows best how long it will take."""
         self.alike, self.failed = False, now.failed
         self.known = None if now.left is None else (now.left, now.at_least, time.monotonic())
         if self.total and not self.quiet and not self.live:

@@ -42,7 +42,7 @@ def report(
     folder, _ = results_folder(given, folder, named=False)
     from compressor.store import read_studies, writable_folder
 
-    read_studies(folder)  # what is wrong is told before libraries load and figures are drawn
+    read_studies(folder)  # errors come before libraries load and figures are drawn
     writable_folder(output, make=False)
     from compressor.report import write_report
 

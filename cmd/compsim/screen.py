@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from compressor.store import Again
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
-MAX_CAUTIONS = 5  # told of one case file
+MAX_CAUTIONS = 5  # reported of one case file
 
 CASE_FILE = re.compile(r"^(joint|clearance_mm|load|machine|blocks|regimes)\s*:", re.MULTILINE)
 PLACES = (".", "configs")  # where case files are looked for, if none is named
@@ -209,7 +209,7 @@ def all_stored(count: int, folder: str, thing: str = "job") -> str:
 
 
 def stored_before(count: int) -> str:
-    """Return that some of what was asked for was there already; "" for none."""
+    """Return how many of the jobs were stored before, in words; "" for none."""
     return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
 
 

@@ -284,7 +284,7 @@ def suggestion(name: str, group: str) -> str:
 
 
 def probable_keys(name: str, group: str) -> list[str]:
-    """Return the dotted keys that an unknown one probably stands for, in a group of that group."""
+    """Return the dotted keys that an unknown one probably means; in a group, those of the group."""
     if name in table() and not group:
         return [name]
     if group and name in map(_leaf, DOUBLES):
@@ -299,7 +299,7 @@ def probable_keys(name: str, group: str) -> list[str]:
 
 
 def _holding(name: str, within: str = "") -> list[str]:
-    """Return the keys, if they are few, in whose name all words of another one stand."""
+    """Return the keys, if they are few, whose names have all words of another one."""
     words = {word for word in name.lower().split("_") if word}
     found = [
         key
@@ -367,7 +367,7 @@ def _scalar(value: Any) -> Any:
 
 
 def check_part(key: str, value: Any, problems: list[Problem]) -> Any:
-    """Return the dataclass, scalar or None that stands for a key at the top of a case file.
+    """Return the value of a key at the top of a case file as a case holds it, or None.
 
     What is wrong with its value joins `problems`.
     """

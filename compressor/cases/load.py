@@ -66,7 +66,7 @@ class KeysRead:
 
     def note(self, cases: Cases) -> None:
         """Note which keys of its blocks the cases of a study read, unless they cannot be built."""
-        with contextlib.suppress(CaseError):  # which is told elsewhere
+        with contextlib.suppress(CaseError):  # which is reported elsewhere
             for block in cases.parts:
                 self._note(block)
 
@@ -110,7 +110,7 @@ class UnreadKey:
 
 
 def _place_of(key: str, node: Node, leaves: Leaves) -> Place:
-    """Return where an unread key or group stands: a group, in the file that the key is of."""
+    """Return the place of an unread key or group; of a group, that in the key's own file."""
     place = leaves.places.get(key, node.key_place)
     return place if place.file == node.key_place.file else node.key_place
 
@@ -119,7 +119,7 @@ MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
 MAX_TEXTS = 4096  # of groups, which jobs share
 MANY_CASES = 20_000  # cases of a study that take seconds to be read
-MAX_CONFLICTS = 20  # told of one file; a sweep can have another in every job
+MAX_CONFLICTS = 20  # reported of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 
 

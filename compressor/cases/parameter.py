@@ -499,7 +499,7 @@ Targets = tuple[tuple[str, float], ...]  # (metric, greatest relative error), by
 
 
 def first_tolerance(targets: Targets) -> float:
-    """Return the tolerance of the first run where accuracy is asked for by number."""
+    """Return the tolerance of the first run where accuracy is given by number."""
     return min(LOOSEST, *(FIRST_TOLERANCE_FACTOR * target for _, target in targets))
 
 

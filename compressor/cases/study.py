@@ -1,4 +1,4 @@
-"""A study: the jobs of one case file, each built when it is asked for."""
+"""A study: the jobs of one case file, each built when it is used."""
 
 import bisect
 import itertools
@@ -65,7 +65,7 @@ class Study:
 
 
 class Cases(Sequence[Case]):
-    """The cases of blocks one after the other, each built when it is asked for.
+    """The cases of blocks one after the other, each built when it is used.
 
     `keys`: of all of them, as soon as they are known.
     """
@@ -116,7 +116,7 @@ class Cases(Sequence[Case]):
 
 
 class StudyJobs(Protocol):
-    """What a study tells of its jobs, whether read from a case file or from a store."""
+    """What a study knows of its jobs, whether read from a case file or from a store."""
 
     @property
     def axes(self) -> Sequence[Any]: ...

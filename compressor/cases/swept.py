@@ -53,7 +53,7 @@ class SweptKey:
     spread: Spread = float
 
     def nodes(self) -> list[Node]:
-        """Return the values; made ones stand where their mapping does."""
+        """Return the values; those that a form has made have the place of its mapping."""
         return self.node.value if self.kind == "list" else self.placed(self.make())
 
     def placed(self, values: list[float]) -> list[Node]:
@@ -253,7 +253,7 @@ class NoComparison(ValueError):
 
 
 def comparison(text: str) -> Test:
-    """Return the test that a text means. Raises NoComparison, which tells where and why."""
+    """Return the test that a text means. Raises NoComparison, which says where and why."""
     if len(text) > MAX_LENGTH:
         raise NoComparison(f"is longer than {MAX_LENGTH} characters")
     reader = _Reader(text)
@@ -273,7 +273,7 @@ class _Reader:
         self.code = LEADING_ZEROS.sub(lambda zeros: " " * len(zeros[0]), spaced)
 
     def refuse(self, at: int, message: str) -> NoReturn:
-        """Raise NoComparison about what stands at a place of the code."""
+        """Raise NoComparison about a place of the code."""
         rest = self.text[self.indent + at :].lstrip()
         where = f"character {len(self.text) - len(rest) + 1}, {quote_value(shorten(rest, 20))}"
         raise NoComparison(f"{message} (at {where if rest else 'the end'})")

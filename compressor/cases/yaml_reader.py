@@ -1,4 +1,4 @@
-"""Strict YAML 1.2: a text -> a tree of values that know where they stand.
+"""Strict YAML 1.2: a text -> a tree of values with their places.
 
 The only module that imports yaml, and only its parser: what a scalar means is decided here, by
 the core schema of YAML 1.2, so that `1e5` is a number and `no` is text. What a case file must not
@@ -84,7 +84,7 @@ NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """Where a value stands; line and column count from 1, line 0 means the file as a whole."""
+    """The place of a value; line and column count from 1, line 0 means the file as a whole."""
 
     file: str
     line: int = 0

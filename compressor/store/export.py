@@ -36,7 +36,7 @@ HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
 
 
 class ExportError(CompsimError):
-    """What cannot be exported to where it was asked for."""
+    """A target that an export cannot be written to."""
 
     exit_code = 2
 
@@ -130,7 +130,7 @@ def _named_jobs(
 
 
 def _form(output: Folder, form: str | None) -> tuple[str, bool]:
-    """Return the form of an export, and whether it goes to one file, which its suffix tells.
+    """Return the form of an export, and whether it goes to one file, by the target's suffix.
 
     Raises ExportError for a suffix that is none of SUFFIXES, unless the name is that of a folder:
     one that exists, or ends in a slash.

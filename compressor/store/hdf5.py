@@ -174,7 +174,7 @@ def attributes(stored: Any) -> dict[str, Any]:
 
 
 def _attribute(stored: Any, name: str) -> Any:
-    """Return an attribute. Raises ValueError where HDF5 could read more than its type tells."""
+    """Return an attribute. Raises ValueError where HDF5 could read more than its type says."""
     found = stored.attrs.get_id(name)
     dtype = found.dtype
     plain = dtype.kind in "fiuS"

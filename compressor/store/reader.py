@@ -185,7 +185,7 @@ class Stored:
         return {key.decode() for key in self.rows.columns["key"]}
 
     def position(self, key: str) -> int | None:
-        """Return where a job stands in `rows`; None where it is not stored."""
+        """Return the position of a job in `rows`; None where it is not stored."""
         position = int(self.rows.find([key])[0])
         return position if position >= 0 else None
 

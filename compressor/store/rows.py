@@ -208,7 +208,7 @@ def decode(data: bytes, path: Path) -> Segment:
             columns[name] = values
         for name in NUMBERS:
             if name in file:
-                values = read_variable(file[name], data)  # not kept: tells what cannot be read
+                values = read_variable(file[name], data)  # not kept: may raise
                 if values.shape != (rows, *ROW[name].shape) or values.dtype.kind != "f":
                     raise ValueError(name)
         blobs = (read_variable(file[name], data).tobytes() for name in ("attributes", "details"))
@@ -333,7 +333,7 @@ class Rows:
         return np.empty(0, ROW) if found is None else found
 
     def find(self, keys: np.ndarray | Sequence[str]) -> np.ndarray:
-        """Return where jobs stand, by key, in an array of the shape of `keys`; -1: nowhere."""
+        """Return the positions of jobs by key, in the shape of `keys`; -1 where there is none."""
         wanted = np.asarray(keys).astype("S20")
         if not len(self):
             return np.full(wanted.shape, -1)

@@ -39,7 +39,7 @@ ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
 
 
 def series_path(place: Path, key: str, checksum: str) -> Path:
-    """Return where a job's time series stand; `place` is the folder that holds `jobs`."""
+    """Return the path of a job's time series; `place` is the folder that holds `jobs`."""
     if not KEY.fullmatch(key):
         raise StoreError(place, f"{key!r} is no job's key", "a key is 20 hexadecimal digits")
     return place / "jobs" / f"{key}-{checksum}.h5"

@@ -1,4 +1,4 @@
-"""How the jobs of a store stand, how far to trust their numbers, and what is damaged.
+"""How many jobs of a store are done, how far to trust their numbers, and what is damaged.
 
 Caveats are what stored numbers cannot say of themselves: motions that were not seen to repeat, or
 settled after metrics began to count, clipped sensor records, cases outside the range that the
@@ -57,7 +57,7 @@ from compressor.store.studies import (
 if TYPE_CHECKING:
     from compressor.cases import Study
 
-MAX_LOOKED_AT = 16  # stored jobs of a study, for what only their cases tell
+MAX_LOOKED_AT = 16  # stored jobs of a study, for what only their cases show
 AUTO = "solve: {settle_rev: auto, duration_rev: auto} waits for that"
 LONGER_REMEDY = "a longer run may give other numbers, or be chaotic"
 
@@ -320,7 +320,7 @@ CLIPPED_SHARE = "clipped_share"  # older name of `clipped_fraction` in files of 
 
 @dataclass(frozen=True)
 class StudyProgress:
-    """How the jobs of one study stand.
+    """How many jobs of one study are done, failed or missing, and why.
 
     `reasons`: failed ones by reason; `promises`, `regimes`: those that are ok by what their
     accuracy promises, and by how far they can be foretold, "" where that is not known; each with
@@ -359,7 +359,7 @@ class JobReport:
 
 
 def standings(folder: Folder) -> list[StudyProgress]:
-    """Return how each study of a folder stands. Raises WrongName where there is none.
+    """Return the progress of each study of a folder. Raises WrongName where there is none.
 
     Former studies come last, those that have finished jobs which the present one lacks.
     """

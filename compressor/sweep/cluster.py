@@ -248,7 +248,7 @@ def describe_lost_scheduler(client: Any) -> ClusterError:
 EXTRA = "--backend dask needs dask.distributed: pip install 'compsim[dask]'"
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
 CLOSE_SECONDS = 2.0  # s in which a scheduler may take leave
-# s in which workers may tell their versions before the jobs; later ones with them
+# s in which workers may send their versions before the jobs; later ones with them
 CHECK_SECONDS = 60.0
 
 

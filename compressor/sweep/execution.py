@@ -268,7 +268,7 @@ def run_batches(
     """
     if multiprocessing.current_process().daemon:
         raise WorkersFailed(f"a daemonic process may start no workers: {ELSEWHERE}")
-    if not POOL.acquire(blocking=False):  # children() does not tell the workers of two calls apart
+    if not POOL.acquire(blocking=False):  # children() mixes the workers of two calls
         raise WorkersFailed(f"other jobs run in this process: wait until they end, or {ELSEWHERE}")
     try:
         yield from Local(work, jobs, workers).run(pulse)
@@ -378,7 +378,7 @@ class Local(Batches):
                 self.suspects.append(batch)
             else:
                 self.waiting.extendleft(reversed(batch))
-        if not running:  # nobody is named: smaller batches will tell
+        if not running:  # nobody is named: smaller batches will show
             self.fruitless, self.most = self.fruitless + 1, max(1, largest // 2)
             if self.fruitless > MAX_FRUITLESS:
                 how = batch_ending(next((codes[pid] for pid in died), None))

@@ -86,7 +86,7 @@ class Ahead:
         self.cases = cases  # of some of them, by key
 
     def with_times(self, workers: int, remark: Callable[[str], None]) -> Forecast:
-        """Return the whole forecast, for so many processes; `remark` is told of compiling."""
+        """Return the whole forecast, for so many processes; `remark` is called about compiling."""
         if not self.counts.missing:
             return self.counts
         looked_at = list(self.cases.values())

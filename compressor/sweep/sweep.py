@@ -31,7 +31,7 @@ from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.worker import JobLost, JobResult, Workers
 
 MANY_JOBS = 100_000  # jobs whose cases take a while to be made
-GRACE = 5.0  # s beyond its time in which a job may tell of it, before its worker is killed
+GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
 
 
 class Backend(Protocol):

@@ -30,7 +30,7 @@ OK_END = JobEnd("ok", "", "")
 
 
 class RequestedJobs(Mapping[str, Case]):
-    """Each selected job once, by key; its case is built when it is asked for.
+    """Each selected job once, by key; its case is built when it is used.
 
     Where studies share a job, its case serves them all. A case can be changed in what is no part of
     its key. among: the keys of those that are wanted, if not all.
@@ -75,7 +75,7 @@ class RequestedJobs(Mapping[str, Case]):
 
 
 class PendingCases(Sequence[Case]):
-    """The cases of some wanted jobs, each built when it is asked for: many take much memory."""
+    """The cases of some requested jobs, each built when it is used: many take much memory."""
 
     def __init__(self, wanted: RequestedJobs, keys: Sequence[str]):
         self.wanted, self.keys = wanted, keys
@@ -144,7 +144,7 @@ MIN_MEASURED_SHARE = 0.5  # of the revolutions ahead must be of kinds that are m
 
 
 class SweepProgress(NamedTuple):
-    """How a sweep stands.
+    """The progress of a sweep.
 
     done, failed, total: jobs, those stored before among them; failed ones are done, too. left: s
     until the end, None as long as that is not known; at_least: kinds of jobs are ahead that were

@@ -154,7 +154,7 @@ def look_ahead(payloads: Sequence[bytes]) -> Sequence[Callable[[], tuple[Any, ..
     try:
         jobs = [pickle.loads(payload) for payload in payloads]
         known = HERE["rules"].ahead(jobs)
-    except MemoryError:  # each job by itself will need less, or tell of it
+    except MemoryError:  # each job by itself will need less, or fail alone
         return [partial(only, payload) for payload in payloads]
     return [partial(tuple, pair) for pair in zip(jobs, known, strict=True)]
 
