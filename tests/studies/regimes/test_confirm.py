@@ -135,7 +135,9 @@ def test_values_at_which_chains_differ_are_doubted(hysteresis, tmp_path):
 def test_two_motions_that_are_reached_confirm(monkeypatch, up, down, starts, verdict):
     ends = {0: up, 1: down}
     monkeypatch.setattr(
-        module, "later", lambda case, state, chain: starts if state is None else ends[int(state[0])]
+        module,
+        "follow_on",
+        lambda case, state, chain: starts if state is None else ends[int(state[0])],
     )
     assert confirm(Doubt(1, CASES[1], np.array([0.0]), np.array([1.0]), PAIR)) == verdict
 
