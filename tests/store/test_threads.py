@@ -13,7 +13,7 @@ from compressor.store.hdf5 import image, open_file
 from compressor.store.reader import open_study, read_job
 from compressor.store.series_file import read_bytes, read_values
 
-TIMES = 100  # each that three threads read three jobs
+TIMES = 40  # each that three threads read three jobs
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_threads_read_their_own_jobs(folder):
     expected = [read_job(folder, key) for key in keys]
 
     def wrong(number):
-        runs = (read_job(folder, keys[number]) for _ in range(30))
+        runs = (read_job(folder, keys[number]) for _ in range(12))
         return sum(not run.identical(expected[number]) for run in runs)
 
     with ThreadPoolExecutor(3) as pool:
