@@ -76,13 +76,15 @@ TOGETHER = {
     "tests/solve/test_horizon.py": "twins",
     "tests/studies/regimes/test_lyapunov.py": "twins",
 }
-# modules that take long; the others, in small pieces, then even out the two processes
+# modules that take long; the others, in small pieces, then even out the processes. The first three
+# compile each its own part of the equations: the march, that of other laws, that of mechanisms
 LONG = (
-    "campaigns/test_chaos_processes",  # compiles the march; the three after it do without
+    "campaigns/test_chaos_processes", "physics/test_contact_laws", "solve/test_feature_runs",
     "sweep/test_execution", "campaigns/test_chaos_files", "cases/test_load",
     "studies/stress/test_stress", "solve/test_integrate", "test_pages", "test_tutorial",
     "sweep/test_cluster",
-    "sweep/test_sweep", "report/test_report", "cmd/test_cli",
+    "sweep/test_sweep", "report/test_report", "cmd/test_cli", "store/test_writer",
+    "store/test_threads",
 )  # fmt: skip
 
 
