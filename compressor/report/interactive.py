@@ -32,6 +32,7 @@ from compressor.report.figures.drawing import (
     axis_title,
     make_grid,
     one_line,
+    thin_places,
 )
 from compressor.report.figures.job import BY_JOINT
 from compressor.report.figures.style import BLACK, LineStyle
@@ -190,18 +191,13 @@ def visible(trace: Trace, panel: Panel) -> Any:
     if trace.kind != "line" or x.size < 3 or not np.isfinite(x).all():
         return slice(None)
     if trace.is_points or (np.diff(x) < 0).any():
-        return slice(None) if x.size <= 2 * MAX_POINTS else evenly_spaced(x.size, 2 * MAX_POINTS)
+        return thin_places(x.size, 2 * MAX_POINTS)
     low, high = sorted(panel.limits("x"))
     first = max(0, int(np.searchsorted(x, low, "left")) - 1)
     last = min(x.size, int(np.searchsorted(x, high, "right")) + 1)
     if last - first <= MAX_POINTS:
         return slice(first, last)
     return first + extremes(y[first:last], MAX_POINTS // 2)
-
-
-def evenly_spaced(size: int, count: int) -> np.ndarray:
-    """Return at most `count` evenly chosen places below a size."""
-    return np.unique(np.linspace(0, size - 1, count).astype(int))
 
 
 def extremes(y: np.ndarray, count: int) -> np.ndarray:
@@ -217,7 +213,7 @@ def extremes(y: np.ndarray, count: int) -> np.ndarray:
     is_shown[[0, -1]] = True
     places = np.flatnonzero(is_shown)
     # where a part's values are equal, all of them are its extremes
-    return places if places.size <= 4 * count else evenly_spaced(y.size, 2 * count)
+    return places if places.size <= 4 * count else thin_places(y.size, 2 * count)
 
 
 def numbers(values: np.ndarray) -> Any:

@@ -136,6 +136,13 @@ def join_with_gaps(parts: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]
     return x, y
 
 
+def thin_places(size: int, most: int) -> np.ndarray:
+    """Return at most `most` evenly chosen numbers below a size, with both ends."""
+    return (
+        np.arange(size) if size <= most else np.unique(np.linspace(0, size - 1, most).astype(int))
+    )
+
+
 def midway(centres: np.ndarray, is_log: bool = False) -> np.ndarray:
     """Return the edges between cells: halfway, on a log scale by ratio; outer cells are symmetric.
 

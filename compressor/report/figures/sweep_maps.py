@@ -21,6 +21,7 @@ from compressor.report.figures.drawing import (
     map_cells,
     midway,
     share_scales,
+    thin_places,
 )
 from compressor.report.figures.style import BLUE, GOLD, GREY, LineStyle, fill, palette
 from compressor.report.figures.sweep_data import (
@@ -39,7 +40,6 @@ from compressor.report.figures.sweep_panels import (
     mark_points,
     marks_shown,
     metric_panels,
-    thin_places,
 )
 
 COLORS = "cividis"

@@ -16,6 +16,7 @@ from compressor.report.figures.drawing import (
     entry,
     make_grid,
     share_scales,
+    thin_places,
 )
 from compressor.report.figures.style import BLUE, CYCLE, LineStyle, fill, mark, palette
 from compressor.report.figures.sweep_data import (
@@ -143,13 +144,6 @@ def lines_for(axis: PlottedAxis, chosen: Iterable[int]) -> list[LineStyle]:
         return list(CYCLE[: len(numbers)])
     shares = np.linspace(0.0, 0.88, len(numbers))
     return [LineStyle(palette("viridis")[int(256 * share)], "-", 1.5) for share in shares]
-
-
-def thin_places(size: int, most: int) -> np.ndarray:
-    """Return at most `most` evenly chosen numbers below a size, with both ends."""
-    return (
-        np.arange(size) if size <= most else np.unique(np.linspace(0, size - 1, most).astype(int))
-    )
 
 
 PLAIN_LINE = LineStyle(BLUE, "-", 1.4, marker="o", markersize=3.8)
