@@ -11,6 +11,7 @@ from compressor.studies import by_kind
 from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
+    as_json,
     caution,
     configs_argument,
     duration,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 @limit
 @click.option("--first", type=click.IntRange(min=0), default=5, show_default=True,
               help="How many of the missing jobs to list.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="The same as JSON.")
+@as_json
 def plan(
     configs: tuple[str, ...],
     output: str,

@@ -148,7 +148,7 @@ def choose_next_steps(scene, W, k):
     for j in range(k):
         plain, alive = W[PLAIN + j] > 0.0, W[ALIVE + j] > 0.0
         error, h, t = W[ERROR + j], W[H + j], W[T + j]
-        refused = alive & (error > 1.0) & (error < math.inf)
+        refused = alive & (not is_accepted(error)) & (error < math.inf)
         now, last = log_error(error), W[LAST_ERROR + j]
         now = now if plain | refused else 0.0  # any other lane's error may be no number
         longer, shorter = growth(now, last, EXPLICIT_ORDER), shrinkage(now, EXPLICIT_ORDER)

@@ -40,7 +40,7 @@ class Reactions(NamedTuple):
     big_y: float
     small_x: float
     small_y: float
-    guide: float
+    guide: float  # on the crosshead along y, N
     big_torque: float  # on the rod, N m
     small_torque: float
     rubbing: float  # of the guide on the crosshead along x, N
