@@ -21,6 +21,7 @@ CODE_VARIABLE = "NUMBA_CACHE_DIR"
 # that keep numeric libraries to so many threads
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
+    "BLIS_NUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS",
 )  # fmt: skip
 MAX_MEANT = 3  # words that may have been meant
 MAX_WORD_LENGTH = 100  # characters of a word that others are compared with

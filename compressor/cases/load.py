@@ -391,6 +391,15 @@ def _fits_limit(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) ->
     return False
 
 
+def _misfits_in_words(block: Block, chosen: dict[str, Node]) -> Sequence[Problem]:
+    """Return what does not fit in a combination of values, as one that is not swept is refused."""
+    try:
+        block.resolve_case(chosen)
+    except CaseError as error:
+        return error.problems
+    raise AssertionError(f"swept values are refused that are good alone: {chosen}")
+
+
 def _check_cases(
     draft: _Draft, cases: Cases, swept: Sequence[str], progress: Progress
 ) -> tuple[tuple[str, ...], dict[str, list[Any]]]:
@@ -410,11 +419,8 @@ def _check_cases(
         case = block.case(place)
         if find_misfits(case, block.given):
             chosen = block.chosen(place)
-            try:
-                block.resolve_case(chosen)
-            except CaseError as error:
-                for problem in error.problems:
-                    found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
+            for problem in _misfits_in_words(block, chosen):
+                found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
         elif not found:
             keys.append(digest(identity(case, True, shared_text)))
             for key in swept:

@@ -479,21 +479,32 @@ def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]
     axis = find_axis(folder, study, name)
     row = row_of(axis.key)
     text = row.choice_of(text) if row else text
-    for value in axis.values:
-        if text == in_words(value) or _equal(text, value):
-            return axis.key, value
+    for is_same in (_has_words, _is_close, _is_rounded):
+        same = [value for value in axis.values if is_same(text, value)]
+        if same and (len({*same}) == 1 or is_same is not _is_rounded):
+            return axis.key, same[0]
     problem = f"no job of {study.name} has {axis.key}={text}"
     raise WrongName(folder, problem, f"there are {_some(axis.values, text)}")
 
 
-def _equal(text: str, value: Any) -> bool:
-    """Return whether a text is the number of an axis, perhaps as captions round it."""
+def _has_words(text: str, value: Any) -> bool:
+    """Return whether a text is a value as it is written."""
+    return text == in_words(value)
+
+
+def _is_close(text: str, value: Any) -> bool:
+    """Return whether a text is the number of an axis, but for rounding."""
     number = _number(text)
     return (
         not isinstance(value, str | tuple | bool | None)
         and number is not None
-        and (math.isclose(number, value, rel_tol=SAME_VALUE) or text == f"{value:g}")
+        and math.isclose(number, value, rel_tol=SAME_VALUE)
     )
+
+
+def _is_rounded(text: str, value: Any) -> bool:
+    """Return whether a text is the number of an axis as captions round it."""
+    return not isinstance(value, str | tuple | bool | None) and text == f"{value:g}"
 
 
 def _number(text: str) -> float | None:

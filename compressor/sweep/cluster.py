@@ -122,7 +122,7 @@ def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) ->
     key = pickle.dumps((work, rules))
     if key not in IDLE_POOLS:
         while IDLE_POOLS:
-            IDLE_POOLS.popitem()[1].stop()
+            end_local(IDLE_POOLS.popitem()[1])
         IDLE_POOLS[key] = Local(work, [], rules)
         IDLE_POOLS[key].decode = bytes  # results travel on as they are
     local = IDLE_POOLS[key]
@@ -130,9 +130,15 @@ def in_processes(work: Callable[[Any], Any], rules: Workers, jobs: list[Job]) ->
     try:
         ends = sorted(local.run_pending(lambda: None), key=lambda end: end.id)
     except BaseException:
-        IDLE_POOLS.pop(key).stop()
+        end_local(IDLE_POOLS.pop(key))
         raise
     return pickle.dumps(ends, pickle.HIGHEST_PROTOCOL)
+
+
+def end_local(local: Local) -> None:
+    """End the processes of a pool, and close the files of its batches."""
+    local.stop()
+    local.discard()
 
 
 SECONDS_BETWEEN_COUNTS = 2.0  # s between two counts of the workers
@@ -196,7 +202,7 @@ class Remote(Batches):
             self.patience = math.inf
 
     def ends_of(self, number: int, data: bytes) -> list[End]:
-        del self.distant[number]
+        self.distant.pop(number, None)  # None: the run has been stopped
         self.size = max(len(data) / len(self.out[number]), 0.9 * self.size)
         return pickle.loads(data)
 
@@ -210,7 +216,7 @@ class Remote(Batches):
             unfit = unfitness(error) or f"a batch failed: {type(error).__name__}: {error}"
             raise ClusterError(f"worker {unfit}") from error
         batch = self.out.pop(number)
-        del self.distant[number]
+        self.distant.pop(number, None)
         if self.alone and len(batch) == 1:
             how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
             yield JobLost(batch[0].id, Reason.WORKER_DIED, f"{how}, {FAILED_ALONE}")

@@ -182,6 +182,7 @@ class Batches:
                 found = self.ends_of(number, ended.result())
                 yield from self.settle(self.out.pop(number), found)
         if self.alone and not self.out:
+            wait([self.sending])  # or it might send the next suspect, which is then forgotten
             self.alone = False
             self.discard()
 
@@ -220,6 +221,7 @@ STALL_SECONDS = 60.0  # s without any result, while no job runs, after which all
 # s that workers may take to begin: what they prepare may have to be compiled
 MAX_START_SECONDS = 600.0
 IDLE_SECONDS = 300.0  # after which a worker without a batch ends
+FILES_PER_WORKER = 8  # of the run: its batches, and what loky opens for it
 MAX_FRUITLESS = 10  # times in a row that workers may die without any job beginning or ending
 ELSEWHERE = "run these jobs in a process of their own"
 POOL = threading.Lock()
@@ -302,6 +304,7 @@ class Local(Batches):
         self.late: set[int] = set()  # processes that were killed for taking too long
         self.fruitless, self.last_news = 0, 0.0  # last_news: when a batch was last sent, or ended
         self.begun = False  # whether a job of this pool has
+        self.unprepared = 0  # answers in a row of workers that could not begin
 
     def start(self) -> ProcessPoolExecutor:
         """Return a new pool, of one process for a suspect."""
@@ -312,10 +315,12 @@ class Local(Batches):
         warnings.filterwarnings("ignore", "resource_tracker")
         resource_tracker.ensure_running()  # before: Python 3.11 lets signals in as it starts this
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in new workers, too, until they settle
-        if self.width > 100:  # whose files may be more than the usual 1024
-            _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-            resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-        environment = {name: os.environ.get(name, "1") for name in THREAD_VARIABLES}
+        needed = FILES_PER_WORKER * self.width + 128
+        limit, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        if limit != resource.RLIM_INFINITY and limit < needed:
+            with contextlib.suppress(ValueError, OSError):  # then as many as there may be
+                resource.setrlimit(resource.RLIMIT_NOFILE, (needed, most))
+        environment = dict.fromkeys(THREAD_VARIABLES, "1")
         environment["PYTHONFAULTHANDLER"] = ""  # or loky has a crash print where it was
         return ProcessPoolExecutor(
             1 if self.alone else self.width, timeout=IDLE_SECONDS, initializer=init_worker,
@@ -330,9 +335,14 @@ class Local(Batches):
 
     def ends_of(self, number: int, problem: str) -> list[End]:
         """Return how jobs ended, from the file of their batch. Raises WorkersFailed."""
-        if problem:
+        if not problem:
+            self.unprepared = 0
+            return self.files.pop(number).read()
+        self.files.pop(number).close()
+        self.unprepared += 1
+        if not self.stopped and (not self.weight or self.unprepared > MAX_FRUITLESS):
             raise WorkersFailed(f"jobs could not even begin: {problem}")
-        return self.files.pop(number).read()
+        return []
 
     def watch(self, now: float, news: bool) -> None:
         """Kill workers whose jobs take too long, and all of them where nothing moves any more."""

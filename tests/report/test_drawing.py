@@ -216,3 +216,12 @@ def test_lines_of_equal_value_lie_where_a_plane_has_them():
     assert {*x[np.isfinite(x)]} == {0.5, 1.5}
     x, y = contour_area(np.arange(3), np.arange(2), plane, 0.5, 1.5)
     assert (x.min(), x.max(), y.min(), y.max()) == (0.5, 1.5, 0, 1)
+
+
+def test_what_has_no_points_has_no_columns():
+    drawing, grid = make_grid(1, 1, 4.0)
+    grid[0, 0].plot([], [], RED, "none")
+    grid[0, 0].plot([0, 1], [2, 3], RED, "two")
+    head = as_csv(drawing).splitlines()[0]
+    assert "two" in head
+    assert "none" not in head

@@ -4,7 +4,7 @@ import pytest
 
 from compressor.program import did_you_mean
 from compressor.store.files import WrongName
-from compressor.store.studies import StoredAxis, StoredStudy, find_job, find_study
+from compressor.store.studies import StoredAxis, StoredStudy, find_job, find_study, find_value
 
 
 def study(name, axes, keys, is_grid=True):
@@ -104,3 +104,17 @@ def test_studies_by_name():
 )
 def test_what_a_word_means(word, told):
     assert did_you_mean(word, ["status", "big-end", "show"]) == told
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"), [("500.002", 500.002), ("500.001", 500.001), ("712.3", 712.3000001)]
+)
+def test_a_value_is_the_nearest_before_a_rounded_one(word, expected):
+    near = study("near", {"machine.speed_rpm": (500, 500.001, 500.0015, 500.002, 712.3000001)}, "")
+    assert find_value("place", near, f"speed_rpm={word}") == ("machine.speed_rpm", expected)
+
+
+def test_what_rounds_to_several_values_is_none_of_them():
+    near = study("near", {"machine.speed_rpm": (500.00151, 500.00152)}, "")
+    with pytest.raises(WrongName, match=r"no job of near has machine.speed_rpm=500.002"):
+        find_value("place", near, "speed_rpm=500.002")

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import json
 import os
+import pickle
 import signal
 import socket
 import subprocess
@@ -31,7 +32,7 @@ from compressor.sweep.cluster import Cluster, Remote
 from compressor.sweep.execution import BATCHES_AHEAD
 from compressor.sweep.sweep import Options, sweep
 from compressor.sweep.versions import ClusterError, differences, versions
-from compressor.sweep.worker import Workers
+from compressor.sweep.worker import JobResult, Workers
 
 MEMORY = "800MB"  # of a worker, of which a job may add three quarters
 TIMES = ("seconds",)  # what two runs of a job may differ in
@@ -283,6 +284,58 @@ def test_many_jobs_are_never_listed(client):
     ends.close()
     assert len(set(first)) == 3000
     assert next(issued) < 3000 + 2 * (2 * BATCHES_AHEAD + 1) * 1000
+
+
+class DoneAtOnce:
+    """A future of dask's that has its result."""
+
+    def __init__(self, data):
+        self.data = data
+
+    def result(self):
+        return self.data
+
+    def add_done_callback(self, call):
+        threading.Timer(0.01, call, [self]).start()
+
+
+class ClientThatIsDone:
+    """A client of dask's with three workers, whose batches are done as soon as they are sent."""
+
+    status = "running"
+
+    def submit(self, _, data, pure):
+        jobs = cluster.Batch(*pickle.loads(data)).jobs
+        return DoneAtOnce(
+            pickle.dumps([JobResult(job.id, pickle.dumps(job.id), 0.01) for job in jobs])
+        )
+
+    def nthreads(self):
+        return dict.fromkeys("abc", 1)
+
+    def cancel(self, futures):
+        pass
+
+
+def test_results_that_wait_at_an_interruption_are_kept():
+    run = Remote(ClientThatIsDone(), int, Workers(), [(n, n, 9.0) for n in range(40)])
+    beats = itertools.count()
+
+    def interrupt():
+        if next(beats) == 2:
+            time.sleep(0.3)
+            raise KeyboardInterrupt
+
+    found = []
+
+    def collect():
+        for end in run.run(interrupt):
+            found.append(end.id)
+
+    with pytest.raises(KeyboardInterrupt):
+        collect()
+    assert run.arrived.empty()
+    assert len(found) == len({*found}) > 2
 
 
 def large(payload):

@@ -192,9 +192,11 @@ def test_a_worker_has_none_of_our_files(tmp_path):
     assert files[1] == files[2]
 
 
-def test_numeric_libraries_have_one_thread_in_a_worker():
-    ends = run_batches(lambda name: os.environ.get(name), named(["OMP_NUM_THREADS"]), Workers(1))
-    assert [*results(ends).values()] == ["1"]
+def test_numeric_libraries_have_one_thread_in_a_worker(monkeypatch):
+    names = ["OMP_NUM_THREADS", "NUMBA_NUM_THREADS"]
+    monkeypatch.setenv(names[0], "8")
+    ends = run_batches(lambda name: os.environ.get(name), named(names), Workers(1))
+    assert [*results(ends).values()] == ["1", "1"]
 
 
 def test_what_is_prepared_is_not_timed(tmp_path):

@@ -264,6 +264,11 @@ class Panel:
         return shared_limits([self], way)
 
 
+def is_in_table(trace: Trace) -> bool:
+    """Return whether a trace has columns of the table: it has points, and a name or jobs."""
+    return trace.x.size > 0 and bool(trace.name or trace.z is not None or trace.jobs)
+
+
 def shared_limits(panels: Sequence[Panel], way: Way) -> tuple[float, float]:
     """Return the ends of an axis that panels share: what the first says, or what all show."""
     scale: Scale = getattr(panels[0], way)
@@ -367,7 +372,7 @@ def as_csv(drawing: Drawing) -> str:
     last, seen = b"", set()
     for number, panel in enumerate(drawing.panels, 1):
         x_title, y_title = axis_title(drawing, panel, "x"), axis_title(drawing, panel, "y")
-        for trace in (one for one in panel.ordered if one.name or one.z is not None or one.jobs):
+        for trace in filter(is_in_table, panel.ordered):
             where = f"{one_line(panel.title) or number}: {trace.name}".removesuffix(": ")
             x, y, *more = points(trace)
             same = x.tobytes(), y.tobytes(), trace.name, *(values.tobytes() for _, values in more)
