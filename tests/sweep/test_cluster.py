@@ -376,7 +376,7 @@ def test_workers_with_other_versions_are_refused(dask, monkeypatch):
 def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
     wrong = rf"worker tcp://.*: has model {MODEL} in place of none, numpy"
     with pytest.raises(ClusterError, match=wrong):
-        list(remote(client, abs, named(range(10)), asked=other_versions()))
+        list(remote(client, abs, named(range(10)), versions=other_versions()))
 
 
 def test_versions_tell_programs_apart():
