@@ -29,7 +29,7 @@ figures: install  ## draw the report again from the stored results
 	$(BIN)/compsim report
 
 test: install  ## run the whole test suite
-	$(BIN)/python -m pytest -n 3
+	$(BIN)/python -m pytest -n 2
 
 test-bare:  ## run it on a fresh clone with nothing but Python, make, git, sh and coreutils
 	@place=$$(mktemp -d) && trap 'rm -rf "$$place"' EXIT && git clone --quiet . "$$place/compsim" \

@@ -76,8 +76,8 @@ TOGETHER = {
     "tests/solve/test_horizon.py": "twins",
     "tests/studies/regimes/test_lyapunov.py": "twins",
 }
-# modules that take long; the others, in small pieces, then even out the processes. The first three
-# compile each its own part of the equations: the march, that of other laws, that of mechanisms
+# modules that take long; the others, in small pieces, then even out the processes. The first
+# ones compile each its own part of the equations: the march, that of other laws, of mechanisms
 LONG = (
     "campaigns/test_chaos_processes", "physics/test_contact_laws", "solve/test_feature_runs",
     "sweep/test_execution", "campaigns/test_chaos_files", "cases/test_load",
