@@ -246,9 +246,10 @@ def fma(a: float, b: float, c: float) -> float:
 def square_root(a: float) -> float:
     """Return the square root by one instruction.
 
-    numba's own square root calls the C library, which sets errno.
+    numba's own square root calls the C library, which sets errno. Of a number below 0 it is nan: a
+    step that tries an impossible position is refused, also in plain Python.
     """
-    return math.sqrt(a)
+    return math.sqrt(a) if a >= 0.0 else math.nan
 
 
 def without_refcount(array: Any) -> Any:

@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -14,7 +15,7 @@ import pytest
 
 from compressor import program
 from compressor.physics import _jit
-from compressor.physics._jit import dispatch_on_record, fma, inline_llvm, jit
+from compressor.physics._jit import dispatch_on_record, fma, inline_llvm, jit, square_root
 from compressor.physics.record import new_record
 
 COMPRESSOR = Path(program.__file__).parent
@@ -156,6 +157,21 @@ def test_a_fused_product_is_rounded_once():
         exact = float(Fraction(a) * Fraction(b) + Fraction(c))
         assert compiled(a, b, c) == exact
         assert fma(a, b, c) == a * b + c  # from Python
+
+
+@pytest.mark.compiled
+def test_a_negative_number_has_no_square_root_either_way():
+    numba = pytest.importorskip("numba")
+    _jit.load_numba()
+
+    @numba.njit
+    def compiled(a):
+        return square_root(a)
+
+    for number in (-1.0, math.nan):
+        assert math.isnan(compiled(number))
+        assert math.isnan(square_root(number))  # from Python
+    assert compiled(2.25) == square_root(2.25) == 1.5
 
 
 @inline_llvm
