@@ -59,7 +59,7 @@ class Block:
         Cases share the groups that are equal, so that one takes some microseconds.
         """
         places = self.places(number)
-        parts = dict(self._shared)
+        parts = dict(self._shared_fields)
         for part, sources in self._sources.items():
             parts[part] = self._part(part, *[places[factor] for factor, _, _ in sources])
         return Case(**parts)
@@ -92,7 +92,7 @@ class Block:
         return found
 
     @cached_property
-    def _shared(self) -> dict[str, Any]:
+    def _shared_fields(self) -> dict[str, Any]:
         """Return the fields that are the same in all cases."""
         same = self._first.keys() - self._sources.keys()
         return {name: _field(name, self._first[name]) for name in same}

@@ -89,7 +89,7 @@ def content(drawing: Drawing) -> dict[str, Any]:
                 "row": panel.row,
                 "column": panel.column,
                 "square": panel.is_square,
-                "traces": [trace_data(trace, panel) for trace in panel.ordered],
+                "traces": [trace_data(trace, panel) for trace in panel.traces_in_order],
                 "notes": [note_data(one, panel) for one in panel.notes if one.tail is None],
             }
             for number, panel in enumerate(panels)
@@ -231,7 +231,7 @@ def describe_figure(drawing: Drawing) -> str:
     """Return a figure in words: its panels, their axes and curves."""
     texts = []
     for panel in drawing.panels:
-        names = [t.name or (t.scale.title if t.scale else "") for t in panel.ordered]
+        names = [t.name or (t.scale.title if t.scale else "") for t in panel.traces_in_order]
         curves = ", ".join(name for name in dict.fromkeys(names) if name)
         titles = [axis_title(drawing, panel, way) for way in WAYS[::-1]]
         axes = " over ".join(title for title in titles if title)

@@ -252,7 +252,7 @@ class Panel:
         self.traces.append(Trace(x, y, style, name, **more))
 
     @property
-    def ordered(self) -> list[Trace]:
+    def traces_in_order(self) -> list[Trace]:
         """Return the traces as the page and the table have them: bars first, then the lowest."""
         first = {"bars", "columns"}
         return sorted(
@@ -372,7 +372,7 @@ def as_csv(drawing: Drawing) -> str:
     last, seen = b"", set()
     for number, panel in enumerate(drawing.panels, 1):
         x_title, y_title = axis_title(drawing, panel, "x"), axis_title(drawing, panel, "y")
-        for trace in filter(is_in_table, panel.ordered):
+        for trace in filter(is_in_table, panel.traces_in_order):
             where = f"{one_line(panel.title) or number}: {trace.name}".removesuffix(": ")
             x, y, *more = points(trace)
             same = x.tobytes(), y.tobytes(), trace.name, *(values.tobytes() for _, values in more)
