@@ -9,9 +9,9 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from compressor.cases.checks import (
@@ -26,7 +26,6 @@ from compressor.cases.checks import (
     values_given,
 )
 from compressor.cases.conflicts import conflicts, values_read
-from compressor.cases.groups import Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
@@ -116,6 +115,14 @@ def model_of(values: Mapping[str, Any]) -> str:
 LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+# the groups with a key that results depend on; of `solve` the span and the solver are parts
+IDENTITY_GROUPS = tuple(
+    name
+    for name in GROUPS
+    if name != "solve"
+    and any(key.partition(".")[0] == name for key in table().keys() - outside_identity())
+)
+IDENTITY = frozenset({"joint", "load", "model", "span", "solver", *IDENTITY_GROUPS})
 NO_SWEEP = (
     "would be swept, and a case has one value of each key: build a case for each, or write a case "
     "file for load_cases"
@@ -212,8 +219,11 @@ class Case(Settings):
         if self.guide:
             values["guide"] = fill_guide(self.guide, self.machine.reciprocating_mass_kg)
         if self.joint != "both":
-            unused = {joint: 0.0 for joint in JOINTS if joint != self.joint}
-            values["clearance_mm"] = replace(self.clearance_mm, **unused)
+            gaps = self.clearance_mm
+            unused = {
+                joint: 0.0 for joint in JOINTS if joint != self.joint and getattr(gaps, joint)
+            }
+            values["clearance_mm"] = replace(gaps, **unused) if unused else gaps
         if self.joint == "none":  # which has no bore that oil fills, or that wears
             values["lubricant"] = values["wear"] = None
         if self.wear:
@@ -323,7 +333,7 @@ class Case(Settings):
     @cached_property
     def physics_key(self) -> str:
         """Return the hash of physics and span, without the solver: 20 hexadecimal digits."""
-        return digest(identity(self, with_solver=False))
+        return digest(join_parts(identity_parts(self, IDENTITY - {"solver"})))
 
     @cached_property
     def key(self) -> str:
@@ -333,7 +343,7 @@ class Case(Settings):
         error bars, and a store holds each once. Name, output, time limit and error bars are no part
         of it.
         """
-        return digest(identity(self, with_solver=True))
+        return digest(join_parts(identity_parts(self)))
 
     def attributes(self) -> dict[str, Any]:
         """Return what an outcome stores of its case: `name`, `case` (JSON), `key`, `physics_key`.
@@ -386,39 +396,48 @@ def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str
     return whole
 
 
-def part_text(part: Any) -> str:
-    """Return the text of a part of an identity: a group, of `solve` the solver, or numbers."""
-    if isinstance(part, Solve):
-        targets = {} if isinstance(part.accuracy, str) else dict(part.accuracy)
-        part = (part.rtol or targets or part.accuracy, part.method, part.max_steps)
-    elif not isinstance(part, tuple):
-        part = {key: value for key, value in vars(part).items() if value is not None}
-    return KEY_TEXT.encode(part)
-
-
-def identity(case: Case, with_solver: bool, part_text: Callable[[Any], str] = part_text) -> str:
-    """Return what makes a case's results: the text, in JSON, that a key is the hash of."""
-    solve = case.solve
-    # what is integrated and from where on it counts, however it is written
-    duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
-    settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
-    texts = {
-        "joint": f'"{case.joint}"',
-        "load": f'"{LOADS_IN_KEYS[case.load]}"',
-        "model": f'"{MODEL_VERSION}"',
-        "span": part_text((duration, settle, round(case.steps))),
-    }
-    if with_solver:
-        texts["solver"] = part_text(solve)
-    for name in _groups_in_identity():
+def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, str]:
+    """Return what makes a case's results, each part as JSON text by its name; `names` of them."""
+    solve, texts = case.solve, {}
+    if "joint" in names:
+        texts["joint"] = f'"{case.joint}"'
+    if "load" in names:
+        texts["load"] = f'"{LOADS_IN_KEYS[case.load]}"'
+    if "model" in names:
+        texts["model"] = f'"{MODEL_VERSION}"'
+    if "span" in names:  # what is integrated and from where on it counts, however it is written
+        duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
+        settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
+        texts["span"] = KEY_TEXT.encode((duration, settle, round(case.steps)))
+    if "solver" in names:
+        targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
+        accuracy = solve.rtol or targets or solve.accuracy
+        texts["solver"] = KEY_TEXT.encode((accuracy, solve.method, solve.max_steps))
+    for name in IDENTITY_GROUPS:
+        if name not in names or (case.joint == "none" and name in OF_JOINTS):
+            continue
         group = getattr(case, name)
         if group is not None:
-            texts[name] = part_text(group)
+            texts[name] = _object_text(vars(group))
         elif not WORDS[name]:
             texts[name] = "false"
-    if case.joint == "none":
-        for name in OF_JOINTS:
-            del texts[name]
+    return texts
+
+
+def _object_text(values: Mapping[str, Any]) -> str:
+    """Return the values that are not None as a JSON object, as `KEY_TEXT` writes it, but faster."""
+    texts = []
+    for key in sorted(values):
+        value = values[key]
+        if type(value) is float and math.isfinite(value):
+            texts.append(f'"{key}":{value!r}')
+        elif value is not None:
+            texts.append(f'"{key}":{KEY_TEXT.encode(value)}')
+    return "{" + ",".join(texts) + "}"
+
+
+def join_parts(texts: Mapping[str, str]) -> str:
+    """Return the text, in JSON, that a key is the hash of, from the parts of an identity."""
     return "{" + ",".join([f'"{name}":{texts[name]}' for name in sorted(texts)]) + "}"
 
 
@@ -481,13 +500,6 @@ def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[
     }
     found = (Problem(short.get(one.key, one.key), one.message) for one in problems)
     return [*dict.fromkeys(found)]
-
-
-@cache
-def _groups_in_identity() -> tuple[str, ...]:
-    """Return the groups that are part of a job's identity; of `solve`, what its numbers mean is."""
-    inside = {key.partition(".")[0] for key in table().keys() - outside_identity()}
-    return tuple(name for name in GROUPS if name in inside and name != "solve")
 
 
 def with_ideal_joints(case: Case) -> Case:

@@ -1,13 +1,13 @@
 """The jobs of a block: every combination of its factors' values, but for those left out."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 from compressor.cases.case import Case, plain_values
 from compressor.cases.checks import single, stands_for, values_given
-from compressor.cases.conflicts import IN_PLACE_OF
+from compressor.cases.conflicts import FILLED_IN, FILLING, IN_PLACE_OF
 from compressor.cases.keys import Leaves, covers, nest_values
 from compressor.cases.swept import Test
 from compressor.cases.table import GROUPS, OF_JOINTS, outside_identity, table
@@ -92,6 +92,35 @@ class Block:
         return found
 
     @cached_property
+    def _deciders(self) -> dict[str, set[int]]:
+        """Return the factors that decide a key, by key; of keys and groups that differ at all."""
+        swept: dict[str, set[int]] = {}
+        for sources in self._sources.values():
+            for factor, _, key in sources:
+                swept.setdefault(key, set()).add(factor)
+        found = {key: set(factors) for key, factors in swept.items()}
+        for key, factors in swept.items():
+            group = key.partition(".")[0]
+            together = [one for one in table() if group in FILLING and covers(group, one)]
+            filled = [one for one, by in FILLED_IN.items() if any(covers(key, b) for b in by)]
+            for other in (*together, *filled):
+                found.setdefault(other, set()).update(factors)
+        return found
+
+    def factors_of(self, keys: Iterable[str]) -> tuple[int, ...]:
+        """Return the factors that decide any of some keys."""
+        return tuple(sorted({f for key in keys for f in self._deciders.get(key, ())}))
+
+    def factors_within(self, names: Iterable[str]) -> tuple[int, ...]:
+        """Return the factors that decide anything of some groups or keys."""
+        return self.factors_of(
+            key
+            for key in self._deciders
+            for name in names
+            if covers(name, key) or covers(key, name)
+        )
+
+    @cached_property
     def _shared_fields(self) -> dict[str, Any]:
         """Return the fields that are the same in all cases."""
         same = self._first.keys() - self._sources.keys()
@@ -115,9 +144,8 @@ class Block:
 
     def rows_of(self, number: int, part: str) -> tuple[int, ...]:
         """Return the rows of factors by which combinations differ in a field of a case."""
-        sources = self._sources.get(part, ())
-        places = self.places(number) if sources else ()
-        return tuple(places[factor] for factor, _, _ in sources)
+        places = self.places(number)
+        return tuple(places[factor] for factor in self.factors_within([part]))
 
     def where(self, test: Test) -> list[bool]:
         """Return whether a comparison holds, of each job."""

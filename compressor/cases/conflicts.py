@@ -296,9 +296,19 @@ SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 FILLED_IN = {
     "machine.rod_centre_mm": ("machine.rod_length_mm",),
     "machine.rod_inertia_kg_m2": ("machine.rod_mass_kg", "machine.rod_length_mm"),
+    "machine.small_end_pin_radius_mm": ("machine.pin_radius_mm",),
     "body.casing_mass_kg": ("body.mass_kg",),
-    **{f"clearance_mm.{joint}": ("joint",) for joint in JOINTS},
-}
+    "guide.crosshead_inertia_kg_m2": (
+        "machine.reciprocating_mass_kg", "guide.crosshead_length_mm", "guide.crosshead_height_mm",
+    ),
+    "clearance_mm.big_end": ("joint",),
+    "clearance_mm.small_end": ("joint",),
+    "lubricant": ("joint",),
+    "wear": ("joint",),
+    "wear.limit_mm": ("joint", "clearance_mm.big_end", "clearance_mm.small_end"),
+}  # fmt: skip
+# groups that fill in values by several of their others: each may decide all of them
+FILLING = ("contact", "friction", "solve")
 
 
 def find_misfits(case: Settings, given: frozenset[str]) -> list[Problem]:
@@ -323,7 +333,12 @@ def conflicts(
         yield from unread_values(case, values)
         return
     undecided = _undecided_keys(wrong)
-    known = cast(Settings, _Known(case, undecided))
+
+    def refuse(key: str) -> None:
+        if key in undecided:
+            raise _Unknown(key)
+
+    known = cast(Settings, Watched(case, refuse))
     for rule in RULES:
         with contextlib.suppress(_Unknown):
             yield from rule(known, given)
@@ -344,24 +359,23 @@ class _Unknown(Exception):
     """The end of a rule that reads a wrong value."""
 
 
-class _Known:
-    """A case, or a group of one, of which some values are wrong: to read those raises _Unknown."""
+class Watched:
+    """A case, or a group of one, that passes each key that is read to a function, `note`."""
 
-    def __init__(self, values: Any, wrong: frozenset[str], prefix: str = ""):
-        self._values, self._wrong, self._prefix = values, wrong, prefix
+    def __init__(self, values: Any, note: Callable[[str], None], prefix: str = ""):
+        self._values, self._note, self._prefix = values, note, prefix
 
     def __getattr__(self, name: str) -> Any:
-        key = self._prefix + name
-        if key in self._wrong:
-            raise _Unknown(key)
         # properties and methods run on this view: what they read is looked up here, too
         member = getattr(type(self._values), name, None)
         if isinstance(member, property) and member.fget:
             return member.fget(self)
         if isinstance(member, FunctionType):
             return partial(member, self)
+        key = self._prefix + name
+        self._note(key)
         value = getattr(self._values, name)
-        return _Known(value, self._wrong, f"{key}.") if key in GROUPS and value else value
+        return Watched(value, self._note, f"{key}.") if key in GROUPS and value else value
 
 
 def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:

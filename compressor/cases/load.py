@@ -2,8 +2,8 @@
 
 A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
 and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
-before any is made. Each job's case is then built, checked for values that do not fit each other,
-and forgotten: it is built again when it is asked for.
+before any is made. What does not fit together, and the keys, come from `bulk`; a job's case is
+built when it is asked for.
 """
 
 import contextlib
@@ -12,15 +12,15 @@ import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from compressor.cases import blocks, regimes
-from compressor.cases.case import Case, digest, identity, part_text
-from compressor.cases.checks import SHORTHANDS, row_of, value_of
+from compressor.cases.bulk import jobs_of
+from compressor.cases.case import Case
+from compressor.cases.checks import SHORTHANDS, row_of
 from compressor.cases.combinations import Block, columns
-from compressor.cases.conflicts import conditions, find_misfits, is_off, problem_of
+from compressor.cases.conflicts import conditions, is_off, problem_of
 from compressor.cases.keys import (
     Leaves,
     leaves,
@@ -117,7 +117,6 @@ def _place_of(key: str, node: Node, leaves: Leaves) -> Place:
 
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
-MAX_TEXTS = 4096  # of groups, which jobs share
 MANY_CASES = 20_000  # cases of a study that take seconds to be read
 MAX_CONFLICTS = 20  # reported of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
@@ -410,21 +409,20 @@ def _check_cases(
     found: dict[Problem, FileProblem] = {}
     keys: list[str] = []
     values: dict[str, list[Any]] = {key: [] for key in swept}
-    shared_text = lru_cache(MAX_TEXTS)(part_text)
     total = len(cases)
     progress = progress if total >= MANY_CASES else no_progress
-    for number, (block, place) in enumerate(cases.combinations()):
+    jobs = ((block, job) for block in cases.parts for job in jobs_of(block, swept))
+    for number, (block, job) in enumerate(jobs):
         if number % 1000 == 0:
             progress(number, total, "" if number else f"{draft.name}: {total} jobs")
-        case = block.case(place)
-        if find_misfits(case, block.given):
-            chosen = block.chosen(place)
+        if job.problems:
+            chosen = block.chosen(job.number)
             for problem in _misfits_in_words(block, chosen):
                 found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
         elif not found:
-            keys.append(digest(identity(case, True, shared_text)))
-            for key in swept:
-                values[key].append(value_of(case, key))
+            keys.append(job.key)
+            for key, value in zip(swept, job.values, strict=True):
+                values[key].append(value)
     progress(total, total, "")
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:
