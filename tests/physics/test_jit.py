@@ -1,6 +1,7 @@
 """One source, compiled or not: the JIT switched off gives the same numbers."""
 
 import ctypes
+import gc
 import json
 import math
 import os
@@ -200,3 +201,24 @@ def test_a_function_by_kind_is_that_of_the_record():
     wrong = new_record(chosen=True)
     with pytest.raises(Exception, match="no_such_field"):
         one_more(2.0, wrong)
+
+
+@pytest.mark.skipif(not _jit.ENABLED, reason="nothing is compiled")
+def test_garbage_is_collected_seldom_while_numba_compiles_and_as_before_afterwards():
+    import numba
+    from numba.core.event import Event, EventStatus, broadcast
+
+    before, during = gc.get_threshold(), []
+    _jit.load_numba()
+    compiling = [Event("numba:compile", status) for status in EventStatus]
+    for event in (compiling[0], compiling[0]):  # a function, and one that it calls
+        broadcast(event)
+        during.append(gc.get_threshold())
+    broadcast(compiling[1])
+    during.append(gc.get_threshold())
+    broadcast(compiling[1])
+    assert during == [_jit.COLLECTING] * 3
+    assert gc.get_threshold() == before
+    with pytest.raises(numba.TypingError):
+        jit(lambda x: x + "text")(1.0)
+    assert gc.get_threshold() == before
