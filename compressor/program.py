@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 VERSION = "0.1.0"
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
@@ -79,6 +79,9 @@ class StudyFiles(NamedTuple):
 
 
 STUDY_FILES: list[StudyFiles] = []  # those of the table in `compressor.studies`, which adds them
+# group of keys by which a case file asks for a study -> function that imports the study's module
+# `group`; of the same table
+STUDY_GROUPS: dict[str, Callable[[], Any]] = {}
 
 
 _FILTERS = threading.RLock()

@@ -11,7 +11,7 @@ from compressor.cases.case import (
     to_yaml,
     with_ideal_joints,
 )
-from compressor.cases.checks import phrase_of, row_of, stands_for, value_in
+from compressor.cases.checks import SHORTHANDS, phrase_of, row_of, stands_for, suggestion, value_in
 from compressor.cases.conflicts import back_action, judged_range, outside_judged, reads
 from compressor.cases.examples import templates
 from compressor.cases.groups import (
@@ -27,13 +27,21 @@ from compressor.cases.groups import (
     Spring,
 )
 from compressor.cases.json_schema import case_schema
+from compressor.cases.keys import Leaves, covers
 from compressor.cases.laws import CYLINDRICAL, READ_BY, law_of
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import joint_stiffness, paper_stiffness_note
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
-from compressor.cases.parameter import ACCURACY, IMPLAUSIBLE, TIGHTEST, CaseError, to_si
-from compressor.cases.regimes import Regimes
-from compressor.cases.study import Axis, Study, points
-from compressor.cases.swept import design
+from compressor.cases.parameter import (
+    ACCURACY,
+    IMPLAUSIBLE,
+    TIGHTEST,
+    CaseError,
+    Parameter,
+    quote_value,
+    to_si,
+)
+from compressor.cases.study import Axis, Study, StudyRequest, points
+from compressor.cases.swept import between, design
 from compressor.cases.table import OF_JOINTS, table
-from compressor.cases.yaml_reader import CaseFileError
+from compressor.cases.yaml_reader import CaseFileError, FileProblem, Node, Place

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from compressor.cases.parameter import NO_VALUE, Parameter, Problem, check_targets, quote_value
 from compressor.cases.table import GROUPS, WORDS, Settings, table
 from compressor.metrics import JOINTS
+from compressor.program import STUDY_GROUPS
 
 
 class Shorthand(NamedTuple):
@@ -208,22 +209,18 @@ def stroke_in(values: Any) -> float:
     return float(stroke) if is_number and stroke is not None else math.nan
 
 
-# keys of a case file that are no part of a case: how values are swept together
-SWEEP = ("sample", "zip", "exclude", "blocks", "regimes")
-MAPPINGS = {  # of these, what stands in them
-    "sample": ("n", "seed"),
-    "regimes": (
-        "over", "from", "to", "n", "log", "direction", "section_deg", "settle_rev", "measure_rev",
-        "exponent",
-    ),
-}  # fmt: skip
+# keys of a case file that are no part of a case: how values are swept together, groups of studies
+SWEEP = ("sample", "zip", "exclude", "blocks", *STUDY_GROUPS)
+MAPPINGS = ("sample", *STUDY_GROUPS)  # of these, those with keys of their own
 MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
 def known_keys(group: str, file: bool = True) -> list[str]:
     """Return the keys that a group (or, for "", the top) may hold; a `file` has those of sweeps."""
-    if group in MAPPINGS:
-        return [*MAPPINGS[group]]
+    if group == "sample":
+        return ["n", "seed"]
+    if group in STUDY_GROUPS:
+        return [*STUDY_GROUPS[group]().ROWS]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
     return [*names, *SWEEP] if file and not group else names
 

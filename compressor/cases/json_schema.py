@@ -12,14 +12,15 @@ from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
 from compressor.cases.checks import DOUBLES, SHORTHANDS, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, TARGET, Parameter
-from compressor.cases.regimes import ROWS, followable
 from compressor.cases.swept import FORMS, SAMPLED, is_number
 from compressor.cases.table import GROUPS, WORDS, outside_identity, table
 from compressor.metrics import METRICS
+from compressor.program import STUDY_GROUPS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
-WHOLE_FILE = ("name", "blocks", "regimes")  # what cannot stand in a block
+MAX_NUMBER = 1e300  # a bound of values that need only be finite
+WHOLE_FILE = ("name", "blocks", *STUDY_GROUPS)  # what cannot stand in a block
 
 Schema = dict[str, Any]
 
@@ -27,7 +28,7 @@ Schema = dict[str, Any]
 def case_schema() -> Schema:
     """Return the JSON Schema of a whole case file, in the dialect 2020-12."""
     found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in _top_keys()}
-    found |= _sweeps() | {"regimes": _regimes()}
+    found |= _sweeps() | {name: _study_group(load()) for name, load in STUDY_GROUPS.items()}
     in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}
     blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
     blocks["description"] = "sets of jobs, one after the other; each over the keys of the file"
@@ -91,8 +92,9 @@ def _single_value(row: Parameter) -> Schema:
     """Return the schema of one value of a parameter, as `Parameter.check` has it."""
     words = {"enum": [*row.choices, *(alias for alias, _ in row.aliases)]}
     if row.kind in ("number", "integer"):
-        lower = {"exclusiveMinimum" if row.above else "minimum": row.low}
-        number = {"type": row.kind, **lower, "maximum": row.high}
+        ends = {"exclusiveMinimum" if row.above else "minimum": row.low, "maximum": row.high}
+        bounds = {word: end for word, end in ends.items() if abs(end) < MAX_NUMBER}
+        number = {"type": row.kind, **bounds}
         return {"anyOf": [words, number]} if row.choices else number
     if row.kind == "materials":
         return {"type": "array", "items": words, "minItems": 2, "maxItems": 2}
@@ -136,23 +138,13 @@ def _sweeps() -> Schema:
     }  # fmt: skip
 
 
-def _regimes() -> Schema:
-    """Return the schema of what is followed, value after value."""
-    ends = {"over": {"description": "the key that is followed", "enum": [*followable()]}}
-    ends |= {
-        "from": {"description": "its least value", **NUMBER},
-        "to": {"description": "its greatest value", **NUMBER},
-    }
-    rows = {
-        name: {
-            "description": row.phrase,
-            **({} if row.default is None else {"default": row.default}),
-        }
-        | _single_value(row)
-        for name, row in ROWS.items()
-    }
-    about = "one machine followed along a key; each value starts from the end of the last one"
-    return {"description": about, **_mapping(ends | rows), "required": ["over", "from", "to", "n"]}
+def _study_group(module: Any) -> Schema:
+    """Return the schema of a group that asks for a study; module: the one that reads it."""
+    keys = {}
+    for name, row in module.ROWS.items():
+        default = {} if row.default is None else {"default": row.default}
+        keys[name] = {"description": row.phrase, **default, **_single_value(row)}
+    return {"description": module.ABOUT, **_mapping(keys), "required": [*module.NEEDED]}
 
 
 def _sweepable() -> Iterable[str]:

@@ -15,10 +15,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from compressor.cases import blocks, regimes
+from compressor.cases import blocks
 from compressor.cases.bulk import jobs_of
 from compressor.cases.case import Case
-from compressor.cases.checks import SHORTHANDS, row_of
+from compressor.cases.checks import SHORTHANDS, TWICE, row_of
 from compressor.cases.combinations import Block, columns
 from compressor.cases.conflicts import conditions, is_off, problem_of
 from compressor.cases.keys import (
@@ -30,8 +30,7 @@ from compressor.cases.keys import (
     read_overrides,
 )
 from compressor.cases.parameter import CaseError, Problem, quote_value
-from compressor.cases.regimes import GROUP, Regimes
-from compressor.cases.study import Axis, Cases, Study
+from compressor.cases.study import Axis, Cases, Study, StudyRequest
 from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
 from compressor.cases.table import WORDS, table
 from compressor.cases.yaml_reader import (
@@ -42,7 +41,7 @@ from compressor.cases.yaml_reader import (
     read_file,
     shorten,
 )
-from compressor.program import Progress, no_progress
+from compressor.program import STUDY_GROUPS, Progress, no_progress
 
 Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it
 
@@ -131,7 +130,7 @@ class _Draft:
     leaves: Leaves
     changes: Mapping[str, Leaves]
     problems: list[FileProblem]
-    regimes: Regimes | None = None
+    request: StudyRequest | None = None
 
 
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
@@ -168,10 +167,10 @@ def load_studies(
 
     Each override, `key=value`, replaces a value in all of them. A file that asks for more than
     `max_jobs` jobs is refused before any is made; `only`, a comparison, selects the jobs to be run.
-    A file with `regimes` is refused where the caller cannot `follow` one. `progress` is told how
-    many of many cases are read. `variants` gives the cases that the caller runs for one; a key that
-    none of them reads is refused. Raises CaseFileError with everything that is wrong in all files,
-    overrides and the comparison.
+    A file with the group of a study is refused where the caller cannot `follow` it. `progress` is
+    told how many of many cases are read. `variants` gives the cases that the caller runs for one; a
+    key that none of them reads is refused. Raises CaseFileError with everything that is wrong in
+    all files, overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
@@ -179,7 +178,7 @@ def load_studies(
     drafts = [_draft(_path_of(path), changes, problems) for path in paths]
     _refuse_shared_names(drafts)
     if not follow:
-        _refuse_regimes(drafts)
+        _refuse_requests(drafts)
     keys = KeysRead(variants)
     studies = [_study(draft, max_jobs, test, progress, keys) for draft in drafts]
     problems += _unread(drafts, keys)
@@ -220,12 +219,21 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
         problems.append(FileProblem(root.place, "", message))
     whole = override_leaves(file, changes)
     name = _study_name(path, whole, problems) if root else ""
-    continuation = regimes.read_regimes(whole, problems)
+    request = _read_request(whole, problems)
     if "blocks" in changes:
         file = override_leaves(file, {"blocks": changes["blocks"]})
-    excluded = ("blocks", GROUP)
+    excluded = ("blocks", *STUDY_GROUPS)
     rest = {key: change for key, change in changes.items() if key.partition(".")[0] not in excluded}
-    return _Draft(path, name, regimes.without(file), rest, problems, continuation)
+    values = {k: node for k, node in file.values.items() if k.partition(".")[0] not in STUDY_GROUPS}
+    return _Draft(path, name, Leaves(values, file.places), rest, problems, request)
+
+
+def _read_request(found: Leaves, problems: list[FileProblem]) -> StudyRequest | None:
+    """Return what the group of a study asks for; None without, or where it is a problem."""
+    names = [name for name in STUDY_GROUPS if name in found.places]
+    for name in names[1:]:
+        problems.append(FileProblem(found.places[name], name, TWICE.format(names[0])))
+    return STUDY_GROUPS[names[0]]().read(found, problems) if names else None
 
 
 def _study_name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
@@ -256,13 +264,14 @@ def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
             draft.problems.append(FileProblem(place, "name", message))
 
 
-def _refuse_regimes(drafts: Sequence[_Draft]) -> None:
-    """Refuse files with regimes: a chain of them is no case."""
+def _refuse_requests(drafts: Sequence[_Draft]) -> None:
+    """Refuse files with the group of a study: a chain is no case."""
     for draft in drafts:
-        if draft.regimes:
-            place = draft.leaves.places.get(GROUP, Place(draft.path, 1, 1))
+        if draft.request:
+            group = draft.request.group
+            place = draft.leaves.places.get(group, Place(draft.path, 1, 1))
             message = "only `compsim run` and `compsim plan` follow them: give a file without"
-            draft.problems.append(FileProblem(place, GROUP, message))
+            draft.problems.append(FileProblem(place, group, message))
 
 
 def _unread(drafts: Sequence[_Draft], keys: KeysRead) -> Iterator[FileProblem]:
@@ -282,9 +291,9 @@ def _note_read(draft: _Draft, cases: Cases | None, keys: KeysRead) -> None:
     if draft.problems or cases is None:
         return
     keys.note(cases)
-    if draft.regimes:
-        last = replace(draft.regimes, first=draft.regimes.last)
-        _, cases = _cases(replace(draft, regimes=last, problems=[]), MAX_JOBS)
+    if draft.request:
+        last = replace(draft, request=draft.request.at_last(), problems=[])
+        _, cases = _cases(last, MAX_JOBS)
         if cases is not None:
             keys.note(cases)
 
@@ -292,8 +301,8 @@ def _note_read(draft: _Draft, cases: Cases | None, keys: KeysRead) -> None:
 def _cases(draft: _Draft, max_jobs: int) -> tuple[list[blocks.Draft], Cases | None]:
     """Return the blocks of a draft, and their cases; None where they are too many to be made."""
     every = _blocks(draft, max_jobs)
-    if draft.regimes:
-        every = (regimes.at_first(leaves, draft.regimes, draft.problems) for leaves in every)
+    if draft.request:
+        every = (draft.request.at_first(leaves, draft.problems) for leaves in every)
     drafts = [blocks.draft(leaves, draft.problems) for leaves in every]
     if not _fits_limit(drafts, draft, max_jobs):
         return drafts, None
@@ -322,13 +331,13 @@ def _study(
     else:
         spreads = {k: s.spread for d in drafts for k, s in d.sweeps.items() if s.kind in SAMPLED}
         axes = [Axis(key, tuple(values[key]), spreads.get(key)) for key in swept]
-    chains = _chains(draft, cases, max_jobs) if draft.regimes else ()
+    chains = _chains(draft, draft.request, cases, max_jobs) if draft.request else ()
     if draft.problems:
         return Study(draft.name, draft.path, (), ())
     selected = range(len(cases)) if only is None else cases.where(only)
     return Study(
         draft.name, draft.path, tuple(axes), cases, keys, is_grid, selected,
-        draft.regimes, chains, tuple(nest_values(block.fixed) for block in found),
+        draft.request, chains, tuple(nest_values(block.fixed) for block in found),
     )  # fmt: skip
 
 
@@ -363,7 +372,7 @@ def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
 def _block_leaves(item: Node, draft: _Draft) -> Leaves:
     """Return the leaves of a block; keys that only a file can have are problems."""
     found = leaves(item, draft.problems)
-    whole = ("name", "blocks", GROUP)
+    whole = ("name", "blocks", *STUDY_GROUPS)
     for key in [key for key in found.values if key.partition(".")[0] in whole]:
         group, message = key.partition(".")[0], IN_BLOCK
         draft.problems.append(FileProblem(found.places[group], group, message))
@@ -431,31 +440,32 @@ def _check_cases(
     return tuple(keys), values
 
 
-def _chains(draft: _Draft, cases: Cases, max_jobs: int) -> tuple[tuple[Case, ...], ...]:
+def _chains(
+    draft: _Draft, request: StudyRequest, cases: Cases, max_jobs: int
+) -> tuple[tuple[Case, ...], ...]:
     """Return the cases of each chain; too many, or such that cannot be followed, are problems."""
-    continuation, places = draft.regimes, draft.leaves.places
-    assert continuation
-    place = places.get(GROUP, Place(draft.path, 1, 1))
-    total = len(cases) * continuation.n * len(continuation.directions)
+    group, places = request.group, draft.leaves.places
+    place = places.get(group, Place(draft.path, 1, 1))
+    total = len(cases) * request.n * len(request.directions)
     if total > max_jobs:
         message = (
             f"{format_count(total)} values are more than {max_jobs}; lower n, or raise --max-jobs"
         )
-        draft.problems.append(FileProblem(places.get(f"{GROUP}.n", place), f"{GROUP}.n", message))
+        draft.problems.append(FileProblem(places.get(f"{group}.n", place), f"{group}.n", message))
         return ()
     chains = []
     for block, number in cases.combinations():
         chosen = block.chosen(number)
         try:
-            chain = tuple(map(block.resolve_case, regimes.follow_key(continuation, chosen)))
+            chain = tuple(map(block.resolve_case, request.follow(chosen)))
         except CaseError as error:
             misfits = (
                 _locate_problem(problem, chosen, block, draft.path) for problem in error.problems
             )
             draft.problems.extend(misfits)
             return ()
-        if message := regimes.objection(chain, continuation):
-            draft.problems.append(FileProblem(place, GROUP, message))
+        if message := request.objection(chain):
+            draft.problems.append(FileProblem(place, group, message))
         chains.append(chain)
     return tuple(chains)
 

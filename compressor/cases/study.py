@@ -8,8 +8,9 @@ from typing import Any, Protocol, overload
 
 from compressor.cases.case import Case
 from compressor.cases.combinations import Block
-from compressor.cases.regimes import Regimes
+from compressor.cases.keys import Leaves
 from compressor.cases.swept import Test
+from compressor.cases.yaml_reader import FileProblem, Node
 
 
 @dataclass(frozen=True)
@@ -25,13 +26,41 @@ class Axis:
     spread: Callable[[float], float] | None = field(default=None, compare=False)
 
 
+class StudyRequest(Protocol):
+    """What a file's group of a study asks for: each case is followed along a key, in chains.
+
+    The study's module `group` is imported when a file has the group. It has `ROWS`, a `Parameter`
+    of each key; `NEEDED`, the keys that a file must give; `ABOUT`, their description in the JSON
+    Schema; and `read(leaves, problems)`, which returns the request, or None where it adds problems.
+    """
+
+    @property
+    def group(self) -> str: ...  # its name
+    @property
+    def n(self) -> int: ...  # number of values of the key
+    @property
+    def directions(self) -> Sequence[str]: ...  # up, down: a chain each
+
+    def at_first(self, leaves: Leaves, problems: list[FileProblem]) -> Leaves:
+        """Return a block's leaves with the key at its first value; add what is wrong."""
+
+    def at_last(self) -> "StudyRequest":
+        """Return the request that begins at the last value."""
+
+    def follow(self, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
+        """Yield a combination of a file's values at each value of the key."""
+
+    def objection(self, cases: tuple[Case, ...]) -> str:
+        """Return why these cases of a chain cannot be followed, or ""."""
+
+
 @dataclass(frozen=True)
 class Study:
     """One case file. In a grid, jobs are in C order over the axes, in the file's order.
 
     Otherwise every axis is a column, with a value for each job, None where the job has none.
     `fixed` has the values that are not swept, group by group as each block of the file gives them.
-    With `regimes` the jobs are those that chains begin at, and `chains` has the cases of each, in
+    With a `request` the jobs are those that chains begin at, and `chains` has the cases of each, in
     the order of the jobs, by the values of the key that is followed.
     """
 
@@ -42,7 +71,7 @@ class Study:
     keys: tuple[str, ...] = ()  # of the cases
     is_grid: bool = True
     selected: Sequence[int] = ()  # numbers of the jobs to be run now
-    regimes: Regimes | None = None
+    request: StudyRequest | None = None
     chains: tuple[tuple[Case, ...], ...] = ()
     fixed: tuple[Mapping[str, Any], ...] = ()
 

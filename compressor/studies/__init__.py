@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from compressor.program import STUDY_FILES, StudyFiles
+from compressor.program import STUDY_FILES, STUDY_GROUPS, StudyFiles
 
 if TYPE_CHECKING:
     import click
@@ -27,7 +27,8 @@ class StudyKind:
 
     `verbs`: of the command line, which its module `command` has.
     `group`: the group of keys by which a case file asks `compsim run` for it; its module `command`
-    then has `check_options`, `run_studies`, `ahead` and `ahead_lines`.
+    then has `check_options`, `run_studies`, `ahead` and `ahead_lines`, and its module `group` what
+    `compressor.cases.StudyRequest` says.
     `figures`: what `compsim plot` draws of it; its module `plots` has `write`.
     `files`: what it keeps beside the jobs; of a kind with figures, a `result` has a study's folder.
     `has_page`: whether its module `page` has `add`, what it adds to the page of a report.
@@ -66,6 +67,7 @@ STUDIES = (
     StudyKind("search", ("find",)),
 )  # fmt: skip
 STUDY_FILES[:] = [kind.files for kind in STUDIES if kind.files]
+STUDY_GROUPS.update({kind.group: partial(kind.module, "group") for kind in STUDIES if kind.group})
 
 
 def verbs() -> "list[click.Command]":
@@ -75,8 +77,8 @@ def verbs() -> "list[click.Command]":
 
 def kind_of(study: "Study") -> StudyKind | None:
     """Return the kind of study that a case file has a group of; None of a file of jobs."""
-    found = [kind for kind in STUDIES if kind.group and getattr(study, kind.group)]
-    return found[0] if found else None
+    request = study.request
+    return next((kind for kind in STUDIES if request and kind.group == request.group), None)
 
 
 def by_kind(studies: "Iterable[Study]") -> "dict[StudyKind | None, list[Study]]":

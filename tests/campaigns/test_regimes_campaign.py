@@ -44,7 +44,7 @@ def test_up_and_down_differ_where_a_second_motion_was_confirmed():
 
 def test_the_first_value_is_as_it_was(rows):
     (study,) = load_studies(example("regimes"), follow=True)
-    found = run_value(study.chains[0][0], None, study.regimes)
+    found = run_value(study.chains[0][0], None, study.request)
     kept_row = rows[0]
     assert found["regime"] == kept_row["regime"] == "periodic"
     assert float(found["period"]) == kept_row["period"]

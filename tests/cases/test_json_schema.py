@@ -23,7 +23,6 @@ OTHERS = [
     "joint: both\nclearance_mm: {big_end: 0.1, small_end: [0.1, 0.2]}",
     "joint: both\nclearance_mm: {random: [0.01, 1], log: true}\nsample: {n: 2, seed: 3}",
     "load: [none, spring]\nexclude: [load == none]\nfriction: false",
-    "joint: big_end\nregimes: {over: clearance_mm, from: 0.1, to: 1, n: 3, section_deg: 30.5}",
 ]
 WRONG = [
     "joint: big_en",
@@ -55,12 +54,6 @@ WRONG = [
     "joint: big_end\nclearance_mm: {sobol: [0.1, 0.2]}\nsample: {n: 0}",
     "joint: big_end\nclearance_mm: [0.1, 0.2]\nzip: [[clearance_mm]]",
     "load: [none, spring]\nexclude: 5",
-    "joint: big_end\nregimes: {over: clearance_mm, from: 0.1, to: 1}",
-    "joint: big_end\nregimes: {over: joint, from: 0.1, to: 1, n: 3}",
-    "joint: big_end\nregimes: {over: clearance_mm, from: 0.1, to: 1, n: 1}",
-    "joint: big_end\nregimes: {over: clearance_mm, from: 0.1, to: 1, n: 3, direction: left}",
-    "joint: big_end\nregimes: 3",
-    "blocks: [{joint: big_end, regimes: {over: clearance_mm, from: 0.1, to: 1, n: 3}}]",
     "blocks: []",
     "blocks: [{name: x}]",
     "blocks: [{blocks: [{load: none}]}]",

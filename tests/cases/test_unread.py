@@ -292,12 +292,6 @@ IN_GAS = "nothing reads this group: it needs load: gas; " + GONE.format("group")
         ("gas: {back_pressure_MPa: 0.1}", ["machine.speed_rpm=400"],
          [f"case.yaml:1:1: gas: {IN_GAS}"]),
         ("joint: big_end\nclearance_mm: 0.1", ["clearance_mm.big_end=0.2"], []),
-        # a chain reads at its last value what it does not read at its first
-        ("joint: both\nclearance_mm: 0.1\nguide: {crosshead_length_mm: 90}\n"
-         "regimes: {over: guide.clearance_mm, from: 0, to: 0.1, n: 3}", [], []),
-        ("joint: both\nclearance_mm: 0.1\n"
-         "regimes: {over: gas.back_pressure_MPa, from: 0, to: 0.1, n: 3}", [],
-         [f"case.yaml:3:11: gas: {IN_GAS}"]),
     ],
 )  # fmt: skip
 def test_one_job_that_reads_a_key_is_enough(text, overrides, expected, tmp_path, monkeypatch):

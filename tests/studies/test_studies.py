@@ -31,6 +31,10 @@ def test_a_study_has_the_parts_that_its_line_names(kind):
         command = kind.module("command")
         for name in ("check_options", "run_studies", "ahead", "ahead_lines"):
             assert callable(getattr(command, name))
+        group = kind.module("group")
+        assert {*group.NEEDED} <= {*group.ROWS}
+        assert callable(group.read)
+        assert group.ABOUT
     if kind.figures:
         assert callable(kind.module("plots").write)
         assert kind.files.result.endswith("*/study.json")
@@ -91,6 +95,16 @@ print(*cli.commands)
 """
 
 
+ERROR = """
+from compressor import CaseFileError
+from compressor.cases.load import load_studies
+try:
+    load_studies("one.yaml")
+except CaseFileError as error:
+    print(error)
+"""
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_the_program_does_without_each_study(name, tmp_path, monkeypatch):
     copy = copy_without(tmp_path, [name])
@@ -107,6 +121,41 @@ def test_the_program_does_without_each_study(name, tmp_path, monkeypatch):
     for rule in test_layers.RULES:
         if rule is not test_layers.faults_of_doors:  # some names are given to this study alone
             assert rule(sources) == []
+    group = STUDIES[NAMES.index(name)].group
+    if group:
+        (copy / "one.yaml").write_text(f"load: none\n{group}: {{over: clearance_mm}}\n")
+        error = run_in(copy, ERROR)
+        assert error.startswith(f"one.yaml:2:1: {group}: unknown key; a case file has name, ")
+        assert group not in error.partition(";")[2]
+
+
+ADDED = """
+from compsim import cli
+from compressor.cases import case_schema, load_studies
+load_studies("jobs.yaml")
+assert not {"compressor.studies.added.group", "compressor.studies.regimes.group"} & {*sys.modules}
+assert cli.main(["plan", "added.yaml"]) == 0
+schema = case_schema()["properties"]
+assert str(schema["added"]) == str(schema["regimes"])
+"""
+
+
+def test_a_study_with_a_group_is_a_folder_and_a_line(tmp_path):
+    studies = copy_without(tmp_path, []) / "compressor/studies"
+    shutil.copytree(studies / "regimes", studies / "added")
+    for path in (studies / "added").glob("*.py"):
+        text = path.read_text().replace("compressor.studies.regimes", "compressor.studies.added")
+        path.write_text(text.replace('GROUP = "regimes"', 'GROUP = "added"'))
+    table = (studies / "__init__.py").read_text()
+    line = 'STUDIES = (\n    StudyKind("added", group="added"),'
+    (studies / "__init__.py").write_text(table.replace("STUDIES = (", line))
+    followed = "{over: clearance_mm, from: 0.1, to: 1, n: 3}\n"
+    (tmp_path / "jobs.yaml").write_text("load: none\n")
+    (tmp_path / "added.yaml").write_text(f"joint: big_end\nadded: {followed}")
+    (tmp_path / "one.yaml").write_text(f"added: {followed}regimes: {followed}")
+    assert "added  1 chain x 3 values" in run_in(tmp_path, ADDED)
+    error = "one.yaml:2:1: regimes: stands in place of added: give one of the two\n"
+    assert run_in(tmp_path, ERROR) == error
 
 
 MAIN_JOB = """

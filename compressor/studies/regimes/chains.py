@@ -20,10 +20,11 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import MODES
-from compressor.cases import MODEL, Case, Regimes, model_of
+from compressor.cases import MODEL, Case, model_of
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
+from compressor.studies.regimes.group import Regimes
 from compressor.studies.regimes.values import COORDINATES, NUMBERS, TEXTS, Row, empty, run_value
 
 FOLDER = "regimes"

@@ -10,11 +10,12 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN
-from compressor.cases import OF_JOINTS, Case, Regimes
+from compressor.cases import OF_JOINTS, Case
 from compressor.metrics import JOINTS
 from compressor.store import Folder, StoreError, coordinate_names, read_dataset, swept_column
 from compressor.studies.regimes.chains import FOLDER, REMEDY, labels, read_chain
 from compressor.studies.regimes.confirm import verdict_attrs
+from compressor.studies.regimes.group import Regimes
 from compressor.studies.regimes.run import FILE
 from compressor.studies.regimes.values import COORDINATES, NUMBERS, TEXTS
 

@@ -29,6 +29,7 @@ from compressor.studies.regimes.chains import (
     run_chain,
 )
 from compressor.studies.regimes.confirm import ChainPair, Verdict, VerdictBook, confirm
+from compressor.studies.regimes.group import Regimes
 from compressor.sweep import JobLost, JobResult, Needs, run_here
 
 LEGS = 4  # runs of a value, each with the case's own wall time at most, and some more
@@ -122,16 +123,16 @@ def machines_of(study: Study) -> list[FollowedMachine]:
 
 def chains_of(study: Study, number: int) -> tuple[Chain, ...]:
     """Return the chains of one case of a study."""
-    request = study.regimes
-    assert request
+    request = study.request
+    assert isinstance(request, Regimes)
     cases = study.chains[number]
     return tuple(Chain.of(study.name, request, way, cases) for way in request.directions)
 
 
 def write_manifest(folder: Path, study: Study) -> None:
     """Store which chains a study has."""
-    request = study.regimes
-    assert request
+    request = study.request
+    assert isinstance(request, Regimes)
     every = [chains_of(study, number) for number in range(study.jobs)]
     plain = {
         "name": study.name,
@@ -282,7 +283,7 @@ def describe_progress(
         differ, confirmed = (
             (sum(column) for column in zip(*pairs, strict=True)) if pairs else (0, 0)
         )
-        values = study.regimes.n if study.regimes else 0
+        values = study.request.n if study.request else 0
         complete = sum(end.values for end in finished)
         counts.append(
             ChainCount(study.name, len(chains), values, complete, len(bad), differ, confirmed)
@@ -323,6 +324,6 @@ def standing(studies: Sequence[Study], folder: Folder) -> list[ChainProgress]:
     found = []
     for study in studies:
         chains = [chain for machine in machines_of(study) for chain in machine.chains]
-        values = study.regimes.n if study.regimes else 0
+        values = study.request.n if study.request else 0
         found.append(ChainProgress(study.name, len(chains), values, sum(map(place, chains))))
     return found

@@ -9,11 +9,12 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import MODES, contact_modes, impacts, mode_shares
-from compressor.cases import Case, Regimes
+from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Regime
 from compressor.physics import state_names
 from compressor.solve import find_repetition, record
+from compressor.studies.regimes.group import Regimes
 from compressor.studies.regimes.lyapunov import largest_exponent
 from compressor.studies.regimes.revolutions import (
     RevolutionRun,

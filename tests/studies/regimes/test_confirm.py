@@ -7,7 +7,6 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.cases.regimes import Regimes
 from compressor.studies.regimes import confirm as module
 from compressor.studies.regimes.chains import Chain, ChainTask, run_chain
 from compressor.studies.regimes.confirm import (
@@ -26,6 +25,7 @@ from compressor.studies.regimes.confirm import (
     read_verdicts,
     signature_of_row,
 )
+from compressor.studies.regimes.group import Regimes
 from compressor.studies.regimes.run import chains_of
 from compressor.studies.regimes.values import empty
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.regimes import Regimes
 from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.simulate import simulate
+from compressor.studies.regimes.group import Regimes
 from compressor.studies.regimes.revolutions import (
     RevolutionSpan,
     bare_case,

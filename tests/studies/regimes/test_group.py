@@ -1,13 +1,16 @@
 """What `regimes` of a case file asks for, and where every mistake in it is shown."""
 
+import contextlib
 import itertools
+import json
 import math
 
+import jsonschema
 import pytest
 
-from compressor.cases.checks import MAPPINGS
+from compressor.cases import case_schema
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.cases.regimes import ROWS, followable
+from compressor.studies.regimes.group import FOLLOWED, NEEDED, ROWS
 
 REGIMES = "regimes: {over: clearance_mm, from: 0.01, to: 1, n: 3, log: true, direction: both}\n"
 WORN = "joint: big_end\n"
@@ -31,9 +34,9 @@ def read(tmp_path, monkeypatch):
 
 def test_cases_are_those_that_chains_begin_at(read):
     study = read(WORN + "machine: {rod_mass_kg: [3, 4]}\n" + REGIMES)
-    assert study.regimes.values == [0.01, 0.1, 1.0]
-    assert study.regimes.directions == ("up", "down")
-    assert (study.regimes.settle_rev, study.regimes.measure_rev) == (50, 64)
+    assert study.request.values == [0.01, 0.1, 1.0]
+    assert study.request.directions == ("up", "down")
+    assert (study.request.settle_rev, study.request.measure_rev) == (50, 64)
     assert [axis.key for axis in study.axes] == ["machine.rod_mass_kg"]
     assert [case.clearance_mm.big_end for case in study.cases] == [0.01, 0.01]
     found = [(c.machine.rod_mass_kg, c.clearance_mm.big_end) for c in study.chains[1]]
@@ -49,13 +52,13 @@ def test_defaults_that_depend_on_what_is_followed_follow_it(read):
 
 def test_a_file_without_has_none(read):
     study = read(WORN + "clearance_mm: [0.1, 0.2]\n")
-    assert (study.regimes, study.chains) == (None, ())
+    assert (study.request, study.chains) == (None, ())
 
 
 def test_overrides_reach_it_and_one_selects_chains(read):
-    assert read(WHOLE, "regimes.n=2").regimes.n == 2
+    assert read(WHOLE, "regimes.n=2").request.n == 2
     whole = read(WORN, "regimes={over: clearance_mm, from: 0.1, to: 0.2, n: 2}")
-    assert whole.regimes.last == 0.2
+    assert whole.request.last == 0.2
     two = WORN + "machine: {rod_mass_kg: [3, 4]}\n" + REGIMES
     assert [*read(two, only="machine.rod_mass_kg > 3").selected] == [1]
 
@@ -98,12 +101,43 @@ def test_overrides_reach_it_and_one_selects_chains(read):
         (WORN + "clearance_mm: 0.1\nregimes: {over: gas.exponent, from: 1, to: 6, n: 2}\n",
          "3:44: regimes.to: of gas.exponent: 6 is outside [1, 5]"),
         (WHOLE.replace("to: 1", "to: 11"), "2:11: clearance_mm: 11 mm exceeds the pin radius"),
+        (WORN + "clearance_mm: 0.1\n" + SPEED.replace("machine.speed_rpm, from: 300, to: 700",
+         "gas.back_pressure_MPa, from: 0, to: 0.1"), "3:11: gas: nothing reads this group: it needs"
+         " load: gas"),
     ],
 )  # fmt: skip
 def test_mistakes_are_told_with_place_key_and_remedy(read, text, message):
     with pytest.raises(CaseFileError) as caught:
         read(text)
     assert f"case.yaml:{message}" in str(caught.value) or message in str(caught.value)
+
+
+def test_a_chain_reads_at_its_last_value_what_it_does_not_at_its_first(read):
+    guide = "guide: {crosshead_length_mm: 90}\n"
+    play = "regimes: {over: guide.clearance_mm, from: 0, to: 0.1, n: 3}"
+    ends = read(f"joint: both\nclearance_mm: 0.1\n{guide}{play}").chains[0][::2]
+    assert [case.guide.clearance_mm for case in ends] == [0.0, 0.1]
+
+
+def test_the_schema_says_what_the_reader_says(read):
+    schema = jsonschema.Draft202012Validator(case_schema())
+    whole = {"over": "clearance_mm", "from": 0.1, "to": 1, "n": 3}
+    for more, good in (
+        ({}, True),
+        ({"section_deg": 30.5, "direction": "both", "log": True}, True),
+        ({"n": None}, False),
+        ({"n": 1}, False),
+        ({"over": "joint"}, False),
+        ({"direction": "left"}, False),
+        ({"settle": 3}, False),
+    ):
+        group = {key: value for key, value in (whole | more).items() if value is not None}
+        case = {"joint": "big_end", "regimes": group}
+        assert schema.is_valid(case) == good
+        assert not schema.is_valid({"blocks": [case]})
+        with contextlib.nullcontext() if good else pytest.raises(CaseFileError):
+            read(json.dumps(case))
+    assert not schema.is_valid({"regimes": 3})
 
 
 def test_too_many_values_are_refused(read):
@@ -117,13 +151,13 @@ def test_who_cannot_follow_says_so(read):
 
 
 def test_every_key_has_its_row():
-    assert set(MAPPINGS["regimes"]) == {"over", "from", "to", *ROWS}
-    assert {"clearance_mm", "machine.speed_rpm", "friction.dynamic"} <= {*followable()}
-    assert not {key for key in followable() if key.startswith(("solve.", "output.", "body."))}
+    assert {*NEEDED} == {key for key, row in ROWS.items() if row.default is None}
+    assert {"clearance_mm", "machine.speed_rpm", "friction.dynamic"} <= {*FOLLOWED}
+    assert not {key for key in FOLLOWED if key.startswith(("solve.", "output.", "body."))}
 
 
 def test_values_are_even_or_have_even_ratios(read):
-    assert read(WORN + "clearance_mm: 0.1\n" + SPEED).regimes.values == [300, 400, 500, 600, 700]
-    values = read(WHOLE, "regimes.n=9").regimes.values
+    assert read(WORN + "clearance_mm: 0.1\n" + SPEED).request.values == [300, 400, 500, 600, 700]
+    values = read(WHOLE, "regimes.n=9").request.values
     ratios = [math.log10(b / a) for a, b in itertools.pairwise(values)]
     assert ratios == pytest.approx([0.25] * 8)
