@@ -14,6 +14,7 @@ FIGURES = (
     "signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map",
     *(name for kind in STUDIES for name in kind.figures),
 )  # fmt: skip
+MORE = "".join(f"; of a study of {k.name} {', '.join(k.figures)}" for k in STUDIES if k.figures)
 KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
 
 
@@ -32,8 +33,7 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @of_results(ONE_JOB, jobs)
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
-    help="Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map; of a study "
-    "of regimes bifurcation, sections, periods.",
+    help=f"Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map{MORE}.",
 )  # fmt: skip
 @click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
               help="Folder of the figures.")  # fmt: skip

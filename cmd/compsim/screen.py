@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.program import THREAD_VARIABLES, printable
+from compressor.program import STUDY_GROUPS, THREAD_VARIABLES, printable
 from compsim.results import files, folders
 
 if TYPE_CHECKING:
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 MAX_CAUTIONS = 5  # reported of one case file
 
-CASE_FILE = re.compile(r"^(joint|clearance_mm|load|machine|blocks|regimes)\s*:", re.MULTILINE)
+KEYS = "|".join(("joint", "clearance_mm", "load", "machine", "blocks", *STUDY_GROUPS))
+CASE_FILE = re.compile(rf"^({KEYS})\s*:", re.MULTILINE)
 PLACES = (".", "configs")  # where case files are looked for, if none is named
 MAX_NEAR = 4  # of them named
 MAX_HEAD = 100_000  # bytes of a file that are looked at
