@@ -349,7 +349,7 @@ def test_the_drawing_of_the_house_is_right():
 def test_physics_needs_numpy_alone(module):
     outside = {source.partition(".")[0] for source, _ in imports(SOURCES[module])}
     allowed = {"numpy", "math", "enum", "typing", "dataclasses", "collections", "compressor"}
-    door = {"numba", "functools", "os", "shutil", "pathlib", "threading"}
+    door = {"numba", "functools", "gc", "os", "shutil", "pathlib", "threading"}
     assert outside - allowed <= (door if module == "compressor.physics._jit" else set())
 
 
