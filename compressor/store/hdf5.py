@@ -16,11 +16,12 @@ import os
 import threading
 import uuid
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from h5py import h5d, h5f, h5l, h5o, h5p, h5t, h5z
+from h5py import h5a, h5d, h5f, h5l, h5o, h5p, h5s, h5t, h5z
 
 from compressor.store.files import Folder, StoreError, system_error
 
@@ -31,6 +32,10 @@ OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"}  # attributes
 LAYOUTS = {h5d.COMPACT, h5d.CONTIGUOUS, h5d.CHUNKED}  # a virtual dataset lies in other files
 FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
 GZIP_LEVEL = 4
+SCALAR = h5s.create(h5s.SCALAR)
+MAX_COMPACT = 1000  # attributes of a file in its header
+MAX_TEMPLATES = 16  # that are kept, one for each layout of late
+MAX_TEMPLATE_BYTES = 4_000_000  # of numbers in a file whose template is kept
 MAX_EXPANSION = 1100  # deflate's limit is 1032: what claims to hold more is no honest file
 HEAP = b"GCOL\1\0\0\0"  # begins a global heap (version 1), where HDF5 keeps texts of any length
 TEXT_PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("item", "<u4")])
@@ -73,43 +78,144 @@ def unseal(data: bytes, path: Folder, remedy: str = REMEDY) -> bytes:
     return data[:at]
 
 
+class Entry(NamedTuple):
+    """What a variable of a file is but for its numbers: what all files of one layout share."""
+
+    name: str
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    dtype: np.dtype
+    texts: tuple[str, ...] | None  # a variable of texts has its values here
+    attributes: tuple[tuple[str, Any], ...]
+    deflated: bool
+
+
+class Template:
+    """The bytes of a netCDF-4 file whose numbers and own attributes are still to be filled in.
+
+    By h5py's high level a file costs some twenty times what its bytes do, and jobs of one layout
+    differ in nothing but numbers: so a file is laid out once and filled in for each job. Numbers
+    are written where HDF5 has put them; what it compresses, and the attributes of the file, whose
+    bytes have checksums, are written by HDF5.
+    """
+
+    def __init__(self, layout: tuple[Entry, ...]):
+        with TURN, h5py.File(_new_file()) as file:
+            for entry in layout:
+                _lay_out(file, entry)
+            for entry in layout:
+                for number, dim in enumerate(entry.dims):
+                    if dim not in file:  # takes no space: nothing is written to it
+                        bare = file.create_dataset(dim, (entry.shape[number],), ">f4")
+                        bare.make_scale(f"{BARE}{entry.shape[number]:10}")
+                    if dim != entry.name:
+                        file[entry.name].dims[number].attach_scale(file[dim])
+            file.flush()
+            self.data = bytearray(file.id.get_file_image())
+            self.deflated = [entry.name for entry in layout if entry.deflated]
+            self.places = {
+                entry.name: np.frombuffer(
+                    self.data, entry.dtype, math.prod(entry.shape), file[entry.name].id.get_offset()
+                ).reshape(entry.shape)
+                for entry in layout
+                if not entry.deflated and entry.texts is None and 0 not in entry.shape
+            }
+
+    def fill(self, variables: Variables, attributes: Mapping[str, Any]) -> bytes:
+        """Return the bytes of a file of this layout, which depend on nothing filled in before."""
+        with TURN:
+            for name, place in self.places.items():
+                place[...] = variables[name][1]
+            file = _open_image(self.data, h5f.ACC_RDWR)
+            try:
+                for name in self.deflated:
+                    values = np.ascontiguousarray(variables[name][1])
+                    h5d.open(file, name.encode()).write(h5s.ALL, h5s.ALL, values)
+                _set_attributes(file, attributes)
+                h5f.flush(file)
+                return file.get_file_image()
+            finally:
+                file.close()
+
+
 def image(
-    variables: Variables, attributes: Mapping[str, Any], deflated: Collection[str] = ()
+    variables: Variables,
+    attributes: Mapping[str, Any],
+    deflated: Collection[str] = (),
+    repeated: bool = False,
 ) -> bytes:
     """Return the variables, (dims, values, attributes) by name, as the bytes of a netCDF-4 file.
 
     A variable with the name of its one dimension is that dimension's coordinate. `deflated` ones
-    are shuffled and compressed.
+    are shuffled and compressed. repeated: other files of the same layout will follow, so that what
+    they share is kept for them.
     """
-    new = {"mode": "w", "driver": "core", "backing_store": False, "track_order": True}
-    with TURN, h5py.File(uuid.uuid4().hex, **new) as file:
-        for name, (dims, values, attrs) in variables.items():
-            dtype = TEXT if values.dtype.kind in "OU" else values.dtype
-            how = {"compression": GZIP_LEVEL, "shuffle": True} if name in deflated else {}
-            stored = file.create_dataset(name, data=values.astype(dtype), dtype=dtype, **how)
-            _set_attributes(stored, attrs)
-            if dims == (name,):
-                stored.make_scale(name)
-        for name, (dims, values, _) in variables.items():
-            for number, dim in enumerate(dims):
-                if dim not in file:  # takes no space: nothing is written to it
-                    bare = file.create_dataset(dim, (values.shape[number],), ">f4")
-                    bare.make_scale(f"{BARE}{values.shape[number]:10}")
-                if dim != name:
-                    file[name].dims[number].attach_scale(file[dim])
-        _set_attributes(file, attributes)
-        file.flush()
-        return file.id.get_file_image()
+    layout = tuple(
+        Entry(
+            name, dims, values.shape, values.dtype,
+            tuple(values.ravel().tolist()) if values.dtype.kind in "OU" else None,
+            tuple(attrs.items()), name in deflated,
+        )
+        for name, (dims, values, attrs) in variables.items()
+    )  # fmt: skip
+    size = sum(values.nbytes for _, values, _ in variables.values())
+    template = _template_of if repeated and size <= MAX_TEMPLATE_BYTES else Template
+    return template(layout).fill(variables, attributes)
 
 
-def _set_attributes(stored: Any, attributes: Mapping[str, Any]) -> None:
+@lru_cache(maxsize=MAX_TEMPLATES)
+def _template_of(layout: tuple[Entry, ...]) -> Template:
+    return Template(layout)
+
+
+def _new_file() -> h5f.FileID:
+    """Return a new HDF5 file in memory that knows the order of its variables and attributes."""
+    new, access = h5p.create(h5p.FILE_CREATE), h5p.create(h5p.FILE_ACCESS)
+    order = h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED
+    new.set_link_creation_order(order)
+    new.set_attr_creation_order(order)
+    new.set_obj_track_times(False)  # the same values are the same bytes
+    new.set_attr_phase_change(MAX_COMPACT, 0)  # in the file's header: quicker than in a heap
+    access.set_fapl_core(backing_store=False)
+    return h5f.create(uuid.uuid4().hex.encode(), h5f.ACC_TRUNC, new, access)
+
+
+def _lay_out(file: h5py.File, entry: Entry) -> None:
+    """Create a dataset with its attributes; its numbers, unless compressed, have their place."""
+    how: dict[str, Any] = {"dtype": entry.dtype}
+    if entry.texts is not None:
+        how = {"data": np.array(entry.texts, object).reshape(entry.shape), "dtype": TEXT}
+    elif not entry.deflated:
+        how["data"] = np.zeros(entry.shape, entry.dtype)
+    if entry.deflated:
+        how |= {"compression": GZIP_LEVEL, "shuffle": True}
+    stored = file.create_dataset(entry.name, entry.shape, **how)
+    _set_attributes(stored.id, dict(entry.attributes))
+    if entry.dims == (entry.name,):
+        stored.make_scale(entry.name)
+
+
+def _set_attributes(stored: h5d.DatasetID | h5f.FileID, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
         if isinstance(value, str):  # of a fixed length: HDF5 is not safe with hostile other ones
             encoded = storable(value).encode()[:MAX_TEXT].decode(errors="ignore").encode()
-            kind = h5py.string_dtype("utf-8", max(1, len(encoded)))
-            stored.attrs.create(name, encoded, dtype=kind)
+            length = max(1, len(encoded))
+            values, kind = np.array(encoded, f"S{length}"), _text_type(length)
         else:
-            stored.attrs[name] = value
+            values = np.asarray(value)
+            kind = _number_type(values.dtype)
+        space = h5s.create_simple(values.shape) if values.ndim else SCALAR
+        h5a.create(stored, name.encode(), kind, space).write(values, kind)
+
+
+@lru_cache(maxsize=1000)  # that HDF5 makes a type takes longer than that it writes a value
+def _text_type(length: int) -> h5t.TypeID:
+    return h5t.py_create(h5py.string_dtype("utf-8", length), logical=True)
+
+
+@lru_cache(maxsize=100)
+def _number_type(dtype: np.dtype) -> h5t.TypeID:
+    return h5t.py_create(dtype, logical=True)
 
 
 def storable(text: str) -> str:
@@ -117,12 +223,12 @@ def storable(text: str) -> str:
     return text.encode(errors="replace").decode().replace("\0", "\ufffd")
 
 
-def _image(data: bytes) -> h5py.File:
+def _open_image(data: bytes | bytearray, access: int = h5f.ACC_RDONLY) -> h5f.FileID:
     """Return an HDF5 file in memory, opened from its bytes."""
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fapl_core(backing_store=False)
-    access.set_file_image(data)
-    return h5py.File(h5f.open(uuid.uuid4().hex.encode(), h5f.ACC_RDONLY, access))
+    how = h5p.create(h5p.FILE_ACCESS)
+    how.set_fapl_core(backing_store=False)
+    how.set_file_image(data)
+    return h5f.open(uuid.uuid4().hex.encode(), access, how)
 
 
 @contextlib.contextmanager
@@ -134,7 +240,7 @@ def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.
     What goes wrong while the caller reads is a DamagedJob, too.
     """
     try:
-        with TURN, _image(data) as file:
+        with TURN, h5py.File(_open_image(data)) as file:
             for name in file:
                 if problem := _objection(file, name, data):
                     raise DamagedJob(path, f"is refused: {name} {problem}", remedy)

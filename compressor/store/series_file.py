@@ -73,7 +73,7 @@ def series_image(dataset: "DatasetParts | xr.Dataset", output: Output) -> bytes:
     """Return a job's Dataset as the bytes of its file."""
     series = {str(name) for name, item in dataset.variables.items() if "time" in item.dims}
     rounded = series - {*ABSCISSAE} if output.precision == "single" else set()
-    return image_of(dataset, rounded, series if output.compress else ())
+    return image_of(dataset, rounded, series if output.compress else (), repeated=True)
 
 
 def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
@@ -101,8 +101,12 @@ def image_of(
     dataset: "DatasetParts | xr.Dataset",
     rounded: Collection[str] = (),
     deflated: Collection[str] = (),
+    repeated: bool = False,
 ) -> bytes:
-    """Return a Dataset as the bytes of a file; `rounded` variables in single precision."""
+    """Return a Dataset as the bytes of a file; `rounded` variables in single precision.
+
+    deflated, repeated: as of `hdf5.image`.
+    """
     variables = {
         str(name): (
             tuple(map(str, item.dims)),
@@ -112,7 +116,7 @@ def image_of(
         for name, item in dataset.variables.items()
     }
     attributes = {str(name): value for name, value in dataset.attrs.items()}
-    return hdf5.image(variables, attributes, deflated)
+    return hdf5.image(variables, attributes, deflated, repeated)
 
 
 def intact(path: Path) -> bool:

@@ -1,0 +1,167 @@
+"""Files that are filled into a kept layout: what they hold, and that they hold nothing else."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from compressor.cases import Output
+from compressor.metrics import NUMBERS, SERIES, SIZES
+from compressor.outcome import Outcome, row
+from compressor.solve.series import FEATURES, SIGNALS
+from compressor.store import hdf5
+from compressor.store.series_file import series_image
+
+OUTPUTS = [Output(precision=p, compress=c) for p in ("double", "single") for c in (False, True)]
+TEXTS = ("", "plain", "Räder und 軸受", "a\tb\nc", "x" * 70_000, "é" * 40_000, "\ud800 and \0")
+SPECIAL = (np.nan, np.inf, -np.inf, -0.0, 5e-324, 1.7976931348623157e308)
+MORE = {name: ((), unit, phrase) for name, (_, unit, phrase) in FEATURES.items()}
+STATUSES = [("ok", ""), ("failed", "accuracy_not_reached")]
+
+
+def make_values(random, shape):
+    """Random numbers of many magnitudes, and now and then a special one."""
+    values = np.array(random.normal(size=shape) * 10.0 ** random.integers(-300, 300, shape))
+    special = random.random(shape) < 0.05
+    values[special] = random.choice(SPECIAL, special.sum())
+    return values
+
+
+def make_job(random, samples, names, status):
+    """A job of random numbers: names of series over time, of SERIES, SIGNALS and features."""
+    numbers = row()
+    for name in NUMBERS:
+        if not NUMBERS[name].when or status[0] == "ok":
+            numbers[name] = make_values(random, numbers[name].shape)
+    attributes = {
+        "key": "".join(random.choice([*"0123456789abcdef"], 20)),
+        "case": TEXTS[random.integers(len(TEXTS))],
+        "detail": "d" * int(random.integers(200)),
+        "complete": int(random.integers(2)),
+        "settle": float(random.normal()),
+        "rtol": np.float64(np.nan),
+        "spans": random.normal(size=int(random.integers(1, 5))),
+        "überschrift": TEXTS[random.integers(len(TEXTS))],
+    }
+    about = SERIES | SIGNALS | MORE
+    series = {"time": (("time",), make_values(random, samples), {"units": "s"})}
+    for name in names:
+        dims, unit, phrase = about[name]
+        values = make_values(random, (samples, *(SIZES[dim] for dim in dims)))
+        series[name] = (("time", *dims), values, {"units": unit, "long_name": phrase})
+    return Outcome(*status, numbers, attributes).table(series)
+
+
+def layouts():
+    """Names of series that jobs have, each with how the job ended."""
+    for status in STATUSES:
+        yield [*SERIES], status
+        yield [*SERIES, *SIGNALS], status
+        yield [*SERIES, *FEATURES], status
+        yield [*reversed(SERIES)], status
+
+
+def opened(data):
+    """The Dataset that a file's bytes hold."""
+    with hdf5.open_file(data, "a job's file") as file:
+        return xr.Dataset(hdf5.variables(file, data), attrs=hdf5.attributes(file))
+
+
+def forget_layouts():
+    hdf5._template_of.cache_clear()
+
+
+def stored_form(name, values, single):
+    """What is stored of a variable's values."""
+    is_rounded = single and name not in ("time", "crank_angle") and values.dtype.kind == "f"
+    return values.astype("f4") if is_rounded else values
+
+
+def stored_attribute(value):
+    """What is stored of an attribute: a text without what HDF5 cannot hold, cut to 60,000 bytes."""
+    if isinstance(value, str):
+        whole = value.encode(errors="replace").decode().replace("\0", "\ufffd").encode()
+        return whole[:60_000].decode(errors="ignore")
+    return value
+
+
+@pytest.mark.parametrize("output", OUTPUTS, ids=lambda o: f"{o.precision}-{o.compress}")
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_a_file_holds_its_job_in_its_order(output):
+    random = np.random.default_rng(1)
+    forget_layouts()
+    for names, status in [*layouts()] * 2:
+        samples = int(random.choice([1, 7, 601]))
+        job = make_job(random, samples, names, status)
+        found = opened(series_image(job, output))
+        assert [*found.variables] == [*job.variables]
+        assert [*found.attrs] == [*job.attrs]
+        for name, (dims, values, attrs) in job.variables.items():
+            series = "time" in dims
+            want = stored_form(name, values, series and output.precision == "single")
+            back = found[name]
+            assert back.dims == tuple(dims)
+            assert dict(back.attrs) == attrs
+            if values.dtype.kind == "f":
+                assert back.dtype == want.dtype
+                assert back.values.tobytes() == want.tobytes()
+            else:
+                assert back.values.tolist() == values.tolist()
+        for name, value in job.attrs.items():
+            np.testing.assert_equal(found.attrs[name], stored_attribute(value))
+
+
+@pytest.mark.parametrize("output", OUTPUTS, ids=lambda o: f"{o.precision}-{o.compress}")
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_bytes_do_not_depend_on_what_was_filled_in_before(output):
+    random = np.random.default_rng(2)
+    jobs = [make_job(random, 50, names, status) for names, status in layouts() for _ in range(4)]
+    alone = []
+    for job in jobs:
+        forget_layouts()
+        alone.append(series_image(job, output))
+    forget_layouts()
+    order = random.permutation(len(jobs))
+    for at in [*order, *reversed(order)]:
+        assert series_image(jobs[at], output) == alone[at]
+    assert hdf5._template_of.cache_info().hits >= len(jobs)
+
+
+def test_xarray_and_h5py_open_a_filled_file(tmp_path):
+    random = np.random.default_rng(3)
+    forget_layouts()
+    for _ in range(2):  # laid out for the first, filled in for the second
+        job = make_job(random, 40, [*SERIES, *SIGNALS], STATUSES[0])
+        path = tmp_path / "job.h5"
+        path.write_bytes(series_image(job, Output()))
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as found:
+            for name, (dims, values, _) in job.variables.items():
+                assert found[name].dims == tuple(dims)
+                np.testing.assert_array_equal(found[name].values, values)
+
+
+def test_layouts_of_large_files_and_of_single_files_are_not_kept():
+    forget_layouts()
+    hdf5.image({"x": (("x",), np.zeros(3), {})}, {})
+    size = hdf5.MAX_TEMPLATE_BYTES // 8 + 1
+    data = hdf5.image({"x": (("x",), np.arange(float(size)), {})}, {}, repeated=True)
+    assert hdf5._template_of.cache_info().currsize == 0
+    with hdf5.open_file(data, "large") as file:
+        assert (file["x"][()] == np.arange(size)).all()
+
+
+def test_empty_and_missing_dimensions():
+    variables = {
+        "none": (("nothing",), np.zeros(0), {}),
+        "grid": (("row", "column"), np.arange(6.0).reshape(2, 3), {}),
+        "words": (("row",), np.array(["a", "ö"]), {}),
+        "fixed": (("row",), np.array([b"ab", b"c"]), {}),
+        "whole": ((), np.array(7), {}),
+        "turned": (("column", "row"), np.arange(6.0).reshape(2, 3).T, {}),
+    }
+    for _ in range(2):
+        data = hdf5.image(variables, {"empty": ""}, repeated=True)
+        found = opened(data)
+        for name, (dims, values, _) in variables.items():
+            assert found[name].dims == dims
+            assert found[name].values.tolist() == values.tolist()
+        assert found.attrs == {"empty": ""}
