@@ -6,6 +6,7 @@ from compressor.store.files import (
     StoreError,
     StoreWarning,
     publish,
+    sync_later,
     writable_folder,
 )
 from compressor.store.hdf5 import DamagedJob

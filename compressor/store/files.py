@@ -9,7 +9,9 @@ import os
 import re
 import time
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import ContextVar
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -22,6 +24,8 @@ HEX20 = "[0-9a-f]{20}"  # a job's key, and the digest of a file's bytes
 KEY = re.compile(HEX20)
 
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
+
+SYNC_THREADS = 4  # a disk needs ms to sync a file, and hardly more for several at once
 
 LOCK_NAME = "writer.lock"
 FREE_SPACE_REMEDY = "free some space there, then run the same command again"
@@ -117,8 +121,8 @@ def publishing(path: Path, pending: bool = False) -> Iterator[BinaryIO]:
     """Yield a file to write: it has its name, durably, once the block has ended well, or never.
 
     What stood under the name is left until then. A `pending` file is left under `pending_path` for
-    `name_pending`, and is durable once its folder has been synced. Raises StoreError where the disk
-    refuses.
+    `name_pending`, and is durable once its folder has been synced; amid `sync_later` not before
+    that ends. Raises StoreError where the disk refuses.
     """
     own = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     temporary = pending_path(path) if pending else own
@@ -128,7 +132,11 @@ def publishing(path: Path, pending: bool = False) -> Iterator[BinaryIO]:
             with open(temporary, "wb") as file:
                 yield file
                 file.flush()
-                os.fsync(file.fileno())
+                later = SYNC_LATER.get() if pending else None
+                if later:
+                    later(os.dup(file.fileno()), path)
+                else:
+                    os.fsync(file.fileno())
             if not pending:
                 os.replace(temporary, path)
         except BaseException:
@@ -139,6 +147,40 @@ def publishing(path: Path, pending: bool = False) -> Iterator[BinaryIO]:
             sync_folder(path.parent)
     except OSError as error:
         raise system_error(path, error) from error
+
+
+# takes a descriptor, which it closes, and the path that its file will have
+SYNC_LATER: ContextVar[Callable[[int, Path], object] | None] = ContextVar("later", default=None)
+
+
+@contextlib.contextmanager
+def sync_later() -> Iterator[None]:
+    """Sync the pending files that the block writes in threads, beside what it goes on with.
+
+    They are on disk when it has ended. Raises StoreError then where the disk refused one, which is
+    removed: of the block's files none may be relied on.
+    """
+    syncs: list[Future[None]] = []
+    with ThreadPoolExecutor(SYNC_THREADS) as pool:  # waits for its threads, whatever is raised
+        before = SYNC_LATER.set(lambda *file: syncs.append(pool.submit(_sync_pending, *file)))
+        try:
+            yield
+        finally:
+            SYNC_LATER.reset(before)
+    for sync in syncs:
+        sync.result()
+
+
+def _sync_pending(descriptor: int, path: Path) -> None:
+    """Sync a file that waits for its name, and close it; remove it where the disk refuses."""
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            pending_path(path).unlink()
+        raise system_error(path, error) from error
+    finally:
+        os.close(descriptor)
 
 
 def pending_path(path: Path) -> Path:

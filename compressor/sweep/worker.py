@@ -17,6 +17,7 @@ from functools import partial
 from typing import Any
 
 from compressor.reasons import Reason
+from compressor.store import StoreError, sync_later
 
 MAX_OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
 MAX_TEXT = 20_000  # characters of a traceback
@@ -134,14 +135,18 @@ def do_batch(path: str, payloads: Sequence[bytes]) -> str:
         began = start = time.monotonic()
         NOTE.pack_into(note, 0, os.getpid(), 0, start)
         jobs, each = look_ahead(payloads), (time.monotonic() - start) / len(payloads)
-        for position, job in enumerate(jobs):
-            start = time.monotonic()
-            NOTE.pack_into(note, 0, os.getpid(), position, start)
-            found.append(perform(job, start - each))
-            start = time.monotonic()
-            NOTE.pack_into(note, 0, os.getpid(), position, -start)
-            if start - began > MAX_OVERRUN * HERE["rules"].target_seconds:
-                break
+        try:
+            with sync_later():  # or each job would wait for the disk
+                for position, job in enumerate(jobs):
+                    start = time.monotonic()
+                    NOTE.pack_into(note, 0, os.getpid(), position, start)
+                    found.append(perform(job, start - each))
+                    start = time.monotonic()
+                    if start - began > MAX_OVERRUN * HERE["rules"].target_seconds:
+                        break
+        except StoreError as error:  # no job's time series are known to be on disk
+            found = [JobResult(None, pickle.dumps(error, pickle.HIGHEST_PROTOCOL), 0.0)]
+        NOTE.pack_into(note, 0, os.getpid(), 0, -time.monotonic())
         file.seek(NOTE.size)
         pickle.dump(found, file, pickle.HIGHEST_PROTOCOL)
     return ""
