@@ -232,8 +232,12 @@ def _open_image(data: bytes | bytearray, access: int = h5f.ACC_RDONLY) -> h5f.Fi
 
 
 @contextlib.contextmanager
-def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.File]:
+def open_file(
+    data: bytes, path: Folder, remedy: str = REMEDY, names: Collection[str] | None = None
+) -> Iterator[h5py.File]:
     """Yield the HDF5 file that `data` is, every part of it checked; `path` is named in errors.
+
+    names: of the parts that are read; the others are not checked. All without.
 
     Raises DamagedJob for what is no HDF5 file or holds what ours never do: groups, links, data in
     other files, foreign filters, types other than numbers and text, more data than can be in it.
@@ -241,7 +245,7 @@ def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.
     """
     try:
         with TURN, h5py.File(_open_image(data)) as file:
-            for name in file:
+            for name in file if names is None else names:
                 if problem := _objection(file, name, data):
                     raise DamagedJob(path, f"is refused: {name} {problem}", remedy)
             yield file
@@ -253,8 +257,10 @@ def open_file(data: bytes, path: Folder, remedy: str = REMEDY) -> Iterator[h5py.
 
 
 def _objection(file: h5py.File, name: str, data: bytes) -> str:
-    """Return what is wrong with an entry of the file that `data` is, or ""."""
+    """Return what is wrong with an entry of the file that `data` is, or "", as of none."""
     encoded = name.encode(errors="surrogateescape")
+    if not file.id.links.exists(encoded):  # which follows no link
+        return ""
     if file.id.links.get_info(encoded).type != h5l.TYPE_HARD:
         return "is a link"
     entry = h5o.open(file.id, encoded)

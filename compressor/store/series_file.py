@@ -179,5 +179,5 @@ def read_series(path: Path) -> "xr.Dataset":
 def read_values(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Return some variables of a job's file by name, without those that it does not have."""
     data = read_bytes(path)
-    with open_file(data, path) as file:
+    with open_file(data, path, names=names) as file:
         return {name: hdf5.read_variable(file[name], data) for name in names if name in file}

@@ -311,9 +311,11 @@ def planted(folder, dataset, data):
 @pytest.mark.parametrize("change", list(FOREIGN))
 def test_what_a_file_must_not_hold_is_refused(change, ideal, tmp_path):
     path = planted(tmp_path, ideal, changed(ideal, FOREIGN[change]))
-    for read in (read_series, lambda path: read_values(path, ["acceleration"])):
+    for read in (read_series, lambda path: read_values(path, ["acceleration", "x"])):
         with pytest.raises(DamagedJob, match=r"is refused: x .*; run its study again"):
             read(path)
+    (alone,) = read_values(path, ["acceleration", "absent"]).values()  # HDF5 meets no x
+    np.testing.assert_array_equal(alone, ideal.acceleration)
 
 
 @pytest.mark.parametrize(
