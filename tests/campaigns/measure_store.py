@@ -1,18 +1,26 @@
-"""Measure the store: rows written a second, the opening of a study, sizes of time series.
+"""Measure the store: rows written a second, the opening of a study, time series and their price.
 
     python tests/campaigns/measure_store.py tests/results/store.json [jobs]  (make store-bench)
 
 Rows are those of a real job under made-up keys, given to a `Writer` as a sweep would; the folder is
 in the working directory, so that its disk is what is measured. The greatest wait is the time from a
 row's `add` to its acknowledgement.
+
+CPU to make a file: of jobs of one layout, one after the other, with numbers and texts that change;
+bytes, digest and writing, without waiting for the disk. The price of time series in a sweep: whole
+commands with and without them, in turn and in both orders, each with few and with many jobs; what
+the further jobs take is divided by their number.
 """
 
 import dataclasses
 import hashlib
 import itertools
 import json
+import os
+import resource
 import shutil
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -24,6 +32,7 @@ from measure_accuracy import provenance
 from compressor.cases.case import Case
 from compressor.cases.groups import Output
 from compressor.solve.simulate import measure, simulate
+from compressor.store.files import pending_path, sync_later
 from compressor.store.reader import open_study, read_store
 from compressor.store.series_file import read_series, series_path, write_series
 from compressor.store.status import verify
@@ -31,6 +40,14 @@ from compressor.store.studies import StoredAxis, StoredStudy, encode
 from compressor.store.writer import Writer
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
+FILES = 60  # that are made one after the other
+SELECTED = 1000  # jobs whose acceleration is read
+SWEPT, TURNS = (100, 500), 4  # jobs of a sweep, few and many; how often both are run
+SWEEP = """
+joint: big_end
+clearance_mm: {{linspace: [0.05, 0.5, {jobs}]}}
+output: {{keep: {keep}}}
+"""
 OUTPUTS = [Output(precision=p, compress=c) for p in ("double", "single") for c in (False, True)]
 
 
@@ -112,7 +129,7 @@ def series(folder):
     found = []
     for output in OUTPUTS:
         write, kept = timed(lambda output=output: write_series(folder, dataset, output), 5)
-        path = series_path(folder, dataset.attrs["key"], kept.digest)
+        path = pending_path(series_path(folder, dataset.attrs["key"], kept.digest))
         read, back = timed(lambda path=path: read_series(path), 5)
         exact, a = dataset["acceleration"].values, back["acceleration"].values
         found.append(
@@ -121,6 +138,7 @@ def series(folder):
                 "compress": output.compress,
                 "bytes": path.stat().st_size,
                 "write_ms": round(1000 * write, 1),
+                "write_cpu_ms": round(1000 * file_cpu(folder, output), 2),
                 "read_ms": round(1000 * read, 1),
                 "acceleration_rounding": float(
                     f"{np.abs(a - exact).max() / np.abs(exact).max():.1g}"
@@ -130,6 +148,71 @@ def series(folder):
     return found
 
 
+def file_cpu(folder, output):
+    """Median of the CPU seconds that a job's file takes; the first one lays its kind out."""
+    dataset, seconds = simulate(Case.from_values(WORN)), []
+    exact = dataset["acceleration"].values.copy()
+    with sync_later():
+        for number in range(FILES):
+            dataset["acceleration"].values[:] = exact + number
+            dataset.attrs |= {"key": key(number), "settle": float(number)}
+            began = time.thread_time()
+            write_series(folder, dataset, output)
+            seconds.append(time.thread_time() - began)
+    return statistics.median(seconds)
+
+
+def selection(folder):
+    """Seconds to open a study with time series, to read one of them at a time, and whole."""
+    dataset, case = simulate(Case.from_values(WORN)), Case.from_values(WORN)
+    found = measure(case)
+    with Writer(folder) as writer, sync_later():
+        for number in range(SELECTED):
+            attributes = dataset.attrs | {"key": key(number)}
+            kept = write_series(folder, dataset.assign_attrs(attributes), case.output)
+            writer.pending[key(number)] = dataclasses.replace(
+                found, attributes=attributes, series=kept
+            )
+    plan(folder, SELECTED)
+    opened, study = timed(lambda: open_study(folder))
+    one, _ = timed(lambda: study["acceleration"].isel(time=-1).values)
+    whole, _ = timed(lambda: study["acceleration"].values)
+    return {
+        "jobs": SELECTED, "open_study_s": round(opened, 3), "one_time_s": round(one, 2),
+        "whole_series_s": round(whole, 2),
+    }  # fmt: skip
+
+
+def sweep_seconds(folder, keep, jobs):
+    """Wall and CPU seconds of a sweep of so many jobs, in a folder that it leaves empty."""
+    folder.mkdir()
+    (folder / "case.yaml").write_text(SWEEP.format(jobs=jobs, keep=keep), encoding="utf-8")
+    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    command = [sys.executable, "-m", "compsim", "run", "case.yaml", "-j", "2", "--quiet"]
+    subprocess.run(command, cwd=folder, env=os.environ, check=True)
+    wall, after = time.monotonic() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+    shutil.rmtree(folder)
+    return np.array([wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime])
+
+
+def price_of_series(folder):
+    """What a further job of a sweep takes, with its time series and with metrics alone."""
+    few, many = SWEPT
+    found = {"series": [], "metrics": []}
+    sweep_seconds(folder, "series", few)  # compiled and in the disk's cache from here on
+    for turn in range(TURNS):
+        for keep in sorted(found, reverse=turn % 2):
+            further = sweep_seconds(folder, keep, many) - sweep_seconds(folder, keep, few)
+            found[keep].append(1000 * further / (many - few))
+    wall, cpu = np.median(np.array(found["series"]) / found["metrics"], axis=0)
+    medians = {keep: np.median(times, axis=0) for keep, times in found.items()}
+    return {
+        "wall_ms": {keep: round(float(wall), 2) for keep, (wall, _) in medians.items()},
+        "cpu_ms": {keep: round(float(cpu), 2) for keep, (_, cpu) in medians.items()},
+        "wall_ratio": round(float(wall), 2), "cpu_ratio": round(float(cpu), 2),
+    }  # fmt: skip
+
+
 def main(target, jobs=100_000):
     place = Path(tempfile.mkdtemp(prefix="store-bench-", dir="."))
     try:
@@ -137,6 +220,8 @@ def main(target, jobs=100_000):
             **provenance("make store-bench"),
             "rows": rows(place / "many", int(jobs)),
             "series": series(place / "series"),
+            "selection": selection(place / "selection"),
+            "sweep": price_of_series(place / "sweep"),
         }
     finally:
         shutil.rmtree(place)
