@@ -36,7 +36,8 @@ GZIP_LEVEL = 4
 SCALAR = h5s.create(h5s.SCALAR)
 MAX_TAG = 255  # attributes of a file that a byte tells apart
 MAX_TEMPLATES = 16  # that are kept, one for each layout of late
-MAX_TEMPLATE_BYTES = 4_000_000  # of numbers in a file whose template is kept
+MAX_FILLERS = 32  # that are kept; attributes of other lengths need one of their own
+MAX_TEMPLATE_BYTES = 2_000_000  # of numbers in a file for which they are kept
 MAX_EXPANSION = 1100  # deflate's limit is 1032: what claims to hold more is no honest file
 HEAP = b"GCOL\1\0\0\0"  # begins a global heap (version 1), where HDF5 keeps texts of any length
 TEXT_PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("item", "<u4")])
@@ -89,6 +90,9 @@ class Entry(NamedTuple):
     texts: tuple[str, ...] | None  # a variable of texts has its values here
     attributes: tuple[tuple[str, Any], ...]
     deflated: bool
+
+
+Kinds = tuple[tuple[str, np.dtype, tuple[int, ...]], ...]  # of attributes: name, type, shape
 
 
 class Place(NamedTuple):
@@ -172,31 +176,54 @@ def _template_of(layout: tuple[Entry, ...]) -> Template:
     return Template(layout)
 
 
-@lru_cache(maxsize=MAX_TEMPLATES)
-def _filler_of(
-    layout: tuple[Entry, ...], kinds: tuple[tuple[str, np.dtype, tuple[int, ...]], ...]
-) -> Template | Stencil:
-    """Return what makes files of a layout with attributes of some kinds: name, type and shape.
+class Filler:
+    """What makes files of a layout with attributes of some kinds.
+
+    The first one by its template, since it may stay the only one; others by a stencil, which takes
+    three times as long to cut, where there can be one.
+    """
+
+    def __init__(self, template: Template, kinds: Kinds):
+        self.template, self.kinds = template, kinds
+        self.count = 0
+        self.stencil: Stencil | None = None
+
+    def fill(self, numbers: Arrays, attributes: Arrays) -> bytes:
+        """Return the bytes of a file."""
+        self.count += 1
+        if self.count == 2:
+            self.stencil = _cut_stencil(self.template, self.kinds)
+        return (self.stencil or self.template).fill(numbers, attributes)
+
+
+@lru_cache(maxsize=MAX_FILLERS)
+def _filler_of(layout: tuple[Entry, ...], kinds: Kinds) -> Filler:
+    return Filler(_template_of(layout), kinds)
+
+
+def _cut_stencil(template: Template, kinds: Kinds) -> Stencil | None:
+    """Return a stencil for files of a template with attributes of some kinds.
 
     Where HDF5 puts the values of attributes shows in a file whose attributes have each a byte of
-    its own all over. If the stencil does not make that very file, something depends on the values
-    (what is compressed, a checksum), and HDF5 has to write each file.
+    its own all over. None where the stencil does not make that very file: something depends on the
+    values (what is compressed, a checksum), and HDF5 has to write each file.
     """
-    template = _template_of(layout)
     if template.deflated or len(kinds) > MAX_TAG:
-        return template
+        return None
     zeros = {name: np.zeros(place.shape, place.dtype) for name, place in template.places.items()}
     blank = {name: _repeat_byte(0, dtype, shape) for name, dtype, shape in kinds}
     tagged = {kind[0]: _repeat_byte(tag, *kind[1:]) for tag, kind in enumerate(kinds, 1)}
     data, wanted = bytearray(template.fill(zeros, blank)), template.fill(zeros, tagged)
     found = np.frombuffer(wanted, np.uint8)
-    tags = np.where(found != np.frombuffer(data, np.uint8), found, 0)
-    stencil = Stencil(data, {n: place.of(data) for n, place in template.places.items()}, {})
-    for tag, (name, dtype, shape) in enumerate(kinds, 1):
-        offset = int(np.argmax(tags == tag))
-        if offset + tagged[name].nbytes <= len(data):
-            stencil.attributes[name] = Place(offset, dtype, shape).of(data)
-    return stencil if stencil.fill(zeros, tagged) == wanted else template
+    differing = np.flatnonzero(found != np.frombuffer(data, np.uint8))[::-1]
+    first = dict(zip(found[differing].tolist(), differing.tolist(), strict=True))  # of each tag
+    attributes = {
+        name: Place(first.get(tag, 0), dtype, shape).of(data)
+        for tag, (name, dtype, shape) in enumerate(kinds, 1)
+    }
+    numbers = {name: place.of(data) for name, place in template.places.items()}
+    stencil = Stencil(data, numbers, attributes)
+    return stencil if stencil.fill(zeros, tagged) == wanted else None
 
 
 def _repeat_byte(byte: int, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
@@ -226,7 +253,7 @@ def image(
     )  # fmt: skip
     numbers = {name: values for name, (_, values, _) in variables.items()}
     encoded = {name: _encode(value) for name, value in attributes.items()}
-    filler: Template | Stencil
+    filler: Template | Filler
     if repeated and sum(values.nbytes for values in numbers.values()) <= MAX_TEMPLATE_BYTES:
         kinds = tuple((name, value.dtype, value.shape) for name, value in encoded.items())
         filler = _filler_of(layout, kinds)

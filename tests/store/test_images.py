@@ -125,7 +125,7 @@ def test_bytes_do_not_depend_on_what_was_filled_in_before(output):
         alone.append(series_image(job, output))
     forget_layouts()
     order = random.permutation(len(jobs))
-    for at in [*order, *reversed(order)]:
+    for at in [*order, *reversed(order), *order]:
         assert series_image(jobs[at], output) == alone[at]
     assert hdf5._template_of.cache_info().misses < len(jobs) / 2
 
@@ -165,17 +165,18 @@ def test_no_stencil_is_made_where_more_than_values_changes(monkeypatch):
     for make in (hdf5._new_file, new_file):
         monkeypatch.setattr(hdf5, "_new_file", make)
         forget_layouts()
-        found = opened(series_image(job, Output()))
-        np.testing.assert_array_equal(found["time"], job.variables["time"].values)
-        assert found.attrs["key"] == job.attrs["key"]
-    assert [*map(type, fillers)] == [hdf5.Stencil, hdf5.Template]
+        for _ in range(3):
+            found = opened(series_image(job, Output()))
+            np.testing.assert_array_equal(found["time"], job.variables["time"].values)
+            assert found.attrs["key"] == job.attrs["key"]
+    assert [one.stencil is None for one in fillers] == [False] * 3 + [True] * 3
     forget_layouts()
 
 
 def test_xarray_and_h5py_open_a_filled_file(tmp_path):
     random = np.random.default_rng(3)
     forget_layouts()
-    for _ in range(2):  # laid out for the first, filled in for the second
+    for _ in range(3):  # laid out for the first, a stencil cut for the second
         job = make_job(random, 40, [*SERIES, *SIGNALS], STATUSES[0])
         path = tmp_path / "job.h5"
         path.write_bytes(series_image(job, Output()))
@@ -204,7 +205,7 @@ def test_empty_and_missing_dimensions():
         "whole": ((), np.array(7), {}),
         "turned": (("column", "row"), np.arange(6.0).reshape(2, 3).T, {}),
     }
-    for _ in range(2):
+    for _ in range(3):
         data = hdf5.image(variables, {"empty": ""}, repeated=True)
         found = opened(data)
         for name, (dims, values, _) in variables.items():
