@@ -294,7 +294,8 @@ def _lay_out(file: h5py.File, entry: Entry) -> None:
 def _encode(value: Any) -> np.ndarray:
     """Return the value of an attribute as it is stored."""
     if not isinstance(value, str):
-        return np.asarray(value)
+        values = np.asarray(value)
+        return np.char.encode(values, "utf-8") if values.dtype.kind == "U" else values
     # of a fixed length: HDF5 is not safe with hostile texts of any other
     encoded = storable(value).encode()[:MAX_TEXT].decode(errors="ignore").encode()
     return np.array(encoded, f"S{max(1, len(encoded))}")

@@ -206,9 +206,10 @@ def test_empty_and_missing_dimensions():
         "turned": (("column", "row"), np.arange(6.0).reshape(2, 3).T, {}),
     }
     for _ in range(3):
-        data = hdf5.image(variables, {"empty": ""}, repeated=True)
+        data = hdf5.image(variables, {"empty": "", "names": ["a", "ö"]}, repeated=True)
         found = opened(data)
         for name, (dims, values, _) in variables.items():
             assert found[name].dims == dims
             assert found[name].values.tolist() == values.tolist()
-        assert found.attrs == {"empty": ""}
+        assert found.attrs["empty"] == ""
+        assert [name.decode() for name in found.attrs["names"]] == ["a", "ö"]
