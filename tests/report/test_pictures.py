@@ -1,15 +1,19 @@
 """Pictures of figures by two processes: the same bytes, and none lost with a process."""
 
+import io
 import os
 import subprocess
 import sys
 import threading
 
+import numpy as np
 import pytest
+from matplotlib import style
+from matplotlib.image import imread
 
 from compressor.report.figures import pictures as module
 from compressor.report.figures.drawing import make_grid
-from compressor.report.figures.pictures import can_fork, pictures, render
+from compressor.report.figures.pictures import STYLE, can_fork, paint, pictures, render
 from compressor.report.figures.style import LineStyle
 
 NAMES = ["one", "two", "three", "four", "five"]
@@ -99,3 +103,20 @@ def test_beside_threads_nothing_is_forked(figures, alone, monkeypatch):
         other.join()
     assert pictures({"one": figures["one"]}, HEADINGS).keys() == {"one.png", "one.svg"}
     assert pictures({}, {}) == {}
+
+
+def test_pictures_are_those_that_matplotlib_saves(figures):
+    for name, drawing in figures.items():
+        saved = {}
+        with style.context(STYLE, after_reset=True):
+            figure = paint(drawing)
+            figure.get_layout_engine().execute(figure)
+            figure.set_layout_engine("none")
+            for kind, metadata in (("png", {}), ("svg", {"Date": None})):
+                saved[kind] = io.BytesIO()
+                figure.savefig(saved[kind], format=kind, metadata=metadata)
+        assert render(drawing, "svg") == saved["svg"].getvalue(), name
+        png, same = (imread(io.BytesIO(data)) for data in (render(drawing, "png"),
+                                                           saved["png"].getvalue()))  # fmt: skip
+        assert png.shape[2] == 3
+        assert np.array_equal(png, same[:, :, :3])

@@ -5,12 +5,15 @@ user's matplotlibrc nor a user's own figures are touched.
 """
 
 import contextlib
+import gc
 import io
 import multiprocessing
 import os
 import signal
+import struct
 import sys
 import threading
+import zlib
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -21,6 +24,7 @@ from matplotlib import style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
@@ -60,7 +64,6 @@ STYLE: dict[str, Any] = {
     "agg.path.chunksize": 20000,
     "svg.fonttype": "path",
     "svg.hashsalt": "compsim",
-    "savefig.dpi": DPI,
 }
 
 
@@ -74,20 +77,47 @@ def render(drawing: Drawing, kind: str) -> bytes:
 def render_kinds(drawing: Drawing, kinds: Iterable[str]) -> list[bytes]:
     """Return a drawing as the bytes of a file of each kind.
 
-    Its layout is found once, and without drawing: matplotlib draws all once more to find it.
+    Its layout is found once, and each picture is drawn once: `savefig` draws all once more before.
     """
     figure = paint(drawing)
     layout = figure.get_layout_engine()
     assert layout
     layout.execute(figure)
     figure.set_layout_engine("none")
-    pictures = []
-    for kind in kinds:
-        stream = io.BytesIO()
-        metadata = {"Date": None} if kind == "svg" else {}
-        figure.savefig(stream, format=kind, metadata=metadata)
-        pictures.append(stream.getvalue())
-    return pictures
+    encode = {"png": encode_png, "svg": encode_svg}
+    return [encode[kind](figure) for kind in kinds]
+
+
+def encode_svg(figure: Figure) -> bytes:
+    """Return a figure as the bytes of an SVG file."""
+    stream = io.BytesIO()
+    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None})
+    return stream.getvalue()
+
+
+def encode_png(figure: Figure) -> bytes:
+    """Return a figure as the bytes of a PNG file, opaque, without filters (PNG 1.2, RFC 2083).
+
+    Curves on white take three fifths of the time that Pillow needs to choose filters for them, and
+    five sixths of the bytes.
+    """
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[:, :, :3]
+    height, width, _ = pixels.shape
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)  # each begins with its filter: none
+    rows[:, 1:] = pixels.reshape(height, -1)
+    a_metre = round(DPI / 0.0254)
+    chunks = {
+        b"IHDR": struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0),  # 8 bits of each of RGB
+        b"pHYs": struct.pack(">IIB", a_metre, a_metre, 1),
+        b"IDAT": zlib.compress(rows.tobytes()),
+        b"IEND": b"",
+    }
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        for name, data in chunks.items()
+    )
 
 
 def paint(drawing: Drawing) -> Figure:
@@ -153,6 +183,8 @@ def paint_scale(axes: Axes, way: Way, panel: Panel) -> None:
     axis, scale = (axes.xaxis, panel.x) if way == "x" else (axes.yaxis, panel.y)
     low, high = panel.limits(way)
     axis.set_label_text(scale.title)
+    if not scale.title:
+        axis.set_label_coords(0.5, 0.5)  # else its place is found from all ticks, at each drawing
     if scale.log:
         (axes.set_xscale if way == "x" else axes.set_yscale)("log")
     if scale.words:
@@ -274,7 +306,11 @@ def pictures(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> di
     Where threads run, whose locks a fork may copy, or the system has no fork, all is done here.
     """
     alone = len(drawings) < MIN_FIGURES_FOR_TWO or threading.active_count() > 1 or not can_fork()
-    files = one_by_one(drawings, headings) if alone else by_two(drawings, headings)
+    gc.freeze()  # libraries and runs: collections need not look at them again, nor the copy write
+    try:
+        files = one_by_one(drawings, headings) if alone else by_two(drawings, headings)
+    finally:
+        gc.unfreeze()
     return {
         f"{name}.{kind}": picture
         for name in drawings
