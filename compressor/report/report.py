@@ -1,7 +1,8 @@
 """The report of a store: the paper's figures and claims, every study's table, and where from.
 
 Everything is drawn in memory before a file is written, and the page is written last, so that a
-report which is interrupted leaves the one before as it was.
+report which is interrupted leaves the one before as it was. Pictures that the folder has already,
+of the same data by the same code, are not drawn again.
 """
 
 import contextlib
@@ -103,17 +104,25 @@ def write_report(
     files = pictures(
         {plate.name: plate.drawing for plate in contents.plates},
         {plate.name: plate.heading for plate in contents.plates},
+        folder,
     )
     for plate in contents.plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
+    files |= {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
     for name, content in files.items():
-        publish(folder / name, content)
-    for key, text in contents.series.items():
-        publish(folder / f"{series_name(key)}.js", text.encode())
+        publish_changed(folder / name, content)
     publish_library(folder)
     publish(folder / "index.html", contents.page.encode(errors="backslashreplace"))
     remove_stale(folder, contents)
     return folder / "index.html"
+
+
+def publish_changed(path: Path, content: bytes) -> None:
+    """Write a file unless it has this content already. Raises StoreError."""
+    with contextlib.suppress(OSError):
+        if path.stat().st_size == len(content) and path.read_bytes() == content:
+            return
+    publish(path, content)
 
 
 def restate(report: Folder, before: Running, now: Running) -> None:

@@ -13,7 +13,14 @@ from matplotlib.image import imread
 
 from compressor.report.figures import pictures as module
 from compressor.report.figures.drawing import make_grid
-from compressor.report.figures.pictures import STYLE, can_fork, paint, pictures, render
+from compressor.report.figures.pictures import (
+    STYLE,
+    can_fork,
+    digest_drawing,
+    paint,
+    pictures,
+    render,
+)
 from compressor.report.figures.style import LineStyle
 
 NAMES = ["one", "two", "three", "four", "five"]
@@ -48,8 +55,8 @@ def threadless(request):
 
 
 @pytest.mark.usefixtures("threadless")
-def test_two_processes_draw_what_one_does(figures, alone, capfd):
-    assert pictures(figures, HEADINGS) == alone
+def test_two_processes_draw_what_one_does(figures, alone, capfd, tmp_path):
+    assert pictures(figures, HEADINGS, tmp_path) == alone
     told = capfd.readouterr().err.splitlines()
     assert sorted(told) == sorted(f"drawing Figure {name}" for name in NAMES)
 
@@ -62,12 +69,12 @@ def test_another_process_takes_part(figures, monkeypatch, tmp_path):
 
     draw = module.render_kinds
     monkeypatch.setattr(module, "render_kinds", noted)
-    pictures(figures, HEADINGS)
+    pictures(figures, HEADINGS, tmp_path)
     assert {path.name for path in tmp_path.iterdir()} > {str(os.getpid())}
 
 
 @pytest.mark.usefixtures("threadless")
-def test_a_process_that_dies_costs_nothing(figures, alone, monkeypatch):
+def test_a_process_that_dies_costs_nothing(figures, alone, monkeypatch, tmp_path):
     def deadly(*args):
         if os.getpid() != here:
             os._exit(9)
@@ -75,11 +82,11 @@ def test_a_process_that_dies_costs_nothing(figures, alone, monkeypatch):
 
     here, draw = os.getpid(), module.render_kinds
     monkeypatch.setattr(module, "render_kinds", deadly)
-    assert pictures(figures, HEADINGS) == alone
+    assert pictures(figures, HEADINGS, tmp_path) == alone
 
 
 @pytest.mark.usefixtures("threadless")
-def test_an_error_of_the_other_process_is_raised(figures, monkeypatch):
+def test_an_error_of_the_other_process_is_raised(figures, monkeypatch, tmp_path):
     def failing(*args):
         if os.getpid() != here:
             raise ZeroDivisionError
@@ -88,21 +95,21 @@ def test_an_error_of_the_other_process_is_raised(figures, monkeypatch):
     here, draw = os.getpid(), module.render_kinds
     monkeypatch.setattr(module, "render_kinds", failing)
     with pytest.raises(ZeroDivisionError):
-        pictures(figures, HEADINGS)
+        pictures(figures, HEADINGS, tmp_path)
 
 
-def test_beside_threads_nothing_is_forked(figures, alone, monkeypatch):
+def test_beside_threads_nothing_is_forked(figures, alone, monkeypatch, tmp_path):
     monkeypatch.setattr(module, "by_two", pytest.fail)
     end = threading.Event()
     other = threading.Thread(target=end.wait)
     other.start()
     try:
-        assert pictures(figures, HEADINGS) == alone
+        assert pictures(figures, HEADINGS, tmp_path) == alone
     finally:
         end.set()
         other.join()
-    assert pictures({"one": figures["one"]}, HEADINGS).keys() == {"one.png", "one.svg"}
-    assert pictures({}, {}) == {}
+    assert pictures({"one": figures["one"]}, HEADINGS, tmp_path).keys() == {"one.png", "one.svg"}
+    assert pictures({}, {}, tmp_path) == {}
 
 
 def test_pictures_are_those_that_matplotlib_saves(figures):
@@ -112,7 +119,10 @@ def test_pictures_are_those_that_matplotlib_saves(figures):
             figure = paint(drawing)
             figure.get_layout_engine().execute(figure)
             figure.set_layout_engine("none")
-            for kind, metadata in (("png", {}), ("svg", {"Date": None})):
+            for kind, metadata in (
+                ("png", {}),
+                ("svg", {"Date": None, "Identifier": digest_drawing(drawing)}),
+            ):
                 saved[kind] = io.BytesIO()
                 figure.savefig(saved[kind], format=kind, metadata=metadata)
         assert render(drawing, "svg") == saved["svg"].getvalue(), name
@@ -120,3 +130,44 @@ def test_pictures_are_those_that_matplotlib_saves(figures):
                                                            saved["png"].getvalue()))  # fmt: skip
         assert png.shape[2] == 3
         assert np.array_equal(png, same[:, :, :3])
+
+
+@pytest.mark.usefixtures("threadless")
+def test_what_is_drawn_already_is_not_drawn_again(figures, alone, tmp_path):
+    def draw():
+        return {*pictures(figures, HEADINGS, tmp_path)}
+
+    def keep():
+        for name, picture in alone.items():
+            (tmp_path / name).write_bytes(picture)
+
+    assert draw() == {*alone}
+    keep()
+    assert draw() == set()
+    (tmp_path / "two.svg").unlink()  # one is lost, of one the end, one is another figure's
+    (tmp_path / "three.png").write_bytes(alone["three.png"][:-20])
+    (tmp_path / "four.png").write_bytes(alone["five.png"])
+    assert draw() == {f"{name}.{kind}" for name in NAMES[1:4] for kind in ("png", "svg")}
+    keep()
+    figures["one"].panels[0].traces[0].y[1] += 1e-15  # any change is one
+    figures["five"].panels[0].title = "other"
+    assert draw() == {f"{name}.{kind}" for name in ("one", "five") for kind in ("png", "svg")}
+
+
+def test_an_equal_drawing_has_the_same_digest_in_another_process(figures):
+    code = (
+        "from compressor.report.figures.drawing import make_grid\n"
+        "from compressor.report.figures.pictures import digest_drawing\n"
+        "from compressor.report.figures.style import LineStyle\n"
+        "drawing, grid = make_grid(1, 1, 2.0)\n"
+        "grid[0, 0].plot([0, 1], [3, 2], LineStyle('#000000'))\n"
+        "print(digest_drawing(drawing))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == digest_drawing(figures["four"])
+
+
+def test_other_code_draws_again(figures, monkeypatch):
+    before = digest_drawing(figures["one"])
+    monkeypatch.setattr(module, "code_digest", lambda: b"of another version")
+    assert digest_drawing(figures["one"]) != before

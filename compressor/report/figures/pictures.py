@@ -6,9 +6,12 @@ user's matplotlibrc nor a user's own figures are touched.
 
 import contextlib
 import gc
+import hashlib
 import io
 import multiprocessing
 import os
+import pathlib
+import pickle
 import signal
 import struct
 import sys
@@ -17,8 +20,10 @@ import zlib
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib import style
 from matplotlib.artist import Artist
@@ -34,13 +39,17 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
+from compressor.report.figures import drawing as drawing_module
+from compressor.report.figures import style as style_module
 from compressor.report.figures.drawing import WAYS, Drawing, Note, Panel, Trace, Way
 from compressor.report.figures.style import LineStyle
 
 DPI = 150
 LEGEND_WIDTH = 130  # characters, in a row of a legend
 PLAIN_DECADES = 2.5  # of a log axis with plain numbers, up to which it has ticks at 2 and 5 as well
-KINDS = ("png", "svg")
+ENDS = {"png": b"IEND\xaeB`\x82", "svg": b"</svg>\n"}  # of whole files
+KINDS = tuple(ENDS)
+HEAD = 2000  # bytes of a picture, in which its identifier is
 MIN_FIGURES_FOR_TWO = 3  # figures for which a second process is worth its start
 
 STYLE: dict[str, Any] = {
@@ -84,19 +93,52 @@ def render_kinds(drawing: Drawing, kinds: Iterable[str]) -> list[bytes]:
     assert layout
     layout.execute(figure)
     figure.set_layout_engine("none")
+    mark = digest_drawing(drawing)
     encode = {"png": encode_png, "svg": encode_svg}
-    return [encode[kind](figure) for kind in kinds]
+    return [encode[kind](figure, mark) for kind in kinds]
 
 
-def encode_svg(figure: Figure) -> bytes:
-    """Return a figure as the bytes of an SVG file."""
+def digest_drawing(drawing: Drawing) -> str:
+    """Return a digest of all that the pictures of a drawing follow from: its data and the code.
+
+    It stands in the pictures themselves, so that each tells whether it is still that of a drawing.
+    """
+    return hashlib.sha256(code_digest() + pickle.dumps(drawing)).hexdigest()
+
+
+@cache
+def code_digest() -> bytes:
+    """Return a digest of the code that draws: these modules and matplotlib."""
+    found = hashlib.sha256(f"{matplotlib.__version__} {np.__version__}".encode())
+    for file in (__file__, drawing_module.__file__, style_module.__file__):
+        found.update(pathlib.Path(file).read_bytes())
+    return found.digest()
+
+
+def is_drawn(drawing: Drawing, folder: pathlib.Path, name: str) -> bool:
+    """Return whether the pictures of a drawing lie in a folder, whole, as this code draws them."""
+    mark = digest_drawing(drawing).encode()
+    for kind, end in ENDS.items():
+        try:
+            picture = (folder / f"{name}.{kind}").read_bytes()
+        except OSError:
+            return False
+        if mark not in picture[:HEAD] or not picture.endswith(end):
+            return False
+    return True
+
+
+def encode_svg(figure: Figure, mark: str) -> bytes:
+    """Return a figure as the bytes of an SVG file. mark: its identifier."""
     stream = io.BytesIO()
-    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None})
+    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Identifier": mark})
     return stream.getvalue()
 
 
-def encode_png(figure: Figure) -> bytes:
+def encode_png(figure: Figure, mark: str) -> bytes:
     """Return a figure as the bytes of a PNG file, opaque, without filters (PNG 1.2, RFC 2083).
+
+    mark: its identifier.
 
     Curves on white take three fifths of the time that Pillow needs to choose filters for them, and
     five sixths of the bytes.
@@ -111,6 +153,7 @@ def encode_png(figure: Figure) -> bytes:
     chunks = {
         b"IHDR": struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0),  # 8 bits of each of RGB
         b"pHYs": struct.pack(">IIB", a_metre, a_metre, 1),
+        b"tEXt": b"Identifier\0" + mark.encode(),
         b"IDAT": zlib.compress(rows.tobytes()),
         b"IEND": b"",
     }
@@ -299,12 +342,17 @@ def paint_note(axes: Axes, note: Note, limits: tuple[float, float]) -> None:
         axes.axvline(note.x, **line_properties(look))
 
 
-def pictures(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict[str, bytes]:
+def pictures(
+    drawings: Mapping[str, Drawing], headings: Mapping[str, str], folder: pathlib.Path
+) -> dict[str, bytes]:
     """Return PNG and SVG of drawings by the names of their files; tells on stderr what is drawn.
+
+    Those that lie in the folder already are not drawn again.
 
     A forked process takes figures from the first on, this one from the last on until they meet.
     Where threads run, whose locks a fork may copy, or the system has no fork, all is done here.
     """
+    drawings = {n: one for n, one in drawings.items() if not is_drawn(one, folder, n)}
     alone = len(drawings) < MIN_FIGURES_FOR_TWO or threading.active_count() > 1 or not can_fork()
     gc.freeze()  # libraries and runs: collections need not look at them again, nor the copy write
     try:
