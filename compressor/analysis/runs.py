@@ -57,7 +57,9 @@ ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibra
 def settled_part(run: xr.Dataset) -> xr.Dataset:
     """Return the samples from `settle_rev` on, since start-up is not the machine."""
     time, begin = run["time"].values, run.attrs["settle"] * (1 - 1e-12)
-    return run if time[0] >= begin else run.isel(time=time >= begin)
+    if time[0] >= begin:
+        return run
+    return run.isel(time=slice(int(np.searchsorted(time, begin)), None))  # views, no copies
 
 
 def settled_revolutions(run: xr.Dataset) -> float:

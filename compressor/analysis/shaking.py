@@ -62,7 +62,8 @@ def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:
     count = int(np.floor(turns[-1] + 1e-6))
     if count < 1:
         raise NoSeriesError("the run has no whole settled revolution (solve.duration_rev)")
-    return settled.isel(time=turns <= count + 1e-6), count
+    beyond = int(np.searchsorted(turns, count + 1e-6, "right"))
+    return settled.isel(time=slice(beyond)), count  # views, no copies
 
 
 def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
@@ -72,9 +73,9 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
     """
     settled, count = whole_revolutions(run)
     angle = np.degrees(settled["crank_angle"].values)
-    inside = angle >= angle[0] + 360.0 * (count - 1) - 1e-6
-    angle = angle[inside]
-    return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9), settled.isel(time=inside)
+    first = int(np.searchsorted(angle, angle[0] + 360.0 * (count - 1) - 1e-6))
+    angle = angle[first:]
+    return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9), settled.isel(time=slice(first, None))
 
 
 def healthy_twin(run: xr.Dataset) -> xr.Dataset:

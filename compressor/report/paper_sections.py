@@ -17,6 +17,7 @@ from compressor.analysis import (
     LOADS,
     ORDER,
     SPOKEN,
+    Claim,
     Shaking,
     caption,
     case_of,
@@ -437,16 +438,19 @@ class PaperCasesContent:
 
 
 def paper_sections(
-    paper: PaperRuns, plates: Sequence[Plate], caveats: list[str]
+    paper: PaperRuns, plates: Sequence[Plate], judged: Sequence[Claim], caveats: list[str]
 ) -> tuple[list[Section], list[Section]]:
-    """Return the paper's sections: figures; and claims, cases, and the load's printed numbers."""
+    """Return the paper's sections: figures; and claims, cases, and the load's printed numbers.
+
+    judged: the paper's claims.
+    """
     figures = [Section("figures", "The paper's figures", "figures.html", plates)] if plates else []
     if not paper.stored:
         return figures, []
     title = "Spring and cam: what is printed, what follows"
     cases = PaperCasesContent(caveats, cases_table(paper))
     return figures, [
-        Section("claims", "The paper's claims", "claims.html", claims(paper.usable)),
+        Section("claims", "The paper's claims", "claims.html", judged),
         Section("cases", "The paper's cases", "cases.html", cases),
         Section("printed", title, "printed.html", printed_table()),
     ]

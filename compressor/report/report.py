@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compressor.analysis import caption, case_of, claims
+from compressor.analysis import Claim, caption, case_of, claims
 from compressor.report.answer import (
     FirstScreen,
     MetricChange,
@@ -171,9 +171,10 @@ def build_report(
     ]
     chapters = [chapter for one in added for chapter in one.chapters]
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
-    figures, tables = paper_sections(paper, of_paper, caveats)
+    judged = claims(paper.usable) if paper.stored else []
+    figures, tables = paper_sections(paper, of_paper, judged, caveats)
     sections = [
-        answer_section(summarise(stored, own, paper, drawn)),
+        answer_section(summarise(stored, own, paper, judged, drawn)),
         *(one.figures for one in drawn),
         *figures,
         *sets,
@@ -237,9 +238,13 @@ def drawn_study(
 
 
 def summarise(
-    stored: Stored, own: Sequence[StoredStudy], paper: PaperRuns, drawn: Sequence[DrawnStudy]
+    stored: Stored,
+    own: Sequence[StoredStudy],
+    paper: PaperRuns,
+    judged: Sequence[Claim],
+    drawn: Sequence[DrawnStudy],
 ) -> FirstScreen:
-    """Return the page's first screen."""
+    """Return the page's first screen; judged: the paper's claims."""
     lines = [one.line for one in drawn]
     each: list[tuple[str, Sequence[MetricChange]]] = [
         (one.line.name, one.findings) for one in drawn
@@ -252,7 +257,6 @@ def summarise(
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )
         each.append(("The paper's cases", findings(worn)))
-    found = claims(paper.usable) if paper.stored else []
     shown = [(f"The last job of {study.name}", last_case(stored, study)) for study in own[:1]]
     if paper.stored and not shown:
         name, run = [*paper.stored.items()][-1]
@@ -262,7 +266,7 @@ def summarise(
         for name, case in shown
         if case
     ]
-    return FirstScreen(lines, [*round_robin(each)], found, pictures)
+    return FirstScreen(lines, [*round_robin(each)], judged, pictures)
 
 
 def remove_stale(report: Path, contents: ReportContent) -> None:
