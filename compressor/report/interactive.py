@@ -9,7 +9,7 @@ import base64
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -65,11 +65,16 @@ def script(name: str, drawing: Drawing) -> str:
 def content(drawing: Drawing) -> dict[str, Any]:
     """Return a figure as plain data. Panels with the same `link` are zoomed together.
 
+    `jobs`: the keys of all jobs, among which a trace's points have places.
+
     `unified`: all curves go from left to right, so that the values at one x are told together.
     """
     panels = drawing.panels
     links = {way: link_scales(drawing, way) for way in WAYS}
+    keys = dict.fromkeys(key for panel in panels for trace in panel.traces for key in trace.jobs)
+    places = {key: place for place, key in enumerate(keys)}
     return {
+        "jobs": [*keys],
         "aspect": round(drawing.height / drawing.width, 4),
         "heights": drawing.heights,
         "widths": drawing.widths,
@@ -89,7 +94,7 @@ def content(drawing: Drawing) -> dict[str, Any]:
                 "row": panel.row,
                 "column": panel.column,
                 "square": panel.is_square,
-                "traces": [trace_data(trace, panel) for trace in panel.traces_in_order],
+                "traces": [trace_data(trace, panel, places) for trace in panel.traces_in_order],
                 "notes": [note_data(one, panel) for one in panel.notes if one.tail is None],
             }
             for number, panel in enumerate(panels)
@@ -150,8 +155,11 @@ def dashes(style: LineStyle) -> list[float]:
     return [round(d * style.linewidth, 2) for d in style.linestyle[1]] if is_dashed else []
 
 
-def trace_data(trace: Trace, panel: Panel) -> dict[str, Any]:
-    """Return a trace as plain data, with the points that its panel can show."""
+def trace_data(trace: Trace, panel: Panel, places: Mapping[str, int]) -> dict[str, Any]:
+    """Return a trace as plain data, with the points that its panel can show.
+
+    places: of the keys of jobs.
+    """
     look, part = trace.style, visible(trace, panel)
     is_bar = trace.kind in ("bars", "columns")
     width = trace.thick if is_bar else look.markersize if trace.is_points else look.linewidth
@@ -171,7 +179,7 @@ def trace_data(trace: Trace, panel: Panel) -> dict[str, Any]:
         found["errors"] = [numbers(ends[part]) for ends in trace.errors]
         found["across"] = trace.across
     if trace.jobs:
-        found["jobs"] = [*np.array(trace.jobs, object)[part].tolist()]
+        found["jobs"] = numbers(np.array([places[key] for key in trace.jobs])[part])
     return found
 
 

@@ -176,6 +176,27 @@ class Running(NamedTuple):
         return f"about {minutes} min" if minutes < 100 else f"about {minutes / 60:.0f} h"
 
 
+class JobFacts(NamedTuple):
+    """What a click on a point tells of a study's jobs: by key, in the order of the names."""
+
+    names: Sequence[str]
+    jobs: Mapping[str, Sequence[str]]
+
+
+class JobsToOpen(NamedTuple):
+    """What clicks on points tell: the results' folder in a shell's words, and jobs by study.
+
+    series: keys of the jobs whose last revolution lies beside the page.
+    """
+
+    results: str
+    studies: Sequence[JobFacts]
+    series: Sequence[str]
+
+
+NO_JOBS = JobsToOpen("", (), ())
+
+
 def templates() -> Environment:
     """Return the page's templates: they escape what they print, and what they lack is an error."""
     return Environment(
@@ -203,14 +224,14 @@ def template_elsewhere(name: str) -> str | None:
 
 
 def document(
-    sections: Sequence[Section], jobs: Mapping[str, Any], running: Running | None = None
+    sections: Sequence[Section], jobs: JobsToOpen = NO_JOBS, running: Running | None = None
 ) -> str:
     """Return the whole page: the first section, a list of contents, and the other sections.
 
-    jobs: by key what a click on a job's point tells, as plain data. running: how the run stands
-    that the page is written beside.
+    running: how the run stands that the page is written beside.
     """
-    facts = Markup(json.dumps(jobs).replace("<", "\\u003c"))
+    data = jobs._asdict() | {"studies": [one._asdict() for one in jobs.studies]}
+    facts = Markup(json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
     page = templates().get_template("page.html")
     return page.render(sections=sections, jobs=facts, running=running)
 

@@ -6,10 +6,11 @@ of the same data by the same code, are not drawn again.
 """
 
 import contextlib
+import shlex
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from compressor.analysis import Claim, caption, case_of, claims
 from compressor.report.answer import (
@@ -37,6 +38,8 @@ from compressor.report.interactive import (
 from compressor.report.page import (
     Add,
     Additions,
+    JobFacts,
+    JobsToOpen,
     Plate,
     Running,
     Section,
@@ -188,10 +191,8 @@ def build_report(
     ]
     plates = [*chain(of_paper, *of_others.values(), of_faults, *(one.plates for one in drawn))]
     plates += [plate for chapter in chapters for plate in chapter.plates]
-    jobs = {key: facts for one in drawn for key, facts in one.jobs.items()}
-    series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs)}
-    for key in series:
-        jobs[key]["series"] = series_name(key)
+    series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs)}
+    jobs = JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
     page = document(sections, jobs, running)
     return ReportContent(plates, [study.name for study in studies], series, page)
 
@@ -209,7 +210,7 @@ class DrawnStudy(NamedTuple):
     plates: list[Plate]
     findings: list[MetricChange]
     line: StudyLine
-    jobs: dict[str, dict[str, Any]]
+    jobs: JobFacts
 
 
 def drawn_study(
@@ -233,7 +234,7 @@ def drawn_study(
         return DrawnStudy(
             figures, table, plates, study_findings(data),
             StudyLine(f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed)),
-            job_facts(stored.folder, data, keys),
+            job_facts(data, keys),
         )  # fmt: skip
 
 

@@ -1,10 +1,9 @@
 """The section of a report about a user's own study: its failures, its table and its figures."""
 
 import re
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,6 +13,7 @@ from compressor.reasons import remedy
 from compressor.report.figures.sweep_data import measures
 from compressor.report.page import (
     Cell,
+    JobFacts,
     PageTable,
     Plate,
     Section,
@@ -24,7 +24,7 @@ from compressor.report.page import (
     status_text,
     value_cell,
 )
-from compressor.store import Folder, Stored, StoredStudy, study_caveats
+from compressor.store import Stored, StoredStudy, study_caveats
 
 MAX_DETAILS = 20
 MAX_ROWS = 500
@@ -132,8 +132,8 @@ def job_counts(data: xr.Dataset) -> Counts:
     return Counts(status.size - failed - missing, failed, missing)
 
 
-def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return what a click on a job's point shows: its place in the sweep, end and command.
+def job_facts(data: xr.Dataset, keys: Sequence[str]) -> JobFacts:
+    """Return what a click on a job's point shows: its place in the sweep, and how it ended.
 
     keys: of the jobs, of which the first MAX_FACTS are told of.
     """
@@ -143,13 +143,9 @@ def job_facts(results: Folder, data: xr.Dataset, keys: Sequence[str]) -> dict[st
     found = {}
     for key in [key for key in dict.fromkeys(keys) if key in place][:MAX_FACTS]:
         n = place[key]
-        point = {name: value_cell(values[n]).text for name, values in swept.items()}
-        found[key] = {
-            "values": point,
-            "status": status_text(status[n], reason[n]),
-            "command": f"compsim show {key[:KEY_DIGITS]} -i {shlex.quote(str(results))}",
-        }
-    return found
+        point = [value_cell(values[n]).text for values in swept.values()]
+        found[key] = [*point, status_text(status[n], reason[n])]
+    return JobFacts([*swept, "status"], found)
 
 
 def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:

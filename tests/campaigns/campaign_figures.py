@@ -94,7 +94,7 @@ def draw_kept_error(cases: xr.Dataset) -> Drawing:
         milliseconds, error = 1e3 * one["seconds"][kept].values, one["error"][kept].values
         color = CYCLE[number % len(CYCLE)].color
         dots = mark(color, "o", 2.2, edge_width=0.0)
-        panel.plot(milliseconds, error, dots, is_raster=True)
+        panel.plot(milliseconds, error, dots)
         middle = mark(color, "D", 10, edge="#ffffff")
         panel.plot(np.median(milliseconds), np.median(error), middle, word)
         promise = replace(PROMISED, color=color, zorder=2)

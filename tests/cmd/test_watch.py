@@ -197,7 +197,7 @@ def test_a_page_that_cannot_be_written_is_a_problem_in_a_line(writer, monkeypatc
 
 def test_between_drawings_the_page_says_how_the_run_stands(writer, monkeypatch, tmp_path):
     def drawn(results, report, command, claims, running):
-        (tmp_path / "index.html").write_text(document([], {}, running))
+        (tmp_path / "index.html").write_text(document([], running=running))
 
     monkeypatch.setattr("compressor.report.write_report", drawn)
     assert writer.write(STANDS, draw=False)["drawn"]  # there is no page yet

@@ -21,7 +21,7 @@ from compressor.report.figures.pictures import (
     pictures,
     render,
 )
-from compressor.report.figures.style import LineStyle
+from compressor.report.figures.style import LineStyle, mark
 
 NAMES = ["one", "two", "three", "four", "five"]
 HEADINGS = {name: f"Figure {name}" for name in NAMES}
@@ -171,3 +171,14 @@ def test_other_code_draws_again(figures, monkeypatch):
     before = digest_drawing(figures["one"])
     monkeypatch.setattr(module, "code_digest", lambda: b"of another version")
     assert digest_drawing(figures["one"]) != before
+
+
+def test_a_cloud_of_many_marks_is_pixels_in_an_svg_and_a_curve_is_not():
+    for count, look, is_raster in (
+        (module.MAX_VECTOR_MARKS, mark("#000000", "o", 3), False),
+        (module.MAX_VECTOR_MARKS + 1, mark("#000000", "o", 3), True),
+        (module.MAX_VECTOR_MARKS + 1, LineStyle("#000000"), False),
+    ):
+        drawing, grid = make_grid(1, 1, 2.0)
+        grid[0, 0].plot(np.arange(count), np.arange(count), look)
+        assert (b"<image" in render(drawing, "svg")) == is_raster

@@ -55,7 +55,7 @@ class Trace:
     `bars` (x from 0, at y), `columns` (y from `foot`, at x), `map` (`z` over the edges x and y;
     nan: no cell). A name of "" stands in no table. errors: (below, above), shape (2, n), in y, or
     in x where `across`; caps: length of their ends in points. jobs: the key of each point's job.
-    thick: of bars and columns. is_raster: pixels also in an SVG.
+    thick: of bars and columns.
     """
 
     x: np.ndarray
@@ -71,7 +71,6 @@ class Trace:
     foot: np.ndarray | None = None
     z: np.ndarray | None = None
     scale: ColorScale | None = None
-    is_raster: bool = False
 
     @property
     def is_points(self) -> bool:

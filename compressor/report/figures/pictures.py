@@ -45,6 +45,8 @@ from compressor.report.figures.drawing import WAYS, Drawing, Note, Panel, Trace,
 from compressor.report.figures.style import LineStyle
 
 DPI = 150
+SVG_DPI = 200  # of what is pixels in an SVG: 1920 across a page, twice those of a usual screen
+MAX_VECTOR_MARKS = 1000  # of a cloud of points: more are pixels in an SVG
 LEGEND_WIDTH = 130  # characters, in a row of a legend
 PLAIN_DECADES = 2.5  # of a log axis with plain numbers, up to which it has ticks at 2 and 5 as well
 ENDS = {"png": b"IEND\xaeB`\x82", "svg": b"</svg>\n"}  # of whole files
@@ -131,7 +133,9 @@ def is_drawn(drawing: Drawing, folder: pathlib.Path, name: str) -> bool:
 def encode_svg(figure: Figure, mark: str) -> bytes:
     """Return a figure as the bytes of an SVG file. mark: its identifier."""
     stream = io.BytesIO()
+    figure.dpi, dpi = SVG_DPI, figure.dpi
     FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Identifier": mark})
+    figure.dpi = dpi
     return stream.getvalue()
 
 
@@ -205,11 +209,13 @@ def paint_panel(axes: Axes, panel: Panel, column: Sequence[Axes]) -> None:
             axes.add_patch(PathPatch(outline(trace), **patch_properties(trace.style)))
         elif trace.kind in ("bars", "columns"):
             paint_bars(axes, trace)
-        elif trace.errors is None:
-            axes.plot(trace.x, trace.y, rasterized=trace.is_raster, **line_properties(trace.style))
         else:
-            axes.errorbar(trace.x, trace.y, **error_properties(trace), elinewidth=1.0,
-                          **line_properties(trace.style))  # fmt: skip
+            look = line_properties(trace.style)
+            look["rasterized"] = trace.is_points and trace.x.size > MAX_VECTOR_MARKS
+            if trace.errors is None:
+                axes.plot(trace.x, trace.y, **look)
+            else:
+                axes.errorbar(trace.x, trace.y, **error_properties(trace), elinewidth=1.0, **look)
     for note in panel.notes:
         paint_note(axes, note, panel.limits("y"))
     for way in WAYS:

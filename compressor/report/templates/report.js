@@ -409,7 +409,8 @@ class Figure {
     const name = escaped(trace.name || panel.title || "");
     const made = { type: "scatter", x: numbers(trace.x), y: numbers(trace.y), name,
       meta: trace.name, visible: !this.off.has(trace.name), opacity: trace.opacity };
-    if (trace.jobs) made.customdata = trace.jobs;
+    const jobs = trace.jobs && Array.from(numbers(trace.jobs), (n) => this.sheet.jobs[n]);
+    if (jobs) made.customdata = jobs;
     const inX = `%{x:.6~g} ${xu}`;
     made.hovertemplate = `%{y:.5~g} ${yu}<extra>${name}</extra>`;
     if (!trace.name && trace.kind !== "map" && trace.kind !== "bars") made.hoverinfo = "skip";
@@ -437,8 +438,8 @@ class Figure {
       made.text = shown;
       made.hovertemplate = `${inX}, %{y:.6~g} ${yu}<br>%{text}` +
         `<extra>${escaped(trace.scale || panel.title)}</extra>`;
-      if (trace.jobs) {
-        made.customdata = rows.map((row, n) => trace.jobs.slice(n * columns, (n + 1) * columns));
+      if (jobs) {
+        made.customdata = rows.map((row, n) => jobs.slice(n * columns, (n + 1) * columns));
       }
       if (trace.limits[0] === trace.limits[1]) made.showscale = false;
       return made;
@@ -499,20 +500,18 @@ class Figure {
 function showJob(key) {
   const box = document.getElementById("job");
   const row = [...document.querySelectorAll("tr[data-job]")].find((one) => one.dataset.job === key);
-  const job = jobs[key] ?? {};
+  const study = told.studies.find((one) => key in one.jobs);
   box.querySelector("h2").textContent = `Job ${key.slice(0, 10)}`;
   const list = box.querySelector("dl");
   list.replaceChildren();
-  const tell = (name, text) => {
-    const [term, told] = [document.createElement("dt"), document.createElement("dd")];
+  study?.names.forEach((name, n) => {
+    const [term, value] = [document.createElement("dt"), document.createElement("dd")];
     term.textContent = name;
-    told.textContent = text;
-    list.append(term, told);
-  };
-  Object.entries(job.values ?? {}).forEach(([name, text]) => tell(name, text));
-  if (job.status) tell("status", job.status);
+    value.textContent = study.jobs[key][n];
+    list.append(term, value);
+  });
   const command = box.querySelector("code");
-  command.textContent = job.command ?? `compsim show ${key}`;
+  command.textContent = `compsim show ${key.slice(0, 10)} -i ${told.results}`;
   const link = box.querySelector("a");
   link.hidden = !row;
   link.onclick = (event) => {
@@ -524,9 +523,9 @@ function showJob(key) {
   };
   box.querySelector("figure")?.remove();
   box.showModal();
-  if (job.series) {
+  if (told.series.includes(key)) {
     const frame = document.createElement("figure");
-    frame.id = job.series;
+    frame.id = `job-${key}`;
     frame.dataset.title = "last revolution";
     const caption = document.createElement("figcaption");
     caption.textContent = "The last revolution, as it is kept with the job.";
@@ -536,15 +535,15 @@ function showJob(key) {
   }
 }
 
-let jobs = {};
+let told = { results: "results", studies: [], series: [] };
 
 // ---- start ----------------------------------------------------------------------------------
 const kept = remembered.get("compsim-theme");
 if (kept) root.dataset.theme = kept;
 
 document.addEventListener("DOMContentLoaded", () => {
-  const told = document.getElementById("jobs");
-  if (told) jobs = JSON.parse(told.textContent);
+  const facts = document.getElementById("jobs");
+  if (facts) told = JSON.parse(facts.textContent);
   each(".theme", (button) => {
     button.hidden = false;
     nameTheme(button);

@@ -85,7 +85,7 @@ def plot_places(panel: Panel, pair: xr.Dataset, joint: str) -> None:
         points = pair["section"].sel(direction=direction, joint=joint, coordinate="x")
         points = points.transpose(over, "revolution")
         x = np.repeat(positions(pair, over), points.sizes["revolution"])
-        panel.plot(x, MILLI * points.values.ravel(), look, direction, is_raster=True)
+        panel.plot(x, MILLI * points.values.ravel(), look, direction)
     panel.title = (
         f"journal's place along the cylinder, {SPOKEN[joint]}, once a revolution at "
         f"{pair.attrs['section_deg']:g}°"

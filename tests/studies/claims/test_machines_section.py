@@ -95,7 +95,7 @@ def test_the_section_of_the_page_has_words_and_figures(folder, capsys):
     (chapter,) = add("results", [], folder).chapters
     assert [part.plate is None for part in chapter.section.content] == [False, False, True]
     assert [plate.name for plate in chapter.plates] == ["machines-claims", "machines-assumptions"]
-    text = document([chapter.section], {})
+    text = document([chapter.section])
     assert "In which machines the paper&#39;s claims hold" in text
     assert "machines-claims.svg" in text
 

@@ -121,7 +121,7 @@ def test_relative_changes_in_words(size, text):
 
 def test_the_page_shows_line_table_and_what_is_assumed():
     data = made()
-    text = document([models_section("models-worn", STUDY, data)] * 2, {})
+    text = document([models_section("models-worn", STUDY, data)] * 2)
     assert text.count(f"<p>{headline(model_table(data))}.</p>") == 2
     assert "The table is of worn at clearance_mm = 0.3, one of 3 jobs: its" in text
     alone = replace(STUDY, axes=(), keys=("a",))
