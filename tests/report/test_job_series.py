@@ -6,7 +6,7 @@ from test_report import forget, part_of
 
 from compressor.report import interactive
 from compressor.report.figures import pictures
-from compressor.report.interactive import draw_job, job_scripts
+from compressor.report.interactive import draw_job, job_scripts, script, series_name
 from compressor.report.report import write_report
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -33,6 +33,8 @@ def test_only_jobs_that_kept_their_series_have_scripts(paper_store, monkeypatch)
     found = dict(job_scripts(stored, ["0" * 20, *keys]))
     assert {*found} == {*keys}
     assert all(text.startswith(f'compsimFigure("job-{key}"') for key, text in found.items())
+    for key in keys:
+        assert found[key] == script(series_name(key), draw_job(stored.job(key)))
     monkeypatch.setattr(interactive, "MAX_SERIES", 2)
     assert [key for key, _ in job_scripts(stored, keys)] == keys[:2]
 
