@@ -28,7 +28,7 @@ from compressor.report.answer import (
     study_findings,
 )
 from compressor.report.figures import FIGURES
-from compressor.report.figures.pictures import pictures
+from compressor.report.figures.pictures import Painter
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
     job_scripts,
@@ -102,13 +102,10 @@ def write_report(
 
     Raises StoreError where there are no results, or the report's folder cannot be written.
     """
-    contents = build_report(results, command, add, running)
     folder = Path(report)
-    files = pictures(
-        {plate.name: plate.drawing for plate in contents.plates},
-        {plate.name: plate.heading for plate in contents.plates},
-        folder,
-    )
+    with Painter(folder) as painter:
+        contents = build_report(results, command, add, running, painter)
+        files = painter.finish()
     for plate in contents.plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
     files |= {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
@@ -148,15 +145,29 @@ class ReportContent(NamedTuple):
 
 
 def build_report(
-    results: Folder, command: str, add: Sequence[Add] = (), running: Running | None = None
+    results: Folder,
+    command: str,
+    add: Sequence[Add],
+    running: Running | None,
+    painter: Painter,
 ) -> ReportContent:
-    """Return the figures, series and page of a report, in memory."""
+    """Return the figures, series and page of a report, in memory.
+
+    painter: it gets each figure as soon as there is one.
+    """
+
+    def begin(plates: Sequence[Plate]) -> None:
+        """Let pictures be drawn while the page is made."""
+        for plate in plates:
+            painter.add(plate.name, plate.drawing, plate.heading)
+
     studies, stored = read_studies(results), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     papers = [study for study in studies if is_of_paper(stored, study)]
     if not papers:
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = draw_paper(paper)
+    begin(of_paper)
     others = second_sets(stored, studies, paper)
     of_others = {n: [Plate(*parts) for parts in second_drawings(one)] for n, one in others.items()}
     found = shakings(paper)
@@ -173,6 +184,9 @@ def build_report(
         for name, one in others.items()
     ]
     chapters = [chapter for one in added for chapter in one.chapters]
+    later = [*chain(*of_others.values(), of_faults, *(one.plates for one in drawn))]
+    later += [plate for chapter in chapters for plate in chapter.plates]
+    begin(later)
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats)
@@ -189,12 +203,10 @@ def build_report(
         *missing_sections(paper, results),
         provenance_section(studies, results, command),
     ]
-    plates = [*chain(of_paper, *of_others.values(), of_faults, *(one.plates for one in drawn))]
-    plates += [plate for chapter in chapters for plate in chapter.plates]
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs)}
     jobs = JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
     page = document(sections, jobs, running)
-    return ReportContent(plates, [study.name for study in studies], series, page)
+    return ReportContent([*of_paper, *later], [study.name for study in studies], series, page)
 
 
 def notes_on(study: str, added: Sequence[Additions]) -> list[StudyNote]:

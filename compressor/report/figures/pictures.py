@@ -18,10 +18,10 @@ import sys
 import threading
 import zlib
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import matplotlib
 import numpy as np
@@ -52,7 +52,6 @@ PLAIN_DECADES = 2.5  # of a log axis with plain numbers, up to which it has tick
 ENDS = {"png": b"IEND\xaeB`\x82", "svg": b"</svg>\n"}  # of whole files
 KINDS = tuple(ENDS)
 HEAD = 2000  # bytes of a picture, in which its identifier is
-MIN_FIGURES_FOR_TWO = 3  # figures for which a second process is worth its start
 
 STYLE: dict[str, Any] = {
     "font.size": 9.5,
@@ -348,28 +347,72 @@ def paint_note(axes: Axes, note: Note, limits: tuple[float, float]) -> None:
         axes.axvline(note.x, **line_properties(look))
 
 
-def pictures(
-    drawings: Mapping[str, Drawing], headings: Mapping[str, str], folder: pathlib.Path
-) -> dict[str, bytes]:
-    """Return PNG and SVG of drawings by the names of their files; tells on stderr what is drawn.
+class Painter:
+    """Draws PNG and SVG of drawings, in a copy of this process while this one does other work.
 
-    Those that lie in the folder already are not drawn again.
-
-    A forked process takes figures from the first on, this one from the last on until they meet.
-    Where threads run, whose locks a fork may copy, or the system has no fork, all is done here.
+    A copy takes drawings from the first on as soon as they are added; `finish` takes them from the
+    last on until both meet. Where threads run, whose locks a fork may copy, or the system has no
+    fork, all is done here. What is drawn is told on stderr.
     """
-    drawings = {n: one for n, one in drawings.items() if not is_drawn(one, folder, n)}
-    alone = len(drawings) < MIN_FIGURES_FOR_TWO or threading.active_count() > 1 or not can_fork()
-    gc.freeze()  # libraries and runs: collections need not look at them again, nor the copy write
-    try:
-        files = one_by_one(drawings, headings) if alone else by_two(drawings, headings)
-    finally:
+
+    def __init__(self, folder: pathlib.Path):
+        """Set the folder, whose pictures are not drawn again where they are those of a drawing."""
+        self.folder = folder
+        self.added: dict[str, tuple[Drawing, str]] = {}
+        self.waiting: deque[str] = deque()
+        self.futures: dict[str, Future[list[bytes]]] = {}
+        self.pool: ProcessPoolExecutor | None = None
+        self.sent: Future[list[bytes]] | None = None  # last of all
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.pool:
+            self.pool.shutdown(cancel_futures=True)
         gc.unfreeze()
-    return {
-        f"{name}.{kind}": picture
-        for name in drawings
-        for kind, picture in zip(KINDS, files[name], strict=True)
-    }
+
+    def add(self, name: str, drawing: Drawing, heading: str) -> None:
+        """Draw a drawing as files of a name; heading: what it is called on stderr."""
+        if is_drawn(drawing, self.folder, name):
+            return
+        self.added[name] = drawing, heading
+        self.waiting.append(name)
+        if not self.pool and threading.active_count() == 1 and can_fork():
+            gc.freeze()  # what is there no collection needs to look at again, nor the copy to write
+            context = multiprocessing.get_context("fork")
+            ignored = signal.SIGINT, signal.SIG_DFL
+            self.pool = ProcessPoolExecutor(1, context, signal.signal, ignored)
+        if self.sent is None or self.sent.done():
+            self.send()
+
+    def send(self, _: object = None) -> None:
+        """Submit the next drawing to the copy, which has finished one or has none."""
+        with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
+            if self.pool:
+                # in the pool's own thread, but a deque gives each name to one side only
+                name = self.waiting.popleft()
+                self.sent = self.futures[name] = self.pool.submit(draw_reported, *self.added[name])
+                self.sent.add_done_callback(self.send)
+
+    def finish(self) -> dict[str, bytes]:
+        """Return the pictures that were to be drawn by the names of their files."""
+        gc.freeze()
+        drawn = {}
+        while self.waiting:
+            with contextlib.suppress(IndexError):
+                name = self.waiting.pop()
+                drawn[name] = draw_reported(*self.added[name])
+        for name in self.added.keys() - drawn.keys():
+            try:
+                drawn[name] = self.futures[name].result()
+            except (KeyError, OSError, RuntimeError):  # the copy has died
+                drawn[name] = draw_reported(*self.added[name])
+        return {
+            f"{name}.{kind}": picture
+            for name in self.added
+            for kind, picture in zip(KINDS, drawn[name], strict=True)
+        }
 
 
 def can_fork() -> bool:
@@ -377,42 +420,6 @@ def can_fork() -> bool:
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     return cores > 1 and "fork" in multiprocessing.get_all_start_methods()
-
-
-def one_by_one(
-    drawings: Mapping[str, Drawing], headings: Mapping[str, str]
-) -> dict[str, list[bytes]]:
-    """Return the pictures of all drawings, made in this process."""
-    return {name: draw_reported(one, headings[name]) for name, one in drawings.items()}
-
-
-def by_two(drawings: Mapping[str, Drawing], headings: Mapping[str, str]) -> dict[str, list[bytes]]:
-    """Return the pictures of all drawings, made in this process and a copy of it."""
-    files, futures, waiting = {}, {}, deque(drawings)
-    context = multiprocessing.get_context("fork")
-    pool = ProcessPoolExecutor(1, context, signal.signal, (signal.SIGINT, signal.SIG_DFL))
-
-    def send(_: object = None) -> None:
-        """Submit the next drawing to the copy as soon as it has finished one."""
-        with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
-            # in the pool's own thread, but a deque gives each name to one side only
-            name = waiting.popleft()
-            futures[name] = pool.submit(draw_reported, drawings[name], headings[name])
-            futures[name].add_done_callback(send)
-
-    try:
-        send()
-        while waiting:
-            with contextlib.suppress(IndexError):
-                name = waiting.pop()
-                files[name] = draw_reported(drawings[name], headings[name])
-        for name in drawings.keys() - files.keys():
-            with contextlib.suppress(KeyError, OSError, RuntimeError):  # it has died
-                files[name] = futures[name].result()
-    finally:
-        pool.shutdown(cancel_futures=True)
-    lost = {name: drawing for name, drawing in drawings.items() if name not in files}
-    return files | one_by_one(lost, headings)
 
 
 def draw_reported(drawing: Drawing, heading: str) -> list[bytes]:
