@@ -1,5 +1,6 @@
 """Fixtures that several test modules share; what is slow is made once for all test processes."""
 
+import contextlib
 import fcntl
 import json
 import os
@@ -26,9 +27,8 @@ from compressor.solve.simulate import simulate
 from compressor.store.files import name_pending
 from compressor.store.reader import read_store
 from compressor.store.series_file import series_path, write_series
-from compressor.store.studies import write_study
+from compressor.store.studies import read_studies, write_study
 from compressor.store.writer import Writer
-from compressor.sweep.run_job import run_job
 from compressor.sweep.worker import JobResult
 
 # nohup ignores SIGHUP, and a shell SIGINT of what it runs behind: tests that send them, and the
@@ -174,6 +174,17 @@ def store(folder, *paths, overrides=()):
     return studies
 
 
+def part_of(whole, folder, *names):
+    """Make a store with some of a store's studies, by name; returns its folder."""
+    stored = read_store(whole)
+    (folder / "studies").mkdir(parents=True, exist_ok=True)
+    for study in read_studies(whole):
+        if study.name in names:
+            shutil.copy(whole / "studies" / f"{study.name}.json", folder / "studies")
+            keep(folder, *map(stored.job, study.keys))
+    return folder
+
+
 @pytest.fixture(scope="session")
 def paper_store(once):
     """A results folder with the paper's eleven cases at draft accuracy."""
@@ -281,16 +292,23 @@ def worn_store(once):
     return once("struck", store_worn)
 
 
+@contextlib.contextmanager
+def jobs_here():
+    """Jobs of sweeps and studies run in this process, one after the other: no worker starts."""
+
+    def run_batches(work, jobs, workers, pulse=lambda: None):
+        for name, payload, _ in jobs:
+            known = workers.ahead([payload]) if workers.ahead else ()
+            yield JobResult(name, work(payload, *known), 0.01)
+            pulse()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.modules["compressor.sweep.sweep"], "run_batches", run_batches)
+        yield
+
+
 @pytest.fixture
-def in_process(monkeypatch):
-    """Sweeps run their jobs here, one after the other: no worker has to start."""
-
-    def here(workers):
-        def run(place, cases, remark, pulse):
-            for case in cases:
-                yield JobResult(case, run_job(place, case), 0.01)
-                pulse()
-
-        return run
-
-    monkeypatch.setattr(sys.modules["compressor.sweep.sweep"], "local", here)
+def in_process():
+    """No worker starts in a test: where it matters how processes end, a test does without this."""
+    with jobs_here():
+        yield

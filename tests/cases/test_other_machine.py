@@ -87,7 +87,7 @@ def test_its_contact_is_told_to_be_of_another_pin(read):
     assert paper_stiffness_note(given) == ""
 
 
-def test_its_page_and_its_status_tell_that_too(read, tmp_path, capsys):
+def test_its_page_and_its_status_tell_that_too(read, tmp_path, capsys, in_process):
     case = replace(read("load: gas" + MACHINE)[0], solve=Solve(duration_rev=2, accuracy="draft"))
     (tmp_path / "nl.yaml").write_text("load: gas" + MACHINE + "solve: {duration_rev: 2}\n")
     for words in (["run", "nl.yaml", "-j", "1"], ["report"], ["status"]):

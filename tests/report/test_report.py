@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import CONFIGS, keep, store
+from conftest import CONFIGS, keep, part_of, store
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
@@ -222,17 +222,6 @@ def test_no_study_of_the_paper_is_told_twice(full):
 # ---- what is missing --------------------------------------------------------------------------
 
 
-def part_of(paper_store, tmp_path, *names):
-    """A store with some of the paper's studies."""
-    stored = read_store(paper_store)
-    for study in read_studies(paper_store):
-        if study.name in names:
-            (tmp_path / "part" / "studies").mkdir(parents=True, exist_ok=True)
-            shutil.copy(paper_store / "studies" / f"{study.name}.json", tmp_path / "part/studies")
-            keep(tmp_path / "part", *map(stored.job, study.keys))
-    return tmp_path / "part"
-
-
 def forget(folder, key):
     """Make a job one that is not stored."""
     (file,) = folder.glob(f"jobs/{key}-*.h5")
@@ -240,7 +229,7 @@ def forget(folder, key):
 
 
 def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
-    part = part_of(paper_store, tmp_path, "design", "typical", "big-end")
+    part = part_of(paper_store, tmp_path / "part", "design", "typical", "big-end")
     gone = next(s for s in read_studies(part) if s.name == "big-end").keys[1]
     forget(part, gone)
     (tmp_path / "out").mkdir()
@@ -273,7 +262,7 @@ def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
     [(["big-end"], "study-big-end"), (["big-end", "typical"], "study-big-end")],
 )
 def test_what_is_one_s_own_comes_first(paper_store, tmp_path, names, first):
-    part = part_of(paper_store, tmp_path, *names)
+    part = part_of(paper_store, tmp_path / "part", *names)
     forget(part, next(s for s in read_studies(part) if s.name == "big-end").keys[0])
     write_report(part, tmp_path / "out")
     ids = [i for i in read(tmp_path / "out").ids if i in ("study-big-end", "figures", "cases")]
@@ -281,7 +270,7 @@ def test_what_is_one_s_own_comes_first(paper_store, tmp_path, names, first):
 
 
 def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
-    part = part_of(paper_store, tmp_path, "design", "typical")
+    part = part_of(paper_store, tmp_path / "part", "design", "typical")
     key = next(s for s in read_studies(part) if s.name == "design").keys[0]
     fail(part, key, "non_finite", EVIL)
     paper = find_paper_runs(read_store(part), read_studies(part))
@@ -296,7 +285,7 @@ def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
 
 
 def test_a_damaged_case_is_told(paper_store, tmp_path):
-    part = part_of(paper_store, tmp_path, "typical")
+    part = part_of(paper_store, tmp_path / "part", "typical")
     (path,) = (part / "jobs").iterdir()
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.warns(StoreWarning, match=f"{path.name}: is damaged"):
@@ -315,7 +304,7 @@ def test_the_paper_s_cases_say_how_far_their_numbers_are_settled(full, paper_sto
 
 
 def test_metrics_without_series_have_tables_but_no_figures(paper_store, tmp_path):
-    part = part_of(paper_store, tmp_path, "typical")
+    part = part_of(paper_store, tmp_path / "part", "typical")
     (key,) = read_store(part).keys()
     replace_jobs(part, read_job(part, key).drop_dims("time"))
     write_report(part, tmp_path / "out")
@@ -327,7 +316,7 @@ def test_metrics_without_series_have_tables_but_no_figures(paper_store, tmp_path
 
 
 def test_the_most_exact_run_is_shown(paper_store, tmp_path):
-    part = part_of(paper_store, tmp_path, "typical")
+    part = part_of(paper_store, tmp_path / "part", "typical")
     (tmp_path / "exact.yaml").write_text("load: gas\nsolve: {rtol: [1e-3, 1e-9]}\n")
     store(part, tmp_path / "exact.yaml")
     assert (

@@ -59,7 +59,9 @@ def test_a_crank_of_usual_length_is_not_odd():
 
 
 @pytest.mark.parametrize("command", ["run", "plan", "explain"])
-def test_commands_say_what_is_outside_the_judged_range(tmp_path, monkeypatch, capsys, command):
+def test_commands_say_what_is_outside_the_judged_range(
+    tmp_path, monkeypatch, capsys, in_process, command
+):
     monkeypatch.chdir(tmp_path)
     text = "load: none\nmachine: {rod_mass_kg: [62, 5]}\nsolve: {duration_rev: 1, settle_rev: 0}\n"
     (tmp_path / "k1.yaml").write_text(text, encoding="utf-8")

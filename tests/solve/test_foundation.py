@@ -183,7 +183,7 @@ def test_bodies_and_sensors_are_stored_and_read(tmp_path):
     assert measure(case).attributes["key"] == case.key
 
 
-def test_a_study_of_bodies_opens(tmp_path, monkeypatch):
+def test_a_study_of_bodies_opens(tmp_path, monkeypatch, in_process):
     from compsim import cli
 
     monkeypatch.chdir(tmp_path)

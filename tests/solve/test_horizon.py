@@ -189,7 +189,7 @@ def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
     assert 0 < stored.numbers["predictability_horizon"] < asked.duration
 
 
-def test_show_and_report_tell_of_chaos(tmp_path, capsys, monkeypatch):
+def test_show_and_report_tell_of_chaos(tmp_path, capsys, monkeypatch, in_process):
     monkeypatch.chdir(tmp_path)
     # The third revolution: beyond what double precision follows, so on no processor foretold
     third = BRIEF | {"duration_rev": 3.2, "settle_rev": 2.2}

@@ -164,7 +164,7 @@ def test_signals_need_time_series():
         Case.from_values({"output": {"signals": True, "keep": "metrics"}})
 
 
-def test_a_stored_job_without_signals_runs_again_for_them(tmp_path, monkeypatch):
+def test_a_stored_job_without_signals_runs_again_for_them(tmp_path, monkeypatch, in_process):
     monkeypatch.chdir(tmp_path)
     brief = {"duration_rev": 0.25, "settle_rev": 0, "output_step_deg": 0.9, "accuracy": "draft"}
 

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from compsim import cli
+from conftest import jobs_here
 
 from compressor.cases.case import Case
 from compressor.outcome import REGIME_WORDS, Regime
@@ -37,7 +38,8 @@ def folder(tmp_path_factory):
     """A study of two jobs from the start on, with a sensor that is far too sensitive."""
     place = tmp_path_factory.mktemp("caveats")
     (place / "k1.yaml").write_text(json.dumps(STUDY), encoding="utf-8")
-    assert cli.main(["run", str(place / "k1.yaml"), "-j", "1", "-o", str(place / "k1")]) == 0
+    with jobs_here():
+        assert cli.main(["run", str(place / "k1.yaml"), "-j", "1", "-o", str(place / "k1")]) == 0
     return place / "k1"
 
 

@@ -23,7 +23,7 @@ MIX = {
 
 
 @pytest.fixture
-def mix(tmp_path, monkeypatch):
+def mix(tmp_path, monkeypatch, in_process):
     """A study of four jobs of which two failed, one is ok and one is missing."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mix.yaml").write_text(json.dumps(MIX))
@@ -96,7 +96,7 @@ def test_a_folder_without_results_is_an_error(tmp_path, capsys):
     assert str(tmp_path) in capsys.readouterr().err
 
 
-def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys):
+def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys, in_process):
     """What was set on the command line is part of them, and so is a raised limit."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "one case.yaml").write_text(json.dumps({"name": "one", "solve": SHORT}))

@@ -146,15 +146,15 @@ def test_a_segment_of_an_older_version_lacks_a_number(tmp_path, monkeypatch):
 def test_small_segments_are_merged_and_nothing_else_changes(tmp_path, monkeypatch):
     monkeypatch.setattr(writer, "MAX_AGE", 0)
     with Writer(tmp_path) as open_writer:
-        for number in range(100):
-            kept = outcome(number % 75, number, detail=f"the {number}th")
+        for number in range(40):
+            kept = outcome(number % 30, number, detail=f"the {number}th")
             assert open_writer.add(kept) == [kept.key]
     assert len(list(tmp_path.glob("rows/*.h5"))) <= writer.MAX_SMALL_AT_END
-    assert peaks(tmp_path) == {n: n + 75 if n < 25 else n for n in range(75)}
+    assert peaks(tmp_path) == {n: n + 30 if n < 10 else n for n in range(30)}
     found = store.read_store(tmp_path)
     details = {k: found.outcome(found.position(k)).detail for k in found.keys()}  # noqa: SIM118
-    assert details[key(3)] == "the 78th"
-    assert details[key(74)] == "the 74th"
+    assert details[key(3)] == "the 33th"
+    assert details[key(29)] == "the 29th"
 
 
 def test_merging_does_not_make_an_old_row_new(tmp_path, monkeypatch):
@@ -296,33 +296,35 @@ def test_a_second_writer_can_wait(tmp_path):
 
 # ---- crashes ------------------------------------------------------------------------------------
 
-DRIVER = """
-    import sys
-    from compressor.store import writer
-    from test_writer import outcome
-    folder, begin = sys.argv[1], int(sys.argv[2])
+
+def write_until_killed(folder, begin, channel):
+    """In a forked process: store outcomes, and tell over a pipe which are acknowledged."""
     writer.MAX_AGE, writer.MAX_SMALL = 0.002, 4
-    with writer.Writer(folder) as open_writer:
+    with Writer(folder) as open_writer, open(channel, "w", buffering=1) as told:
         for number in range(begin, begin + 10**6):
-            for key in open_writer.add(outcome(number)):
-                print(int(key, 16), flush=True)
-"""
+            for name in open_writer.add(outcome(number)):
+                print(int(name, 16), file=told)
 
 
 @pytest.mark.slow
 def test_what_was_acknowledged_survives_sigkill(tmp_path):
     wait, acknowledged = np.random.default_rng(1), set()
     for attempt in range(10):
-        call = [sys.executable, "-c", textwrap.dedent(DRIVER), str(tmp_path), str(attempt * 10**6)]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        driver = subprocess.Popen(call, stdout=subprocess.PIPE, text=True, env=environment)
-        assert driver.stdout is not None
-        for _ in range(wait.integers(11, 40)):
-            acknowledged.add(int(driver.stdout.readline()))
-        time.sleep(wait.uniform(0, 0.05))
-        driver.send_signal(signal.SIGKILL)
-        rest = driver.communicate()[0].splitlines(keepends=True)
-        acknowledged |= {int(line) for line in rest if line.endswith("\n")}
+        reader, channel = os.pipe()
+        driver = os.fork()
+        if not driver:
+            try:
+                write_until_killed(tmp_path, attempt * 10**6, channel)
+            finally:
+                os._exit(1)
+        os.close(channel)
+        with open(reader) as told:
+            for _ in range(wait.integers(11, 40)):
+                acknowledged.add(int(told.readline()))
+            time.sleep(wait.uniform(0, 0.05))
+            os.kill(driver, signal.SIGKILL)
+            acknowledged |= {int(line) for line in told if line.endswith("\n")}
+        assert os.waitstatus_to_exitcode(os.waitpid(driver, 0)[1]) == -signal.SIGKILL
         stored = peaks(tmp_path)
         assert acknowledged <= stored.keys()
         assert all(value == number for number, value in stored.items())
@@ -420,7 +422,7 @@ def test_every_flipped_bit_of_a_segment_is_found_and_its_jobs_named(tmp_path):
     plan(tmp_path, StoredAxis("machine.speed_rpm", (1, 2, 3), "rpm"), count=3)
     (path,) = tmp_path.glob("rows/*.h5")
     good = path.read_bytes()
-    places = {*range(0, len(good), 97)}
+    places = {*range(0, len(good), 389)}
     for name in store.read_store(tmp_path).keys():  # noqa: SIM118
         begin = good.index(name.encode())
         places |= {*range(begin, begin + 20)}
@@ -429,7 +431,7 @@ def test_every_flipped_bit_of_a_segment_is_found_and_its_jobs_named(tmp_path):
         (damage,) = damaged(path, flipped)
         assert damage.path == path
         assert damage.keys == (key(0), key(1), key(2))
-    for size in range(0, len(good), 211):
+    for size in range(0, len(good), 839):
         (damage,) = damaged(path, good[:size])
         assert {key(0), key(1), key(2)} <= {*damage.keys}
     assert damaged(path, good) == []
@@ -443,14 +445,14 @@ def test_every_flipped_bit_of_a_job_or_study_is_found(tmp_path):
         attributes = {**job.attrs, "name": "made"}
         open_writer.add(Outcome("ok", "", np.zeros(1, ROW)[0], attributes, series))
     plan(tmp_path, count=1, keys=(case.key,))
-    for pattern, keys, step in (("jobs/*.h5", (case.key,), 151), ("studies/*.json", (), 3)):
+    for pattern, keys, step in (("jobs/*.h5", (case.key,), 1511), ("studies/*.json", (), 29)):
         (path,) = tmp_path.glob(pattern)
         good = path.read_bytes()
         for place in range(0, len(good), step):
             flipped = good[:place] + bytes([good[place] ^ (1 << place % 8)]) + good[place + 1 :]
             (damage,) = damaged(path, flipped)
             assert (damage.path, damage.keys) == (path, keys)
-        for size in range(0, len(good), 11 * step):
+        for size in range(0, len(good), 3 * step):
             (damage,) = damaged(path, good[:size])
             assert (damage.path, damage.keys) == (path, keys)
         assert damaged(path, good) == []

@@ -161,7 +161,10 @@ def test_a_study_with_a_group_is_a_folder_and_a_line(tmp_path):
 MAIN_JOB = """
 from pathlib import Path
 from compsim import cli
-Path("one.yaml").write_text("clearance_mm: 0\\njoint: none\\nload: [spring, none]\\n")
+Path("one.yaml").write_text(
+    "clearance_mm: 0\\njoint: none\\nload: [spring, none]\\n"
+    "solve: {duration_rev: 0.1, settle_rev: 0, accuracy: draft, output_step_deg: 1}\\n"
+)
 assert cli.main(["plan", "one.yaml"]) == 0
 assert cli.main(["run", "one.yaml", "-j", "1", "--quiet"]) == 0
 assert cli.main(["report"]) == 0

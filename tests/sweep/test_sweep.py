@@ -49,10 +49,9 @@ def statuses(folder, study):
     return [store.read_store(folder).status(case.key).status for case in study.cases]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_failed_job_leaves_the_others_be(workers, studies, tmp_path):
+def test_a_failed_job_leaves_the_others_be(studies, tmp_path):
     made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}, "load": ["none", "spring"]})
-    summary = sweep(made, tmp_path / "out", workers)
+    summary = sweep(made, tmp_path / "out", 2)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "failed", "ok", "ok"]
     assert (summary.total, summary.done_before, summary.run_now) == (4, 0, 4)
     assert [(count.study, count.jobs, count.failed) for count in summary.counts] == [
@@ -67,7 +66,7 @@ def test_a_failed_job_leaves_the_others_be(workers, studies, tmp_path):
     )
 
 
-def test_a_second_sweep_does_nothing_and_still_tells_what_failed(studies, tmp_path):
+def test_a_second_sweep_does_nothing_and_still_tells_what_failed(studies, tmp_path, in_process):
     made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}})
     first = sweep(made, tmp_path / "out", 1)
     before = stamps(tmp_path / "out")
@@ -77,7 +76,7 @@ def test_a_second_sweep_does_nothing_and_still_tells_what_failed(studies, tmp_pa
     assert stamps(tmp_path / "out") == before
 
 
-def test_studies_share_jobs(studies, tmp_path):
+def test_studies_share_jobs(studies, tmp_path, in_process):
     made = studies(
         one={"machine": {"rod_mass_kg": [4, 5]}}, two={"machine": {"rod_mass_kg": [5, 6]}}
     )
@@ -160,7 +159,7 @@ def test_shards_are_one_study_together(studies, tmp_path, in_process):
     assert verify(tmp_path / "out") == []
 
 
-def test_series_that_were_rounded_do_not_serve_for_exact_ones(studies, tmp_path):
+def test_series_that_were_rounded_do_not_serve_for_exact_ones(studies, tmp_path, in_process):
     single = studies(one={"output": {"precision": "single", "compress": True}})
     sweep(single, tmp_path / "out", 1)
     assert store.read_job(tmp_path / "out", single[0].cases[0].key).acceleration.dtype == "f4"
@@ -171,7 +170,7 @@ def test_series_that_were_rounded_do_not_serve_for_exact_ones(studies, tmp_path)
     assert len(list(tmp_path.glob("out/jobs/*"))) == 1
 
 
-def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path):
+def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path, in_process):
     sweep(studies(one={}), tmp_path / "out", 1)
     for rough in ({"keep": "metrics"}, {"precision": "single"}):
         (path,) = tmp_path.glob("out/jobs/*")
@@ -184,7 +183,7 @@ def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path):
         assert verify(tmp_path / "out") == []
 
 
-def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypatch):
+def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypatch, in_process):
     """A shard keeps the time series of a job that another run, which ends later, runs without."""
     monkeypatch.setattr(compressor.store.writer, "MAX_AGE", 0)
     shared = studies(all={"machine": {"rod_mass_kg": 6}})
@@ -220,40 +219,44 @@ def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monk
     assert math.isnan(found.peak_acceleration.sel(load="none"))
 
 
-@pytest.mark.parametrize(
-    ("end", "reason", "detail", "again"),
-    [
-        (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", "SIGSEGV", 0),
-        (lambda: bytearray(10**15), "out_of_memory", "that a worker may add", 0),
-        (lambda: os.kill(os.getpid(), signal.SIGSTOP), "budget_seconds", "more than 0.5 s", 1),
-    ],
-)
-def test_a_poison_job_is_a_failed_job(end, reason, detail, again, studies, tmp_path, monkeypatch):
+POISON = {  # by load: what the job does, its reason, part of the detail
+    "none": (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", "SIGSEGV"),
+    "gas": (lambda: bytearray(10**15), "out_of_memory", "that a worker may add"),
+    "spring": (lambda: os.kill(os.getpid(), signal.SIGSTOP), "budget_seconds", "more than 0.5 s"),
+}
+
+
+def test_poison_jobs_are_failed_jobs(studies, tmp_path, monkeypatch):
+    """Each in its place; only the one that ran out of time is tried again."""
+
     def poisoned(place, case, real=SWEEP.run_job):
-        if case.load == "none":
-            end()
+        if case.machine.rod_mass_kg == 5:
+            POISON[case.load][0]()
         return real(place, case)
 
     monkeypatch.setattr(SWEEP, "run_job", poisoned)
     monkeypatch.setattr(SWEEP, "GRACE", 0.5)
-    made = studies(one={"load": ["spring", "none", "gas"], "solve": {"timeout_s": 0.5}})
+    masses = {"machine": {"rod_mass_kg": [4, 5]}, "solve": {"timeout_s": 0.5}}
+    made = studies(one={"load": [*POISON], **masses})
     summary = sweep(made, tmp_path / "out", 2)
-    assert statuses(tmp_path / "out", made[0]) == ["ok", "failed", "ok"]
-    (failure,) = summary.failed
-    assert failure.reason == reason
-    assert detail in failure.detail
-    assert store.read_job(tmp_path / "out", failure.key).attrs["detail"] == failure.detail
-    assert sweep(made, tmp_path / "out", 2).run_now == again
+    assert statuses(tmp_path / "out", made[0]) == ["ok", "failed"] * 3
+    assert len(summary.failed) == 3
+    for failure in summary.failed:
+        _, reason, detail = POISON[failure.coordinates["load"]]
+        assert failure.reason == reason
+        assert detail in failure.detail
+        assert store.read_job(tmp_path / "out", failure.key).attrs["detail"] == failure.detail
+    assert sweep(made, tmp_path / "out", 2).run_now == 1
 
 
-def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path):
+def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path, in_process):
     for _ in range(2):
         summary = sweep(studies(one=LATE), tmp_path / "out", 1)
         assert summary.run_now == 1
         assert summary.failed[0].reason == "budget_seconds"
 
 
-def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch):
+def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch, in_process):
     monkeypatch.setattr(warm_up, "SECONDS_TO_REMARK", 0)
     told = []
     for name in ("one", "one", "two"):
@@ -383,7 +386,7 @@ def test_lanes_are_compiled_for_many_jobs_alone(studies, tmp_path, monkeypatch):
     assert list(warm_up.Needs.of(few).parts) == ["auto"]
 
 
-def test_laws_are_an_axis_of_a_sweep(studies, tmp_path):
+def test_laws_are_an_axis_of_a_sweep(studies, tmp_path, in_process):
     """What one law alone reads stands beside it for all; equal jobs are run once."""
     contact = {"law": ["impact", "hertz", "flores"], "restitution": [0.5, 0.9]}
     made = studies(laws={**BOTH, "clearance_mm": 0.2, "contact": contact})
@@ -406,12 +409,11 @@ def test_a_copied_folder_compiles_anew(tmp_path, monkeypatch):
     assert len(loaded) == 2
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_job_that_cannot_be_stored_ends_the_sweep(workers, studies, tmp_path):
+def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/jobs").symlink_to("nowhere")
     with pytest.raises(store.StoreError, match=r"out/jobs: is a link that leads nowhere"):
-        sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", workers)
+        sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", 2)
 
 
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):

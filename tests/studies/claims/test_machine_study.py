@@ -92,8 +92,8 @@ def test_what_the_papers_cases_decide_is_refused(plan, text, key):
         machines(plan(text))
 
 
-def test_a_study_goes_on_where_it_ended(plan, tmp_path, monkeypatch):
-    """In a process of a sweep: all at first, then what the file lacks, then nothing."""
+def test_a_study_goes_on_where_it_ended(plan, tmp_path, monkeypatch, in_process):
+    """All at first, then what the file lacks, then nothing."""
     study = plan(QUICK + "machine: {rod_mass_kg: [3, 4.7]}\n")
     seen = []
     first = judge_machines(study, tmp_path / "out", 1, lambda *told: seen.append(told[:2]))
@@ -116,9 +116,8 @@ def test_a_study_goes_on_where_it_ended(plan, tmp_path, monkeypatch):
 
     monkeypatch.setattr(machine_study, "run_here", run)
     again = judge_machines(study, tmp_path / "out", 2)
-    # a worker's sums have one thread each
-    xr.testing.assert_allclose(again, first, rtol=1e-9)
-    xr.testing.assert_allclose(read_machines(path), whole, rtol=1e-9)
+    xr.testing.assert_identical(again, first)
+    xr.testing.assert_identical(read_machines(path), whole)
     judge_machines(study, tmp_path / "out", 2)
     assert tasks == [[1], []]
 

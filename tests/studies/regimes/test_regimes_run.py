@@ -1,12 +1,12 @@
 """Studies with regimes from the command line to a Dataset."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
+from conftest import jobs_here
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
@@ -15,7 +15,6 @@ from compressor.store.studies import swept_column
 from compressor.studies.regimes.chains import FOLDER
 from compressor.studies.regimes.dataset import of_joint, open_regimes
 from compressor.studies.regimes.values import NUMBERS, TEXTS
-from compressor.sweep.worker import JobResult
 
 TEXT = """
 joint: big_end
@@ -36,22 +35,9 @@ def place(tmp_path_factory):
     """A folder with the results of a study of four chains."""
     place = tmp_path_factory.mktemp("regimes")
     path = write(place / "wear.yaml")
-    assert cli.main(["run", path, "-o", str(place / "r"), "-j", "2", "--quiet"]) == 0
+    with jobs_here():
+        assert cli.main(["run", path, "-o", str(place / "r"), "-j", "2", "--quiet"]) == 0
     return place
-
-
-@pytest.fixture
-def begun(monkeypatch):
-    """Jobs run in this process, which needs no time to start; the jobs that were begun."""
-    found = []
-
-    def run_here(work, jobs, needs, workers, remark, pulse=lambda: None):
-        for name, payload, _ in jobs:
-            found.append(name)
-            yield JobResult(name, work(payload), 0.0)
-
-    monkeypatch.setattr(sys.modules["compressor.studies.regimes.run"], "run_here", run_here)
-    return found
 
 
 def run(place, capsys, *words):
@@ -115,7 +101,7 @@ def test_a_second_run_has_nothing_to_do(place, capsys):
     assert "nothing to do: all 12 values are stored" in said
 
 
-def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys):
+def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys, in_process):
     before = open_regimes(place / "r", "wear")
     folder = place / "r" / FOLDER / "wear"
     manifest = json.loads((folder / "study.json").read_text())
@@ -141,7 +127,7 @@ def test_plan_tells_chains_and_values_as_json(place, capsys):
     assert json.loads(out)["regimes"] == [{"study": "wear", "chains": 4, "values": 3, "done": 12}]
 
 
-def test_failed_values_end_with_3_and_say_why(begun, capsys, tmp_path):
+def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
     path = write(tmp_path / "short.yaml", 60)
     code = cli.main(["run", path, "-o", str(tmp_path), "-j", "1"])
     out, said = capsys.readouterr()
@@ -173,7 +159,7 @@ def test_a_study_that_is_not_there_is_told(tmp_path):
         open_regimes(tmp_path, "wear")
 
 
-def test_a_study_that_is_no_grid_has_jobs(begun, tmp_path):
+def test_a_study_that_is_no_grid_has_jobs(in_process, tmp_path):
     text = """
 blocks:
   - {joint: big_end, clearance_mm: 0.2}

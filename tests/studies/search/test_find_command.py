@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from compsim import cli
+from conftest import jobs_here
 
 from compressor.cases.load import load_cases, load_studies
 from compressor.solve.simulate import simulate
@@ -35,13 +36,13 @@ def found(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
         Path("worn.yaml").write_text(json.dumps(CASE))
-        with contextlib.redirect_stdout(io.StringIO()) as out:
+        with jobs_here(), contextlib.redirect_stdout(io.StringIO()) as out:
             assert cli.main([*ASKED, "--json", "--quiet"]) == 0
     return place, json.loads(out.getvalue())
 
 
 @pytest.fixture
-def folder(found, tmp_path, monkeypatch):
+def folder(found, tmp_path, monkeypatch, in_process):
     shutil.copytree(found[0], tmp_path / "copy")
     monkeypatch.chdir(tmp_path / "copy")
 
