@@ -234,55 +234,6 @@ def test_what_is_not_simulated_is_not_checked(values):
     assert Case.from_attribute(case.attributes()["case"]) == case
 
 
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ({"joint": "top"}, ("joint", "needs none, big_end, small_end or both, not 'top'")),
-        ({"name": ".hidden"}, ("name", "is no name")),
-        ({"name": 5}, ("name", "needs text, not 5")),
-        ({"machine": {"rod_mass_kg": 0}}, ("machine.rod_mass_kg", "0 is outside (0, 1e+06] kg")),
-        (
-            {"machine": {"rod_mass_kg": True}},
-            ("machine.rod_mass_kg", "needs a number in (0, 1e+06] kg, not true"),
-        ),
-        ({"machine": {"rod_mass_kg": 10**400}}, ("machine.rod_mass_kg", "must be finite")),
-        ({"solve": {"max_steps": float("inf")}}, ("solve.max_steps", "must be finite")),
-        ({"solve": {"error_bars": 1}}, ("solve.error_bars", "needs true or false, not 1")),
-        ({"solve": {"error_bars": "no"}}, ("solve.error_bars", "needs true or false, not 'no'")),
-        ({"solve": {"accuracy": []}}, ("solve.accuracy", "[] would be swept")),
-        (
-            {"solve": {"max_steps": 1.5}},
-            ("solve.max_steps", "needs a whole number in [1, 1e+12], not 1.5"),
-        ),
-        ({"contact": {"materials": ["steel"]}}, ("contact.materials", "needs a pair")),
-        (
-            {"contact": {"materials": ["steel", "tin"]}},
-            ("contact.materials", "not ['steel', 'tin']"),
-        ),
-        (
-            {"machine": 5},
-            ("machine", "needs a mapping of keys, such as {crank_radius_mm: 120}, not 5"),
-        ),
-        ({"machine": {"colour": 5}}, ("machine.colour", "unknown key")),
-        ({"colour": 5}, ("colour", "unknown key")),
-    ],
-)
-def test_a_value_that_is_wrong_alone(values, expected):
-    (found,) = problems_of(values)
-    assert found[0] == expected[0]
-    assert expected[1] in found[1]
-
-
-def test_everything_wrong_is_told_at_once():
-    found = problems_of({"load": "x", "machine": {"rod_mass_kg": -1, "colour": 1}, "zzz": 1})
-    assert [key for key, _ in found] == [
-        "load",
-        "machine.rod_mass_kg",
-        "machine.colour",
-        "zzz",
-    ]
-
-
 def test_an_error_survives_the_way_between_processes():
     error = CaseError([Problem("load", "is heavy")])
     copied = pickle.loads(pickle.dumps(error))

@@ -44,6 +44,9 @@ SHARED = [
      "machine.rod_mass_kg: needs a number in (0, 1e+06] kg, not '4,7'; write 4.7"),
     ({"solve": {"rtol": "1e-6"}},
      "solve.rtol: needs a number in [1e-13, 0.1], not '1e-6'; write 1e-6 without quotes"),
+    ({"machine": {"rod_mass_kg": True}},
+     "machine.rod_mass_kg: needs a number in (0, 1e+06] kg, not true"),
+    ({"machine": {"rod_mass_kg": 0}}, "machine.rod_mass_kg: 0 is outside (0, 1e+06] kg"),
     ({"machine": {"rod_mass_kg": -4.7}},
      "machine.rod_mass_kg: -4.7 is outside (0, 1e+06] kg"),
     ({"solve": {"max_steps": 1.5}},
@@ -53,6 +56,9 @@ SHARED = [
      "did you mean auto?"),
     ({"solve": {"error_bars": "True"}},
      "solve.error_bars: needs true or false, not 'True'; did you mean true?"),
+    ({"solve": {"error_bars": 1}}, "solve.error_bars: needs true or false, not 1"),
+    ({"name": ".hidden"},
+     "name: '.hidden' is no name: use [A-Za-z0-9._-], at most 64, no leading dot"),
     ({"solve": {"accuracy": "finer"}},
      "solve.accuracy: needs draft, standard, fine or reference, or errors by metric such as "
      "{peak_acceleration: 0.01}, not 'finer'; did you mean fine?"),
@@ -62,6 +68,9 @@ SHARED = [
     ({"load": "sprnig"}, "load: needs spring, gas or none, not 'sprnig'; did you mean spring?"),
     ({"name": "my case"},
      "name: 'my case' is no name: use [A-Za-z0-9._-], at most 64, no leading dot"),
+    ({"contact": {"materials": ["steel"]}},
+     "contact.materials: needs a pair of materials, steel or copper, such as [steel, steel], "
+     "not ['steel']"),
     ({"contact": {"materials": ["steel", "coper"]}},
      "contact.materials: needs a pair of materials, steel or copper, such as [steel, steel], "
      "not ['steel', 'coper']; did you mean copper?"),
@@ -117,6 +126,13 @@ def test_values_and_files_are_told_alike(values, message, tmp_path):
         ({1: 2}, f"1: unknown key; a case has {AT_TOP}"),
         ({"machine": {1: 2}}, f"machine.1: unknown key; machine has {IN_MACHINE}"),
         ({"machine": None}, "machine: has no value; leave the key out to get its default"),
+        ({"name": 5}, "name: needs text, not 5"),
+        ({"solve": {"accuracy": []}}, f"solve.accuracy: [] {NO_SWEEP}"),
+        ({"solve": {"max_steps": float("inf")}},
+         "solve.max_steps: must be finite: needs a whole number in [1, 1e+12], not inf"),
+        ({"machine": {"rod_mass_kg": 10**400}},
+         "machine.rod_mass_kg: must be finite: needs a number in (0, 1e+06] kg, not "
+         f"1{'0' * 27}...{'0' * 29}"),
         ({"machine": {"rod_mass_kg": float("nan")}},
          "machine.rod_mass_kg: must be finite: needs a number in (0, 1e+06] kg, not nan"),
     ],

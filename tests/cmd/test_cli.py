@@ -54,35 +54,6 @@ def test_help_is_on_stdout(arguments, capsys):
     assert "compsim" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["run"], "Missing argument 'CONFIG...'"),
-        (["rum"], "No such command 'rum'"),
-        (["run", "a.yaml", "-j", "0"], "0 is not in the range"),
-        (["run", "a.yaml", "--force"], "No such option"),
-        (["run", "absent.yaml"], "absent.yaml: cannot be read: No such file"),
-        (["run", "configs/*.yaml"], "configs/*.yaml: cannot be read"),
-        (["run", "."], ".: cannot be read: Is a directory"),
-        (["run", "bad.yaml"], "bad.yaml:1:9: joint: needs none, big_end, small_end or both"),
-        (["run", "good.yaml", "--set", "joint"], "--set joint: needs the form key=value"),
-        (["run", "good.yaml", "--set", "jiont=both"], "--set jiont=both: jiont: unknown key"),
-        (["run", "good.yaml", "--only", "load"], "--only load: needs one of == != < <= > >= after"),
-        (["run", "good.yaml", "--only", "load == none"], "--only load == none: selects no job"),
-        (["run", "good.yaml", "--set", "load=[none, spring]", "--max-jobs", "1"],
-         "--set load=[none, spring]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
-    ],
-)  # fmt: skip
-def test_usage_errors(arguments, told, case_file, capsys):
-    case_file("good.yaml")
-    Path("bad.yaml").write_text("joint:  bigend\nload: none\n")
-    assert cli.main(arguments) == 2
-    out, err = capsys.readouterr()
-    assert told in err
-    assert out == ""
-    assert not Path("results").exists()
-
-
 @pytest.mark.parametrize("command", ["run", "plan"])
 def test_without_a_case_file_those_nearby_are_named(command, case_file, capsys):
     assert cli.main([command]) == 2

@@ -45,6 +45,7 @@ MISTAKES = [
     ("run wear.yaml again/wear.yaml", "would be stored under one name, wear"),
     ("run 'my case.yaml'", "name: the file's name gives none", "set name"),
     ("run *.yml", "no file has such a name", "compsim init"),
+    ("run absent.yaml", "absent.yaml: cannot be read: No such file"),
     # what stands in them
     ("run tabs.yaml", "tabs.yaml:3:1", "indent with spaces, not tabs"),
     ("run unit.yaml", "unit.yaml:1:22: machine.speed_rpm", "a number", "700 rpm"),
@@ -69,6 +70,9 @@ MISTAKES = [
     ("run good.yaml --only 'clearance_mm = 0.2'", "write == for equal"),
     ("run good.yaml --only 'clearence_mm < 0.2'", "unknown key", "did you mean clearance_mm?"),
     ("run good.yaml --only 'clearance_mm < 0.2mm'", "write numbers without their unit"),
+    ("run good.yaml --only load", "--only load: needs one of == != < <= > >= after"),
+    ("run good.yaml --set 'load=[none, spring]' --max-jobs 1",
+     "--set load=[none, spring]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
     ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
     ("run good.yaml --shard 3/2", "no I/N with 1 <= I <= N, such as 2/8"),
     ("run good.yaml --quite", "No such option '--quite'", "did you mean --quiet"),
