@@ -26,14 +26,17 @@ values of a stored series are exact, means over one are not. `mean_crank_torque`
 
 import math
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.cases import Case
 from compressor.metrics import SERIES, SIZES
 from compressor.physics import COLUMNS, WIDE, Column, Coordinate, frame_of_series, observe_all
 from compressor.solve.request import Trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COLUMN = {
     "displacement": Column.DISPLACEMENT,
@@ -218,7 +221,7 @@ def signals(rows: np.ndarray) -> dict[str, np.ndarray]:
     return {name: block(name, rows).copy() for name in SIGNALS}
 
 
-def signals_of_scene(p: np.record, run: xr.Dataset) -> dict[str, np.ndarray]:
+def signals_of_scene(p: np.record, run: "xr.Dataset") -> dict[str, np.ndarray]:
     """Return the `SIGNALS` by name from the time series of a run without features; SI.
 
     The force on the rod is F_N n - F_t t with n along the eccentricity, and t a quarter turn from

@@ -632,10 +632,15 @@ def test_the_table_has_a_row_for_every_key_and_seven_columns():
     assert any(line.startswith(row) for line in lines)
 
 
-def test_reading_needs_no_heavy_library():
-    code = (
-        "import sys, compressor.cases.load; print({'numpy', 'scipy', 'numba'} & set(sys.modules))"
-    )
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        ("compressor.cases.load", {"numpy", "scipy", "numba"}),
+        ("compressor.solve", {"xarray", "pandas", "scipy", "numba"}),  # in each worker
+    ],
+)
+def test_no_heavy_library_is_loaded_before_it_is_needed(module, heavy):
+    code = f"import sys, {module}; print({heavy} & set(sys.modules))"
     run = [sys.executable, "-c", code]
     assert subprocess.run(run, capture_output=True, text=True, check=True).stdout == "set()\n"
 
