@@ -71,6 +71,15 @@ def key(folder, name, place=0):
     return {study.name: study for study in read_studies(folder)}[name].keys[place]
 
 
+@pytest.fixture
+def unpainted(monkeypatch):
+    """No pixels are made, which takes long: files have their first bytes."""
+    heads = {"png": b"\x89PNG\r", "svg": b"<?xml"}
+    monkeypatch.setattr(
+        "compressor.report.plots.render_kinds", lambda drawing, kinds: [heads[k] for k in kinds]
+    )
+
+
 def job(folder, name, place=0):
     return read_store(folder).job(key(folder, name, place))
 
@@ -123,7 +132,7 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     assert FILM in PLOT_CAPTIONS["study"]["map"](rows, "clearance")
 
 
-def test_a_job_is_named_as_in_show(plot, folder, capsys):
+def test_a_job_is_named_as_in_show(plot, folder, capsys, unpainted):
     words = ["worn", "clearance_mm=0.3", "machine.speed_rpm=500"]
     assert cli.main(["show", *words, "-i", str(folder), "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)["key"]
@@ -132,7 +141,7 @@ def test_a_job_is_named_as_in_show(plot, folder, capsys):
     assert shown == key(folder, "worn", 3)
 
 
-def test_a_folder_and_a_study_of_one_name_are_told_apart(plot, folder, tmp_path, capsys):
+def test_a_folder_and_a_study_of_one_name_are_told_apart(plot, folder, tmp_path, capsys, unpainted):
     """Whatever kind of study it is: `plot -i worn worn` draws the study in the folder."""
     shutil.copytree(folder, tmp_path / "worn")
     for words in (["worn", "worn"], ["-i", "worn", "worn"], ["worn/", "worn"]):
@@ -176,7 +185,7 @@ def test_a_study_is_drawn_along_an_axis(plot, folder):
     assert "Here machine.speed_rpm 400." in default
 
 
-def test_a_study_that_is_no_grid_says_what_else_varies(plot):
+def test_a_study_that_is_no_grid_says_what_else_varies(plot, unpainted):
     code, found, _ = plot("listed", "--what", "waterfall")
     assert code == 0
     assert "Along with it vary machine.speed_rpm." in next(iter(found.values()))
@@ -189,7 +198,7 @@ def test_rounding_is_not_drawn_as_a_spectrum(folder):
     assert worn.traces[0].y.max() > 0.1
 
 
-def test_ideal_joints_have_no_contacts_to_draw(plot, folder):
+def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):
     mine = key(folder, "ideal")
     code, found, _ = plot(mine)
     assert code == 0

@@ -133,7 +133,7 @@ def test_lugre_with_one_coefficient_of_0_is_refused(key):
     ],
 )
 def test_what_no_guide_or_rod_bears_ends_a_run(values, reason, words, method):
-    solve = {"duration_rev": 1, "settle_rev": 0.25, "accuracy": "draft", "method": method}
+    solve = {"duration_rev": 0.5, "settle_rev": 0.25, "accuracy": "draft", "method": method}
     found = run(**values, solve=solve)
     assert (found["reason"], found["status"]) == (reason, "failed")
     assert words in found.attrs["detail"]

@@ -37,7 +37,7 @@ from compressor.studies.stress.stress import (
 )
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
-COUNT, SEED = 36, 1
+COUNT, SEED = 24, 1
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +121,7 @@ def test_most_supported_scenes_are_ok(study):
     assert ends["ok"] >= 0.8 * COUNT // 2, ends  # 0.95 of thousands: make stress
 
 
-def test_a_campaign_goes_on_and_scenes_repeat_their_verdicts(study, tmp_path):
+def test_a_campaign_goes_on_and_scenes_repeat_their_verdicts(study, tmp_path, in_process):
     told = []
     campaign(tmp_path, 4, SEED, 1, budget=SMALL)
     again = campaign(tmp_path, 6, SEED, 1, lambda *event: told.append(event), SMALL)
@@ -257,7 +257,7 @@ def test_a_scene_is_repeated_as_a_case_file(capsys, tmp_path):
     assert study.cases[0] == Case.from_values(values(number, SEED))
 
 
-def test_the_command_writes_data_and_map(capsys, tmp_path):
+def test_the_command_writes_data_and_map(capsys, tmp_path, in_process):
     assert cli.main(["stress", "-n", "2", "--seed", "1", "-j", "1", "-o", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert out.startswith("supported range: 1 scene,")
