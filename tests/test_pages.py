@@ -4,15 +4,18 @@ Commands in `console` blocks run in one folder, page by page in the order of PAG
 are files named in their first line; `python` blocks run there; `bash` and `py` blocks are not run.
 """
 
+import contextlib
 import json
 import re
 import shlex
 import subprocess
-import sys
 
 import page_tables
 import pytest
+from click.testing import CliRunner
 from compsim.cli import cli
+from compsim.cli import main as cli_main
+from conftest import jobs_here
 from measure_tradeoff import fingerprint
 
 import compressor
@@ -219,11 +222,11 @@ def folder(tmp_path_factory):
         words = shlex.split(command, comments=True)
         words = [w for word in words for w in expanded(place, word)]
         more = QUICK if words[1] == "run" else []
-        call = [sys.executable, "-m", "compsim", *words[1:], *more]
-        done = subprocess.run(call, cwd=place, capture_output=True, text=True)
-        assert done.returncode == 0, f"{command}\n{done.stderr}"
+        with jobs_here(), contextlib.chdir(place), CliRunner().isolation() as (out, err, _):
+            code, said = cli_main([*words[1:], *more]), err.getvalue()
+        assert code == 0, f"{command}\n{said.decode()}"
         if target:
-            (place / target).write_text(done.stdout, encoding="utf-8")
+            (place / target).write_bytes(out.getvalue())
     return place
 
 

@@ -9,7 +9,7 @@ from chaos import concurrent, kill, poison
 from chaos.processes import Run, members
 
 # seeds by what they do, so that a sample has something of everything; the first: the real command
-KILLS = {"parent amid metrics": 18, "worker amid series": 16, "both, series over metrics": 20}
+KILLS = {"parent amid metrics": 18, "both, series over metrics": 20}
 AT_ONCE = 6  # shards and a whole run; the next one: --wait
 
 

@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("sklearn", reason="scikit-learn is not installed: pip install 'compsim[learn]'")
 
 import measure_diagnosis
+from conftest import jobs_here
 from machines import JOINTS, LOADS, machines
 from measure_diagnosis import BINS, NOISE, by_machine, population, told_apart
 from page_tables import kept
@@ -22,7 +23,8 @@ FASTER = ("sensor.rate_Hz=6400", "sensor.mounting_Hz=6000", "solve.error_bars=fa
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     """A data set of few machines, whose sensor has a quarter of the rate."""
-    return population(tmp_path_factory.mktemp("machines"), FEW, seed=2, more=FASTER)
+    with jobs_here():
+        return population(tmp_path_factory.mktemp("machines"), FEW, seed=2, more=FASTER)
 
 
 def test_machines_share_no_value(tmp_path):
@@ -39,6 +41,12 @@ def test_machines_share_no_value(tmp_path):
         assert len({*values}) == 80
 
 
+@pytest.fixture(autouse=True)
+def few_trees(monkeypatch):
+    """A sixth of the campaign's: the rest is only more certain."""
+    monkeypatch.setattr(measure_diagnosis, "TREES", 50)
+
+
 def test_the_campaign_runs_on_few_machines(found):
     """Four kinds of ten machines each: better than chance, which is a quarter, by far."""
     assert found.sizes["window"] == 2 * FEW
@@ -49,9 +57,8 @@ def test_the_campaign_runs_on_few_machines(found):
     assert row["accuracy"] == pytest.approx(np.trace(row["confusion"]) / 24, abs=1e-3)
 
 
-def test_labels_that_mean_nothing_are_not_learned(found, monkeypatch):
+def test_labels_that_mean_nothing_are_not_learned(found):
     """Machines with labels of others: what was split by machine cannot be known again."""
-    monkeypatch.setattr(measure_diagnosis, "TREES", 50)
     machine, joint = found["machine"].values, found["joint"].values
     scores = []
     for seed in range(4):

@@ -17,7 +17,7 @@ from page_tables import kept
 # the least environment: nothing says that output is not to be buffered
 BARE = {"PATH": os.defpath, "PYTHONPATH": f"{mutation.ROOT}/tests:{mutation.ROOT}/tests/campaigns"}
 SCRIPT = "tests/campaigns/measure_mutants.py"
-SAMPLE = ("K a hundredth too large", "the cam does not close", "friction's velocity in mm/s")
+SAMPLE = ("K a hundredth too large", "the cam does not close")
 
 
 def test_thirty_bugs_can_be_planted():
@@ -103,7 +103,7 @@ def test_a_few_planted_bugs_are_caught(tmp_path):
     assert done.returncode == 0, done.stderr
     caught = [row["caught_by"] for row in json.loads(target.read_text())["mutants"]]
     assert [test.partition("::")[0] for test in caught] == [
-        "physics/test_contact.py", "physics/test_loads.py", "physics/test_contact.py"
+        "physics/test_contact.py", "physics/test_loads.py"
     ]  # fmt: skip
 
 

@@ -151,7 +151,7 @@ def test_runs_on_worn_bores_keep_their_energy_and_agree(features):
     runs = []
     onsets = "contact" in features  # on which LSODA does not stop
     for method in ("TSIT5", "RODAS", "DOPRI5" if onsets else "LSODA"):
-        case, p = made(lobes, **features, solve={"duration_rev": 0.2, "settle_rev": 0,
+        case, p = made(lobes, **features, solve={"duration_rev": 0.1, "settle_rev": 0,
                                                  "method": method, "rtol": 1e-8})  # fmt: skip
         run = integrate(build_request(case, 1e-8, p, times_of(case, False)))
         assert not run.reason

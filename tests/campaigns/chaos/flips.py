@@ -78,12 +78,14 @@ class Campaign:
         )
         self.whole = contents(self.complete)
         self.keys = sorted(read_store(self.complete).keys())
-        self.said = {
-            (reader, key): forked(lambda r=reader, k=key: self.say(r, self.complete, k)).result
-            for reader in READERS
-            for key in self.keys
-        }
-        assert None not in self.said.values()
+        self.said: dict[tuple[str, str], Any] = {}
+
+    def undamaged(self, reader: str, key: str) -> Any:
+        """What a command says of the undamaged store; it is called once."""
+        if (reader, key) not in self.said:
+            self.said[reader, key] = forked(lambda: self.say(reader, self.complete, key)).result
+            assert self.said[reader, key] is not None
+        return self.said[reader, key]
 
     def say(self, reader: str, store: Path, key: str) -> Any:
         """What a command says of a store, and of the job of a key."""
@@ -112,13 +114,14 @@ class Campaign:
             (store / file).write_bytes(data)
             self.tally.counts[f"in {kind}"] += 1
             reader, key = rng.choice(READERS), rng.choice(self.keys)
+            was = self.undamaged(reader, key)
             mend = number % MEND_EVERY == 0
             self.tally.counts["mended"] += mend
 
             def looked_at() -> str:
                 return (
                     self.verified(store, file)
-                    or self.told(reader, key, store)
+                    or self.told(was, self.say(reader, store, key))
                     or self.opened(store)
                     or (self.mended(store) if mend else "")
                 )
@@ -137,9 +140,8 @@ class Campaign:
             return f"no job is named: {said}"
         return ""
 
-    def told(self, reader: str, key: str, store: Path) -> str:
-        """What is wrong with what a reader says, or ""."""
-        said, was = self.say(reader, store, key), self.said[reader, key]
+    def told(self, was: Any, said: Any) -> str:
+        """What is wrong with what a reader says, who said something else before, or ""."""
         if said.code not in (0, 5) or "Traceback" in said.err:
             return str(said)
         silent_about_it = said.code == 0 and "damaged" not in said.err

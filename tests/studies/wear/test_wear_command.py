@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 from compsim.cli import main
+from conftest import jobs_here
 
 from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
@@ -37,7 +38,8 @@ def place(tmp_path_factory):
 def told(place):
     """What the command gave, and its code."""
     here, out = place / "bearing.yaml", place / "results"
-    assert main(["wear", str(here), "-o", str(out), "-j", "2", "--quiet"]) == 0
+    with jobs_here():
+        assert main(["wear", str(here), "-o", str(out), "-j", "2", "--quiet"]) == 0
     return load_cases(here), out
 
 
@@ -112,7 +114,9 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
     assert len({*stops}) > 1
 
 
-def test_a_failed_machine_is_told_and_goes_on_when_asked(place, tmp_path, capsys, monkeypatch):
+def test_a_failed_machine_is_told_and_goes_on_when_asked(
+    place, tmp_path, capsys, monkeypatch, in_process
+):
     file = place / "failing.yaml"
     file.write_text(TEXT.replace("[400, 500]", "400"), encoding="utf-8")
     rub, calls = stages.wear_bores, []
