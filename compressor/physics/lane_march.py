@@ -260,7 +260,7 @@ def march_lanes(scene, W, k, runs, lane_jobs, limit):
     `new_lanes`; lane_jobs: (k,) integers, the run in each lane, at first -1; limit: attempts of a
     step that a run may take.
     """
-    begun = 0
+    begun = np.int64(0)  # of a plain 0 numba would compile `load_next_run` twice
     for j in range(k):
         W[CALL + j] = 1.0
     while True:

@@ -13,7 +13,7 @@ from compressor.cases.case import Case
 from compressor.physics import lane_steps
 from compressor.physics import lane_steps as rows
 from compressor.physics.lane_control import top_and_vertex
-from compressor.physics.lane_march import fits_lane
+from compressor.physics.lane_march import fits_lane, load_next_run
 from compressor.physics.march import NODES
 from compressor.physics.record import RECORD
 from compressor.physics.tally import peak_of
@@ -138,6 +138,14 @@ def test_a_peak_in_a_lane_is_that_of_a_step_by_itself(every, size):
         values = np.abs(drawn[:, 0]) if size else drawn[:, 0]
         found = max(top_and_vertex(tuple(values), every == 1))
         assert found == peak_of(NODES, drawn, every, 0, -np.inf, size)
+
+
+def test_lanes_are_loaded_by_one_function():
+    """numba compiled it again for a plain 0 among its arguments, in five seconds."""
+    side_by_side(cases("both", 1), (3,))
+    index = load_next_run.target._cache._cache_file._load_index()
+    assert index
+    assert not [types for (types, *_) in index if "Literal" in str(types)]
 
 
 LOOK = """

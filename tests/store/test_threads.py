@@ -14,7 +14,7 @@ from compressor.store.hdf5 import image, open_file
 from compressor.store.reader import open_study, read_job
 from compressor.store.series_file import read_bytes, read_values
 
-TIMES = 40  # each that three threads read three jobs
+TIMES = 5  # each that three threads read three jobs: images of one name clash at once
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_threads_read_the_series_of_their_own_jobs(folder, alone):
 
 
 def test_dask_threads_read_the_series_of_their_own_jobs(folder, alone):
-    for _ in range(20):
+    for _ in range(TIMES):
         chunked = open_study(folder, "small").acceleration.chunk({"clearance_mm": 1})
         np.testing.assert_array_equal(chunked.compute(scheduler="threads"), alone)
 
@@ -54,7 +54,7 @@ def test_threads_read_their_own_jobs(folder):
     expected = [read_job(folder, key) for key in keys]
 
     def wrong(number):
-        runs = (read_job(folder, keys[number]) for _ in range(12))
+        runs = (read_job(folder, keys[number]) for _ in range(TIMES))
         return sum(not run.identical(expected[number]) for run in runs)
 
     with ThreadPoolExecutor(3) as pool:
