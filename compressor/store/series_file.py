@@ -166,7 +166,7 @@ def read_series(path: Path) -> "xr.Dataset":
             raise ValueError
         dataset = xr.Dataset(hdf5.variables(file, data), attrs=attributes)
         for name, metric in NUMBERS.items():
-            found = dataset.get(name)
+            found = dataset.variables.get(name)  # a Dataset looks for similar names
             if found is not None and (found.dims, found.dtype.kind) != (metric.dims, "f"):
                 raise ValueError
         if not {"status", "reason", "time"} <= set(dataset.variables):
