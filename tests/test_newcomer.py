@@ -90,7 +90,7 @@ import compressor
 from compressor.cases import optional_groups
 from compressor.studies.tradeoff.features import FEATURES
 
-solve = {"duration_rev": 0.03, "settle_rev": 0, "accuracy": "draft"}
+solve = {"duration_rev": 0.03, "settle_rev": 0, "accuracy": "draft", "error_bars": False}
 usual = {"solve": solve, "output": {"signals": True}}
 damper = {"damper": {"damping_N_s_per_mm": 0.2}}
 worn = {"joint": "big_end", "clearance_mm": 0.2}
