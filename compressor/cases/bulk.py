@@ -21,7 +21,7 @@ MADE_FROM = {"span": ("solve", "machine.speed_rpm"), "solver": ("solve",)}
 Rows = Callable[[Sequence[int]], Any]  # of a combination's places: those that decide an answer
 
 
-class Job(NamedTuple):
+class ExaminedJob(NamedTuple):
     """A combination of a block: what does not fit in it, its key, and its values of columns."""
 
     number: int
@@ -80,7 +80,7 @@ def _no_rows(places: Sequence[int]) -> None:
     """Return the rows that decide what no factor decides."""
 
 
-def jobs_of(block: Block, columns: Sequence[str]) -> Iterator[Job]:
+def examine_jobs(block: Block, columns: Sequence[str]) -> Iterator[ExaminedJob]:
     """Yield the jobs of a block; columns: the keys whose values are wanted.
 
     A job in which something does not fit has no key and no values.
@@ -96,13 +96,13 @@ def jobs_of(block: Block, columns: Sequence[str]) -> Iterator[Job]:
         needed = any(one.needs_case for one in (*rules, *parts, values))
         case = block.case(number) if needed else None
         if problems := [one for rule in rules for one in rule.answer(number, places, case)]:
-            yield Job(number, problems, "", ())
+            yield ExaminedJob(number, problems, "", ())
             continue
         texts = dict(same)
         for part in parts:
             texts |= part.answer(number, places, case)
         key = digest(join_parts(texts))
-        yield Job(number, (), key, values.answer(number, places, case))
+        yield ExaminedJob(number, (), key, values.answer(number, places, case))
         if not same:  # what is constant is known after the first good job
             rules = [rule for rule in rules if not rule.is_constant]
             for part in [part for part in parts if part.is_constant]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from compressor.cases import blocks
-from compressor.cases.bulk import jobs_of
+from compressor.cases.bulk import examine_jobs
 from compressor.cases.case import Case
 from compressor.cases.checks import SHORTHANDS, TWICE, row_of
 from compressor.cases.combinations import Block, columns
@@ -420,7 +420,7 @@ def _check_cases(
     values: dict[str, list[Any]] = {key: [] for key in swept}
     total = len(cases)
     progress = progress if total >= MANY_CASES else no_progress
-    jobs = ((block, job) for block in cases.parts for job in jobs_of(block, swept))
+    jobs = ((block, job) for block in cases.parts for job in examine_jobs(block, swept))
     for number, (block, job) in enumerate(jobs):
         if number % 1000 == 0:
             progress(number, total, "" if number else f"{draft.name}: {total} jobs")

@@ -95,7 +95,7 @@ class Entry(NamedTuple):
 Kinds = tuple[tuple[str, np.dtype, tuple[int, ...]], ...]  # of attributes: name, type, shape
 
 
-class Place(NamedTuple):
+class ArrayPlace(NamedTuple):
     """Where values stand in a file: at which byte, and what they are."""
 
     offset: int
@@ -108,7 +108,7 @@ class Place(NamedTuple):
         return values.reshape(self.shape)
 
 
-class Template:
+class FileTemplate:
     """The bytes of a netCDF-4 file whose numbers and own attributes are still to be filled in.
 
     By h5py's high level a file costs some twenty times what its bytes do, and jobs of one layout
@@ -132,7 +132,7 @@ class Template:
             self.data = bytearray(file.id.get_file_image())
             self.deflated = [entry.name for entry in layout if entry.deflated]
             self.places = {
-                entry.name: Place(file[entry.name].id.get_offset(), entry.dtype, entry.shape)
+                entry.name: ArrayPlace(file[entry.name].id.get_offset(), entry.dtype, entry.shape)
                 for entry in layout
                 if not entry.deflated and entry.texts is None and 0 not in entry.shape
             }
@@ -162,7 +162,7 @@ class Stencil(NamedTuple):
     attributes: dict[str, np.ndarray]
 
     def fill(self, numbers: Arrays, attributes: Arrays) -> bytes:
-        """Return the bytes that the stencil's `Template` makes of the same, in a tenth of a ms."""
+        """Return the bytes that its `FileTemplate` makes of the same, in a tenth of a ms."""
         with TURN:
             for name, place in self.numbers.items():
                 place[...] = numbers[name]
@@ -172,8 +172,8 @@ class Stencil(NamedTuple):
 
 
 @lru_cache(maxsize=MAX_TEMPLATES)
-def _template_of(layout: tuple[Entry, ...]) -> Template:
-    return Template(layout)
+def _template_of(layout: tuple[Entry, ...]) -> FileTemplate:
+    return FileTemplate(layout)
 
 
 class Filler:
@@ -183,7 +183,7 @@ class Filler:
     three times as long to cut, where there can be one.
     """
 
-    def __init__(self, template: Template, kinds: Kinds):
+    def __init__(self, template: FileTemplate, kinds: Kinds):
         self.template, self.kinds = template, kinds
         self.count = 0
         self.stencil: Stencil | None = None
@@ -201,7 +201,7 @@ def _filler_of(layout: tuple[Entry, ...], kinds: Kinds) -> Filler:
     return Filler(_template_of(layout), kinds)
 
 
-def _cut_stencil(template: Template, kinds: Kinds) -> Stencil | None:
+def _cut_stencil(template: FileTemplate, kinds: Kinds) -> Stencil | None:
     """Return a stencil for files of a template with attributes of some kinds.
 
     Where HDF5 puts the values of attributes shows in a file whose attributes have each a byte of
@@ -218,7 +218,7 @@ def _cut_stencil(template: Template, kinds: Kinds) -> Stencil | None:
     differing = np.flatnonzero(found != np.frombuffer(data, np.uint8))[::-1]
     first = dict(zip(found[differing].tolist(), differing.tolist(), strict=True))  # of each tag
     attributes = {
-        name: Place(first.get(tag, 0), dtype, shape).of(data)
+        name: ArrayPlace(first.get(tag, 0), dtype, shape).of(data)
         for tag, (name, dtype, shape) in enumerate(kinds, 1)
     }
     numbers = {name: place.of(data) for name, place in template.places.items()}
@@ -253,12 +253,12 @@ def image(
     )  # fmt: skip
     numbers = {name: values for name, (_, values, _) in variables.items()}
     encoded = {name: _encode(value) for name, value in attributes.items()}
-    filler: Template | Filler
+    filler: FileTemplate | Filler
     if repeated and sum(values.nbytes for values in numbers.values()) <= MAX_TEMPLATE_BYTES:
         kinds = tuple((name, value.dtype, value.shape) for name, value in encoded.items())
         filler = _filler_of(layout, kinds)
     else:
-        filler = Template(layout)
+        filler = FileTemplate(layout)
     return filler.fill(numbers, encoded)
 
 
