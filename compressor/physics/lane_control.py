@@ -267,10 +267,10 @@ def select_plain_steps(scene, W, k):
         W[MEASURED + j] = 1.0 if measured else 0.0
         W[PLAIN + j] = 1.0 if plain else 0.0
         W[NEAR_PEAK + j] = 1.0 if near & measured & plain else 0.0
-    total = 0.0
+    found = 0
     for j in range(k):
-        total += W[NEAR_PEAK + j]
-    return total > 0.0
+        found |= 1 if W[NEAR_PEAK + j] > 0.0 else 0
+    return found > 0
 
 
 @inline_numba
@@ -321,6 +321,94 @@ def top_and_vertex(values, fine):
 
 
 @inline_numba
+def range_at_nodes(values, fine):
+    """Return the greatest and the least of a step's values at its nodes; fine: as above."""
+    a, b, c, d, e = values
+    top, low = max(max(a, e), c), min(min(a, e), c)
+    return max(top, max(b, d)) if fine else top, min(low, min(b, d)) if fine else low
+
+
+@inline_numba
+def sizes_at_nodes(W, column):
+    """Return the sizes of an observed column of a lane at the five nodes of its step."""
+    a, b, c, d, e = at_nodes(W, column)
+    return abs(a), abs(b), abs(c), abs(d), abs(e)
+
+
+@inline_numba
+def may_rise(values, fine, known, counts):
+    """Return 1 where a parabola through a step's nodes may rise above a known peak, else 0.
+
+    Through three neighbours of the nodes it rises above them by less than a third of their range;
+    half of it is allowed for here. Where no lane's does, as in seven of eight steps, no lane needs
+    the divisions of `top_and_vertex`.
+    """
+    top, low = range_at_nodes(values, fine)
+    return 1 if counts & (top + 0.5 * (top - low) > known) else 0
+
+
+@inline_numba
+def raised(values, fine, known, counts):
+    """Return a known peak, or a larger one of a step that counts, by nodes and parabola."""
+    top, top_of_parabola = top_and_vertex(values, fine)
+    best = max(known, top, top_of_parabola if may_exceed(top, known) else top)
+    return best if counts else known
+
+
+@inline_numba
+def raised_at_nodes(values, fine, known, counts):
+    """Return `raised` of a step whose parabola does not rise above the known peak."""
+    top, _ = range_at_nodes(values, fine)
+    return max(known, top) if counts else known
+
+
+@jit
+def raise_peaks(W, k):
+    """Raise the greatest sizes of the observed columns by the steps of plain, measured lanes."""
+    W = without_refcount(W)
+    for column in range(PEAKED):
+        o, p = column * LANES, PEAK + column * LANES
+        rises = 0
+        for j in range(k):
+            counts, fine = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0), W[NEAR_PEAK + j] > 0.0
+            rises |= may_rise(sizes_at_nodes(W, o + j), fine, W[p + j], counts)
+        if rises > 0:
+            for j in range(k):
+                counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
+                values, fine = sizes_at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
+                W[p + j] = raised(values, fine, W[p + j], counts)
+        else:
+            for j in range(k):
+                counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
+                values, fine = sizes_at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
+                W[p + j] = raised_at_nodes(values, fine, W[p + j], counts)
+
+
+@jit
+def raise_depths(scene, W, k):
+    """Raise the greatest penetrations by the steps of plain, measured lanes."""
+    W = without_refcount(W)
+    for joint in range(2):
+        if has_clearance(scene, joint):
+            o, p = PENETRATION + joint * LANES, MAX_PENETRATION + joint * LANES
+            rises = 0
+            for j in range(k):
+                counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
+                values, fine = at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
+                rises |= may_rise(values, fine, W[p + j], counts)
+            if rises > 0:
+                for j in range(k):
+                    counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
+                    values, fine = at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
+                    W[p + j] = raised(values, fine, W[p + j], counts)
+            else:
+                for j in range(k):
+                    counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
+                    values, fine = at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
+                    W[p + j] = raised_at_nodes(values, fine, W[p + j], counts)
+
+
+@inline_numba
 def count_contacts_at(W, row, c, events, use, counts):
     """Return `tally.count_contacts` after a node whose rows begin at `row`, if it is one to use."""
     a, b, m, n = events
@@ -343,10 +431,7 @@ def tally_joint(W, j, joint, plain, fine, measured):
     W[FLOWN + c] = (1.0 if flown else 0.0) if plain else W[FLOWN + c]
     W[IMPACTS + c] = hits if plain else W[IMPACTS + c]
     W[RELEASES + c] = leaves if plain else W[RELEASES + c]
-    top, top_of_parabola = top_and_vertex(at_nodes(W, PENETRATION + c), fine)
-    known = W[MAX_PENETRATION + c]
-    best = max(top, known, top_of_parabola if may_exceed(top, known) else top)
-    W[MAX_PENETRATION + c] = best if plain & measured else known
+    top, _ = range_at_nodes(at_nodes(W, PENETRATION + c), fine)
     W[DEEPEST + j] = max(W[DEEPEST + j], top) if plain else W[DEEPEST + j]
     # contact does not change within the step
     gap_fraction = FINE_WHOLE if fine else COARSE_WHOLE
@@ -400,13 +485,5 @@ def tally_lanes(scene, W, k):
         W[SQUARE_DEVIATION + j] = add_integral(W[SQUARE_DEVIATION + j], squares, h, fine)
         W[TORQUE_SUM + j] = add_integral(W[TORQUE_SUM + j], at_nodes(W, TORQUE + j), h, fine)
         W[MOMENT_SUM + j] = add_integral(W[MOMENT_SUM + j], at_nodes(W, MOMENT + j), h, fine)
-    for column in range(PEAKED):
-        o = column * LANES
-        for j in range(k):
-            counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
-            fine = W[NEAR_PEAK + j] > 0.0
-            a, b, c, d, e = at_nodes(W, o + j)
-            top, top_of_parabola = top_and_vertex((abs(a), abs(b), abs(c), abs(d), abs(e)), fine)
-            known = W[PEAK + o + j]
-            best = max(known, top, top_of_parabola if may_exceed(top, known) else top)
-            W[PEAK + o + j] = best if counts else known
+    raise_peaks(W, k)
+    raise_depths(scene, W, k)

@@ -66,6 +66,7 @@ from compressor.physics.runge_kutta import FLOWS, STAGES, weights_at
 from compressor.physics.step_control import AUTO, begin_stiff_steps, is_last_step
 from compressor.physics.tally import TALLY
 
+MIN_FULL = 4  # lanes: fewer runs are faster one after the other, each by itself
 NO_TEST = 1e300  # steps without a test for stiffness, where another method is not wanted
 
 
@@ -253,6 +254,21 @@ def march_out_of_lane(W, j, runs, job, limit):
 
 
 @jit
+def march_to_end(W, j, runs, job, limit):
+    """March the run of a lane by itself from where the lane is."""
+    work, w, p = work_arrays(runs, job), runs.steppers[job], runs.records[job]
+    unload_lane(W, j, runs, job, work)
+    first, count = runs.places[job, 0], runs.places[job, 1]
+    begin, samples = runs.places[job, 2], runs.places[job, 3]
+    march(
+        w, p, runs.z[job], work, runs.atol[job], runs.size[job],
+        runs.edges[first + job : first + job + count + 1], runs.phases[first : first + count],
+        runs.times[begin : begin + samples], runs.states[begin : begin + samples],
+        runs.tallies[job], np.int64(limit - w.steps - w.rejected - w.onsets),
+    )  # fmt: skip
+
+
+@jit
 def march_lanes(scene, W, k, runs, lane_jobs, limit):
     """March all runs, k at a time; a stepper that is still RUNNING then has taken too many steps.
 
@@ -271,7 +287,10 @@ def march_lanes(scene, W, k, runs, lane_jobs, limit):
             ):
                 begun = load_next_run(W, j, runs, lane_jobs, begun, limit)
             empty += lane_jobs[j] < 0
-        if empty == k:
+        if k - empty < MIN_FULL:
+            for j in range(k):
+                if lane_jobs[j] >= 0:
+                    march_to_end(W, j, runs, lane_jobs[j], limit)
             return
         try_steps(scene, W, k)
         if select_plain_steps(scene, W, k):  # else two of five nodes need not be observed

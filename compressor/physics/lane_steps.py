@@ -13,7 +13,7 @@ import numpy as np
 
 from compressor.physics._jit import fma, inline_numba, jit, square_root, without_refcount
 from compressor.physics.contact_laws import Law
-from compressor.physics.kinematics import ideal_after
+from compressor.physics.kinematics import IdealMotion, ideal_after
 from compressor.physics.march import NODE_WEIGHTS as ALL_NODE_WEIGHTS
 from compressor.physics.march import NODES
 from compressor.physics.motion import deviation_accelerations, evaluate
@@ -65,7 +65,9 @@ ALIVE, PLAIN, NEAR_PEAK, MEASURED, CALL = (_rows() for _ in range(5))
 ATOL, SIZE = _rows(MAX_STATES), _rows(MAX_STATES)
 Z = _rows(STATE)
 NEW = _rows(STATE)
-OUT = _rows(STATE)  # dz/dt of the stage at hand
+MOTION = _rows(len(IdealMotion._fields))  # the ideal motion at the stage or node at hand
+Y = _rows(MAX_STATES)  # the motion there
+OUT = _rows(STATE)  # dz/dt there
 K = _rows(STAGE_COUNT * STATE)
 OBSERVED = _rows(OBSERVED_COUNT)
 NODE_ROWS = _rows(NODE_COUNT * OBSERVED_COUNT)
@@ -94,7 +96,8 @@ PAIR, IMPACT = int(RungeKuttaPair.TSIT5), int(Law.IMPACT)
 NO_CORNERS = (0.0, 0.0, 0.0)  # of the load: a lane ends at each
 STEP_WEIGHTS, FRACTIONS, ERROR_WEIGHTS = A[PAIR], C[PAIR], E[PAIR]
 NODE_WEIGHTS = ALL_NODE_WEIGHTS[PAIR]
-OUTER, BETWEEN = np.array([2, 4]), np.array([1, 3])  # nodes: middle and end; the others
+MIDDLE, BETWEEN = np.array([2]), np.array([1, 3])  # nodes: the one within, and those beside it
+LAST_STAGE = K + (STAGES - 1) * STATE * LANES
 ROW = OBSERVED_COUNT * LANES
 R0, R1, R2, R3, R4 = (NODE_ROWS + i * ROW for i in range(5))
 
@@ -136,18 +139,6 @@ def combine_stages(W, i, j, w):
 
 
 @inline_numba
-def stage_state(scene, W, j, w):
-    """Return the motion of lane j where the stages have the weights w, eight numbers."""
-    y0, y1 = combine_stages(W, 0, j, w), combine_stages(W, 1, j, w)
-    y2, y3 = combine_stages(W, 2, j, w), combine_stages(W, 3, j, w)
-    y4, y5, y6, y7 = 0.0, 0.0, 0.0, 0.0
-    if len(scene) == 3:
-        y4, y5 = combine_stages(W, 4, j, w), combine_stages(W, 5, j, w)
-        y6, y7 = combine_stages(W, 6, j, w), combine_stages(W, 7, j, w)
-    return y0, y1, y2, y3, y4, y5, y6, y7
-
-
-@inline_numba
 def read_four(W, row):
     """Return four numbers of a lane, of rows that follow each other."""
     return W[row], W[row + LANES], W[row + 2 * LANES], W[row + 3 * LANES]
@@ -157,30 +148,6 @@ def read_four(W, row):
 def write_four(W, row, x):
     """Write four numbers of a lane into rows that follow each other."""
     W[row], W[row + LANES], W[row + 2 * LANES], W[row + 3 * LANES] = x
-
-
-@inline_numba
-def write_rates(scene, W, j, y, d, q):
-    """Write dz/dt into OUT: rates, accelerations, powers."""
-    o = OUT + j
-    if len(scene) == 3:
-        write_four(W, o, (y[4], y[5], y[6], y[7]))
-        write_four(W, o + 4 * LANES, d)
-        write_four(W, o + 8 * LANES, q)
-    else:
-        write_four(W, o, (y[2], y[3], d[0], d[3]))
-        write_four(W, o + 4 * LANES, q)
-
-
-@inline_numba
-def write_observed(W, j, g, energy):
-    """Write what is observed at a node into OBSERVED; energy: kinetic and potential."""
-    s = OBSERVED + j
-    write_four(W, s, (g[0], g[1], g[2], g[3]))
-    write_four(W, s + 4 * LANES, (g[4], g[5], g[6], g[7]))
-    write_four(W, s + 8 * LANES, (g[8], g[9], g[10], g[11]))
-    write_four(W, s + 12 * LANES, (g[12], g[13], g[14], g[15]))
-    W[s + 16 * LANES], W[s + 17 * LANES] = energy
 
 
 @jit
@@ -196,51 +163,135 @@ def copy_rows(W, target, source, count):
 
 
 @jit
-def stage_rates(scene, W, k, fraction, w, s):
-    """Compute dz/dt where the stages have the weights w, at a fraction of the steps: stage s."""
+def move_cranks(W, k, fraction):
+    """Write the ideal motion at a fraction of the steps into MOTION.
+
+    In a loop of its own: while its roots and quotients of one vector of lanes are waited for, those
+    of the next are begun.
+    """
     W = without_refcount(W)
     for j in range(k):
-        p = lane_record(scene, W, j)
-        motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
-        y = stage_state(scene, W, j, w)
-        now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
+        p = lane_record((), W, j)
+        m = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
+        o = MOTION + j
+        write_four(W, o, (m[0], m[1], m[2], m[3]))
+        write_four(W, o + 4 * LANES, (m[4], m[5], m[6], m[7]))
+        W[o + 8 * LANES] = m[8]
+
+
+@jit
+def move_states(scene, W, k, w):
+    """Write the motion where the stages have the weights w into Y."""
+    W = without_refcount(W)
+    for j in range(k):
+        W[Y + j], W[Y + LANES + j] = combine_stages(W, 0, j, w), combine_stages(W, 1, j, w)
+        W[Y + 2 * LANES + j] = combine_stages(W, 2, j, w)
+        W[Y + 3 * LANES + j] = combine_stages(W, 3, j, w)
+        if len(scene) == 3:
+            W[Y + 4 * LANES + j] = combine_stages(W, 4, j, w)
+            W[Y + 5 * LANES + j] = combine_stages(W, 5, j, w)
+            W[Y + 6 * LANES + j] = combine_stages(W, 6, j, w)
+            W[Y + 7 * LANES + j] = combine_stages(W, 7, j, w)
+
+
+@inline_numba
+def read_motion(W, j):
+    """Return the ideal motion that `move_cranks` has written of a lane."""
+    o = MOTION + j
+    a, b, c, d = read_four(W, o)
+    e, f, g, h = read_four(W, o + 4 * LANES)
+    return IdealMotion(a, b, c, d, e, f, g, h, W[o + 8 * LANES])
+
+
+@inline_numba
+def read_state(scene, W, j):
+    """Return the motion that `move_states` has written of a lane, eight numbers."""
+    a, b, c, d = read_four(W, Y + j)
+    e, f, g, h = 0.0, 0.0, 0.0, 0.0
+    if len(scene) == 3:
+        e, f, g, h = read_four(W, Y + 4 * LANES + j)
+    return a, b, c, d, e, f, g, h
+
+
+@inline_numba
+def write_rates(scene, W, o, y, d, q):
+    """Write dz/dt into rows from o on: rates, accelerations, powers."""
+    if len(scene) == 3:
+        write_four(W, o, (y[4], y[5], y[6], y[7]))
+        write_four(W, o + 4 * LANES, d)
+        write_four(W, o + 8 * LANES, q)
+    else:
+        write_four(W, o, (y[2], y[3], d[0], d[3]))
+        write_four(W, o + 4 * LANES, q)
+
+
+@inline_numba
+def write_columns(W, o, g):
+    """Write the observed columns from ACCELERATION to GUIDE_MOMENT into rows from o on."""
+    write_four(W, o, (g[0], g[1], g[2], g[3]))
+    write_four(W, o + 4 * LANES, (g[4], g[5], g[6], g[7]))
+    write_four(W, o + 8 * LANES, (g[8], g[9], g[10], g[11]))
+    write_four(W, o + 12 * LANES, (g[12], g[13], g[14], g[15]))
+
+
+@jit
+def stage_rates(scene, W, k, s):
+    """Compute dz/dt at MOTION and Y as stage s."""
+    W = without_refcount(W)
+    for j in range(k):
+        p, y = lane_record(scene, W, j), read_state(scene, W, j)
+        now = evaluate(read_motion(W, j), y, np.int64(W[PHASE + j]), p)
         accelerations = deviation_accelerations(now, p)
-        write_rates(scene, W, j, y, accelerations, powers(now, y, joint_forces(now, y, p), p))
+        flows = powers(now, y, joint_forces(now, y, p), p)
+        write_rates(scene, W, OUT + j, y, accelerations, flows)
     copy_rows(W, K + s * STATE * LANES, OUT, STATE if len(scene) == 3 else MAX_STATES)
 
 
 @jit
-def observe_node(scene, W, k, fraction, w, i):
-    """Write what is observed at node i of the steps."""
+def last_stage(scene, W, k):
+    """Compute dz/dt at MOTION and Y, the steps' ends, as the last stage, and observe them."""
     W = without_refcount(W)
     for j in range(k):
-        p = lane_record(scene, W, j)
-        motion = ideal_after((W[COS + j], W[SIN + j]), fraction * W[H + j], p)
-        y = stage_state(scene, W, j, w)
-        now = evaluate(motion, y, np.int64(W[PHASE + j]), p)
-        columns = observed_columns(now, y, joint_forces(now, y, p), p)
-        write_observed(W, j, columns, energies(now, y, p))
+        p, y = lane_record(scene, W, j), read_state(scene, W, j)
+        now = evaluate(read_motion(W, j), y, np.int64(W[PHASE + j]), p)
+        forces = joint_forces(now, y, p)
+        flows = powers(now, y, forces, p)
+        write_rates(scene, W, LAST_STAGE + j, y, deviation_accelerations(now, p), flows)
+        write_columns(W, R4 + j, observed_columns(now, y, forces, p))
+        W[R4 + 16 * LANES + j], W[R4 + 17 * LANES + j] = energies(now, y, p)
+
+
+@jit
+def observe_node(scene, W, k, i):
+    """Write what is observed at MOTION and Y as node i of the steps; not their energies."""
+    W = without_refcount(W)
+    for j in range(k):
+        p, y = lane_record(scene, W, j), read_state(scene, W, j)
+        now = evaluate(read_motion(W, j), y, np.int64(W[PHASE + j]), p)
+        write_columns(W, OBSERVED + j, observed_columns(now, y, joint_forces(now, y, p), p))
     copy_rows(W, NODE_ROWS + i * ROW, OBSERVED, OBSERVED_COUNT)
 
 
 @jit
 def finish_step(scene, W, k, w):
-    """Write state and flows at the ends of the steps, and their error norms."""
+    """Write state and flows at the ends of the steps, and their error norms.
+
+    The state is that of the last stage, in Y.
+    """
     W = without_refcount(W)
     n = 8 if len(scene) == 3 else 4
+    copy_rows(W, NEW, Y, n)
     for j in range(k):
-        W[NEW + j], W[NEW + LANES + j] = combine_stages(W, 0, j, w), combine_stages(W, 1, j, w)
-        W[NEW + 2 * LANES + j] = combine_stages(W, 2, j, w)
-        W[NEW + 3 * LANES + j] = combine_stages(W, 3, j, w)
-        W[NEW + 4 * LANES + j] = combine_stages(W, 4, j, w)
-        W[NEW + 5 * LANES + j] = combine_stages(W, 5, j, w)
-        W[NEW + 6 * LANES + j] = combine_stages(W, 6, j, w)
-        W[NEW + 7 * LANES + j] = combine_stages(W, 7, j, w)
         if len(scene) == 3:
             W[NEW + 8 * LANES + j] = combine_stages(W, 8, j, w)
             W[NEW + 9 * LANES + j] = combine_stages(W, 9, j, w)
             W[NEW + 10 * LANES + j] = combine_stages(W, 10, j, w)
             W[NEW + 11 * LANES + j] = combine_stages(W, 11, j, w)
+        else:
+            W[NEW + 4 * LANES + j] = combine_stages(W, 4, j, w)
+            W[NEW + 5 * LANES + j] = combine_stages(W, 5, j, w)
+            W[NEW + 6 * LANES + j] = combine_stages(W, 6, j, w)
+            W[NEW + 7 * LANES + j] = combine_stages(W, 7, j, w)
     for j in range(k):
         e = add_error_square(W, 1, j, add_error_square(W, 0, j, 0.0))
         e = add_error_square(W, 3, j, add_error_square(W, 2, j, e))
@@ -274,13 +325,20 @@ def weights_of(table, i):
 def observe_nodes(scene, W, k, nodes):
     """Write what is observed at some nodes of the steps."""
     for i in nodes:
-        observe_node(scene, W, k, NODES[i], weights_of(NODE_WEIGHTS, i), i)
+        move_cranks(W, k, NODES[i])
+        move_states(scene, W, k, weights_of(NODE_WEIGHTS, i))
+        observe_node(scene, W, k, i)
 
 
 @jit
 def try_steps(scene, W, k):
     """Try a step in each lane: stages, error, and what is observed in its middle and at its end."""
-    for s in range(1, STAGES):
-        stage_rates(scene, W, k, FRACTIONS[s], weights_of(STEP_WEIGHTS, s), s)
-    observe_nodes(scene, W, k, OUTER)
+    for s in range(1, STAGES - 1):
+        move_cranks(W, k, FRACTIONS[s])
+        move_states(scene, W, k, weights_of(STEP_WEIGHTS, s))
+        stage_rates(scene, W, k, s)
+    # the last two stages stand both at the step's end: its ideal motion is computed once
+    move_states(scene, W, k, weights_of(STEP_WEIGHTS, STAGES - 1))
+    last_stage(scene, W, k)
     finish_step(scene, W, k, weights_of(STEP_WEIGHTS, STAGES - 1))
+    observe_nodes(scene, W, k, MIDDLE)

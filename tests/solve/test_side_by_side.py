@@ -12,7 +12,12 @@ from random_cases import strangers
 from compressor.cases.case import Case
 from compressor.physics import lane_steps
 from compressor.physics import lane_steps as rows
-from compressor.physics.lane_control import top_and_vertex
+from compressor.physics.lane_control import (
+    may_rise,
+    raised,
+    raised_at_nodes,
+    top_and_vertex,
+)
 from compressor.physics.lane_march import fits_lane, load_next_run
 from compressor.physics.march import NODES
 from compressor.physics.record import RECORD
@@ -51,7 +56,7 @@ def test_an_outcome_has_the_same_bits():
     some = cases("both")
     alone = side_by_side(some[:1], (3,))  # and compiled: its clock runs meanwhile
     ahead = side_by_side(some, (3,))
-    assert sum(len(made) == 2 for made in ahead) >= 0.8 * len(some)  # the run and its companion
+    assert sum(len(made) >= 2 for made in ahead) >= 0.8 * len(some)  # the run and its companion
     for case, made in zip(some, ahead, strict=True):
         assert told(measure(case, made)) == told(measure(case))
         assert all(0.0 < one.trajectory.seconds < 1.0 for one in made.values())
@@ -148,12 +153,32 @@ def test_lanes_are_loaded_by_one_function():
     assert not [types for (types, *_) in index if "Literal" in str(types)]
 
 
+@pytest.mark.parametrize("fine", [True, False])
+def test_no_parabola_rises_above_a_peak_where_none_may(fine):
+    """The bound that spares its divisions, close to it: known peaks just above the nodes."""
+    rng = np.random.default_rng(6)
+    near = 0
+    for drawn, above in zip(
+        rng.normal(0.0, 1.0, (500, 5)), rng.uniform(0.0, 0.6, 500), strict=True
+    ):
+        values = tuple(drawn)
+        nodes = drawn if fine else drawn[::2]
+        known = nodes.max() + above * np.ptp(nodes)
+        whole, by_nodes = (find(values, fine, known, True) for find in (raised, raised_at_nodes))
+        assert may_rise(values, fine, known, True) or whole == by_nodes
+        near += whole > by_nodes
+    assert near > 10  # some do rise
+
+
 LOOK = """
 from compressor.physics import lane_steps
-weights = (0.1,) * 7
-for function in (lane_steps.stage_rates, lane_steps.observe_node):
-    function((0, 0, 0), lane_steps.new_lanes(), lane_steps.LANES, 0.5, weights, 1)
-    print(*function.target.inspect_asm().values())
+W, k = lane_steps.new_lanes(), lane_steps.LANES
+lane_steps.move_cranks(W, k, 0.5)
+lane_steps.stage_rates((0, 0, 0), W, k, 1)
+lane_steps.last_stage((0, 0, 0), W, k)
+lane_steps.observe_node((0, 0, 0), W, k, 1)
+for name in ("move_cranks", "stage_rates", "last_stage", "observe_node"):
+    print(*getattr(lane_steps, name).target.inspect_asm().values())
 """
 
 
@@ -169,7 +194,7 @@ def test_loops_over_lanes_are_vector_code(tmp_path):
     functions = seen.stdout.split(".Lfunc_end")
     if not re.search(r"\b[xyz]mm\d", seen.stdout):
         pytest.skip("no x86 machine code to look at")
-    for name in ("stage_rates", "observe_node"):
+    for name in ("move_cranks", "stage_rates", "last_stage", "observe_node"):
         (code,) = (f for f in functions if re.search(rf"^_ZN10compressor\S*{name}\S*:$", f, re.M))
         assert re.search(r"v?sqrtpd", code), name
         assert re.search(r"v?divpd", code), name
