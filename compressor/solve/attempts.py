@@ -41,7 +41,7 @@ from compressor.solve.error_bars import (
     next_audit_rtol,
     series_errors,
 )
-from compressor.solve.march_driver import COMPILED, march_through
+from compressor.solve.march_driver import COMPILED, LANE_METHODS, march_through
 from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merge_turns, overdue
 from compressor.solve.run_metrics import metrics, sampled_bars, sampled_metrics, sampled_times
 from compressor.solve.scipy_driver import step_through
@@ -193,6 +193,34 @@ Ahead = Mapping[float, Solution]  # attempts of a case that were made before, by
 NOTHING_AHEAD: Ahead = {}
 
 
+class RunNeeded(Exception):
+    """A run that a case needs next, of those that were not made before."""
+
+    def __init__(self, case: Case, rtol: float, sampled: bool):
+        self.case, self.rtol, self.sampled = case, rtol, sampled
+        super().__init__(f"a run at rtol {rtol:g}")
+
+
+class RunsAhead(dict[float, Solution]):
+    """Attempts of a case that were made before; while `is_planned`, a missing one is not made."""
+
+    is_planned = False
+
+
+def take_run(
+    ahead: Ahead, case: Case, rtol: float, timeout: float, sampled: bool = False
+) -> Solution:
+    """Return an attempt that was made before, or `run_at_tolerance`.
+
+    Raises RunNeeded in place of the latter while the attempts are planned.
+    """
+    if case.solve.method in LANE_METHODS and (made := ahead.get(rtol)):
+        return made
+    if isinstance(ahead, RunsAhead) and ahead.is_planned:
+        raise RunNeeded(case, rtol, sampled)
+    return run_at_tolerance(case, rtol, timeout, sampled)
+
+
 def run_at_tolerance(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
     state: np.ndarray | None = None, worn: np.ndarray | None = None,
@@ -324,15 +352,15 @@ def comparison_run(
     """
     tighter = companion_rtol(solution.p, solution.rtol)
     if tighter is not None:
-        return ahead.get(tighter) or run_at_tolerance(case, tighter, timeout, False)
+        return take_run(ahead, case, tighter, timeout)
     if overruns_friction(solution.p, solution.rtol):
         stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, False)
-    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, False)
+        return take_run(ahead, stiff, solution.rtol / STIFF_TIGHTER, timeout)
+    return take_run(ahead, case, 10.0 * solution.rtol, timeout)
 
 
 def looser_comparison_run(
-    case: Case, solution: Solution, other: Solution, timeout: float
+    case: Case, solution: Solution, other: Solution, timeout: float, ahead: Ahead = NOTHING_AHEAD
 ) -> Solution | None:
     """Return a looser run, by which errors are estimated as well where the motion enlarges them.
 
@@ -340,7 +368,7 @@ def looser_comparison_run(
     """
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
-    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, False)
+    looser = take_run(ahead, case, LOOSER_FACTOR * solution.rtol, timeout)
     return None if looser.reason else looser
 
 

@@ -14,11 +14,13 @@ import numpy as np
 
 from compressor.cases import TIGHTEST, Case
 from compressor.outcome import Regime
-from compressor.physics import Run, march_side_by_side
+from compressor.physics import MIN_FULL, Run, march_side_by_side
 from compressor.reasons import Reason
 from compressor.solve.attempts import (
     NOTHING_AHEAD,
     Ahead,
+    RunNeeded,
+    RunsAhead,
     Solution,
     Times,
     build_request,
@@ -29,6 +31,7 @@ from compressor.solve.attempts import (
     prepare_run,
     run_at_tolerance,
     solution_of_trajectory,
+    take_run,
     times_of,
 )
 from compressor.solve.error_bars import (
@@ -55,9 +58,11 @@ from compressor.solve.request import Cuts, Trajectory, revolutions, with_edge
 from compressor.solve.run_metrics import chaotic_bars, statistics
 from compressor.solve.si_record import natural_sizes, record, scene
 
-MAX_ATTEMPTS = 200_000  # of a step, of a run in a lane: a longer one is looked at by the clock
+MAX_ATTEMPTS = 500_000  # of a step, of a run in a lane: a longer one is looked at by the clock
 MIN_TIME = 10.0  # s of wall time that a case must have: the clock is not looked at in lanes
+MAX_TIME = 3.0  # s of wall time after which no further attempts are begun in lanes
 MAX_SAMPLES = 100_000  # of a run in a lane
+STEPS_POWER = -0.2  # of the tolerance by which a run's steps grow, by the order of the method
 
 
 class LaneRequest(NamedTuple):
@@ -65,32 +70,98 @@ class LaneRequest(NamedTuple):
 
     case: int
     rtol: float
+    max_steps: int
     times: Times
     run: Run
     trajectory: Trajectory
 
 
-def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Ahead]:
-    """Return the first attempts of each case, by tolerance, as far as lanes can make them.
+class Plan(RunsAhead):
+    """The runs of a case that lanes have made; also what came of them, where no other is needed.
 
-    scenes: those for which lanes are compiled. A case that cannot run in lanes has none.
+    `search`, `solution`: of `refine_until_accurate`, None as long as it has not ended; `known`: of
+    `HorizonSearch`.
     """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.search: HorizonSearch | None = None
+        self.solution: Solution | None = None
+        self.known: list[dict[str, float]] = []
+
+    def next_run(self, case: Case) -> RunNeeded | None:
+        """Return the run that a case needs next, None where it needs none."""
+        search, self.is_planned = HorizonSearch(case, self.known), True
+        try:
+            self.solution = refine_until_accurate(case, search, self)
+        except RunNeeded as needed:
+            return needed
+        except Exception:  # it is raised again, and is its own, where the case is solved
+            return None
+        finally:
+            self.is_planned = False
+        self.search = search
+        return None
+
+
+def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Plan]:
+    """Return the attempts of each case, by tolerance, as far as lanes can make them.
+
+    First the attempts that each case begins with, then those that it is found to need. scenes:
+    those for which lanes are compiled. A case that cannot run in lanes has none.
+    """
+    deadline = time.monotonic() + MAX_TIME
+    plans = [Plan() for _ in cases]
     requests: dict[int, list[LaneRequest]] = {number: [] for number in scenes}
     for number, case in enumerate(cases):
         if may_run_in_lanes(case) and (of := int(scene(case))) in requests:
             requests[of] += attempts_of(number, case)
-    solutions: list[dict[float, Solution]] = [{} for _ in cases]
     for attempts in requests.values():
-        if not attempts:
-            continue
-        began = time.perf_counter()
-        runs = march_side_by_side([one.run for one in attempts], MAX_ATTEMPTS)
-        evaluations = sum(int(run.stepper["evaluations"]) for run in runs if run)
-        per_evaluation = (time.perf_counter() - began) / max(evaluations, 1)
-        for one, run in zip(attempts, runs, strict=True):
-            if run:
-                solutions[one.case][one.rtol] = lane_solution(one, run, per_evaluation)
-    return list(solutions)
+        while attempts:
+            make_attempts(attempts, plans)
+            lost = {one.case for one in attempts if one.rtol not in plans[one.case]}
+            further = [
+                further_attempt(number, cases[number], plans)
+                for number in dict.fromkeys(one.case for one in attempts)
+                if number not in lost and time.monotonic() < deadline
+            ]
+            attempts = [one for one in further if one]
+            if len(attempts) < MIN_FULL:  # each is as fast by itself
+                break
+    return plans
+
+
+def make_attempts(attempts: Sequence[LaneRequest], plans: Sequence[Plan]) -> None:
+    """March attempts of cases of one scene side by side, and add those that end to the plans."""
+    # the longest first: the last ones to end leave lanes empty
+    attempts = sorted(attempts, key=expected_length, reverse=True)
+    began = time.perf_counter()
+    runs = march_side_by_side([one.run for one in attempts], MAX_ATTEMPTS)
+    evaluations = sum(int(run.stepper["evaluations"]) for run in runs if run)
+    per_evaluation = (time.perf_counter() - began) / max(evaluations, 1)
+    for one, run in zip(attempts, runs, strict=True):
+        if run and run.stepper["steps"] + run.stepper["rejected"] < one.max_steps:
+            plans[one.case][one.rtol] = lane_solution(one, run, per_evaluation)
+
+
+def expected_length(one: LaneRequest) -> float:
+    """Return about how many steps an attempt takes, but for a factor that all have in common."""
+    return float(one.run.edges[-1] / one.run.stepper["contact_step"] * one.rtol**STEPS_POWER)
+
+
+def further_attempt(number: int, case: Case, plans: Sequence[Plan]) -> LaneRequest | None:
+    """Return the attempt that a case needs next, by the plans, if lanes can make it."""
+    case = with_settle_rev(case, float(case.solve.settle_rev), 1)
+    needed = plans[number].next_run(case)
+    if needed is None or needed.case.solve.method not in LANE_METHODS:
+        return None
+    rtol, steps = min((rtol, made.trajectory.steps) for rtol, made in plans[number].items())
+    if steps * (needed.rtol / rtol) ** STEPS_POWER > MAX_ATTEMPTS:  # it would not end in a lane
+        return None
+    p, times = record(case), times_of(case, needed.sampled)
+    if times.all.size > MAX_SAMPLES:
+        return None
+    return lane_request(number, needed.case, needed.rtol, p, times)
 
 
 def may_run_in_lanes(case: Case) -> bool:
@@ -130,7 +201,7 @@ def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Time
     stepper = prepare_stepper(request, size)
     edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     run = Run(stepper, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
-    return LaneRequest(number, rtol, times, run, trajectory)
+    return LaneRequest(number, rtol, request.max_steps, times, run, trajectory)
 
 
 def lane_solution(one: LaneRequest, run: Run, each: float) -> Solution:
@@ -167,8 +238,8 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
     before: Solution | None = None
     unsound = 0  # runs that did not balance
     while True:
-        now = ahead.get(rtol) or run_at_tolerance(
-            search.within_budget(case), rtol, search.left, case.output.keep == "series"
+        now = take_run(
+            ahead, search.within_budget(case), rtol, search.left, case.output.keep == "series"
         )
         if now.reason:
             return end_early(case, best, now, search)
@@ -193,7 +264,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
         excess, third = excess_over_promise(case, now), None
         if excess <= 1.0:
             # two runs may agree by chance where the motion enlarges their errors: ask a third
-            excess, third = recheck(case, now, other, before is None, search)
+            excess, third = recheck(case, now, other, before is None, search, ahead)
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"
             return now
@@ -215,7 +286,7 @@ def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
 
 
 def recheck(
-    case: Case, now: Solution, other: Solution, first: bool, search: HorizonSearch
+    case: Case, now: Solution, other: Solution, first: bool, search: HorizonSearch, ahead: Ahead
 ) -> tuple[float, Solution | None]:
     """Compare a run that seems to keep its promise with a third one; two may agree by chance.
 
@@ -224,9 +295,9 @@ def recheck(
     run where it is by that.
     """
     if first:
-        third = looser_comparison_run(case, now, other, search.left)
+        third = looser_comparison_run(case, now, other, search.left, ahead)
     else:
-        third = comparison_run(case, now, search.left)
+        third = comparison_run(case, now, search.left, ahead)
         if third.reason or third.rtol == other.rtol:
             third = None
     excess = excess_over_promise(case, now)
@@ -327,12 +398,14 @@ def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
     ahead: its attempts that `side_by_side` has made. Raises nothing for a run that fails: its
     `reason` and `detail` say why.
     """
-    search = HorizonSearch(case)
+    plan = ahead if isinstance(ahead, Plan) else Plan()
+    search = plan.search or HorizonSearch(case, plan.known)
+    search.began = time.monotonic() - search.twin_evaluations * EVALUATION
     for attempt in ahead.values():
         search.began -= attempt.trajectory.evaluations * EVALUATION
     settling = with_span(case, search)
     case = search.case = settling.case
-    solution = refine_until_accurate(case, search, ahead)
+    solution = plan.solution or refine_until_accurate(case, search, ahead)
     solution.settled = settling.settled
     if solution.reason not in ("", Reason.ACCURACY_NOT_REACHED):
         return solution

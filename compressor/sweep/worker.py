@@ -132,9 +132,11 @@ def do_batch(path: str, payloads: Sequence[bytes]) -> str:
         return problem
     with open(path, "r+b") as file, mmap.mmap(file.fileno(), NOTE.size) as note:
         found: list[JobResult | JobLost] = []
-        began = start = time.monotonic()
+        start = time.monotonic()
         NOTE.pack_into(note, 0, os.getpid(), 0, start)
-        jobs, each = look_ahead(payloads), (time.monotonic() - start) / len(payloads)
+        jobs = look_ahead(payloads)
+        began = time.monotonic()  # jobs that are given back would lose what was computed ahead
+        each = (began - start) / len(payloads)
         try:
             with sync_later():  # or each job would wait for the disk
                 for position, job in enumerate(jobs):

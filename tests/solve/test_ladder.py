@@ -180,8 +180,8 @@ def test_a_third_run_that_tells_more_is_what_the_next_run_is_compared_with(monke
     """It is tighter than the one that it spoke against; a failed one is not heard."""
     original, made, rtol = solution.recheck, [], ACCURACY["standard"].rtol
 
-    def wary(case, now, other, first, search):
-        excess, _ = original(case, now, other, first, search)
+    def wary(case, now, other, first, search, ahead):
+        excess, _ = original(case, now, other, first, search, ahead)
         made.append(asked[-1])
         if len(made) == 1:
             third = attempts.comparison_run(case, now, search.left)
