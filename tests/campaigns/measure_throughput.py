@@ -121,13 +121,13 @@ def starting():
     return {name: round(statistics.median(found), 3) for name, found in times.items()}
 
 
-def many(jobs, bars=False):
-    """A study of big-end jobs without time series, as a case file."""
+def many(jobs, bars=False, joint="big_end"):
+    """A study of jobs without time series, as a case file."""
     side = next(n for n in range(math.isqrt(jobs), 0, -1) if jobs % n == 0)
     return json.dumps(
         {
             "name": "many",
-            "joint": "big_end",
+            "joint": joint,
             "clearance_mm": np.linspace(0.1, 0.3, side).tolist(),
             "machine": {"rod_mass_kg": np.linspace(3, 5, jobs // side).tolist()},
             "solve": {"error_bars": bars},
@@ -218,33 +218,45 @@ def sweeping(jobs):
 
 
 def lanes():
-    """Random cases with error bars, job by job and side by side: bits that differ, and speed."""
-    found = {}
+    """Cases job by job and side by side, by what they are and joint: bits that differ, and speed.
+
+    Random ones with error bars, and a sweep without.
+    """
+    found = {"lanes": {}, "bare": {}}
     for scene, joint in LANES.items():
         drawn = [one for one in strangers(SEED, 10 * RUNS) if one["joint"] == joint][:RUNS]
         values = {"load": "spring", "output": {"keep": "metrics"}}
-        cases = [Case.from_values(one | values) for one in drawn]
-        measure(cases[0], side_by_side(cases[:1], (scene,))[0])  # compiled before anything counts
-        times, differ = [], 0
-        for turn in range(TURNS):
-            seconds, outcomes = {}, {}
-            for way in ("alone", "lanes") if turn % 2 else ("lanes", "alone"):
-                began = time.process_time()
-                ahead = side_by_side(cases, (scene,)) if way == "lanes" else [{}] * len(cases)
-                pairs = zip(cases, ahead, strict=True)
-                outcomes[way] = [told(measure(case, made)) for case, made in pairs]
-                seconds[way] = time.process_time() - began
-            times.append(seconds)
-            ours = zip(outcomes["alone"], outcomes["lanes"], strict=True)
-            differ = max(differ, sum(one != other for one, other in ours))
-        found[joint] = {
-            "cases": len(cases),
-            "differ": differ,
-            "alone_ms": 1e3 * statistics.median(one["alone"] for one in times) / len(cases),
-            "lanes_ms": 1e3 * statistics.median(one["lanes"] for one in times) / len(cases),
-            "times as fast": statistics.median(one["alone"] / one["lanes"] for one in times),
-        }
+        found["lanes"][joint] = beside([Case.from_values(one | values) for one in drawn], scene)
+        text = many(RUNS, joint=joint)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "many.yaml")
+            path.write_text(text, encoding="utf-8")
+            found["bare"][joint] = beside([*load_studies(path)[0].cases], scene)
     return found
+
+
+def beside(cases, scene):
+    """How fast cases of a scene are side by side and job by job, in turn: CPU time."""
+    measure(cases[0], side_by_side(cases, (scene,))[0])  # compiled before anything counts
+    times, differ = [], 0
+    for turn in range(TURNS):
+        seconds, outcomes = {}, {}
+        for way in ("alone", "lanes") if turn % 2 else ("lanes", "alone"):
+            began = time.process_time()
+            ahead = side_by_side(cases, (scene,)) if way == "lanes" else [{}] * len(cases)
+            pairs = zip(cases, ahead, strict=True)
+            outcomes[way] = [told(measure(case, made)) for case, made in pairs]
+            seconds[way] = time.process_time() - began
+        times.append(seconds)
+        ours = zip(outcomes["alone"], outcomes["lanes"], strict=True)
+        differ = max(differ, sum(one != other for one, other in ours))
+    return {
+        "cases": len(cases),
+        "differ": differ,
+        "alone_ms": 1e3 * statistics.median(one["alone"] for one in times) / len(cases),
+        "lanes_ms": 1e3 * statistics.median(one["lanes"] for one in times) / len(cases),
+        "times as fast": statistics.median(one["alone"] / one["lanes"] for one in times),
+    }
 
 
 def told(outcome):
@@ -255,7 +267,7 @@ def told(outcome):
 
 
 def main(target, jobs=10_000, commit=BEFORE):
-    kept = {**provenance("make throughput"), "lanes": lanes()}  # first: compiled for all
+    kept = {**provenance("make throughput"), **lanes()}  # first: compiled for all
     kept |= {"start": starting(), "sweep": sweeping(int(jobs))}
     kept |= {"before": commit, "compared": compared(commit)}
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
