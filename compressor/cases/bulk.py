@@ -50,7 +50,7 @@ class _Shared:
 
     @property
     def is_constant(self) -> bool:
-        """Return whether all combinations have the same answer, as far as it is known."""
+        """Return whether no factor decides the answer, once it was computed."""
         return () in self.answers
 
     def answer(self, number: int, places: Sequence[int], case: Case | None) -> Any:

@@ -110,7 +110,7 @@ def load_numba() -> None:
 def collect_seldom() -> Any:
     """Return numba's listener that lets Python look for garbage seldom while numba compiles.
 
-    It takes a sixth of the time: numba makes millions of objects, of which hardly any is garbage.
+    It took a tenth of the time: numba makes millions of objects, of which hardly any is garbage.
     """
     from numba.core import event
 

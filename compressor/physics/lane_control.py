@@ -348,7 +348,7 @@ def may_rise(values, fine, known, counts):
 
 
 @inline_numba
-def raised(values, fine, known, counts):
+def raise_peak(values, fine, known, counts):
     """Return a known peak, or a larger one of a step that counts, by nodes and parabola."""
     top, top_of_parabola = top_and_vertex(values, fine)
     best = max(known, top, top_of_parabola if may_exceed(top, known) else top)
@@ -356,8 +356,8 @@ def raised(values, fine, known, counts):
 
 
 @inline_numba
-def raised_at_nodes(values, fine, known, counts):
-    """Return `raised` of a step whose parabola does not rise above the known peak."""
+def raise_peak_at_nodes(values, fine, known, counts):
+    """Return `raise_peak` of a step whose parabola does not rise above the known peak."""
     top, _ = range_at_nodes(values, fine)
     return max(known, top) if counts else known
 
@@ -376,12 +376,12 @@ def raise_peaks(W, k):
             for j in range(k):
                 counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
                 values, fine = sizes_at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
-                W[p + j] = raised(values, fine, W[p + j], counts)
+                W[p + j] = raise_peak(values, fine, W[p + j], counts)
         else:
             for j in range(k):
                 counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
                 values, fine = sizes_at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
-                W[p + j] = raised_at_nodes(values, fine, W[p + j], counts)
+                W[p + j] = raise_peak_at_nodes(values, fine, W[p + j], counts)
 
 
 @jit
@@ -400,12 +400,12 @@ def raise_depths(scene, W, k):
                 for j in range(k):
                     counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
                     values, fine = at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
-                    W[p + j] = raised(values, fine, W[p + j], counts)
+                    W[p + j] = raise_peak(values, fine, W[p + j], counts)
             else:
                 for j in range(k):
                     counts = (W[PLAIN + j] > 0.0) & (W[MEASURED + j] > 0.0)
                     values, fine = at_nodes(W, o + j), W[NEAR_PEAK + j] > 0.0
-                    W[p + j] = raised_at_nodes(values, fine, W[p + j], counts)
+                    W[p + j] = raise_peak_at_nodes(values, fine, W[p + j], counts)
 
 
 @inline_numba

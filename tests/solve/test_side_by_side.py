@@ -15,8 +15,8 @@ from compressor.physics import lane_steps
 from compressor.physics import lane_steps as rows
 from compressor.physics.lane_control import (
     may_rise,
-    raised,
-    raised_at_nodes,
+    raise_peak,
+    raise_peak_at_nodes,
     top_and_vertex,
 )
 from compressor.physics.lane_march import fits_lane, load_next_run
@@ -174,7 +174,9 @@ def test_no_parabola_rises_above_a_peak_where_none_may(fine):
         values = tuple(drawn)
         nodes = drawn if fine else drawn[::2]
         known = nodes.max() + above * np.ptp(nodes)
-        whole, by_nodes = (find(values, fine, known, True) for find in (raised, raised_at_nodes))
+        whole, by_nodes = (
+            find(values, fine, known, True) for find in (raise_peak, raise_peak_at_nodes)
+        )
         assert may_rise(values, fine, known, True) or whole == by_nodes
         near += whole > by_nodes
     assert near > 10  # some do rise
