@@ -32,6 +32,7 @@ from compressor.report.figures.drawing import (
     axis_title,
     make_grid,
     one_line,
+    shared_title,
     thin_places,
 )
 from compressor.report.figures.job import BY_JOINT
@@ -88,7 +89,7 @@ def content(drawing: Drawing) -> dict[str, Any]:
             {
                 "title": one_line(panel.title),
                 "x": axis(drawing, panel, "x")
-                | {"link": links["x"][number], "unit": unit(title_below(drawing, panel))},
+                | {"link": links["x"][number], "unit": unit(shared_title(drawing, panel, "x"))},
                 "y": axis(drawing, panel, "y")
                 | {"link": links["y"][number], "unit": unit(axis_title(drawing, panel, "y"))},
                 "row": panel.row,
@@ -100,12 +101,6 @@ def content(drawing: Drawing) -> dict[str, Any]:
             for number, panel in enumerate(panels)
         ],
     }
-
-
-def title_below(drawing: Drawing, panel: Panel) -> str:
-    """Return the title of a panel's x axis, or of one below it in the same column."""
-    below = [one for one in drawing.panels if one.column == panel.column and one.row >= panel.row]
-    return next((title for one in below if (title := axis_title(drawing, one, "x"))), "")
 
 
 def unit(title: str) -> str:

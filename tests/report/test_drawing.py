@@ -123,6 +123,21 @@ def test_a_csv_has_every_number_once(drawing):
     ]  # fmt: skip
 
 
+def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
+    drawing, grid = make_grid(2, 2, 4.0)
+    for (row, column), panel in np.ndenumerate(grid):
+        panel.plot([row, 1], [column, 1], RED, "a job", jobs=("k1", "k2"))
+        panel.x.title = f"x{column}" if row == 1 else ""
+        panel.y.title = "" if column else f"y{row}"
+    share_scales(drawing.panels, "x", "y")
+    head, *rows = csv.reader(io.StringIO(as_csv(drawing)))
+    assert [title for title in head if title.endswith("job")] == ["1: a job: job"]
+    assert [title.rpartition(" ")[2] for title in head] == [
+        "x0", "y0", "job", "x1", "y0", "x0", "y1", "x1", "y1"
+    ]  # fmt: skip
+    assert rows[0] == ["0", "0", "k1", "0", "1", "1", "0", "1", "1"]
+
+
 def test_the_page_gets_what_was_drawn(drawing):
     found = content(drawing)
     whole, enlarged, low, bars = found["panels"]

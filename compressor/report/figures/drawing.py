@@ -361,16 +361,27 @@ def axis_title(drawing: Drawing, panel: Panel, way: Way) -> str:
     return one_line(own or (drawing.x_title if way == "x" else drawing.y_title))
 
 
+def shared_title(drawing: Drawing, panel: Panel, way: Way) -> str:
+    """Return the title of a panel's axis, or of the one below or beside it that has its numbers."""
+    if way == "x":
+        alike = [p for p in drawing.panels if p.column == panel.column and p.row >= panel.row]
+    else:
+        alike = [p for p in drawing.panels if p is panel or (panel.y.bare and p.row == panel.row)]
+    return next((title for one in alike if (title := axis_title(drawing, one, way))), "")
+
+
 def as_csv(drawing: Drawing) -> str:
     """Return all numbers of a figure. Curves over the same x share a column of it, and stand once.
 
-    A column is headed "panel: curve: title of the axis", with " below" and " above" for the ends
+    So do points of the same jobs, in all panels, share the column of the jobs' keys. A column is
+    headed "panel: curve: title of the axis", with " below" and " above" for the ends
     of error bars, counted from the value. A map has a row a cell, x and y in its middle.
     """
     columns: list[tuple[str, Sequence[str]]] = []
-    last, seen = b"", set()
+    last, seen = ("", b""), set()
+    last_jobs: tuple[str, ...] = ()
     for number, panel in enumerate(drawing.panels, 1):
-        x_title, y_title = axis_title(drawing, panel, "x"), axis_title(drawing, panel, "y")
+        x_title, y_title = (shared_title(drawing, panel, way) for way in WAYS)
         for trace in filter(is_in_table, panel.traces_in_order):
             where = f"{one_line(panel.title) or number}: {trace.name}".removesuffix(": ")
             x, y, *more = points(trace)
@@ -378,13 +389,14 @@ def as_csv(drawing: Drawing) -> str:
             if same in seen:
                 continue  # an enlarged view of the same curve
             seen.add(same)
-            if x.tobytes() != last:
+            if (x_title, x.tobytes()) != last:
                 columns.append((f"{where}: {x_title}", texts(x)))
-                last = x.tobytes()
+                last = x_title, x.tobytes()
             columns.append((f"{where}: {y_title}", texts(y)))
             columns += [(f"{where}: {name}", texts(values)) for name, values in more]
-            if trace.jobs:
+            if trace.jobs and trace.jobs != last_jobs:
                 columns.append((f"{where}: job", trace.jobs))
+                last_jobs = trace.jobs
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([head for head, _ in columns])
