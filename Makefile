@@ -86,7 +86,7 @@ validation: install  ## compare with what others have published (a minute)
 wear: install  ## measure wear by steps and sectors, and on machines drawn at random (ten minutes)
 	$(CAMPAIGN)/measure_wear.py tests/results/wear.json
 
-peers: install  ## time other tools and ours in turn on one problem (about three minutes)
+peers: install  ## time other tools and ours in turn on one problem (about six minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
 	  || echo "going on without numbalsoda: it needs a Fortran compiler"

@@ -217,6 +217,24 @@ def peers_table():
     return "\n".join(lines) + "\n"
 
 
+def sweeps_table():
+    """The lines are there once `make peers` has measured them."""
+    head = ["way", "s in all", "ms a further job", "CPU ms a further job",
+            "error of peak acceleration: median", "worst", "of peak force", "worst",
+            "script's time over ours, in all", "of a further job",
+            "CPU of a further job"]  # fmt: skip
+    keys = ["seconds", "ms_a_job", "cpu_ms_a_job", "peak_acceleration_error",
+            "worst_peak_acceleration_error", "peak_contact_force_error",
+            "worst_peak_contact_force_error", "ratio", "ratio_a_job",
+            "cpu_ratio_a_job"]  # fmt: skip
+    rows = [
+        [row["way"], row.get("reason") or cell(row["seconds"])]
+        + [cell(row.get(key)) for key in keys[1:]]
+        for row in kept("peers.json").get("sweeps", [])
+    ]
+    return markdown(head, rows)
+
+
 def cell(value, form="{:.2g}"):
     """A number of a kept measurement; a dash where there is none."""
     return "—" if value is None else form.format(value)
@@ -898,6 +916,7 @@ PAGES = {
         "regimes": regimes_table,
         "store": store_table,
         "peers": peers_table,
+        "sweeps": sweeps_table,
         "throughput": throughput_table,
         "scale": scale_table,
         "million": million_table,

@@ -8,6 +8,8 @@ ends with the crosshead's acceleration on the output grid of 0.1 ms; ours is the
 `simulate(case)`, with all its series, metrics and energy balance, the kernel's own seconds beside
 it. Errors are against the reference of reference.py. What is not installed, or fails, is a
 row with its reason.
+
+Before that a sweep by a user's script is timed beside ours, on two cores (peers/sweeps.py).
 """
 
 import json
@@ -26,8 +28,9 @@ from typing import NamedTuple
 
 import reference
 from measure_accuracy import provenance
-from peers import multibody, notebook, soda
-from peers.mechanism import DURATION, SCENES, case_values, error, output_grid, params
+from peers import multibody, notebook, soda, sweeps
+from peers.mechanism import DURATION, SCENES, case_values, error, loosest, output_grid, params
+from peers.sweeps import rounded
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
@@ -78,12 +81,6 @@ def timed(call):
 def ours(scene, rtol):
     """Our run of a scene, the `Case` made anew."""
     return simulate(Case.from_values(case_values(scene, rtol=rtol, error_bars=False)))
-
-
-def loosest(errors, limit):
-    """The loosest tolerance of {rtol: error} whose error is at most `limit`, or None."""
-    enough = [rtol for rtol, found in errors.items() if found <= limit]
-    return max(enough, default=None)
 
 
 def first_call(peer, scene, truth):
@@ -138,11 +135,6 @@ class Contest:
             "wall_ratio": rounded(wall / our_wall),
             "kernel_wall_ratio": rounded(wall / kernel),
         }
-
-
-def rounded(number):
-    """Three digits."""
-    return float(f"{number:.3g}")
 
 
 def compile_seconds():
@@ -208,6 +200,7 @@ def versions():
 
 
 def main(target):
+    swept = sweeps.compare()
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     errors, contestants, rows, checks, tighter = {}, [], [], [], []
     for scene in SCENES:
@@ -233,6 +226,7 @@ def main(target):
     kept["versions"] |= versions()
     kept |= {"rounds": ROUNDS, "our_first_call_seconds": compile_seconds()}
     kept |= {"agreement": checks, "numbalsoda_tightened": tighter, "rows": rows}
+    kept |= {"swept_jobs": sweeps.JOBS, "sweeps": swept}
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(rows, indent=1))
 

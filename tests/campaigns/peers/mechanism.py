@@ -65,6 +65,12 @@ def error(found, truth):
     return float(np.linalg.norm(found - truth) / np.linalg.norm(truth))
 
 
+def loosest(errors, limit):
+    """The loosest tolerance of {rtol: error} whose error is at most `limit`, or None."""
+    enough = [rtol for rtol, found in errors.items() if found <= limit]
+    return max(enough, default=None)
+
+
 PARAMS = params("both")
 R, L, OMEGA, M_ROD, A, I_ROD, M_CROSS = (
     PARAMS[key]
