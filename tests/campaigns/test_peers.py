@@ -153,6 +153,17 @@ def test_row_of_a_contest_has_medians_and_ratios():
     assert (row["error"], row["our_error"]) == (1e-3, 5e-4)
 
 
+def test_round_of_a_contest_takes_short_calls_again(monkeypatch):
+    monkeypatch.setattr(measure_peers, "LEAST_CPU", 0.02)
+    calls = []
+    monkeypatch.setattr(measure_peers, "ours", lambda scene, rtol: calls.append("ours") or ran)
+    ran = {"seconds": 1e-3}
+    contest = Contest(Peer("a", "", lambda scene: calls.append("peer")), "both", 1e-3, 9.0, 1e-4)
+    contest.round()
+    assert len(contest.theirs) == len(contest.ours) == len(contest.kernel) > 2
+    assert calls[:4] == ["peer", "ours", "ours", "peer"]
+
+
 def test_kept_contests_are_at_equal_or_better_error():
     kept = json.loads((page_tables.RESULTS / "peers.json").read_text(encoding="utf-8"))
     tools = {(row["tool"], row["scene"]) for row in kept["rows"]}
