@@ -165,12 +165,17 @@ def inline_llvm(function: Function) -> Function:
 
 
 def inline_numba(function: Function) -> Function:
-    """Return `jit`, written into each caller by numba, with its types.
+    """Return `inline_llvm`, but written by numba itself, with its types, into loops over lanes.
 
-    For what loops over lanes call with tuples or arrays. By `inline_llvm`, LLVM sees too late that
-    nothing is called there, and makes no vector code of the loop.
+    For what these call with tuples or arrays. By `inline_llvm`, LLVM sees too late that nothing is
+    called there, and makes no vector code of the loop. Elsewhere it is compiled but once.
     """
-    return _compile(function, inline="always")
+    return _compile(function, forceinline=True, inline=is_for_lanes)
+
+
+def is_for_lanes(call: Any, caller: Any, callee: Any) -> bool:
+    """Return whether a call stands in a loop over lanes: numba asks with its own forms of each."""
+    return str(caller.func_id.modname).startswith("compressor.physics.lane_")
 
 
 class ByKind:

@@ -12,7 +12,14 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from compressor.physics._jit import fma, inline_llvm, inline_numba, jit, square_root
+from compressor.physics._jit import (
+    dispatch_on_record,
+    fma,
+    inline_llvm,
+    inline_numba,
+    jit,
+    square_root,
+)
 from compressor.physics.contact_laws import (
     HYSTERESIS,
     Law,
@@ -22,6 +29,7 @@ from compressor.physics.contact_laws import (
     normal_force,
     rise,
 )
+from compressor.physics.record import CHOICE
 
 SATURATED = 1.0 - math.exp(-3.0)  # Threlfall's curve at its knee
 
@@ -104,11 +112,13 @@ def chosen_coefficient(slip, bristle, p):
 
 
 @inline_llvm
-def friction_coefficient(slip, bristle, p):
-    """Return the signed friction coefficient at a slip (m/s) and a bristle deflection (m)."""
-    if has_chosen_laws(p):
-        return chosen_coefficient(slip, bristle, p)
+def default_coefficient(slip, bristle, p):
+    """Return `chosen_coefficient` where no law has been chosen: by ADAMS's."""
     return adams(slip, p)
+
+
+# signed, at a slip (m/s) and a mean deflection of bristles (m)
+friction_coefficient = dispatch_on_record(CHOICE, chosen_coefficient, default_coefficient)
 
 
 def steepest(p) -> float:

@@ -26,7 +26,6 @@ from compressor.physics._jit import (
     square_root,
     without_refcount,
 )
-from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
 from compressor.physics.mechanism_rows import wear_at
 from compressor.physics.observe import (
@@ -44,7 +43,7 @@ from compressor.physics.onset import (
     may_touch,
     store_approach_velocity,
 )
-from compressor.physics.record import MECHANISM, zero
+from compressor.physics.record import CHOICE, MECHANISM, zero
 from compressor.physics.runge_kutta import (
     FLOWS,
     STAGES,
@@ -348,13 +347,22 @@ def accumulate_metrics(w, h, stride, work, phase, p, tally):
     tally_step(h, NODES, weights, work.rows, stride, work.gap_fraction, measured, tally, p)
 
 
+@jit
+def keep_velocities(w, t, work, phase, p, tally):
+    """Return that no joint carries a new speed: the default laws do not read it."""
+    return False
+
+
+store_velocities = dispatch_on_record(CHOICE, store_approach_velocity, keep_velocities)
+
+
 @inline_llvm
 def finish_at_event(w, h, work, phase, p, tally):
     """Return whether joints carry new speeds after a step of length h that ends on an onset."""
     w.landing = 0.0
     w.landed = 1
     w.onsets += 1
-    return has_chosen_laws(p) and store_approach_velocity(w, w.t + h, work, phase, p, tally)
+    return store_velocities(w, w.t + h, work, phase, p, tally)
 
 
 @jit
@@ -490,6 +498,8 @@ def step_twin(w, twin_stepper, twin, work, atol, size, phase, p):
 @inline_llvm
 def match_contact_speeds(w, z, twin, work, phase, p):
     """Store approach speeds in the twin where the first motion has just stored its own."""
+    if not w.landed:
+        return
     n = work.y.size
     for joint in range(2):
         if p.clearance[joint] > 0.0:
@@ -498,6 +508,14 @@ def match_contact_speeds(w, z, twin, work, phase, p):
             if z[place] == max(speed, p.least_approach):  # it has met just now
                 _, speed = approach_at(joint, w.t, twin[:n], phase, p, work.y, work.column[:n])
                 twin[place] = max(speed, p.least_approach)
+
+
+@jit
+def keep_contact_speeds(w, z, twin, work, phase, p):
+    """Return at once: with the default laws a motion carries no approach speeds."""
+
+
+match_speeds = dispatch_on_record(CHOICE, match_contact_speeds, keep_contact_speeds)
 
 
 @jit
@@ -520,8 +538,7 @@ def march_twins(
         march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))
         if w.steps > steps:
             step_twin(w, twin_stepper, twin, twin_work, atol, size, phase, p)
-            if has_chosen_laws(p) and w.landed:
-                match_contact_speeds(w, z, twin, twin_work, phase, p)
+            match_speeds(w, z, twin, twin_work, phase, p)
             if not separation(w.t, z[:n], twin[:n], p, rows) <= far:
                 twin_stepper.status = DONE
                 return

@@ -33,13 +33,16 @@ PEAKED = DEVIATION - ACCELERATION  # columns whose greatest size is tallied
 def lobatto(n):
     """Return the nodes in [0, 1] and the weights of n-point Gauss-Lobatto quadrature, (n,) each.
 
-    Both ends are nodes. Exact for polynomials up to degree 2 n - 3.
+    Both ends are nodes. Exact for polynomials up to degree 2 n - 3. The arrays are read-only.
     """
     legendre = np.polynomial.legendre.Legendre.basis(n - 1)
     inner = np.sort(legendre.deriv().roots().real)
     nodes = np.concatenate(([-1.0], inner, [1.0]))
     weights = 2.0 / (n * (n - 1) * legendre(nodes) ** 2)
-    return (nodes + 1.0) / 2.0, weights / 2.0
+    nodes, weights = (nodes + 1.0) / 2.0, weights / 2.0
+    for fixed in (nodes, weights):  # as global arrays are in compiled code: of one type from Python
+        fixed.setflags(write=False)
+    return nodes, weights
 
 
 TALLY = np.dtype(
