@@ -178,6 +178,14 @@ def is_for_lanes(call: Any, caller: Any, callee: Any) -> bool:
     return str(caller.func_id.modname).startswith("compressor.physics.lane_")
 
 
+def inline_once(function: Function) -> Function:
+    """Return `jit`, written by numba into the one function that calls it.
+
+    So it takes no machine code of its own, which is a third of what compiling it costs.
+    """
+    return _compile(function, inline="always")
+
+
 class ByKind:
     """A function that is one of two others, by the kind of the record among its arguments.
 

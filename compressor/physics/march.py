@@ -22,6 +22,7 @@ from compressor.physics import rosenbrock
 from compressor.physics._jit import (
     dispatch_on_record,
     inline_llvm,
+    inline_once,
     jit,
     square_root,
     without_refcount,
@@ -212,7 +213,7 @@ rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
 rosenbrock_extend = rosenbrock.extend
 
 
-@inline_llvm
+@inline_once
 def try_step(w, base, h, z, work, atol, size, phase, p):
     """Take a step of length h by the stepper's present method, and return its error norm."""
     if w.stiff:
@@ -228,7 +229,7 @@ def try_step(w, base, h, z, work, atol, size, phase, p):
     return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
 
 
-@inline_llvm
+@inline_once
 def observe_step(w, base, h, z, work, phase, p, tally):
     """Observe the step's interpolant at its nodes and return their stride: 1 for all, 2 for three.
 
@@ -269,7 +270,7 @@ def observe_step(w, base, h, z, work, phase, p, tally):
     return stride
 
 
-@inline_llvm
+@inline_once
 def onset_ahead(w, h, stride, work, phase, p):
     """Return whether contact begins within the step just tried, which must then end there.
 
@@ -290,7 +291,7 @@ def onset_ahead(w, h, stride, work, phase, p):
     return must_land
 
 
-@inline_llvm
+@inline_once
 def sample_grid(w, t_end, h, z, work, times, states):
     """Fill the output samples up to t_end.
 
@@ -306,7 +307,7 @@ def sample_grid(w, t_end, h, z, work, times, states):
         w.sample += 1
 
 
-@inline_llvm
+@inline_once
 def measure_gap_fractions(w, h, stride, work, phase, p):
     """Write the share of a step that each joint is without contact.
 
@@ -331,7 +332,7 @@ def measure_gap_fractions(w, h, stride, work, phase, p):
         work.gap_fraction[joint] = gap_fraction
 
 
-@inline_llvm
+@inline_once
 def accumulate_metrics(w, h, stride, work, phase, p, tally):
     """Tally an accepted step that has been observed, and audit its energy."""
     last = NODES.size - 1
@@ -356,7 +357,7 @@ def keep_velocities(w, t, work, phase, p, tally):
 store_velocities = dispatch_on_record(CHOICE, store_approach_velocity, keep_velocities)
 
 
-@inline_llvm
+@inline_once
 def finish_at_event(w, h, work, phase, p, tally):
     """Return whether joints carry new speeds after a step of length h that ends on an onset."""
     w.landing = 0.0
@@ -374,7 +375,7 @@ def is_finite(new):
     return math.isfinite(total)
 
 
-@inline_llvm
+@inline_once
 def accept_step(w, z, work, reached, fresh, at_edge, segments):
     """Move the stepper to the end of the step that was taken, and into the next segment.
 
@@ -393,7 +394,7 @@ def accept_step(w, z, work, reached, fresh, at_edge, segments):
             w.status = DONE
 
 
-@inline_llvm
+@inline_once
 def stop_beyond(w, z, tally, p):
     """Stop a stepper whose motion has left what the model describes."""
     if tally.deepest > w.deepest:

@@ -8,7 +8,7 @@ metrics take the share of it that was without contact.
 
 import math
 
-from compressor.physics._jit import inline_llvm, jit
+from compressor.physics._jit import inline_llvm, inline_once, jit
 from compressor.physics.contact import nearness
 from compressor.physics.observe import NEARNESS, PENETRATION
 from compressor.physics.runge_kutta import interpolate
@@ -44,7 +44,7 @@ def may_touch_in(low, high):
     return (low <= 0.0) & (high + (high - low) > 0.0)
 
 
-@inline_llvm
+@inline_once
 def may_change(rows, p):
     """Return whether contact may begin or end within a step, by its first, middle and last row."""
     middle, last = rows.shape[0] // 2, rows.shape[0] - 1
@@ -94,7 +94,7 @@ def locate_onset(joint, low, high, t, h, dense, phase, p, y):
     return high
 
 
-@jit
+@inline_once
 def locate_contact_between(joint, low, high, t, h, dense, phase, p, y):
     """Return a fraction in (low, high) at which there is contact, by golden section; NEVER if none.
 
@@ -131,7 +131,7 @@ def sample_fraction(i):
     return (i - 1) / INTERVALS
 
 
-@jit
+@inline_once
 def joint_onset(joint, t, h, dense, phase, p, y):
     """Return from where to where in a step a joint touches that was apart at its begin.
 
@@ -166,7 +166,7 @@ def joint_onset(joint, t, h, dense, phase, p, y):
     return NEVER, NEVER
 
 
-@jit
+@inline_once
 def first_onset(t, h, dense, phase, p, y):
     """Return `joint_onset` of whichever joint with clearance touches first."""
     begin, end = NEVER, NEVER

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import fma, inline_llvm, square_root
+from compressor.physics._jit import fma, inline_llvm, inline_once, square_root
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.systems import derivative_and_columns, write_flowing_derivative
 
@@ -100,7 +100,7 @@ P = np.array(
 )  # fmt: skip
 
 
-@inline_llvm
+@inline_once
 def take_step(pair, base, h, z, k, phase, p, new, row):
     """Take a step of length h from z: write stages 1 to 6 into k, and its end's state into new.
 
@@ -140,7 +140,7 @@ def error_share(error, before, after, rtol, atol):
     return error / fma(rtol, max(abs(before), abs(after)), atol)
 
 
-@inline_llvm
+@inline_once
 def error_norm(pair, h, z, new, k, rtol, atol):
     """Return the root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
@@ -161,7 +161,7 @@ def error_norm(pair, h, z, new, k, rtol, atol):
     return h * square_root(total / n)
 
 
-@inline_llvm
+@inline_once
 def weights_at(pair, s, weights):
     """Write the weights of the stages at the fraction s of a step into weights, (STAGES,)."""
     for stage in range(STAGES):

@@ -11,7 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import inline_llvm, jit, square_root
+from compressor.physics._jit import inline_llvm, inline_once, square_root
 from compressor.physics.elementary import exponential, logarithm
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
 from compressor.physics.systems import derivative_with_flows
@@ -56,7 +56,7 @@ def step_error(w, before, after, step):
     return step * (E[w.pair] @ np.vstack((before[:1], after[1:STAGES])))
 
 
-@jit
+@inline_once
 def first_step(w, z, work, atol, phase, p, end):
     """Return a length (s) for the first step of an order-5 method.
 
@@ -129,7 +129,7 @@ def shrinkage(now, order):
     return max(SHRINK, SAFETY * exponential(-now / order))
 
 
-@inline_llvm
+@inline_once
 def next_step_length(w, h, error):
     """Return the next step's length after an accepted step, and remember its error."""
     now = log_error(error)
@@ -138,7 +138,7 @@ def next_step_length(w, h, error):
     return longer
 
 
-@inline_llvm
+@inline_once
 def refuse(w, h, error):
     """Shorten the step after a refused attempt."""
     order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
@@ -146,7 +146,7 @@ def refuse(w, h, error):
     w.h = h * (shrinkage(log_error(error), order) if error < math.inf else NON_FINITE_SHRINK)
 
 
-@jit
+@inline_once
 def stiff_rate(w, h, z, work, size):
     """Return an estimate of the largest eigenvalue's size (1/s) from the step just taken.
 
@@ -187,7 +187,7 @@ def begin_stiff_steps(w):
         w.stiff, w.stability_limited, w.explicit_ok, w.steps_saved = 1, 0, 0, 0.0
 
 
-@inline_llvm
+@inline_once
 def choose_method(w, h, z, work, size):
     """Change to the stiff partner where stability holds the explicit steps, and back.
 
