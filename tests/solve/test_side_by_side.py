@@ -1,10 +1,6 @@
 """Runs side by side: to the bit what each gives by itself, whoever its neighbours are."""
 
 import math
-import os
-import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -180,33 +176,3 @@ def test_no_parabola_rises_above_a_peak_where_none_may(fine):
         assert may_rise(values, fine, known, True) or whole == by_nodes
         near += whole > by_nodes
     assert near > 10  # some do rise
-
-
-LOOK = """
-from compressor.physics import lane_steps
-W, k = lane_steps.new_lanes(), lane_steps.LANES
-lane_steps.move_cranks(W, k, 0.5)
-lane_steps.stage_rates((0, 0, 0), W, k, 1)
-lane_steps.last_stage((0, 0, 0), W, k)
-lane_steps.observe_node((0, 0, 0), W, k, 1)
-for name in ("move_cranks", "stage_rates", "last_stage", "observe_node"):
-    print(*getattr(lane_steps, name).target.inspect_asm().values())
-"""
-
-
-def test_loops_over_lanes_are_vector_code(tmp_path):
-    """Square roots and divisions of several lanes at once, where the processor is known.
-
-    Made as on a fresh machine: LLVM sees other code where parts of it were kept on disk.
-    """
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    seen = subprocess.run(
-        [sys.executable, "-c", LOOK], env=environment, capture_output=True, text=True, check=True
-    )
-    functions = seen.stdout.split(".Lfunc_end")
-    if not re.search(r"\b[xyz]mm\d", seen.stdout):
-        pytest.skip("no x86 machine code to look at")
-    for name in ("move_cranks", "stage_rates", "last_stage", "observe_node"):
-        (code,) = (f for f in functions if re.search(rf"^_ZN10compressor\S*{name}\S*:$", f, re.M))
-        assert re.search(r"v?sqrtpd", code), name
-        assert re.search(r"v?divpd", code), name
