@@ -77,14 +77,15 @@ TOGETHER = {
     "tests/studies/regimes/test_lyapunov.py": "twins",
 }
 # modules that take long; the others, in small pieces, then even out the processes. The first
-# ones compile each its own part of the equations: lanes, the march, those of other laws, of
-# mechanisms
+# ones compile each its own part of the equations, so that two processes do not compile the same at
+# once: lanes and then the march, chosen laws, mechanisms
 LONG = (
-    "physics/test_lane_steps", "physics/test_contact_laws", "campaigns/test_chaos_processes",
-    "solve/test_feature_runs", "sweep/test_execution", "campaigns/test_chaos_files",
-    "cases/test_load", "studies/stress/test_stress", "solve/test_integrate", "test_pages",
-    "test_tutorial", "sweep/test_cluster", "sweep/test_sweep", "report/test_report",
-    "cmd/test_cli", "store/test_writer", "store/test_threads",
+    "physics/test_lane_steps", "physics/test_contact_laws", "solve/test_chosen_laws",
+    "campaigns/test_chaos_processes", "solve/test_feature_runs", "sweep/test_execution",
+    "campaigns/test_chaos_files", "cases/test_load", "studies/stress/test_stress",
+    "solve/test_integrate", "test_pages", "test_tutorial", "sweep/test_cluster",
+    "sweep/test_sweep", "report/test_report", "cmd/test_cli", "store/test_writer",
+    "store/test_threads",
 )  # fmt: skip
 
 
