@@ -1,5 +1,6 @@
 """The oil film: Reynolds' equation, Butenschoen's tables, limits, symmetry and smoothness."""
 
+import functools
 import math
 import re
 from pathlib import Path
@@ -25,19 +26,21 @@ ROW = re.compile(
 DIRECTIONS = [tuple(map(float, row)) for row in ROW.findall(PAGE.read_text(encoding="utf-8"))]
 
 
+@functools.cache  # its constants take a second, which collecting the tests need not wait for
 def record_of(ratio=1.0, share=0.02):
     lubricant = {"bearing_length_mm": 20 * ratio, "last_share": share}
     values = {"joint": "big_end", "clearance_mm": 1000 * CLEARANCE, "lubricant": lubricant}
     return record(Case.from_values(values))
 
 
-P = record_of()
-PIN = P["pin_radius"][0]
-SIZE = P["viscosity"] * P["film_length"] * 2 * PIN * (PIN / CLEARANCE) ** 2
+def unit_force():
+    """The film's force for a Sommerfeld number of 1, at a speed of 1 rad/s."""
+    p, pin = record_of(), record_of()["pin_radius"][0]
+    return p["viscosity"] * p["film_length"] * 2 * pin * (pin / CLEARANCE) ** 2
 
 
-def force(e, rate=(0.0, 0.0), spins=(SPEED, 0.0), p=P):
-    return np.array(film(0, (*e, *rate), spins, p))
+def force(e, rate=(0.0, 0.0), spins=(SPEED, 0.0), p=None):
+    return np.array(film(0, (*e, *rate), spins, record_of() if p is None else p))
 
 
 @pytest.mark.parametrize(("ratio", "eps", "number", "angle"), BEARING)
@@ -144,7 +147,7 @@ def test_forces_are_smooth_in_the_place(begin, end):
 def test_in_its_last_share_the_film_bears_no_more():
     """Its force on the wall is that of the middle of the share."""
     at_wall = force((CLEARANCE, 0.0))
-    exact = SIZE * SPEED * 0.99 * math.hypot(*reynolds(0.99, 1.0))
+    exact = unit_force() * SPEED * 0.99 * math.hypot(*reynolds(0.99, 1.0))
     assert math.hypot(*at_wall[:2]) == pytest.approx(exact, rel=5e-3)
 
 
@@ -215,10 +218,10 @@ def test_the_film_in_all_directions_is_as_near_to_reynolds_as_the_page_says(row)
 def test_a_journal_settles_where_its_sommerfeld_number_is_the_load_s():
     """A light journal under a steady load: eccentricity and attitude of the table."""
     eps = 0.8
-    load = SIZE * SPEED * eps * math.hypot(*reynolds(eps, 1.0))
+    p, load = record_of(), unit_force() * SPEED * eps * math.hypot(*reynolds(eps, 1.0))
 
     def move(t, y):
-        fx, fy = film(0, (y[0], y[1], y[2], y[3]), (SPEED, 0.0), P)[:2]
+        fx, fy = film(0, (y[0], y[1], y[2], y[3]), (SPEED, 0.0), p)[:2]
         return [y[2], y[3], (load + fx) / 0.05, fy / 0.05]
 
     start = [0.5 * CLEARANCE, 0.2 * CLEARANCE, 0.0, 0.0]

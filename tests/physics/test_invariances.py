@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import jobs_here
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -257,12 +258,11 @@ def swept(folder, workers, backwards=False, interrupted=False):
 def test_workers_order_and_resuming_change_no_bit(tmp_path):
     first = swept(tmp_path / "one", 1)
     assert len(first) == 8
-    for name, others in {
-        "two": {"workers": 2},
-        "backwards": {"workers": 1, "backwards": True},
-        "resumed": {"workers": 1, "interrupted": True},
-    }.items():
-        found = swept(tmp_path / name, **others)
+    others = {"two": swept(tmp_path / "two", 2)}
+    with jobs_here():
+        others["backwards"] = swept(tmp_path / "backwards", 1, backwards=True)
+        others["resumed"] = swept(tmp_path / "resumed", 1, interrupted=True)
+    for name, found in others.items():
         assert found.keys() == first.keys()
         for key, job in first.items():
             for variable in job.variables:

@@ -52,7 +52,7 @@ def coupled(case, revolutions):
 
     times = np.linspace(0, revolutions * case.turn, 1201)
     start = np.zeros(12)
-    found = solve_ivp(slope, (0, times[-1]), start, "LSODA", times, rtol=1e-6, atol=1e-9)
+    found = solve_ivp(slope, (0, times[-1]), start, "LSODA", times, rtol=1e-4, atol=1e-7)
     return found.y[10:].T
 
 

@@ -18,7 +18,8 @@ def case(joint, method, **solve):
 
 
 def run(of, cuts=None):
-    return run_at_tolerance(of, 1e-8, 60.0, False, cuts)
+    rtol = 1e-7 if of.solve.method == "LSODA" else 1e-8  # which steps in Python
+    return run_at_tolerance(of, rtol, 60.0, False, cuts)
 
 
 def ends(of):
@@ -58,7 +59,7 @@ def test_a_revolution_has_its_own_peaks():
 
 @pytest.mark.parametrize("method", ["auto", "LSODA"])
 def test_a_run_ends_where_enough_is_known(method):
-    of = case("big_end", method, settle_rev=0)
+    of = case("big_end", method, settle_rev=0, duration_rev=2)
     found = run(of, Cuts(ends(of), lambda turns: len(turns) == 1))
     assert not found.reason
     assert len(found.turns) == 1
