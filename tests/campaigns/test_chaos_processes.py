@@ -10,6 +10,7 @@ from chaos.processes import Run, members
 
 # seeds by what they do, so that a sample has something of everything; the first: the real command
 KILLS = {"parent amid metrics": 18, "both, series over metrics": 20}
+MIX = 22  # jobs that crash, leave and hang
 AT_ONCE = 6  # shards and a whole run; the next one: --wait
 
 
@@ -22,7 +23,7 @@ def test_killed_sweeps_resume(seed, tmp_path):
 
 
 def test_mixes_of_good_and_bad_jobs(tmp_path):
-    found = poison.campaign(1, 1, tmp_path)
+    found = poison.campaign(1, MIX, tmp_path)
     assert found["failures"] == []
     assert sum(found["counts"].values()) > found["counts"]["good jobs"] > 0
 

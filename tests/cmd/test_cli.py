@@ -605,9 +605,7 @@ def started(tmp_path, answering):
     answering(signal.SIGINT, signal.SIG_DFL)  # a child inherits what is ignored
     rods = [4 + number / 1000 for number in range(JOBS)]
     values = {"joint": "both", "clearance_mm": 0.1, "machine": {"rod_mass_kg": rods}}
-    (tmp_path / "many.yaml").write_text(
-        json.dumps(values | {"solve": SOLVE | {"duration_rev": 1, "method": "LSODA"}})
-    )
+    (tmp_path / "many.yaml").write_text(json.dumps(values | {"solve": SOLVE | {"method": "LSODA"}}))
     command = [sys.executable, "-c", "import sys; from compsim.cli import main; sys.exit(main())"]
     process = subprocess.Popen(
         [*command, "run", "many.yaml"],
