@@ -85,7 +85,8 @@ LONG = (
     "campaigns/test_chaos_files", "cases/test_load", "studies/stress/test_stress",
     "solve/test_integrate", "test_pages", "test_tutorial", "sweep/test_cluster",
     "sweep/test_sweep", "report/test_report", "cmd/test_cli", "store/test_writer",
-    "store/test_threads",
+    "store/test_threads", "test_newcomer", "studies/test_studies", "test_systems",
+    "campaigns/test_mutants",
 )  # fmt: skip
 
 

@@ -221,7 +221,7 @@ def folder(tmp_path_factory):
         command, _, target = command.partition(" > ")
         words = shlex.split(command, comments=True)
         words = [w for word in words for w in expanded(place, word)]
-        more = QUICK if words[1] == "run" else []
+        more = QUICK if words[1] in ("run", "explain") else []
         with jobs_here(), contextlib.chdir(place), CliRunner().isolation() as (out, err, _):
             code, said = cli_main([*words[1:], *more]), err.getvalue()
         assert code == 0, f"{command}\n{said.decode()}"
