@@ -165,10 +165,11 @@ def inline_llvm(function: Function) -> Function:
 
 
 def inline_numba(function: Function) -> Function:
-    """Return `inline_llvm`, but written by numba itself, with its types, into loops over lanes.
+    """Return `inline_llvm`, written by numba instead where modules of lanes call it.
 
-    For what these call with tuples or arrays. By `inline_llvm`, LLVM sees too late that nothing is
-    called there, and makes no vector code of the loop. Elsewhere it is compiled but once.
+    For what loops over lanes call with tuples or arrays. By `inline_llvm`, LLVM sees too late that
+    nothing is called there, and makes no vector code of the loop. Numba's passes over it are then
+    taken again for each caller, so that others than lanes do without.
     """
     return _compile(function, forceinline=True, inline=is_for_lanes)
 
@@ -179,9 +180,11 @@ def is_for_lanes(call: Any, caller: Any, callee: Any) -> bool:
 
 
 def inline_once(function: Function) -> Function:
-    """Return `jit`, written by numba into the one function that calls it.
+    """Return `jit`, written by numba into its caller: for what one function calls, or a few lines.
 
-    So it takes no machine code of its own, which is a third of what compiling it costs.
+    So it has no machine code of its own, which is a third of what compiling it costs, and is not
+    optimized again in each function above. Where a caller gets long by it, that costs more than it
+    saves: numba's passes take longer than in proportion.
     """
     return _compile(function, inline="always")
 

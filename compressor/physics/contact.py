@@ -17,6 +17,7 @@ from compressor.physics._jit import (
     fma,
     inline_llvm,
     inline_numba,
+    inline_once,
     jit,
     square_root,
 )
@@ -159,7 +160,7 @@ def hysteresis(contact: str, restitution: float) -> float:
     return HYSTERESIS[Law[contact.upper()]](restitution)
 
 
-@inline_llvm
+@inline_once
 def carried_numbers(joint, y, p):
     """Return a joint's numbers among what contacts carry in the state; zeros with the default laws.
 

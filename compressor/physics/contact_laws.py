@@ -27,7 +27,14 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import fma, inline_llvm, inline_numba, jit, square_root, uncompiled
+from compressor.physics._jit import (
+    fma,
+    inline_llvm,
+    inline_numba,
+    inline_once,
+    square_root,
+    uncompiled,
+)
 
 FLATTEST = 1.25  # of ln(4 S c / F) - 1: from there on Johnson's force goes on along its tangent
 JOHNSON_DEEPEST = 0.5  # of the clearance: up to which the law is meant, before that
@@ -38,7 +45,7 @@ SERIES = (
 )  # fmt: skip
 
 
-@jit
+@inline_once
 def johnson_share(depth):
     """Return w = ln(4 S c / F) - 1 where a depth, over 4 c, is w exp(-1 - w): the larger solution.
 
@@ -52,7 +59,7 @@ def johnson_share(depth):
     return share
 
 
-@jit
+@inline_once
 def johnson(penetration, stiffness, clearance):
     """Return Johnson's elastic force (N) at a positive penetration (m); stiffness: S (N/m)."""
     depth = 0.25 * penetration / clearance
@@ -63,7 +70,7 @@ def johnson(penetration, stiffness, clearance):
     return 4.0 * stiffness * clearance * along
 
 
-@jit
+@inline_once
 def johnson_energy(elastic, penetration, stiffness, clearance):
     """Return the energy (J) stored where Johnson's force (N) has reached a penetration (m)."""
     force = 4.0 * stiffness * clearance * math.exp(-1.0 - FLATTEST)
@@ -74,13 +81,13 @@ def johnson_energy(elastic, penetration, stiffness, clearance):
     return 0.5 * force * (depth - 0.5 * force / stiffness) + along
 
 
-@jit
+@inline_once
 def liu(penetration, stiffness, clearance):
     """Return Liu's elastic force (N) at a positive penetration (m); stiffness: K (N/m^1.5)."""
     return stiffness * penetration * square_root(penetration / (1.0 + penetration / clearance))
 
 
-@jit
+@inline_once
 def liu_energy(penetration, stiffness, clearance):
     """Return the energy (J) that is stored at a penetration (m): the integral of Liu's force."""
     x = penetration / clearance
@@ -236,7 +243,7 @@ def impact_elastic(penetration, stiffness, p):
     return stiffness * power(penetration, p.exponent)
 
 
-@inline_llvm
+@inline_once
 def impact(penetration, rate, stiffness, p):
     """Return `normal_force` by ADAMS's IMPACT, damped by C_max STEP(delta / d_max) (N s/m)."""
     if penetration <= 0.0:
@@ -269,7 +276,7 @@ def elastic_energy(elastic, penetration, stiffness, clearance, p):
     return elastic * penetration / (p.exponent + 1.0)
 
 
-@jit
+@inline_once
 def hysteretic(penetration, rate, approach, stiffness, clearance, p):
     """Return `normal_force` by a law of HYSTERESIS: F_e (1 + chi delta' / delta'_0)."""
     if penetration <= 0.0:

@@ -107,7 +107,7 @@ def plain_ahead(w, omega, end):
     return ready and not is_last_step(w.t, w.h, end) and omega * w.h <= MAX_SERIES_ANGLE
 
 
-@jit
+@inline_numba
 def march_to_plain_step(runs, job, work, limit):
     """March a run by itself until its next step is a plain one; False where it has ended."""
     w, p = runs.steppers[job], runs.records[job]
@@ -225,7 +225,7 @@ def work_arrays(runs, job):
     )  # fmt: skip
 
 
-@jit
+@inline_numba
 def load_next_run(W, j, runs, lane_jobs, begun, limit):
     """Load the next run that gets to a plain step into a lane whose run has ended.
 
@@ -242,7 +242,7 @@ def load_next_run(W, j, runs, lane_jobs, begun, limit):
     return begun
 
 
-@jit
+@inline_numba
 def march_out_of_lane(W, j, runs, job, limit):
     """March the run of a lane by itself over what is ahead; False where it has ended."""
     work, w = work_arrays(runs, job), runs.steppers[job]
@@ -253,7 +253,7 @@ def march_out_of_lane(W, j, runs, job, limit):
     return True
 
 
-@jit
+@inline_numba
 def march_to_end(W, j, runs, job, limit):
     """March the run of a lane by itself from where the lane is."""
     work, w, p = work_arrays(runs, job), runs.steppers[job], runs.records[job]
@@ -276,7 +276,7 @@ def march_lanes(scene, W, k, runs, lane_jobs, limit):
     `new_lanes`; lane_jobs: (k,) integers, the run in each lane, at first -1; limit: attempts of a
     step that a run may take.
     """
-    begun = np.int64(0)  # of a plain 0 numba would compile `load_next_run` twice
+    begun = np.int64(0)  # as `load_next_run` returns it
     for j in range(k):
         W[CALL + j] = 1.0
     while True:

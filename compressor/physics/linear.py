@@ -2,10 +2,10 @@
 symmetric and positive; in place.
 """
 
-from compressor.physics._jit import jit
+from compressor.physics._jit import inline_once, jit
 
 
-@jit
+@inline_once
 def factorize(matrix, pivots):
     """Write the LU factors of a small square matrix in place; return False if it is singular.
 
@@ -30,7 +30,7 @@ def factorize(matrix, pivots):
     return True
 
 
-@jit
+@inline_once
 def substitute(matrix, pivots, b):
     """Solve with the factors of `factorize`, b (n,) being overwritten by the solution."""
     n = pivots.size

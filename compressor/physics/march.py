@@ -307,7 +307,7 @@ def sample_grid(w, t_end, h, z, work, times, states):
         w.sample += 1
 
 
-@inline_once
+@inline_llvm
 def measure_gap_fractions(w, h, stride, work, phase, p):
     """Write the share of a step that each joint is without contact.
 
@@ -332,7 +332,7 @@ def measure_gap_fractions(w, h, stride, work, phase, p):
         work.gap_fraction[joint] = gap_fraction
 
 
-@inline_once
+@inline_llvm
 def accumulate_metrics(w, h, stride, work, phase, p, tally):
     """Tally an accepted step that has been observed, and audit its energy."""
     last = NODES.size - 1
@@ -350,7 +350,7 @@ def accumulate_metrics(w, h, stride, work, phase, p, tally):
 
 @jit
 def keep_velocities(w, t, work, phase, p, tally):
-    """Return that no joint carries a new speed: the default laws do not read it."""
+    """Return False: with the default laws contacts carry no speed."""
     return False
 
 

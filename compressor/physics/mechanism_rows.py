@@ -5,7 +5,7 @@ The same calls as `motion` and `observe` have for the scenes; `systems` chooses 
 
 import math
 
-from compressor.physics._jit import jit, square_root
+from compressor.physics._jit import inline_once, jit, square_root
 from compressor.physics.contact import LUGRE, bristle_rate, nearness
 from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
@@ -237,7 +237,7 @@ def observe_with_energy(motion, y, phase, p, row):
     write_row(solve(motion, y, phase, p), p, row)
 
 
-@jit
+@inline_once
 def observe(t, y, phase, p, row):
     """Write the row of `observe.observe`, of the mechanism: (COLUMNS,), or (WIDE,) for series."""
     now = solve(ideal(t, p), y, phase, p)
@@ -279,7 +279,7 @@ def at_joint(joint, now, p):
     return now.joints.small, eccentricity, axes, now.joints.small_spin
 
 
-@jit
+@inline_once
 def wear_at(motion, y, phase, weight, p, tally):
     """Add to the tally what sliding wears off at a state that stands for `weight` (s) of t."""
     now = solve(motion, y, phase, p)

@@ -13,7 +13,7 @@ nanometre keeps its digits.
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import fma, inline_llvm, inline_numba, jit
+from compressor.physics._jit import fma, inline_llvm, inline_numba, inline_once, jit
 from compressor.physics.contact import (
     LUGRE,
     NO_CONTACT,
@@ -155,7 +155,7 @@ def solve_both(motion, turn, load, big, small, p):
     return a, centre_x, centre_y, moment * p.per_rod_inertia
 
 
-@inline_numba
+@inline_once
 def contact_big_end(y, motion, turn, p):
     """Return `joint_contact` of the big end in scene big_end."""
     big = eccentricity_big_end(y, turn, p)
@@ -164,7 +164,7 @@ def contact_big_end(y, motion, turn, p):
     return joint_contact(big, spins, bearing, carried_numbers(AT_BIG_END, y, p), p)
 
 
-@inline_numba
+@inline_once
 def contact_small_end(y, motion, turn, p):
     """Return `joint_contact` of the small end in scene small_end."""
     small = eccentricity_small_end(y, turn, p)
@@ -173,7 +173,7 @@ def contact_small_end(y, motion, turn, p):
     return joint_contact(small, spins, bearing, carried_numbers(AT_SMALL_END, y, p), p)
 
 
-@inline_numba
+@inline_once
 def contacts_both(y, motion, turn, p):
     """Return `joint_contact` of the big end and of the small end in scene both."""
     big, small = eccentricities_both(y, turn, p)
@@ -236,7 +236,7 @@ def evaluate(motion, y, phase, p):
     return Instant(motion, turn, load, big, small, a, spin_up, centre_x, centre_y)
 
 
-@inline_numba
+@inline_once
 def deviation_accelerations(now, p):
     """Return the accelerations (x, X, Y, phi) at an evaluated instant less the ideal motion's.
 
@@ -249,7 +249,7 @@ def deviation_accelerations(now, p):
     return now.a - now.motion.a, x, y, now.spin_up - now.motion.spin_up
 
 
-@inline_numba
+@inline_once
 def write_carried_rates(now, y, p, out):
     """Write the rates of what contacts carry: an approach speed stays until the bodies meet again.
 

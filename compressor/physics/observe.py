@@ -7,7 +7,7 @@ The right-hand side records nothing. `observe` writes one row of quantities; the
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import inline_llvm, inline_numba, jit, square_root
+from compressor.physics._jit import inline_llvm, inline_numba, inline_once, jit, square_root
 from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
@@ -98,7 +98,7 @@ def write_eccentricities(t, y, p, row):
     eccentricity_row(y, rod_turn(ideal(t, p), y[n - 1], y[2 * n - 1], p), p, row)
 
 
-@inline_numba
+@inline_once
 def centre_velocity(now, y, p):
     """Return the rod centre's velocity (m/s), x and y, and its height (m)."""
     motion = now.motion
@@ -120,7 +120,7 @@ def centre_velocity(now, y, p):
     return vx, vy, height - c * now.turn.ds
 
 
-@inline_numba
+@inline_once
 def centre_acceleration(now, y, p):
     """Return the acceleration (m/s^2), x and y, of the centre of a rod with an ideal joint."""
     motion = now.motion
@@ -173,7 +173,7 @@ def damping_power(contact):
     return (contact.normal - contact.elastic) * contact.rate
 
 
-@inline_numba
+@inline_once
 def torque_and_moment(crank, x, forces, friction, penetration, p):
     """Return the torque (N m) that drives the crank, and the moment of the crosshead on its guide.
 
@@ -228,7 +228,7 @@ def frame_of_series(crank, friction, p, rows):
         write_scene_frame(p, row)
 
 
-@inline_numba
+@inline_once
 def powers(now, y, forces, p):
     """Return the four powers (W): of crank and load, lost to damping and friction."""
     motion, big, small = now.motion, now.big, now.small
@@ -247,7 +247,7 @@ def write_powers(now, y, forces, p, out):
     out[0], out[1], out[2], out[3] = powers(now, y, forces, p)
 
 
-@inline_numba
+@inline_once
 def energies(now, y, p):
     """Return the kinetic and potential energy (J)."""
     v = now.motion.v + y[p.freedoms]
@@ -261,7 +261,7 @@ def energies(now, y, p):
     return 0.5 * kinetic, potential + p.rod_mass * p.gravity * height
 
 
-@inline_numba
+@inline_once
 def observed_columns(now, y, forces, p):
     """Return the columns from ACCELERATION to GUIDE_MOMENT."""
     big, small = now.big, now.small
@@ -296,7 +296,7 @@ def write_columns(now, y, forces, p, row):
     row[KINETIC], row[POTENTIAL] = energies(now, y, p)
 
 
-@jit
+@inline_once
 def observe(t, y, phase, p, row):
     """Write all quantities of `Column` at time t (s) and state y into row.
 

@@ -82,7 +82,7 @@ def nearness_at(joint, s, t, h, dense, phase, p, y):
     return nearness(contact, p.stiffness[joint], p.clearance[joint], p)
 
 
-@jit
+@inline_once
 def locate_onset(joint, low, high, t, h, dense, phase, p, y):
     """Return the fraction at which contact begins, between `low` (apart) and `high` (touching)."""
     for _ in range(MAX_HALVINGS):
@@ -166,7 +166,7 @@ def joint_onset(joint, t, h, dense, phase, p, y):
     return NEVER, NEVER
 
 
-@inline_once
+@jit
 def first_onset(t, h, dense, phase, p, y):
     """Return `joint_onset` of whichever joint with clearance touches first."""
     begin, end = NEVER, NEVER
@@ -178,7 +178,7 @@ def first_onset(t, h, dense, phase, p, y):
     return begin, end
 
 
-@jit
+@inline_once
 def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
     """Return the fraction at which contact begins or ends between two others, to CHANGE_TOLERANCE.
 
@@ -201,7 +201,7 @@ def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
     return 0.5 * (low + high)
 
 
-@jit
+@inline_once
 def approach_at(joint, t, y, phase, p, rates, before):
     """Return a joint's penetration (m), and the speed (m/s) at which its gap closes.
 

@@ -7,7 +7,7 @@ Ordinary Differential Equations II, IV.7 and IV.10, with their continuous extens
 
 import numpy as np
 
-from compressor.physics._jit import jit, square_root
+from compressor.physics._jit import inline_once, jit, square_root
 from compressor.physics.linear import factorize, substitute
 from compressor.physics.runge_kutta import FLOWS
 from compressor.physics.systems import derivative_with_flows
@@ -46,7 +46,7 @@ POWER_ITERATIONS = 8
 TIME_SHARE = 1e-3  # of a step, by which time is varied either way
 
 
-@jit
+@inline_once
 def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, time_rate):
     """Write the Jacobian of motion and flows by the motion, (n + 4, n), and d/dt of dz/dt.
 
@@ -116,7 +116,7 @@ def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
     return True
 
 
-@jit
+@inline_once
 def spectral_radius(jacobian, size, v, w):
     """Return an estimate of the largest eigenvalue's size (1/s) by a few power iterations.
 
@@ -141,7 +141,7 @@ def spectral_radius(jacobian, size, v, w):
     return growth
 
 
-@jit
+@inline_once
 def error_norm(z, new, u, rtol, atol):
     """Return the root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
@@ -151,7 +151,7 @@ def error_norm(z, new, u, rtol, atol):
     return square_root(total / n)
 
 
-@jit
+@inline_once
 def extend(z, new, u, dense):
     """Write the coefficients of the step's cubic interpolant into dense, (5, n).
 

@@ -11,7 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from compressor.physics import rosenbrock
-from compressor.physics._jit import inline_llvm, inline_once, square_root
+from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
 from compressor.physics.elementary import exponential, logarithm
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
 from compressor.physics.systems import derivative_with_flows
@@ -56,7 +56,7 @@ def step_error(w, before, after, step):
     return step * (E[w.pair] @ np.vstack((before[:1], after[1:STAGES])))
 
 
-@inline_once
+@jit
 def first_step(w, z, work, atol, phase, p, end):
     """Return a length (s) for the first step of an order-5 method.
 
@@ -187,7 +187,7 @@ def begin_stiff_steps(w):
         w.stiff, w.stability_limited, w.explicit_ok, w.steps_saved = 1, 0, 0, 0.0
 
 
-@inline_once
+@inline_llvm
 def choose_method(w, h, z, work, size):
     """Change to the stiff partner where stability holds the explicit steps, and back.
 

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
+from compressor.physics._jit import dispatch_on_record, inline_llvm, inline_once, jit
 from compressor.physics.contact_laws import in_contact
 from compressor.physics.observe import (
     ACCELERATION,
@@ -189,7 +189,7 @@ def may_beat(top, known):
     return (top > 0.0) & (top >= PEAK_NEARNESS * known)
 
 
-@inline_llvm
+@inline_once
 def may_beat_peaks(rows, middle, tally):
     """Return whether a peak may be beaten within a step, by its first, middle and last row."""
     last = rows.shape[0] - 1
@@ -256,7 +256,7 @@ def count_contacts(touching, flown, impacts, releases, normal, depth, counts):
     return now, flown & (not now), impacts + (begins & flown), releases + (begins & (not flown))
 
 
-@inline_llvm
+@inline_once
 def tally_contact(joint, span, nodes, rows, every, gap_fraction, measured, tally):
     """Add a step's contact loss, impacts, releases and penetration at one joint."""
     touching, flown = tally.touching[joint] > 0, tally.flown[joint] > 0
@@ -339,10 +339,9 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, measured, tally,
     span is that of a steady crank; what is tallied are shares and means of the time that passes.
     """
     seconds = span * pace_of_step(weights, rows, every, p)
-    if p.clearance[0] > 0.0:
-        tally_contact(0, seconds, nodes, rows, every, gap_fraction, measured, tally)
-    if p.clearance[1] > 0.0:
-        tally_contact(1, seconds, nodes, rows, every, gap_fraction, measured, tally)
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            tally_contact(joint, seconds, nodes, rows, every, gap_fraction, measured, tally)
     if not measured:
         return
     add_time(span, seconds, tally, p)

@@ -15,7 +15,7 @@ from compressor.physics.lane_control import (
     raise_peak_at_nodes,
     top_and_vertex,
 )
-from compressor.physics.lane_march import fits_lane, load_next_run
+from compressor.physics.lane_march import fits_lane, load_lane
 from compressor.physics.march import NODES
 from compressor.physics.record import RECORD
 from compressor.physics.tally import peak_of
@@ -152,9 +152,9 @@ def test_a_peak_in_a_lane_is_that_of_a_step_by_itself(every, size):
 
 
 def test_lanes_are_loaded_by_one_function():
-    """numba compiled it again for a plain 0 among its arguments, in five seconds."""
+    """numba would compile it again for a plain 0 among its arguments."""
     side_by_side(cases("both", 1), (3,))
-    index = load_next_run.target._cache._cache_file._load_index()
+    index = load_lane.target._cache._cache_file._load_index()
     assert index
     assert not [types for (types, *_) in index if "Literal" in str(types)]
 
